@@ -1,0 +1,1 @@
+"""A behaviour-tree task executive for vision-guided pick and place."""

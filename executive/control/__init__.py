@@ -1,0 +1,1 @@
+"""Control nodes on the mission clock."""

@@ -1,0 +1,43 @@
+"""What can go wrong outside a mission's own failures, each with its exit code."""
+
+from __future__ import annotations
+
+
+class ExecutiveError(Exception):
+    """Base of every error this project raises on purpose; `exit_code` is what the command ends with."""
+
+    exit_code = 3
+
+
+class InputError(ExecutiveError):
+    """Something the user gave is wrong; the text says where, what and what instead."""
+
+    exit_code = 2
+
+
+class Fault(ExecutiveError):
+    """A bug or a broken device: never retried, ends the run with the arm at rest.
+
+    Attributes:
+        node: Path of the tree node in which it happened, or "" outside the tree.
+    """
+
+    def __init__(self, message: str, node: str = "") -> None:
+        super().__init__(message)
+        self.node = node
+
+
+class Unreachable(ExecutiveError):
+    """No joint configuration inside the limits brings the tool to a goal; the text says how far off it is."""
+
+
+class Blocked(ExecutiveError):
+    """A motion exists but would come too close to something; the text names the body and the distance."""
+
+
+class Unavailable(ExecutiveError):
+    """A detector gave no usable answer; the text says why."""
+
+
+class NoDepth(ExecutiveError):
+    """A detection could not be localized because the frame has no usable depth there."""

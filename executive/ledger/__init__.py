@@ -1,0 +1,1 @@
+"""Who is who on the table: identity, freshness and fate of every object."""

@@ -1,0 +1,1 @@
+"""Kinematics, limits, trajectories and braking of the arm; no simulator."""

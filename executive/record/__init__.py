@@ -1,0 +1,1 @@
+"""What a run leaves behind: observers of its events."""

@@ -1,0 +1,1 @@
+"""The tick loop, halting and the variables of a running mission."""

@@ -1,0 +1,1 @@
+"""The PyBullet work cell."""

@@ -1,0 +1,1 @@
+"""Camera model, localization, detectors, dataset, training, evaluation."""
