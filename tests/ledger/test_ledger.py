@@ -1,0 +1,187 @@
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from executive.cell import Bin, Detection, Detections, Frame, Target
+from executive.cell_config import LedgerConfig
+from executive.errors import Fault
+from executive.geometry import looking_down
+from executive.ledger.ledger import ItemLedger
+
+Thing = tuple[str, float, float]
+
+
+class Bench:
+    """A ledger with a camera above it that sees exactly what a test says."""
+
+    def __init__(self) -> None:
+        self.events: list[tuple[str, dict]] = []
+        bins = {
+            "red_bin": Bin(
+                "red_bin", np.array([0.2, -0.44, 0]), np.array([0.22, 0.24, 0.06]), np.zeros((6, 2))
+            )
+        }
+        self.ledger = ItemLedger(
+            LedgerConfig(), bins, {"cube": "red_bin"}, lambda kind, **data: self.events.append((kind, data))
+        )
+        self.frames = 0
+
+    def look(self, *things: Thing, view: str = "table", epoch: int | None = None) -> Sequence[Target]:
+        self.frames += 1
+        area = (192.0, 100.0, 448.0, 356.0) if view == "table" else (0.0, 0.0, 640.0, 480.0)
+        frame = Frame(
+            self.frames,
+            "camera",
+            np.zeros((1, 1, 3), np.uint8),
+            None,
+            np.array([[461.0, 0, 320.0], [0, 461.0, 240.0], [0, 0, 1.0]]),
+            looking_down((0.5, 0.0, 1.2)),
+            0.0,
+            np.ones((480, 640), bool),
+            self.ledger.epoch if epoch is None else epoch,
+        )
+        found = tuple(Detection(label, 0.9, (0, 0, 1, 1)) for label, _, _ in things)
+        return self.ledger.observe(
+            Detections(frame, found, view, area), [np.array([x, y, 0.025]) for _, x, y in things]
+        )
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+def test_an_object_seen_twice_is_one_item(bench: Bench) -> None:
+    bench.look(("cube", 0.5, 0.0))
+    assert [t.item for t in bench.look(("cube", 0.503, 0.002))] == ["cube-1"]
+    assert bench.ledger.balance()["seen"] == 1
+
+
+def test_two_close_objects_stay_two_items_whatever_the_order_of_detections(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0), ("cube", 0.55, 0.0))
+    assert [t.item for t in bench.look(("cube", 0.551, 0.0), ("cube", 0.501, 0.0))] == ["cube-2", "cube-1"]
+
+
+def test_the_class_is_evidence_and_not_identity(bench: Bench) -> None:
+    bench.look(("cube", 0.5, 0.0))
+    bench.look(("cube", 0.5, 0.0))
+    target = bench.look(("duck", 0.5, 0.0))[0]
+    assert (target.item, target.label) == ("cube-1", "cube"), "two votes against one"
+
+
+def test_a_pick_puts_only_its_neighbourhood_in_doubt(bench: Bench) -> None:
+    near, far = bench.look(("cube", 0.50, 0.0), ("cube", 0.60, 0.1))
+    bench.ledger.held("cube-1")
+    assert not bench.ledger.is_fresh(near)
+    assert bench.ledger.is_fresh(far)
+
+
+def test_a_missed_grasp_puts_the_whole_table_in_doubt(bench: Bench) -> None:
+    near, far = bench.look(("cube", 0.50, 0.0), ("cube", 0.60, 0.2))
+    bench.ledger.missed("cube-1")
+    assert not bench.ledger.is_fresh(near)
+    assert not bench.ledger.is_fresh(far)
+
+
+def test_an_object_pushed_away_by_a_missed_grasp_is_still_the_same_item(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0), ("duck", 0.6, 0.1))
+    bench.ledger.missed("cube-1")
+    assert [t.item for t in bench.look(("cube", 0.60, -0.1), ("duck", 0.6, 0.1))] == ["cube-1", "duck-1"]
+
+
+def test_an_object_that_jumps_without_the_robots_doing_is_another_item(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0))
+    assert bench.look(("cube", 0.60, -0.1))[0].item == "cube-2"
+
+
+def test_a_dropped_item_is_recognized_where_it_lies(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0), ("cube", 0.6, 0.1))
+    bench.ledger.held("cube-1")
+    bench.ledger.dropped("cube-1")
+    items = [t.item for t in bench.look(("cube", 0.6, 0.1), ("cube", 0.30, -0.3), view="full")]
+    assert items == ["cube-2", "cube-1"]
+
+
+def test_a_dropped_item_that_fell_into_its_bin_is_placed(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0))
+    bench.ledger.held("cube-1")
+    bench.ledger.dropped("cube-1")
+    assert bench.look(("cube", 0.2, -0.44), view="full") == []
+    assert bench.ledger.balance()["placed"] == 1
+
+
+def test_what_lies_in_a_bin_is_no_target(bench: Bench) -> None:
+    assert bench.look(("cube", 0.25, -0.40), view="full") == []
+    assert bench.ledger.balance()["seen"] == 0
+
+
+def test_an_empty_table_needs_looks_that_agree_since_the_last_change(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0))
+    bench.ledger.held("cube-1")
+    bench.look(view="full")
+    assert not bench.ledger.believes_empty()
+    bench.ledger.placed("cube-1", "red_bin")
+    bench.look(view="full")
+    assert bench.ledger.believes_empty()
+
+
+def test_a_frame_from_before_a_change_says_nothing_about_emptiness(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0))
+    bench.ledger.held("cube-1")
+    for _ in range(3):
+        bench.look(view="full", epoch=0)
+    assert not bench.ledger.believes_empty()
+
+
+def test_what_one_look_believed_and_no_other_is_a_phantom(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0))
+    bench.look(view="full")
+    bench.ledger.close()
+    assert bench.ledger.balance() == {"seen": 0, "placed": 0, "rejected": 0, "lost": 0, "phantom": 1}
+
+
+def test_what_two_looks_agreed_on_and_then_vanished_is_lost(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0))
+    bench.look(("cube", 0.50, 0.0))
+    bench.look(view="full")
+    bench.ledger.close()
+    assert bench.ledger.balance() == {"seen": 1, "placed": 0, "rejected": 0, "lost": 1, "phantom": 0}
+
+
+def test_what_still_stands_there_when_the_run_ends_is_left_and_not_lost(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0))
+    bench.look(("cube", 0.50, 0.0))
+    bench.ledger.close()
+    assert bench.ledger.balance()["rejected"] == 1
+    assert bench.ledger.rows()[0]["why"] == "the run ended before its turn"
+
+
+def test_an_item_outside_the_searched_part_is_not_missed(bench: Bench) -> None:
+    bench.look(("cube", 0.10, -0.30), view="full")
+    bench.look(("cube", 0.10, -0.30), view="full")
+    bench.look(view="table")
+    bench.ledger.close()
+    assert bench.ledger.balance()["lost"] == 0
+
+
+def test_every_change_is_told_and_the_books_balance(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0), ("cube", 0.6, 0.1), ("duck", 0.45, -0.2))
+    bench.look(("cube", 0.50, 0.0), ("cube", 0.6, 0.1), ("duck", 0.45, -0.2))
+    bench.ledger.held("cube-1")
+    bench.ledger.placed("cube-1", "red_bin")
+    bench.ledger.rejected("duck-1", "slippery")
+    bench.look(view="full")
+    bench.ledger.close()
+    count = bench.ledger.balance()
+    assert count["seen"] == count["placed"] + count["rejected"] + count["lost"] == 3
+    states = [data["state"] for kind, data in bench.events if data["item"] == "cube-1"]
+    assert states == ["seen", "seen", "held", "placed"]
+
+
+def test_an_item_nobody_entered_is_a_fault(bench: Bench) -> None:
+    bench.look(("cube", 0.5, 0.0))
+    with pytest.raises(Fault, match='the ledger knows no item "cube-9"; it knows: cube-1'):
+        bench.ledger.held("cube-9")

@@ -1,0 +1,43 @@
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from executive.geometry import Pose, looking_down, tool_down
+
+unit = st.floats(-1, 1, allow_nan=False)
+quaternions = st.tuples(unit, unit, unit, unit).filter(lambda q: np.linalg.norm(q) > 0.1)
+points = st.tuples(unit, unit, unit)
+
+
+@given(points, quaternions, points)
+def test_the_inverse_undoes_a_pose(position, quaternion, point) -> None:
+    X = Pose.of(position, quaternion)
+    assert np.allclose(X.inverse().apply(X.apply(point)), point, atol=1e-9)
+    assert np.allclose((X @ X.inverse()).rotation, np.eye(3), atol=1e-9)
+
+
+@given(quaternions)
+def test_a_quaternion_survives_the_way_through_a_matrix(quaternion) -> None:
+    q = np.asarray(quaternion) / np.linalg.norm(quaternion)
+    back = Pose.of((0, 0, 0), q).quaternion
+    assert np.allclose(back, q, atol=1e-9) or np.allclose(back, -q, atol=1e-9)
+
+
+@given(points, quaternions, points, quaternions, points)
+def test_poses_chain(p, q, r, s, point) -> None:
+    X_AB, X_BC = Pose.of(p, q), Pose.of(r, s)
+    assert np.allclose((X_AB @ X_BC).apply(point), X_AB.apply(X_BC.apply(point)), atol=1e-9)
+
+
+@given(points, st.floats(-3, 3))
+def test_the_tool_points_down_at_every_yaw(position, yaw) -> None:
+    assert np.allclose(tool_down(position, yaw).rotation[:, 2], [0, 0, -1])
+
+
+def test_a_camera_looking_down_shows_forward_at_the_top_of_its_image() -> None:
+    X_WC = looking_down((0.5, 0.0, 1.2), up=(1, 0, 0))
+    assert np.allclose(X_WC.rotation[:, 1], [-1, 0, 0]), "down in the image is backwards"
+    assert np.allclose(X_WC.rotation[:, 0], [0, -1, 0]), "right in the image is the robot's right"
+    assert np.isclose(np.linalg.det(X_WC.rotation), 1.0)
