@@ -1,0 +1,64 @@
+"""A table without physics: objects are points that are picked, carried and let go."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from executive.cell import ObjectClass
+from executive.geometry import Array
+
+STEP = 1 / 240
+"""Length of one control step [s]."""
+
+CUP = 0.012
+"""How far beside an object's centre the fake cup still seals [m]."""
+
+
+@dataclass(eq=False)
+class FakeObject:
+    """One object on the fake table; `position` `(3,)` [m] is its centre."""
+
+    label: str
+    position: Array
+
+
+@dataclass(eq=False)
+class FakeWorld:
+    """Everything on the fake table.
+
+    Attributes:
+        classes: What objects there may be.
+        objects: The objects, in the order they were put down.
+        held: The object at the tool, or None.
+        steps: Control steps since the run began.
+    """
+
+    classes: dict[str, ObjectClass]
+    objects: list[FakeObject] = field(default_factory=list)
+    held: FakeObject | None = None
+    steps: int = 0
+
+    @property
+    def now(self) -> float:
+        """Time since the run began [s]."""
+        return self.steps * STEP
+
+    def put(self, label: str, x: float, y: float) -> FakeObject:
+        """Stand an object on the table and return it."""
+        added = FakeObject(label, np.array([x, y, self.classes[label].height / 2]))
+        self.objects.append(added)
+        return added
+
+    def top(self, thing: FakeObject) -> float:
+        """Return the height of an object's upper side [m]."""
+        return float(thing.position[2]) + self.classes[thing.label].height / 2
+
+    def under(self, tip: Array) -> FakeObject | None:
+        """Return the object whose upper side the cup at `tip` `(3,)` [m] is on, if any."""
+        for thing in self.objects:
+            beside = float(np.linalg.norm(thing.position[:2] - tip[:2]))
+            if thing is not self.held and beside <= CUP and abs(self.top(thing) - tip[2]) <= 0.002:
+                return thing
+        return None

@@ -1,0 +1,1 @@
+"""The skills this project ships, one class per file."""

@@ -1,0 +1,65 @@
+"""Bring the cup onto a target."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+import numpy as np
+
+from executive.cell import Cell, Steps, Target, Via
+from executive.errors import Blocked, Unreachable
+from executive.geometry import Array
+from executive.moving import follow, settle, travel
+from executive.skill import EMPTY, In, Metres, Skill, param, port
+
+GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
+
+
+class Approach(Skill):
+    """Touch the target with the cup from above.
+
+    Travels above it, comes down fast and feels its way through the last part, since the surface may be
+    higher or lower than a camera can tell. Succeeds on contact near the expected height. Every attempt
+    after a failed one comes down a little beside the last, on a spiral.
+    """
+
+    target: In[Target] = port(doc="where to go")
+    overtravel: Metres = param(0.015, ge=0, le=0.03, doc="how far below the expected surface to feel")
+    offset: Metres = param(0.004, ge=0, le=0.02, doc="spacing of the spiral of further attempts")
+    reasons: ClassVar = ("unreachable", "blocked", "no_contact")
+    uses: ClassVar = ("arm", "tool")
+    moves: ClassVar = True
+    tool_state: ClassVar = (EMPTY, EMPTY)
+
+    def run(self, cell: Cell) -> Steps:
+        """Go above the place, then feel the way down."""
+        yield from settle(cell.arm)
+        kind = cell.classes[self.target.label]
+        surface = float(self.target.position[2]) + kind.height / 2
+        place = self.target.position[:2] + self._aside(cell)
+        lowest = max(surface - self.overtravel, kind.height / 4)
+        above = Via(np.array([*place, surface + cell.descent]))
+        down = Via(np.array([*place, lowest]), speed=cell.descent_speed)
+        try:
+            yield from follow(cell.arm, cell.arm.plan([*travel(cell, place), above]))
+            yield from follow(cell.arm, cell.arm.plan([down]), until=lambda: cell.tool.touching)
+        except Unreachable as error:
+            raise self.failed("unreachable", str(error)) from error
+        except Blocked as error:
+            raise self.failed("blocked", str(error)) from error
+        height = float(cell.arm.tool_pose.position[2])
+        if not cell.tool.touching:
+            cell.ledger.missed(self.target.item)
+            raise self.failed(
+                "no_contact",
+                f"nothing felt down to {height * 1000:.0f} mm, {self.target.item} was expected at "
+                f"{surface * 1000:.0f} mm",
+            )
+        cell.ledger.touched(self.target.item)
+
+    def _aside(self, cell: Cell) -> Array:
+        """Return the sideways step `(2,)` [m] of this attempt: none at first, then Vogel's spiral."""
+        attempt = cell.ledger.attempts(self.target.item)
+        angle = attempt * GOLDEN_ANGLE
+        return self.offset * math.sqrt(attempt) * np.array([math.cos(angle), math.sin(angle)])

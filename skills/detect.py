@@ -1,0 +1,49 @@
+"""Search a fresh camera image for objects."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from executive.cell import Cell, Detections, Steps
+from executive.errors import Unavailable
+from executive.skill import Out, Skill, param, port
+
+
+class Detect(Skill):
+    """Know which objects a fresh image shows, beside the running tick loop.
+
+    Succeeds with everything at or above the detector's threshold; an empty list is a result, not a failure.
+    """
+
+    detections: Out[Detections] = port(doc="what was found, with the frame it was found in")
+    detector: str = param("", refers="detector", doc="which detector of the cell; empty: the first")
+    view: str = param(
+        "table", choices=("table", "full"), doc="`table`: the workspace; `full`: everything the camera sees"
+    )
+    reasons: ClassVar = ("unsure", "hidden", "unavailable")
+    uses: ClassVar = ("camera",)
+    senses: ClassVar = True
+
+    def run(self, cell: Cell) -> Steps:
+        """Take a frame, ask the detector, wait for its answer."""
+        if not cell.camera.sees_table():
+            raise self.failed("hidden", f"the arm hides part of the workspace from camera {cell.camera.name}")
+        name = self.detector or next(iter(cell.detectors))
+        detector = cell.detectors[name]
+        frame = cell.camera.capture()
+        request = detector.request(frame, self.view)
+        while not request.ready:
+            yield
+        try:
+            answer = request.result()
+        except Unavailable as error:
+            raise self.failed("unavailable", f"detector {name}: {error}") from error
+        found = tuple(detection for detection in answer if detection.confidence >= detector.threshold)
+        if not found and answer:
+            best = answer[0]
+            raise self.failed(
+                "unsure",
+                f"detector {name} saw nothing it is sure of: at best a {best.label} "
+                f"at {best.confidence:.2f} < {detector.threshold:.2f}",
+            )
+        self.detections = Detections(frame, found, self.view, cell.camera.area(self.view))

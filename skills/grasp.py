@@ -1,0 +1,33 @@
+"""Seal the tool to what it touches."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from executive.cell import Cell, Item, Steps, Target
+from executive.skill import EMPTY, HOLDING, In, Out, Seconds, Skill, param, port
+
+
+class Grasp(Skill):
+    """Close the tool on the target and prove that it holds.
+
+    Succeeds when the tool's sensor still reports a seal after `settle`.
+    """
+
+    target: In[Target] = port(doc="what the tool touches")
+    held: Out[Item] = port(doc="the item in the tool")
+    settle: Seconds = param(0.10, ge=0, le=2, doc="time given to the seal")
+    reasons: ClassVar = ("missed",)
+    uses: ClassVar = ("tool",)
+    tool_state: ClassVar = (EMPTY, HOLDING)
+
+    def run(self, cell: Cell) -> Steps:
+        """Switch the vacuum on and ask the sensor."""
+        cell.tool.close()
+        yield from cell.clock.sleep(self.settle)
+        if not cell.tool.holding:
+            cell.tool.open()
+            cell.ledger.missed(self.target.item)
+            raise self.failed("missed", f"no seal on {self.target.item} {self.settle:.2f} s after contact")
+        cell.ledger.held(self.target.item)
+        self.held = self.target.item

@@ -1,0 +1,35 @@
+"""Turn detections into targets in the world."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from executive.cell import Cell, Detections, Steps, Target
+from executive.errors import NoDepth
+from executive.skill import In, Out, Skill, port
+
+
+class Localize(Skill):
+    """Know where every detected object is and which item it is.
+
+    Uses the camera pose stored with the frame, so it holds wherever the camera is by now. The ledger
+    binds each detection to an item.
+    """
+
+    detections: In[Detections] = port(doc="what was found, with its frame")
+    targets: Out[list[Target]] = port(doc="one target per detection outside the bins")
+    reasons: ClassVar = ("stale", "no_depth")
+
+    def run(self, cell: Cell) -> Steps:
+        """Locate every detection, then let the ledger say who is who."""
+        yield from ()
+        frame = self.detections.frame
+        if not cell.ledger.is_current(frame):
+            raise self.failed(
+                "stale", f"frame {frame.id} shows the table before change {cell.ledger.epoch}; look again"
+            )
+        try:
+            positions = [cell.localizer.locate(detection, frame) for detection in self.detections.found]
+        except NoDepth as error:
+            raise self.failed("no_depth", str(error)) from error
+        self.targets = list(cell.ledger.observe(self.detections, positions))

@@ -1,0 +1,50 @@
+"""Bring the arm where the camera sees the whole workspace."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from executive.cell import Cell, Steps
+from executive.errors import Blocked, Unreachable
+from executive.moving import follow, settle, travel
+from executive.skill import Skill, param
+
+
+class MoveToScan(Skill):
+    """Stand where the camera sees the whole workspace.
+
+    Succeeds when the arm is at rest and the workspace is in view; at once where it already is, unless a
+    pose is asked for.
+    """
+
+    pose: str = param(
+        "auto",
+        refers="pose",
+        doc="an arm pose of the cell; `auto`: the camera's first, if needed; `next`: its next one",
+    )
+    reasons: ClassVar = ("unreachable", "blocked")
+    uses: ClassVar = ("arm",)
+    moves: ClassVar = True
+
+    def run(self, cell: Cell) -> Steps:
+        """Lift the tool, then go to the pose."""
+        yield from settle(cell.arm)
+        if self.pose == "auto" and cell.camera.sees_table():
+            return
+        try:
+            here = cell.arm.tool_pose.position
+            if here[2] < cell.travel_height - 1e-3:
+                yield from follow(cell.arm, cell.arm.plan(travel(cell, here)[:1]))
+            yield from follow(cell.arm, cell.arm.plan_to_pose(self._name(cell)))
+        except Unreachable as error:
+            raise self.failed("unreachable", str(error)) from error
+        except Blocked as error:
+            raise self.failed("blocked", str(error)) from error
+
+    def _name(self, cell: Cell) -> str:
+        poses = cell.camera.scan_poses
+        if self.pose == "auto":
+            return poses[0]
+        if self.pose == "next":
+            return poses[(cell.ledger.looks + 1) % len(poses)]
+        return self.pose

@@ -1,0 +1,43 @@
+"""Leave what the tool holds at a safe free place."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from executive.cell import Cell, Item, Steps, Via
+from executive.errors import Blocked, Unreachable
+from executive.moving import follow, settle, travel
+from executive.skill import EMPTY, HOLDING, In, Metres, Seconds, Skill, param, port
+
+
+class PutDown(Skill):
+    """Put the held item down on the cell's safe place, where the next look finds it."""
+
+    held: In[Item] = port(doc="the item in the tool")
+    drop: Metres = param(0.005, ge=0, le=0.05, doc="height of the item's underside above the table")
+    settle: Seconds = param(0.10, ge=0, le=2, doc="time given to the vacuum to vanish")
+    reasons: ClassVar = ("unreachable", "blocked", "stuck")
+    uses: ClassVar = ("arm", "tool")
+    moves: ClassVar = True
+    tool_state: ClassVar = (HOLDING, EMPTY)
+
+    def run(self, cell: Cell) -> Steps:
+        """Carry it there, come down, let go."""
+        yield from settle(cell.arm)
+        kind = cell.classes[cell.ledger.label(self.held)]
+        low = float(cell.safe_place[2]) + kind.height + self.drop
+        way = [*travel(cell, cell.safe_place), Via(np.array([*cell.safe_place[:2], low]))]
+        try:
+            motion = cell.arm.plan(way, carrying=kind)
+        except Unreachable as error:
+            raise self.failed("unreachable", str(error)) from error
+        except Blocked as error:
+            raise self.failed("blocked", str(error)) from error
+        yield from follow(cell.arm, motion)
+        cell.tool.open()
+        yield from cell.clock.sleep(self.settle)
+        if cell.tool.holding:
+            raise self.failed("stuck", f"{self.held} hangs on the tool {self.settle:.2f} s after release")
+        cell.ledger.returned(self.held)

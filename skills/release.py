@@ -1,0 +1,29 @@
+"""Let go of what the tool holds."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from executive.cell import Cell, Item, Steps
+from executive.skill import EMPTY, HOLDING, In, Out, Seconds, Skill, param, port
+
+
+class Release(Skill):
+    """Let the held item fall into its bin and prove that the tool is empty."""
+
+    held: In[Item] = port(doc="the item in the tool")
+    bin: In[str] = port(doc="where it is let go")
+    placed: Out[Item] = port(doc="the item in the bin")
+    settle: Seconds = param(0.10, ge=0, le=2, doc="time given to the vacuum to vanish")
+    reasons: ClassVar = ("stuck",)
+    uses: ClassVar = ("tool",)
+    tool_state: ClassVar = (HOLDING, EMPTY)
+
+    def run(self, cell: Cell) -> Steps:
+        """Switch the vacuum off and ask the sensor."""
+        cell.tool.open()
+        yield from cell.clock.sleep(self.settle)
+        if cell.tool.holding:
+            raise self.failed("stuck", f"{self.held} hangs on the tool {self.settle:.2f} s after release")
+        cell.ledger.placed(self.held, self.bin)
+        self.placed = self.held

@@ -1,0 +1,54 @@
+"""Carry what the tool holds into a bin."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from executive.cell import Cell, Item, Steps, Via
+from executive.errors import Blocked, Unreachable
+from executive.moving import follow, settle, travel
+from executive.skill import HOLDING, In, Metres, Skill, param, port
+
+
+class Transit(Skill):
+    """Hang the held item over a free slot of a bin, just above the floor.
+
+    Lifts it straight up, crosses above every wall, and comes down inside. The tool's sensor is watched
+    all the way.
+    """
+
+    held: In[Item] = port(doc="the item in the tool")
+    bin: In[str] = port(doc="where to")
+    drop: Metres = param(0.015, ge=0.005, le=0.1, doc="height of the item's underside above the floor")
+    reasons: ClassVar = ("unreachable", "blocked", "dropped")
+    uses: ClassVar = ("arm", "tool")
+    moves: ClassVar = True
+    tool_state: ClassVar = (HOLDING, HOLDING)
+
+    def run(self, cell: Cell) -> Steps:
+        """Plan the whole way, then follow it as long as the seal holds."""
+        yield from settle(cell.arm)
+        bin = cell.bins[self.bin]
+        kind = cell.classes[cell.ledger.label(self.held)]
+        slot = cell.ledger.free_slot(self.bin)
+        layer, place = divmod(slot, len(bin.slots))
+        over = bin.slots[place]
+        low = float(bin.position[2]) + kind.height * (1 + layer) + self.drop
+        way = [*travel(cell, over), Via(np.array([*over, min(low, cell.travel_height)]))]
+        try:
+            motion = cell.arm.plan(way, carrying=kind)
+        except Unreachable as error:
+            raise self.failed("unreachable", str(error)) from error
+        except Blocked as error:
+            raise self.failed("blocked", str(error)) from error
+        yield from follow(cell.arm, motion, until=lambda: not cell.tool.holding)
+        if not cell.tool.holding:
+            x, y, z = cell.arm.tool_pose.position
+            cell.tool.open()
+            cell.ledger.dropped(self.held)
+            raise self.failed(
+                "dropped",
+                f"the seal on {self.held} broke on the way to {self.bin}, near ({x:.2f}, {y:.2f}, {z:.2f}) m",
+            )

@@ -1,0 +1,45 @@
+from __future__ import annotations
+
+from executive.cell import Detection
+from executive.testing.fake_cell import FakeCell
+from executive.testing.run_skill import run_skill
+from skills.detect import Detect
+
+
+def test_an_answer_becomes_visible_after_the_detectors_latency(fake: FakeCell) -> None:
+    fake.world.put("cube", 0.5, 0.0)
+    result = run_skill(Detect(), fake)
+    assert result.status == "SUCCESS"
+    assert [found.label for found in result.outputs["detections"].found] == ["cube"]
+    assert result.ticks == 12, "0.05 s at 240 Hz"
+
+
+def test_an_empty_table_is_a_result_and_no_failure(fake: FakeCell) -> None:
+    result = run_skill(Detect(), fake)
+    assert (result.status, result.outputs["detections"].found) == ("SUCCESS", ())
+
+
+def test_boxes_below_the_threshold_alone_are_unsure(fake: FakeCell) -> None:
+    fake.detector.answers = lambda look, true: [Detection("duck", 0.4, (0, 0, 9, 9))]
+    result = run_skill(Detect(), fake)
+    assert result.reason == "unsure"
+    assert result.message == "detector embedded saw nothing it is sure of: at best a duck at 0.40 < 0.50"
+
+
+def test_a_weak_box_beside_a_sure_one_is_left_out(fake: FakeCell) -> None:
+    fake.world.put("cube", 0.5, 0.0)
+    fake.detector.answers = lambda look, true: [*true, Detection("duck", 0.4, (0, 0, 9, 9))]
+    assert [d.label for d in run_skill(Detect(), fake).outputs["detections"].found] == ["cube"]
+
+
+def test_an_arm_in_the_way_is_hidden_and_nothing_is_photographed(fake: FakeCell) -> None:
+    fake.camera.sees = lambda: False
+    result = run_skill(Detect(), fake)
+    assert result.reason == "hidden"
+    assert result.message == "the arm hides part of the workspace from camera fake"
+
+
+def test_a_detector_without_an_answer_is_unavailable_with_its_sentence(fake: FakeCell) -> None:
+    fake.detector.answers = lambda look, true: "no answer within 1.0 s"
+    result = run_skill(Detect(), fake)
+    assert (result.reason, result.message) == ("unavailable", "detector embedded: no answer within 1.0 s")

@@ -1,0 +1,151 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from executive.cell import Target
+from executive.testing.fake_cell import FakeCell
+from executive.testing.run_skill import run_skill
+from skills.approach import Approach
+from skills.grasp import Grasp
+from skills.move_to_scan import MoveToScan
+from skills.put_down import PutDown
+from skills.reject_target import RejectTarget
+from skills.release import Release
+from skills.transit import Transit
+
+
+@pytest.fixture
+def target(fake: FakeCell, look) -> Target:
+    """A cube in the middle of the fake table, seen once."""
+    fake.world.put("cube", 0.5, 0.0)
+    return look()[0]
+
+
+@pytest.fixture
+def held(fake: FakeCell, target: Target) -> str:
+    """The cube, in the tool."""
+    run_skill(Approach(target=target), fake)
+    return run_skill(Grasp(target=target), fake).outputs["held"]
+
+
+def test_approach_ends_on_the_surface_it_expected(fake: FakeCell, target: Target) -> None:
+    assert run_skill(Approach(target=target), fake).status == "SUCCESS"
+    assert fake.tool.touching
+    assert fake.arm.tool_pose.position[2] == pytest.approx(0.05, abs=0.002)
+
+
+def test_approach_feels_for_a_surface_lower_than_expected(fake: FakeCell, target: Target) -> None:
+    fake.world.objects[0].position[2] -= 0.01
+    assert run_skill(Approach(target=target), fake).status == "SUCCESS"
+    assert fake.arm.tool_pose.position[2] == pytest.approx(0.04, abs=0.002)
+
+
+def test_approach_to_nothing_is_no_contact_and_counts_as_an_attempt(fake: FakeCell, target: Target) -> None:
+    fake.world.objects.clear()
+    result = run_skill(Approach(target=target), fake)
+    assert result.reason == "no_contact"
+    assert result.message == "nothing felt down to 35 mm, cube-1 was expected at 50 mm"
+    assert fake.ledger.attempts("cube-1") == 1
+
+
+def test_every_further_attempt_comes_down_elsewhere(fake: FakeCell, target: Target) -> None:
+    places = []
+    for _ in range(4):
+        run_skill(Approach(target=target), fake)
+        places.append(fake.arm.tool_pose.position[:2].copy())
+        fake.ledger.missed("cube-1")
+    assert all(np.linalg.norm(a - b) > 0.003 for i, a in enumerate(places) for b in places[:i])
+
+
+def test_a_target_out_of_reach_is_unreachable_and_nothing_moves(fake: FakeCell, look) -> None:
+    fake.world.put("cube", 0.80, 0.30)
+    result = run_skill(Approach(target=look("full")[0]), fake)
+    assert result.reason == "unreachable"
+    assert "more than the arm's 0.85 m" in result.message
+    assert fake.arm.commanded == []
+
+
+def test_a_halted_approach_stops_the_arm(fake: FakeCell, target: Target) -> None:
+    assert run_skill(Approach(target=target), fake, halt_at=30).status == "HALTED"
+    assert fake.arm.at_rest
+    assert fake.arm.commanded == ["start", "stop"]
+
+
+def test_grasp_holds_and_tells_the_ledger(fake: FakeCell, held: str) -> None:
+    assert held == "cube-1"
+    assert fake.tool.holding
+    assert not fake.ledger.is_open("cube-1")
+
+
+def test_a_grasp_without_a_seal_is_missed_and_lets_go(fake: FakeCell, target: Target) -> None:
+    fake.tool.seals = lambda: False
+    run_skill(Approach(target=target), fake)
+    result = run_skill(Grasp(target=target), fake)
+    assert result.reason == "missed"
+    assert result.message == "no seal on cube-1 0.10 s after contact"
+    assert not fake.ledger.is_fresh(target)
+
+
+def test_transit_hangs_the_item_over_a_slot_of_the_bin(fake: FakeCell, held: str) -> None:
+    assert run_skill(Transit(held=held, bin="red_bin"), fake).status == "SUCCESS"
+    tip = fake.arm.tool_pose.position
+    assert np.allclose(tip[:2], fake.cell.bins["red_bin"].slots[0])
+    assert tip[2] == pytest.approx(0.065)
+
+
+def test_a_seal_that_breaks_on_the_way_is_dropped_and_the_arm_stops(fake: FakeCell, held: str) -> None:
+    skill = Transit(held=held, bin="red_bin")
+    steps = skill.run(fake.cell)
+    for _ in range(60):
+        next(steps)
+        fake.advance()
+    fake.tool.open()
+    with pytest.raises(Exception, match="the seal on cube-1 broke on the way to red_bin, near"):
+        for _ in range(600):
+            next(steps)
+            fake.advance()
+    assert fake.arm.at_rest
+    assert fake.ledger.is_open("cube-1"), "a dropped item is looked for again"
+
+
+def test_release_places_the_item(fake: FakeCell, held: str) -> None:
+    run_skill(Transit(held=held, bin="red_bin"), fake)
+    assert run_skill(Release(held=held, bin="red_bin"), fake).outputs["placed"] == "cube-1"
+    assert fake.ledger.balance()["placed"] == 1
+    assert fake.ledger.free_slot("red_bin") == 1
+
+
+def test_the_next_item_goes_to_the_next_slot(fake: FakeCell, held: str, look) -> None:
+    run_skill(Transit(held=held, bin="red_bin"), fake)
+    run_skill(Release(held=held, bin="red_bin"), fake)
+    fake.world.put("cube", 0.5, 0.1)
+    target = look()[0]
+    run_skill(Approach(target=target), fake)
+    run_skill(Grasp(target=target), fake)
+    run_skill(Transit(held=target.item, bin="red_bin"), fake)
+    assert np.allclose(fake.arm.tool_pose.position[:2], fake.cell.bins["red_bin"].slots[1])
+
+
+def test_put_down_leaves_the_item_where_the_next_look_finds_it(fake: FakeCell, held: str, look) -> None:
+    assert run_skill(PutDown(held=held), fake).status == "SUCCESS"
+    assert not fake.tool.holding
+    assert [target.item for target in look("full")] == ["cube-1"]
+
+
+def test_a_rejected_item_keeps_its_reason(fake: FakeCell, target: Target) -> None:
+    fake.ledger.missed("cube-1")
+    run_skill(RejectTarget(item="cube-1"), fake)
+    assert fake.ledger.rows()[0]["why"] == "could not be picked (1 failed attempts)"
+
+
+def test_move_to_scan_stays_where_the_table_is_in_view(fake: FakeCell) -> None:
+    assert run_skill(MoveToScan(), fake).ticks == 0
+    assert fake.arm.commanded == []
+
+
+def test_move_to_scan_lifts_the_tool_before_it_travels(fake: FakeCell, held: str) -> None:
+    fake.camera.sees = lambda: False
+    assert run_skill(MoveToScan(), fake).status == "SUCCESS"
+    assert fake.arm.commanded[-4:] == ["start", "start"] or fake.arm.commanded.count("start") >= 3
+    assert np.allclose(fake.arm.tool_pose.position, [0.3, -0.3, 0.3])

@@ -1,0 +1,65 @@
+from __future__ import annotations
+
+from executive.testing.fake_cell import FakeCell
+from executive.testing.run_skill import SkillResult, run_skill
+from skills.select_target import SelectTarget
+
+
+def select(fake: FakeCell, targets, **values) -> SkillResult:
+    return run_skill(SelectTarget(targets=targets, **values), fake)
+
+
+def test_the_nearest_target_comes_first_with_its_bin(fake: FakeCell, look) -> None:
+    fake.world.put("cube", 0.6, 0.2)
+    fake.world.put("duck", 0.45, -0.2)
+    result = select(fake, look())
+    assert (result.outputs["item"], result.outputs["bin"]) == ("duck-1", "yellow_bin")
+    assert [decision.item for decision in fake.decisions] == ["duck-1"]
+
+
+def test_a_rejected_item_is_passed_over(fake: FakeCell, look) -> None:
+    fake.world.put("cube", 0.6, 0.2)
+    fake.world.put("duck", 0.45, -0.2)
+    targets = look()
+    fake.ledger.rejected("duck-1", "slippery")
+    assert select(fake, targets).outputs["item"] == "cube-1"
+
+
+def test_a_neighbour_of_a_picked_item_is_not_trusted(fake: FakeCell, look) -> None:
+    fake.world.put("cube", 0.50, 0.0)
+    fake.world.put("duck", 0.55, 0.0)
+    fake.world.put("sphere", 0.60, 0.2)
+    targets = look()
+    fake.ledger.held("cube-1")
+    assert select(fake, targets).outputs["item"] == "sphere-1"
+
+
+def test_only_the_same_item_or_the_wanted_class_will_do(fake: FakeCell, look) -> None:
+    fake.world.put("cube", 0.6, 0.2)
+    fake.world.put("duck", 0.45, -0.2)
+    targets = look()
+    assert select(fake, targets, same="cube-1").outputs["item"] == "cube-1"
+    assert select(fake, targets, wanted="cube").outputs["item"] == "cube-1"
+    result = select(fake, targets, wanted="sphere")
+    assert result.reason == "unseen"
+    assert result.message == "the last look shows no sphere that can be trusted; look again"
+
+
+def test_an_empty_look_at_the_workspace_alone_is_not_believed(fake: FakeCell, look) -> None:
+    for _ in range(5):
+        assert select(fake, look("table")).reason == "unseen"
+
+
+def test_two_empty_looks_at_the_full_frame_are_believed(fake: FakeCell, look) -> None:
+    assert select(fake, look("full")).reason == "unseen"
+    result = select(fake, look("full"))
+    assert result.reason == "no_candidate"
+    assert result.message == "nothing is left on the table but rejected items"
+
+
+def test_a_table_with_only_rejected_items_ends_the_work(fake: FakeCell, look) -> None:
+    fake.world.put("cube", 0.6, 0.2)
+    look()
+    fake.ledger.rejected("cube-1", "slippery")
+    assert select(fake, look("full")).reason == "unseen"
+    assert select(fake, look("full")).reason == "no_candidate"
