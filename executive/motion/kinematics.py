@@ -1,0 +1,234 @@
+"""Forward and analytic inverse kinematics of the KUKA LBR iiwa 14.
+
+Its seven joints are a shoulder, an elbow and a wrist (S-R-S): the axes of joints 1-3 meet in the
+shoulder, those of joints 5-7 in the wrist, and
+
+    R_WT = Rz(q1) Ry(q2) Rz(q3) Ry(-q4) Rz(q5) Ry(q6) Rz(q7).
+
+A tool pose therefore fixes the wrist, the triangle shoulder-elbow-wrist fixes joint 4, and the elbow
+may swivel on a circle about the line from shoulder to wrist. Each swivel angle has eight solutions:
+shoulder, elbow and wrist can each be flipped, `(a, b, c) -> (a + π, -b, c + π)`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from executive.errors import Unreachable
+from executive.geometry import Array, Pose
+
+SHOULDER_HEIGHT, UPPER_ARM, FOREARM, WRIST_TO_FLANGE = 0.36, 0.42, 0.40, 0.081 + 0.045
+"""[m]; pybullet_data kuka_iiwa/model.urdf, and the flange's outer face 0.045 m beyond its last link frame."""
+
+BRANCHES = np.array([[s, e, w] for s in (1, -1) for e in (1, -1) for w in (1, -1)])
+"""Signs of joints 2, 4 and 6 in the eight solutions of one swivel angle, `(8, 3)`."""
+
+_FLIPPED = np.zeros((8, 7))
+_FLIPPED[:, [0, 2]] += (BRANCHES[:, :1] < 0) * math.pi
+_FLIPPED[:, [2, 4]] += (BRANCHES[:, 1:2] < 0) * math.pi
+_FLIPPED[:, [4, 6]] += (BRANCHES[:, 2:] < 0) * math.pi
+_SIGNS = np.ones((8, 7))
+_SIGNS[:, [1, 3, 5]] = BRANCHES
+_IS_Z = (True, False, True, False, True, False, True)
+
+
+def wrapped(angle: Array) -> Array:
+    """Return every `angle` [rad] turned by full turns into [-π, π)."""
+    return (angle + math.pi) % (2 * math.pi) - math.pi
+
+
+class Kinematics:
+    """An iiwa 14 at the world's origin with a straight tool on its flange.
+
+    Attributes:
+        reach: From the wrist to the tool centre point [m].
+        position_limit: Largest joint angle to either side `(7,)` [rad].
+        nearest, farthest: Smallest and largest distance of the wrist from the shoulder [m].
+
+    """
+
+    def __init__(self, tool_length: float, position_limit: ArrayLike) -> None:
+        self.reach = WRIST_TO_FLANGE + tool_length
+        self.position_limit = np.asarray(position_limit, dtype=float)
+        bend = math.cos(self.position_limit[3])
+        self.nearest = math.sqrt(UPPER_ARM**2 + FOREARM**2 + 2 * UPPER_ARM * FOREARM * bend)
+        self.farthest = UPPER_ARM + FOREARM
+        self._tool_length = tool_length
+        self._swivels = np.radians(np.arange(-180.0, 180.0, 5.0))
+        self._fine_swivels = np.radians(np.arange(-180.0, 180.0, 0.25))
+
+    def forward(self, q: ArrayLike) -> Pose:
+        """Return the tool pose `X_WT` at the joint positions `q` `(7,)` [rad]."""
+        R, _, p = self._chain(np.asarray(q, dtype=float)[None])
+        return Pose(R[0, -1], p[0, -1])
+
+    def flange(self, q: ArrayLike) -> Pose:
+        """Return the flange's pose `X_WF` at `q` `(7,)` [rad]; the tool is fixed on it along z."""
+        X_WT = self.forward(q)
+        return Pose(X_WT.rotation, X_WT.position - self._tool_length * X_WT.rotation[:, 2])
+
+    def joint_frames(self, q: ArrayLike) -> tuple[Pose, ...]:
+        """Return, for joints 1 to 7, the frame that turns with the joint, z along the arm, at its centre."""
+        R, _, p = self._chain(np.asarray(q, dtype=float)[None])
+        return tuple(Pose(R[0, i], p[0, i]) for i in range(7))
+
+    def positions(self, qs: Array) -> Array:
+        """Return the tool centre points `(N, 3)` [m] of many joint positions `(N, 7)` [rad]."""
+        return self._chain(qs)[2][:, -1]
+
+    def velocities(self, qs: Array, qds: Array) -> Array:
+        """Return the tool centre point's velocities `(N, 3)` [m/s] at `qs`, moving with `qds` `(N, 7)`."""
+        _, axes, p = self._chain(qs)
+        levers = p[:, -1:] - p[:, :7]
+        return np.einsum("nij,ni->nj", np.cross(axes, levers), qds)
+
+    def swivel(self, q: ArrayLike) -> float:
+        """Return the elbow's angle about the line from shoulder to wrist [rad]; 0 is up."""
+        frames = self.joint_frames(q)
+        shoulder, elbow, wrist = (frames[i].position for i in (1, 3, 5))
+        _, up, side = _triangle_frame(wrist - shoulder)
+        return math.atan2(float((elbow - shoulder) @ side), float((elbow - shoulder) @ up))
+
+    def branch(self, q: ArrayLike) -> int:
+        """Return the row of `BRANCHES` that `q` `(7,)` belongs to."""
+        negative = np.asarray(q, dtype=float)[[1, 3, 5]] < 0
+        return int(negative @ [4, 2, 1])
+
+    def grid(self, X_WT: Pose, swivels: Array) -> Array:
+        """Return every solution of a tool pose as `(8, S, 7)` [rad]: by branch and by swivel angle `(S,)`.
+
+        Joint limits are not looked at.
+
+        Raises:
+            Unreachable: The wrist is too near to or too far from the shoulder.
+
+        """
+        wrist = X_WT.position - self.reach * X_WT.rotation[:, 2]
+        line = wrist - (0.0, 0.0, SHOULDER_HEIGHT)
+        distance = self._distance(X_WT, line)
+        n, up, side = _triangle_frame(line)
+        cos4 = (distance**2 - UPPER_ARM**2 - FOREARM**2) / (2 * UPPER_ARM * FOREARM)
+        q4 = math.acos(min(1.0, max(-1.0, cos4)))
+        cos_lift = (UPPER_ARM**2 + distance**2 - FOREARM**2) / (2 * UPPER_ARM * distance)
+        lift = math.acos(min(1.0, max(-1.0, cos_lift)))
+
+        out = np.outer(np.cos(swivels), up) + np.outer(np.sin(swivels), side)
+        # Frame 3: z along the upper arm, y normal to the triangle, x completes it.
+        z3 = math.cos(lift) * n + math.sin(lift) * out
+        y3 = np.cross(n, out)
+        x3 = np.cross(y3, z3)
+        x4 = math.cos(q4) * x3 + math.sin(q4) * z3
+        z4 = -math.sin(q4) * x3 + math.cos(q4) * z3
+        R_47 = np.stack([x4, y3, z4], axis=-2) @ X_WT.rotation
+
+        base = np.empty((len(swivels), 7))
+        base[:, 0], base[:, 1], base[:, 2] = _zyz(x3, y3, z3)
+        base[:, 3] = q4
+        columns = R_47.transpose(2, 0, 1)
+        base[:, 4], base[:, 5], base[:, 6] = _zyz(*columns)
+        return wrapped(base * _SIGNS[:, None] + _FLIPPED[:, None])
+
+    def solutions(self, X_WT: Pose) -> Array:
+        """Return joint positions `(N, 7)` [rad] inside the limits that bring the tool to `X_WT`, `N` > 0.
+
+        All eight branches at every fifth degree of swivel; where that finds none, at every quarter.
+
+        Raises:
+            Unreachable: There is none; the text says what is too short, too long or outside its limit.
+
+        """
+        for swivels in (self._swivels, self._fine_swivels):
+            found = self.grid(X_WT, swivels).reshape(-1, 7)
+            inside = found[np.all(np.abs(found) <= self.position_limit, axis=1)]
+            if len(inside):
+                return inside
+        raise self.outside_limits(X_WT, found)
+
+    def nearest_solution(self, X_WT: Pose, q: ArrayLike) -> Array:
+        """Return the solution `(7,)` [rad] whose largest joint difference from `q` is smallest."""
+        found = self.solutions(X_WT)
+        return found[np.argmin(np.max(np.abs(found - np.asarray(q, dtype=float)), axis=1))]
+
+    def outside_limits(self, X_WT: Pose, rejected: Array) -> Unreachable:
+        """Return the error that says which joint of the `rejected` solutions `(N, 7)` is least outside."""
+        excess = np.abs(rejected) - self.position_limit
+        best = excess[np.argmin(np.max(excess, axis=1))]
+        joint = int(np.argmax(best))
+        return Unreachable(
+            f"The tool cannot reach {_text(X_WT)}: no swivel of the elbow keeps every joint inside its "
+            f"limits; the best one leaves joint {joint + 1} {math.degrees(best[joint]):.1f}° outside "
+            f"±{math.degrees(self.position_limit[joint]):.0f}°."
+        )
+
+    def _distance(self, X_WT: Pose, line: Array) -> float:
+        distance = float(np.linalg.norm(line))
+        if distance > self.farthest:
+            how = f"{distance - self.farthest:.3f} m farther than the arm is long ({self.farthest:.2f} m)"
+        elif distance < self.nearest:
+            how = f"{self.nearest - distance:.3f} m nearer than joint 4 can fold ({self.nearest:.2f} m)"
+        else:
+            return distance
+        raise Unreachable(
+            f"The tool cannot reach {_text(X_WT)}: its wrist would be {distance:.3f} m from the shoulder, "
+            f"{how}."
+        )
+
+    def _chain(self, qs: Array) -> tuple[Array, Array, Array]:
+        """Return rotations `(N, 8, 3, 3)` and positions `(N, 8, 3)` of joints and tool, axes `(N, 7, 3)`."""
+        count = len(qs)
+        rotations, axes, positions = (
+            np.empty((count, 8, 3, 3)),
+            np.empty((count, 7, 3)),
+            np.empty((count, 8, 3)),
+        )
+        R = np.broadcast_to(np.eye(3), (count, 3, 3))
+        p = np.broadcast_to(np.array([0.0, 0.0, SHOULDER_HEIGHT]), (count, 3))
+        lengths = {3: UPPER_ARM, 5: FOREARM}
+        angles = qs * (1, 1, 1, -1, 1, 1, 1)
+        cosines, sines = np.cos(angles), np.sin(angles)
+        for i, is_z in enumerate(_IS_Z):
+            p = p + lengths.get(i, 0.0) * R[:, :, 2]
+            axes[:, i] = R[:, :, 2] if is_z else R[:, :, 1] * (-1 if i == 3 else 1)
+            R = _turned(R, cosines[:, i, None], sines[:, i, None], is_z)
+            rotations[:, i], positions[:, i] = R, p
+        rotations[:, 7], positions[:, 7] = R, p + self.reach * R[:, :, 2]
+        return rotations, axes, positions
+
+
+def _turned(R: Array, c: Array, s: Array, is_z: bool) -> Array:
+    """Return rotations `(N, 3, 3)` followed by a turn about their own z or y axis."""
+    first, second = (0, 1) if is_z else (2, 0)
+    turned = np.array(R)
+    turned[:, :, first] = c * R[:, :, first] + s * R[:, :, second]
+    turned[:, :, second] = c * R[:, :, second] - s * R[:, :, first]
+    return turned
+
+
+def _zyz(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
+    """Return `a`, `b >= 0`, `c` with `Rz(a) Ry(b) Rz(c) = [x y z]`, given as columns `(N, 3)`."""
+    sine = np.hypot(z[:, 0], z[:, 1])
+    straight = sine < 1e-9  # only the sum (or difference) of a and c is defined: all of it goes to c
+    a = np.where(straight, 0.0, np.arctan2(z[:, 1], z[:, 0]))
+    c = np.where(
+        straight,
+        np.arctan2(x[:, 1], np.where(z[:, 2] > 0, x[:, 0], -x[:, 0])),
+        np.arctan2(y[:, 2], -x[:, 2]),
+    )
+    return a, np.arctan2(sine, z[:, 2]), c
+
+
+def _triangle_frame(line: Array) -> tuple[Array, Array, Array]:
+    """Return the unit vector along `line`, the one square to it nearest to up, and the third."""
+    n = line / np.linalg.norm(line)
+    up = np.array([0.0, 0.0, 1.0]) if abs(n[2]) < 0.9999 else np.array([1.0, 0.0, 0.0])
+    up = up - (up @ n) * n
+    up /= np.linalg.norm(up)
+    return n, up, np.cross(n, up)
+
+
+def _text(X_WT: Pose) -> str:
+    x, y, z = X_WT.position
+    return f"({x:.3f}, {y:.3f}, {z:.3f}) m"

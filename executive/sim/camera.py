@@ -1,0 +1,202 @@
+"""Rendering the simulated world, and the camera that a simulated cell offers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+
+from executive.cell import Box, Clock, Frame
+from executive.cell_config import CameraConfig, NoiseConfig
+from executive.geometry import Array, Pose
+from executive.sim.world import World
+from executive.vision.camera_model import camera_matrix, looking_at, projection_matrix, view_matrix
+
+Image = NDArray[np.uint8]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Light:
+    """One distant lamp and the light that comes from everywhere.
+
+    Attributes:
+        direction: Towards the lamp, in the world.
+        colour: Red, green and blue, 0 to 1.
+        ambient, diffuse, specular: Shares of the three terms of Phong's reflection model.
+        shadow: Whether things cast shadows.
+
+    """
+
+    direction: tuple[float, float, float] = (0.3, 0.2, 1.0)
+    colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    ambient: float = 0.6
+    diffuse: float = 0.35
+    specular: float = 0.05
+    shadow: bool = False
+
+
+CELL_LIGHT = Light()
+"""The lamp of every simulated cell: white, a little in front and to the left, no shadows."""
+
+
+@dataclass(frozen=True, eq=False)
+class Render:
+    """A part of a camera's image as the renderer made it, free of noise.
+
+    Attributes:
+        image: `(h, w, 3)` uint8, RGB.
+        bodies: `(h, w)` body seen at each pixel, -1 where there is none.
+
+    """
+
+    image: Image
+    bodies: NDArray[np.int32]
+
+
+def camera_pose(world: World, config: CameraConfig) -> Pose:
+    """Return `X_WC` of a camera where it is mounted now."""
+    X_MC = looking_at(config.position, config.look_at, config.up)
+    return X_MC if config.mount == "fixed" else world.flange_pose() @ X_MC
+
+
+def render(world: World, matrix: Array, X_WC: Pose, part: tuple[int, int, int, int], light: Light) -> Render:
+    """Draw `part` (left, top, right, bottom [pixel]) of a camera's image at the camera's own resolution."""
+    left, top, right, bottom = part
+    width, height = right - left, bottom - top
+    # TinyRenderer samples a pixel at its lower left corner; half a pixel further is its centre.
+    sampled = (left + 0.5, top - 0.5, right + 0.5, bottom - 0.5)
+    _, _, rgba, _, segmentation = world.client.getCameraImage(
+        width,
+        height,
+        view_matrix(X_WC),
+        projection_matrix(matrix, sampled),
+        lightDirection=light.direction,
+        lightColor=light.colour,
+        lightDistance=3.0,
+        shadow=int(light.shadow),
+        lightAmbientCoeff=light.ambient,
+        lightDiffuseCoeff=light.diffuse,
+        lightSpecularCoeff=light.specular,
+        renderer=pybullet.ER_TINY_RENDERER,
+    )
+    image = np.asarray(rgba, dtype=np.uint8).reshape(height, width, 4)[..., :3]
+    return Render(
+        np.ascontiguousarray(image), np.asarray(segmentation, dtype=np.int32).reshape(height, width)
+    )
+
+
+def add_noise(image: Image, noise: NoiseConfig, rng: np.random.Generator) -> Image:
+    """Return the image with one brightness factor for the frame and read noise for every pixel."""
+    gain = rng.normal(1.0, noise.gain)
+    read = rng.standard_normal(image.shape, dtype=np.float32) * np.float32(noise.read)
+    return np.asarray(np.clip(image * np.float32(gain) + read + 0.5, 0, 255).astype(np.uint8))
+
+
+class Shadow(Protocol):
+    """Knows what the arm hides from a camera; `size` is the image's width and height [pixel]."""
+
+    def visible(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> Mask:
+        """Return `(H, W)` bool, False where the arm may hide the scene."""
+
+    def sees_table(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> bool:
+        """Tell whether the whole workspace is in view, the arm not in front of it."""
+
+
+class SimCamera:
+    """A camera of the simulated world; satisfies `executive.cell.Camera`.
+
+    Frames are numbered from 1. The noise of frame n depends on the seed and n alone.
+
+    Attributes:
+        name: Its name in the cell file.
+        config: Its section of the cell file.
+        matrix: Camera matrix `(3, 3)` [pixel].
+
+    """
+
+    def __init__(
+        self,
+        world: World,
+        name: str,
+        config: CameraConfig,
+        clock: Clock,
+        seed: int,
+        *,
+        shadow: Shadow | None = None,
+        epoch: Callable[[], int] = lambda: 0,
+        light: Light = CELL_LIGHT,
+    ) -> None:
+        """Mount the camera.
+
+        Args:
+            world: What it looks at.
+            name: Its name in the cell file.
+            config: Its section of the cell file.
+            clock: Stamps the frames.
+            seed: Seed of its noise.
+            shadow: Tells what the arm hides; by default it hides nothing, and the table is always seen.
+            epoch: Tells the ledger's count of changes of the table.
+            light: How the scene is lit.
+
+        """
+        self.name = name
+        self.config = config
+        self.matrix = camera_matrix(config.width, config.height, config.fov_deg)
+        self._world = world
+        self._clock = clock
+        self._seed = seed
+        self._shadow = shadow
+        self._epoch = epoch
+        self._light = light
+        self._frames = 0
+
+    @property
+    def scan_poses(self) -> Sequence[str]:
+        """Names of the arm poses from which it sees the table, best first."""
+        return self.config.scan_poses
+
+    def area(self, view: str) -> Box:
+        """Return the part of the image [pixel] that `view` (`table` or `full`) means."""
+        if view == "table":
+            left, top, right, bottom = self.config.table_view
+            return left, top, right, bottom
+        return 0, 0, *self._size
+
+    def sees_table(self) -> bool:
+        """Tell whether the whole workspace is in view now, the arm not in front of it."""
+        return self._shadow is None or self._shadow.sees_table(self.matrix, self._pose(), self._size)
+
+    def capture(self) -> Frame:
+        """Return a fresh frame of what the camera sees now."""
+        self._frames += 1
+        X_WC = self._pose()
+        clean = render(self._world, self.matrix, X_WC, (0, 0, *self._size), self._light).image
+        rng = np.random.default_rng([self._seed, self._frames])
+        return Frame(
+            id=self._frames,
+            camera=self.name,
+            image=add_noise(clean, self.config.noise, rng),
+            depth=None,
+            matrix=self.matrix,
+            X_WC=X_WC,
+            stamp=self._clock.now,
+            visible=self._visible(X_WC),
+            epoch=self._epoch(),
+        )
+
+    @property
+    def _size(self) -> tuple[int, int]:
+        return self.config.width, self.config.height
+
+    def _pose(self) -> Pose:
+        return camera_pose(self._world, self.config)
+
+    def _visible(self, X_WC: Pose) -> Mask:
+        if self._shadow is None:
+            return np.ones(self._size[::-1], np.bool_)
+        return self._shadow.visible(self.matrix, X_WC, self._size)

@@ -1,0 +1,141 @@
+"""The simulated work cell: arm, tool, camera and detectors around one PyBullet world."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from executive.cell import Accounts, Bin, Cell, CellOptions, ObjectClass, Target
+from executive.cell_config import BinConfig, CellConfig
+from executive.errors import InputError
+from executive.events import Emit
+from executive.ledger.ledger import ItemLedger
+from executive.motion.kinematics import Kinematics
+from executive.motion.limits import JointLimits
+from executive.motion.planner import Planner
+from executive.sim.arm import SimArm
+from executive.sim.audit import audit
+from executive.sim.camera import SimCamera
+from executive.sim.clearance import PathClearance
+from executive.sim.clock import SimClock
+from executive.sim.spawn import spawn
+from executive.sim.tool import SuctionTool
+from executive.sim.view import ArmShadow
+from executive.sim.world import STEP, World
+from executive.vision.detectors.registry import build_detectors
+from executive.vision.localize import PlaneLocalizer
+
+
+class SimCell:
+    """A cell file brought to life; implements `executive.cell.Workcell`.
+
+    Raises:
+        InputError: The cell asks for something the simulated cell cannot do yet.
+    """
+
+    def __init__(
+        self, config: CellConfig, *, seed: int, routes: Mapping[str, str], emit: Emit, options: CellOptions
+    ) -> None:
+        if config.localization != "plane":
+            raise InputError(
+                f'cell {config.cell}: localization "{config.localization}" is not available; use "plane"'
+            )
+        spawn_seed, camera_seed = (int(s.generate_state(1)[0]) for s in np.random.SeedSequence(seed).spawn(2))
+        self._config = config
+        self._routes = dict(routes)
+        self._world = World(config, gui=options.gui)
+        self._world.set_arm(np.radians(config.arm.poses_deg["home"]))
+        spawn(self._world, config, spawn_seed)
+        self._initial = {body: self._world.object_pose(body).position for body in self._world.bodies}
+        self._bins = {name: as_bin(name, bin) for name, bin in config.bins.items()}
+        clock = SimClock(self._world, STEP)
+        limits = JointLimits.of(config.arm.limits)
+        kinematics = Kinematics(config.tool.length, limits.position)
+        self._clearance = PathClearance(config)
+        self._arm = SimArm(
+            self._world, Planner(kinematics, limits, self._clearance.check), limits, config.arm
+        )
+        self._tool = SuctionTool(self._world, config.tool, emit)
+        self._ledger = ItemLedger(config.ledger, self._bins, routes, emit)
+        name, camera = next(iter(config.cameras.items()))
+        self._camera = SimCamera(
+            self._world, name, camera, clock, camera_seed, shadow=ArmShadow(self._arm, kinematics, config), epoch=lambda: self._ledger.epoch
+        )
+        self._detectors = build_detectors(config.detectors, camera=camera, clock=clock, base=options.base)
+        classes = {
+            label: ObjectClass(label, kind.height, kind.radius) for label, kind in config.objects.items()
+        }
+
+        def decided(target: Target, bin: str) -> None:
+            emit("decision", item=target.item, label=target.label, frame=target.frame, bin=bin)
+
+        self._cell = Cell(
+            clock=clock,
+            arm=self._arm,
+            tool=self._tool,
+            camera=self._camera,
+            detectors=self._detectors,
+            ledger=self._ledger,
+            operator=options.operator,
+            bins=self._bins,
+            classes=classes,
+            routes=self._routes,
+            localizer=PlaneLocalizer(classes),
+            safe_place=np.array(config.safe_place),
+            travel_height=travel_height(config),
+            descent=config.motion.descent,
+            descent_speed=config.motion.descent_speed,
+            decided=decided,
+        )
+
+    @property
+    def cell(self) -> Cell:
+        """What skills see."""
+        return self._cell
+
+    @property
+    def accounts(self) -> Accounts:
+        """The books of the cell's ledger."""
+        return self._ledger
+
+    def advance(self) -> None:
+        """Let one physics step pass."""
+        self._arm.advance()
+        self._world.step()
+        self._tool.advance()
+
+    def audit(self) -> dict[str, int]:
+        """Return what really became of the objects; for after the run only."""
+        return audit(
+            self._world,
+            self._initial,
+            self._ledger.records,
+            self._bins,
+            self._routes,
+            self._config.ledger.gate,
+        )
+
+    def close(self) -> None:
+        """End the detectors and the physics."""
+        for detector in self._detectors.values():
+            detector.close()
+        self._clearance.close()
+        self._world.close()
+
+
+def as_bin(name: str, config: BinConfig) -> Bin:
+    """Return the bin of a cell file with its drop slots spread evenly over the floor."""
+    position, size = np.array(config.position), np.array(config.size)
+    columns, rows = config.slots
+    x = position[0] + size[0] * ((np.arange(columns) + 0.5) / columns - 0.5)
+    y = position[1] + size[1] * ((np.arange(rows) + 0.5) / rows - 0.5)
+    slots = np.array([[column, row] for column in x for row in y])
+    return Bin(name, position, size, slots)
+
+
+def travel_height(config: CellConfig) -> float:
+    """Return the tool height [m] at which the highest load clears the highest wall and object."""
+    tallest = max(kind.height for kind in config.objects.values())
+    wall = max(bin.position[2] + bin.size[2] for bin in config.bins.values())
+    return max(wall, tallest) + tallest + config.motion.clearance

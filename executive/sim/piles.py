@@ -1,0 +1,47 @@
+"""Objects dropped onto table and bins until they lie still, in a small world of their own.
+
+A fresh world every time makes the outcome a function of the starting poses alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pybullet
+from pybullet_utils.bullet_client import BulletClient
+
+from executive.cell_config import CellConfig
+from executive.geometry import Pose
+from executive.sim.models import find_model, upright
+from executive.sim.world import STEP, add_bin
+
+SETTLING = 360
+"""Physics steps after which a pile is taken as it is."""
+
+
+def settle(config: CellConfig, objects: Sequence[tuple[str, Pose]]) -> list[Pose]:
+    """Return where objects (label, `X_WO`) come to lie 1.5 s after they are let go."""
+    client = BulletClient(pybullet.DIRECT)
+    try:
+        client.setGravity(0, 0, -9.81)
+        client.setTimeStep(STEP)
+        client.setPhysicsEngineParameter(deterministicOverlappingPairs=1)
+        table = client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[2, 2, 0.5])
+        client.createMultiBody(0, table, basePosition=[0, 0, -0.5])
+        for bin in config.bins.values():
+            add_bin(client, bin)
+        poses = []
+        for label, X_WO in objects:
+            model = config.objects[label]
+            X_WL = X_WO @ upright(model)
+            body = client.loadURDF(
+                str(find_model(model.urdf)), X_WL.position, X_WL.quaternion, globalScaling=model.scale
+            )
+            client.changeDynamics(body, -1, rollingFriction=0.0005, spinningFriction=0.0005)
+            X_LI = Pose.of(*client.getDynamicsInfo(body, -1)[3:5])
+            poses.append((body, (upright(model) @ X_LI).inverse()))
+        for _ in range(SETTLING):
+            client.stepSimulation()
+        return [Pose.of(*client.getBasePositionAndOrientation(body)) @ X_IO for body, X_IO in poses]
+    finally:
+        client.disconnect()

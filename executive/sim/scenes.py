@@ -1,0 +1,281 @@
+"""Random labelled scenes of a cell, for training and measuring detectors.
+
+A sample is a function of cell file, camera and seed alone. Labels are amodal and sub-pixel: the box
+of an object's whole silhouette, computed from its mesh, also where something hides a part of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from executive.cell import Box
+from executive.cell_config import CellConfig
+from executive.errors import InputError
+from executive.geometry import Array, Pose
+from executive.sim.arrangements import Arrangement, arrange, random_light, random_part, random_tint, reach
+from executive.sim.camera import Image, add_noise, camera_pose, render
+from executive.sim.models import load_mesh
+from executive.sim.silhouette import outline_box, visible_share
+from executive.sim.world import World
+from executive.vision.camera_model import camera_matrix, on_plane, project
+from executive.vision.dataset import Entry, image_path, save_image, write_annotations
+
+SIZE = 256
+"""Side of a sample's image [pixel]: what a detector is given."""
+LABELLED = 0.5
+"""Share of its silhouette that must be visible for an object to be labelled."""
+UNNOTICED = 0.15
+"""Share under which an object counts as hidden; in between it is neither labelled nor background."""
+BLOCK = 40
+"""Samples that a worker makes before it reports, with one world per cell."""
+MOST_IGNORED = 1
+"""Objects between the two that a scene may have: more would confuse training."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """A labelled image.
+
+    Attributes:
+        image: `(SIZE, SIZE, 3)` uint8, RGB.
+        labels: Class of each labelled object.
+        boxes: Their boxes `(N, 4)` [pixel] in `image`, clipped to it.
+        visible_fraction: Visible share of each `(N,)`, 0 to 1.
+        positions: Where the centre of each whole silhouette's box meets the height of the object's
+            middle `(N, 3)` [m] in the world: what a perfect detector would be localized to.
+        centres: Middle of each object's extents `(N, 3)` [m] in the world.
+        ignored: Boxes `(M, 4)` of objects too hidden to be labelled and too visible to be background.
+        part: Part of the camera's image shown (left, top, right, bottom [pixel]).
+        matrix: Camera matrix of the whole image.
+        X_WC: Where the camera was.
+
+    """
+
+    image: Image
+    labels: tuple[str, ...]
+    boxes: Array
+    visible_fraction: Array
+    positions: Array
+    centres: Array
+    ignored: Array
+    part: tuple[int, int, int, int]
+    matrix: Array
+    X_WC: Pose
+
+
+class SceneRenderer:
+    """Makes samples of one camera of a cell, reusing one world for all of them."""
+
+    def __init__(self, config: CellConfig, camera: str) -> None:
+        self._config = config
+        self._camera = config.cameras[camera]
+        self._meshes = {label: load_mesh(model) for label, model in config.objects.items()}
+        self._world = World(config)
+        self._matrix = camera_matrix(self._camera.width, self._camera.height, self._camera.fov_deg)
+
+    def sample(self, seed: int) -> Sample:
+        """Return the sample of `seed`: the first of its random scenes with few half-hidden objects."""
+        attempt = 0
+        while True:
+            sample = self._draw(np.random.default_rng([seed, attempt]))
+            if sample is not None:
+                return sample
+            attempt += 1
+
+    def close(self) -> None:
+        """Give the world back."""
+        self._world.close()
+
+    def _draw(self, rng: np.random.Generator) -> Sample | None:
+        world = self._world
+        holds = reach(world, self._camera, rng)
+        X_WC = camera_pose(world, self._camera)
+        part = random_part(self._camera, rng)
+        corners = [(x, y) for x in part[::2] for y in part[1::2]]
+        footprint = np.array([on_plane(self._matrix, X_WC, corner, 0.0)[:2] for corner in corners])
+        plain_view = part == self._camera.table_view
+        arrangement = arrange(self._config, self._meshes, footprint, plain_view, rng)
+        if holds:
+            arrangement = arrangement.holding(world.tool_pose(), self._meshes, self._config, rng)
+        bodies = [world.add_object(*item) for item in arrangement.items]
+        try:
+            world.client.changeVisualShape(world.table, -1, rgbaColor=[*random_tint(rng), 1])
+            shot = render(world, self._matrix, X_WC, part, random_light(rng))
+        finally:
+            for body in bodies:
+                world.remove_object(body)
+        image = add_noise(shot.image, self._camera.noise, rng)
+        return self._label(image, shot.bodies, bodies, arrangement, X_WC, part)
+
+    def _label(
+        self,
+        image: Image,
+        seen: NDArray[np.int32],
+        bodies: list[int],
+        arrangement: Arrangement,
+        X_WC: Pose,
+        part: tuple[int, int, int, int],
+    ) -> Sample | None:
+        """Label a render, or return None where too many objects are half hidden."""
+        labels, boxes, shares, positions, centres, ignored = [], [], [], [], [], []
+        corner, scale = np.array(part[:2], dtype=float), SIZE / (part[2] - part[0])
+        for body, (label, X_WO, _) in zip(bodies, arrangement.items, strict=True):
+            mine = seen == body
+            if not mine.any():
+                continue
+            mesh = self._meshes[label]
+            vertices = X_WO.apply(mesh.vertices)
+            pixels = project(self._matrix, X_WC, vertices)
+            share = visible_share(mesh, pixels, mine)
+            whole = outline_box(pixels)
+            box = _clipped(whole, corner, scale)
+            if share < UNNOTICED:
+                continue
+            if share < LABELLED:
+                ignored.append(box)
+                continue
+            centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+            middle = ((whole[0] + whole[2]) / 2, (whole[1] + whole[3]) / 2)
+            labels.append(label)
+            boxes.append(box)
+            shares.append(share)
+            positions.append(on_plane(self._matrix, X_WC, middle, float(centre[2])))
+            centres.append(centre)
+        if len(ignored) > MOST_IGNORED:
+            return None
+        return Sample(
+            image=_resized(image),
+            labels=tuple(labels),
+            boxes=np.array(boxes).reshape(-1, 4),
+            visible_fraction=np.array(shares),
+            positions=np.array(positions).reshape(-1, 3),
+            centres=np.array(centres).reshape(-1, 3),
+            ignored=np.array(ignored).reshape(-1, 4),
+            part=part,
+            matrix=self._matrix,
+            X_WC=X_WC,
+        )
+
+
+def render_sample(config: CellConfig, camera_name: str, seed: int) -> Sample:
+    """Return the sample of `seed` as seen by a camera of a cell."""
+    renderer = SceneRenderer(config, camera_name)
+    try:
+        return renderer.sample(seed)
+    finally:
+        renderer.close()
+
+
+def generate(
+    configs: Mapping[str, CellConfig],
+    out: Path,
+    *,
+    images: int,
+    seed: int,
+    layout: str,
+    workers: int,
+    valid: float,
+    progress: Callable[[int, int], None],
+) -> None:
+    """Write a dataset of random scenes, the cells taking turns; the last share of it is for validation.
+
+    Args:
+        configs: Cells by name.
+        out: Folder of the dataset.
+        images: How many images.
+        seed: Seed; with the same cells it gives the same dataset, whatever the number of workers.
+        layout: `coco` or `yolo`.
+        workers: Processes that render.
+        valid: Share of the images that goes into the split `valid`, 0 to 1.
+        progress: Told (images made, images in all) now and then.
+
+    Raises:
+        InputError: The layout is unknown, the cells differ in their classes, or a file cannot be written.
+
+    """
+    cells = list(configs.values())
+    classes = list(cells[0].objects)
+    if any(list(cell.objects) != classes for cell in cells):
+        raise InputError(
+            "the cells of one dataset must have the same classes in the same order; "
+            + "; ".join(f"{name} has {', '.join(cell.objects)}" for name, cell in configs.items())
+        )
+    first_valid = images - round(images * valid)
+    splits = ["train" if number < first_valid else "valid" for number in range(images)]
+    write_annotations(out, layout, [], classes)
+    entries: dict[int, Entry] = {}
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        blocks = [
+            pool.submit(_render_block, cells, out, layout, seed, first, splits[first : first + BLOCK])
+            for first in range(0, images, BLOCK)
+        ]
+        for block in as_completed(blocks):
+            entries.update(block.result())
+            progress(len(entries), images)
+    write_annotations(out, layout, [entries[number] for number in sorted(entries)], classes)
+
+
+def _render_block(
+    cells: Sequence[CellConfig], out: Path, layout: str, seed: int, first: int, splits: Sequence[str]
+) -> dict[int, Entry]:
+    """Render and save the images from number `first` on, one per split; runs in a process of its own."""
+    cv2.setNumThreads(1)
+    cameras = [next(iter(cell.cameras)) for cell in cells]
+    renderers = [SceneRenderer(cell, camera) for cell, camera in zip(cells, cameras, strict=True)]
+    entries = {}
+    for number, split in enumerate(splits, first):
+        turn = number % len(cells)
+        sample_seed = int(np.random.SeedSequence([seed, number]).generate_state(1, np.uint64)[0])
+        sample = renderers[turn].sample(sample_seed)
+        file = f"{cameras[turn]}_{number:06d}.jpg"
+        save_image(image_path(out, layout, split, file), sample.image)
+        entries[number] = _entry(sample, split, file, cameras[turn])
+    for renderer in renderers:
+        renderer.close()
+    return entries
+
+
+def _entry(sample: Sample, split: str, file: str, camera: str) -> Entry:
+    """Return the dataset entry of a sample, with what a localization can be measured against."""
+    return Entry(
+        split=split,
+        file=file,
+        size=(SIZE, SIZE),
+        labels=sample.labels,
+        boxes=_tuples(sample.boxes),
+        ignored=_tuples(sample.ignored),
+        truth={
+            "camera": camera,
+            "part": sample.part,
+            "matrix": sample.matrix.tolist(),
+            "X_WC": sample.X_WC.rounded(9),
+            "labels": sample.labels,
+            "positions": sample.positions.round(6).tolist(),
+            "centres": sample.centres.round(6).tolist(),
+            "visible_fraction": sample.visible_fraction.round(4).tolist(),
+        },
+    )
+
+
+def _tuples(boxes: Array) -> tuple[Box, ...]:
+    return tuple((float(left), float(top), float(right), float(bottom)) for left, top, right, bottom in boxes)
+
+
+def _clipped(box: Box, corner: Array, scale: float) -> list[float]:
+    """Return a box of the whole image in a sample's pixels, cut at its edges."""
+    points = (np.array(box).reshape(2, 2) - corner) * scale
+    return [float(value) for value in points.clip(0, SIZE).ravel()]
+
+
+def _resized(image: Image) -> Image:
+    if image.shape[0] == SIZE:
+        return image
+    return np.asarray(cv2.resize(image, (SIZE, SIZE), interpolation=cv2.INTER_AREA), dtype=np.uint8)

@@ -1,0 +1,195 @@
+"""The simulated world of a cell: arm with tool, table, bins and loose objects in PyBullet.
+
+The world frame W stands at the foot of the arm, on the table top. Rebuilding a world from the same
+cell file and adding the same objects in the same order gives the same bits.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pybullet
+from pybullet_utils.bullet_client import BulletClient
+
+from executive.cell_config import BinConfig, CellConfig
+from executive.geometry import Array, Pose
+from executive.sim.models import find_model, upright
+
+STEP = 1 / 240
+"""Length of a physics step [s]."""
+TABLE_HEIGHT = 0.625
+"""Height of the top of pybullet_data's table over its feet [m]."""
+TABLE_CENTRE = (0.40, 0.0)
+"""Centre of the table top [m]; it is 1.0 m long along x and 1.5 m along y."""
+FLANGE_OFFSET = 0.045
+"""From the origin of link 7 to the flange along its z axis [m]."""
+TOOL_RADIUS = 0.012
+"""Radius of the tool's body [m]."""
+LIP_LENGTH = 0.015
+"""Length of the thin part at the tool's end [m]."""
+CYLINDER_MARGIN = 0.001
+"""What Bullet adds all around a URDF's cylinder when it collides [m]."""
+TOOL_MASS = 0.1
+"""Mass of the tool [kg]."""
+BIN_THICKNESS = 0.005
+"""Thickness of a bin's floor and walls [m]."""
+
+
+class World:
+    """A PyBullet world with everything a cell file describes, arm at `home`, no objects yet.
+
+    Attributes:
+        client: The connection to the physics server.
+        arm: Body of the arm, fixed at the origin.
+        flange: Index of the arm's link 7; the flange is 0.045 m along its z axis.
+        tool: Index of the tool's link, whose frame is the flange's.
+        table, plane: Bodies of the table and of the floor under it.
+        bins: Bodies of each bin.
+        bodies: Label of every loose object, by body.
+        steps: Physics steps made so far.
+
+    """
+
+    flange = 6
+    tool = 7
+
+    def __init__(self, config: CellConfig, *, gui: bool = False) -> None:
+        self.config = config
+        self.client = BulletClient(pybullet.GUI if gui else pybullet.DIRECT)
+        self.client.setGravity(0, 0, -9.81)
+        self.client.setTimeStep(STEP)
+        self.client.setPhysicsEngineParameter(deterministicOverlappingPairs=1)
+        self.plane = self.client.loadURDF(str(find_model("plane.urdf")), [0, 0, -TABLE_HEIGHT])
+        self.table = self.client.loadURDF(
+            str(find_model("table/table.urdf")),
+            [*TABLE_CENTRE, -TABLE_HEIGHT],
+            self.client.getQuaternionFromEuler([0, 0, np.pi / 2]),
+            useFixedBase=True,
+        )
+        self.arm = self._load_arm()
+        self.bins = {name: (add_bin(self.client, bin),) for name, bin in config.bins.items()}
+        self.bodies: dict[int, str] = {}
+        self.steps = 0
+        self.set_arm(np.radians(config.arm.poses_deg["home"]))
+
+    def add_object(self, label: str, X_WO: Pose, colour: Sequence[float]) -> int:
+        """Put an object of class `label` at `X_WO` (z up as it stands) and return its body."""
+        model = self.config.objects[label]
+        X_WL = X_WO @ upright(model)
+        body = self.client.loadURDF(
+            str(find_model(model.urdf)), X_WL.position, X_WL.quaternion, globalScaling=model.scale
+        )
+        # Without the models' textures: these would tell the classes apart, and darken the colour.
+        self.client.changeVisualShape(body, -1, textureUniqueId=-1, rgbaColor=[*colour, 1])
+        # Without these a ball set down at rest creeps, and a released one never stops.
+        self.client.changeDynamics(body, -1, rollingFriction=0.0005, spinningFriction=0.0005)
+        self.bodies[body] = label
+        return int(body)
+
+    def remove_object(self, body: int) -> None:
+        """Take a loose object out of the world."""
+        del self.bodies[body]
+        self.client.removeBody(body)
+
+    def object_pose(self, body: int) -> Pose:
+        """Return `X_WO` of a loose object, the frame that `add_object` takes."""
+        X_WI = Pose.of(*self.client.getBasePositionAndOrientation(body))
+        X_LI = Pose.of(*self.client.getDynamicsInfo(body, -1)[3:5])
+        return X_WI @ X_LI.inverse() @ upright(self.config.objects[self.bodies[body]]).inverse()
+
+    def place_object(self, body: int, X_WO: Pose) -> None:
+        """Move a loose object to `X_WO`, at rest."""
+        X_LI = Pose.of(*self.client.getDynamicsInfo(body, -1)[3:5])
+        X_WI = X_WO @ upright(self.config.objects[self.bodies[body]]) @ X_LI
+        self.client.resetBasePositionAndOrientation(body, X_WI.position, X_WI.quaternion)
+
+    def set_arm(self, q: Sequence[float] | Array) -> None:
+        """Put the arm at joint positions `q` `(7,)` [rad], at rest, whatever is in the way."""
+        for joint, angle in enumerate(q):
+            self.client.resetJointState(self.arm, joint, angle)
+
+    def flange_pose(self) -> Pose:
+        """Return `X_WF`, the pose of the flange."""
+        state = self.client.getLinkState(self.arm, self.flange, computeForwardKinematics=True)
+        return Pose.of(*state[4:6]) @ Pose.of([0, 0, FLANGE_OFFSET])
+
+    def tool_pose(self) -> Pose:
+        """Return `X_WT`, the pose of the tool centre point: the middle of the cup's lip."""
+        return self.flange_pose() @ Pose.of([0, 0, self.config.tool.length])
+
+    def step(self) -> None:
+        """Advance the physics by 1/240 s."""
+        self.client.stepSimulation()
+        self.steps += 1
+
+    def close(self) -> None:
+        """Give the physics server back; the world cannot be used afterwards."""
+        self.client.disconnect()
+
+    def _load_arm(self) -> int:
+        """Load the arm with the tool as one more fixed link: no constraint whose error could drift.
+
+        Bodies do not collide with themselves (PyBullet's default), so the tool never fights the wrist.
+        """
+        path = find_model(self.config.arm.urdf)
+        text = path.read_text().replace('filename="meshes/', f'filename="{path.parent}/meshes/')
+        text = text.replace("</robot>", _tool_link(self.config.tool.length, self.config.tool.cup_radius))
+        with tempfile.TemporaryDirectory() as folder:
+            generated = Path(folder) / "arm_with_tool.urdf"
+            generated.write_text(text)
+            return int(self.client.loadURDF(str(generated), useFixedBase=True))
+
+
+def add_bin(client: BulletClient, bin: BinConfig) -> int:
+    """Build floor and walls as one static body standing at the bin's position, and return it."""
+    (length, width, height), t = bin.size, BIN_THICKNESS
+    boxes = [
+        ((length / 2 + t, width / 2 + t, t / 2), (0, 0, t / 2)),
+        ((t / 2, width / 2 + t, height / 2), ((length + t) / 2, 0, height / 2)),
+        ((t / 2, width / 2 + t, height / 2), (-(length + t) / 2, 0, height / 2)),
+        ((length / 2, t / 2, height / 2), (0, (width + t) / 2, height / 2)),
+        ((length / 2, t / 2, height / 2), (0, -(width + t) / 2, height / 2)),
+    ]
+    shape = {
+        "shapeTypes": [pybullet.GEOM_BOX] * len(boxes),
+        "halfExtents": [half for half, _ in boxes],
+    }
+    places = [place for _, place in boxes]
+    return int(
+        client.createMultiBody(
+            baseMass=0,
+            baseCollisionShapeIndex=client.createCollisionShapeArray(**shape, collisionFramePositions=places),
+            baseVisualShapeIndex=client.createVisualShapeArray(
+                **shape, visualFramePositions=places, rgbaColors=[[*bin.colour, 1]] * len(boxes)
+            ),
+            basePosition=bin.position,
+        )
+    )
+
+
+def _tool_link(length: float, cup_radius: float) -> str:
+    """Return the URDF text of the tool, from the flange to the lip, and the closing tag."""
+    body = length - LIP_LENGTH
+    parts = [(body, TOOL_RADIUS, body / 2), (LIP_LENGTH, cup_radius, length - LIP_LENGTH / 2)]
+    shapes = "".join(
+        f'<{kind}><origin xyz="0 0 {z}"/><geometry>'
+        f'<cylinder length="{size - 2 * less}" radius="{radius - less}"/></geometry>'
+        + ('<material name="Grey"/>' if kind == "visual" else "")
+        + f"</{kind}>"
+        for size, radius, z in parts
+        for kind, less in (("visual", 0.0), ("collision", CYLINDER_MARGIN))
+    )
+    return f"""
+  <link name="tool">
+    <inertial><origin xyz="0 0 {length / 2}"/><mass value="{TOOL_MASS}"/>
+      <inertia ixx="1e-4" ixy="0" ixz="0" iyy="1e-4" iyz="0" izz="1e-5"/></inertial>
+    {shapes}
+  </link>
+  <joint name="tool_joint" type="fixed">
+    <parent link="lbr_iiwa_link_7"/><child link="tool"/><origin xyz="0 0 {FLANGE_OFFSET}"/>
+  </joint>
+</robot>
+"""

@@ -1,0 +1,116 @@
+"""The pinhole camera: where a point in the world appears in an image, and back.
+
+Camera frames follow OpenCV (z along the optical axis, x to the right, y down). Image coordinates are
+continuous: pixel i covers [i, i + 1), so the principal point of a centred camera is (W / 2, H / 2).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from executive.cell import Box
+from executive.geometry import Array, Pose
+
+NEAR, FAR = 0.02, 5.0
+"""Clipping planes of rendered cameras [m]."""
+
+
+def camera_matrix(width: int, height: int, fov_deg: float) -> Array:
+    """Return the camera matrix `(3, 3)` [pixel] of a centred camera with square pixels.
+
+    Args:
+        width: Image width [pixel].
+        height: Image height [pixel].
+        fov_deg: Vertical field of view [degree].
+
+    """
+    focal = height / 2 / math.tan(math.radians(fov_deg) / 2)
+    return np.array([[focal, 0.0, width / 2], [0.0, focal, height / 2], [0.0, 0.0, 1.0]])
+
+
+def looking_at(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> Pose:
+    """Return the pose of a camera at `position` whose optical axis passes through `target`.
+
+    `up` `(3,)` is the direction that the top of the image shows; it need not be square to the axis.
+
+    Raises:
+        ValueError: The three do not determine a pose.
+
+    """
+    origin = np.asarray(position, dtype=float)
+    axis = np.asarray(target, dtype=float) - origin
+    right = np.cross(axis, np.asarray(up, dtype=float))
+    if np.linalg.norm(right) < 1e-9:
+        raise ValueError(
+            f"a camera at {origin.tolist()} with axis {axis.tolist()} cannot have "
+            f"{np.asarray(up, dtype=float).tolist()} as its upward direction: "
+            "look_at must differ from position, and up must not lie along the axis"
+        )
+    z = axis / np.linalg.norm(axis)
+    x = right / np.linalg.norm(right)
+    return Pose(np.column_stack([x, np.cross(z, x), z]), origin)
+
+
+def project(matrix: Array, X_WC: Pose, points: ArrayLike) -> Array:
+    """Return the image coordinates `(..., 2)` [pixel] of points `(..., 3)` [m] in the world.
+
+    The points must lie in front of the camera.
+    """
+    p = X_WC.inverse().apply(points) @ matrix.T
+    return np.asarray(p[..., :2] / p[..., 2:])
+
+
+def pixel_ray(matrix: Array, X_WC: Pose, pixel: ArrayLike) -> Array:
+    """Return the direction `(3,)` in the world, of length 1, in which the camera sees `pixel` `(2,)`."""
+    u, v = np.asarray(pixel, dtype=float)
+    direction = X_WC.rotation @ np.linalg.solve(matrix, np.array([u, v, 1.0]))
+    return np.asarray(direction / np.linalg.norm(direction))
+
+
+def on_plane(matrix: Array, X_WC: Pose, pixel: ArrayLike, z: float) -> Array:
+    """Return the point `(3,)` [m] at height `z` [m] in the world that appears at `pixel` `(2,)`.
+
+    Raises:
+        ValueError: The camera does not look towards that height there.
+
+    """
+    ray = pixel_ray(matrix, X_WC, pixel)
+    drop = z - X_WC.position[2]
+    if ray[2] * drop <= 0:
+        raise ValueError(
+            f"pixel {np.asarray(pixel, dtype=float).tolist()} of a camera {X_WC.position[2]:.3f} m high "
+            f"looks away from the plane z = {z:.3f} m; only pixels whose ray meets it can be placed on it"
+        )
+    return np.asarray(X_WC.position + ray * (drop / ray[2]))
+
+
+def view_matrix(X_WC: Pose) -> tuple[float, ...]:
+    """Return OpenGL's view matrix, 16 numbers column by column, as PyBullet takes it."""
+    X_CW = X_WC.inverse()
+    view = np.eye(4)
+    view[:3, :3], view[:3, 3] = X_CW.rotation, X_CW.position
+    return tuple((np.diag([1.0, -1.0, -1.0, 1.0]) @ view).T.ravel().tolist())
+
+
+def projection_matrix(matrix: Array, part: Box, near: float = NEAR, far: float = FAR) -> tuple[float, ...]:
+    """Return OpenGL's projection matrix, 16 numbers column by column, of a part of an image.
+
+    A renderer that uses it draws just `part` (left, top, right, bottom [pixel]) of the camera's image,
+    with the pixels the full image would have there. `near` and `far` are the clipping planes [m].
+    """
+    (left, top), (right, bottom) = (
+        ((x - matrix[0, 2]) / matrix[0, 0] * near, (matrix[1, 2] - y) / matrix[1, 1] * near)
+        for x, y in (part[:2], part[2:])
+    )
+    projection = np.array(
+        [
+            [2 * near / (right - left), 0.0, (right + left) / (right - left), 0.0],
+            [0.0, 2 * near / (top - bottom), (top + bottom) / (top - bottom), 0.0],
+            [0.0, 0.0, -(far + near) / (far - near), -2 * far * near / (far - near)],
+            [0.0, 0.0, -1.0, 0.0],
+        ]
+    )
+    return tuple(projection.T.ravel().tolist())
