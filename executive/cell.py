@@ -7,14 +7,15 @@ blocks: a skill asks, yields, and looks again at the next tick.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from executive.events import Emit
 from executive.geometry import Array, Pose
 
 Box = tuple[float, float, float, float]
@@ -226,7 +227,10 @@ class Arm(Protocol):
         """
 
     def plan_to_pose(self, name: str) -> Motion:
-        """Return a motion to the named joint pose of the cell file; raises as `plan` does."""
+        """Return a motion straight up to travel height, then to the named joint pose of the cell file.
+
+        Raises as `plan` does.
+        """
 
     def start(self, motion: Motion) -> None:
         """Begin to follow `motion`; the arm must be at rest where it starts."""
@@ -431,11 +435,7 @@ class Accounts(Protocol):
 
 
 class Workcell(Protocol):
-    """What the runtime drives: a cell together with the world it acts in.
-
-    A kind of cell registers a class with these members and a constructor
-    `(config, *, seed, routes, emit, options)` under the entry-point group `executive.cells`.
-    """
+    """What the runtime drives: a cell together with the world it acts in."""
 
     @property
     def cell(self) -> Cell:
@@ -468,3 +468,19 @@ class CellOptions:
     operator: Operator
     base: Path
     gui: bool = False
+
+
+KeyPath = tuple[str | int, ...]
+"""Keys that lead to a value in a cell file, outermost first."""
+
+
+class CellKind(Protocol):
+    """A class that makes work cells; found by its name in the entry-point group `executive.cells`."""
+
+    def __call__(
+        self, config: Any, *, seed: int, routes: Mapping[str, str], emit: Emit, options: CellOptions
+    ) -> Workcell:
+        """Return a cell made from a cell file (`executive.cell_config.CellConfig`)."""
+
+    def check(self, config: Any) -> Iterable[tuple[KeyPath, str]]:
+        """Return what is wrong with a cell file beyond its form: the key it is about, and a sentence."""

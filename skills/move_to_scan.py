@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from executive.cell import Cell, Steps
 from executive.errors import Blocked, Unreachable
-from executive.moving import follow, settle, travel
+from executive.moving import follow, settle
 from executive.skill import Skill, param
 
 
@@ -20,6 +20,7 @@ class MoveToScan(Skill):
     pose: str = param(
         "auto",
         refers="pose",
+        choices=("auto", "next"),
         doc="an arm pose of the cell; `auto`: the camera's first, if needed; `next`: its next one",
     )
     reasons: ClassVar = ("unreachable", "blocked")
@@ -27,14 +28,11 @@ class MoveToScan(Skill):
     moves: ClassVar = True
 
     def run(self, cell: Cell) -> Steps:
-        """Lift the tool, then go to the pose."""
+        """Go to the pose."""
         yield from settle(cell.arm)
         if self.pose == "auto" and cell.camera.sees_table():
             return
         try:
-            here = cell.arm.tool_pose.position
-            if here[2] < cell.travel_height - 1e-3:
-                yield from follow(cell.arm, cell.arm.plan(travel(cell, here)[:1]))
             yield from follow(cell.arm, cell.arm.plan_to_pose(self._name(cell)))
         except Unreachable as error:
             raise self.failed("unreachable", str(error)) from error

@@ -86,6 +86,7 @@ class ItemLedger:
                     record.item, record.label, place, detection.confidence, frame.id, frame.epoch, frame.stamp
                 )
             )
+        self._emit_look(detections, positions)
         seen = {target.item for target in targets}
         for record in records:
             if record.item not in seen and detections.searched(record.position):
@@ -242,6 +243,21 @@ class ItemLedger:
             there = sum(r.bin == bin and r.label == record.label for r in self._records.values())
             if shown[record.label, bin] > there:
                 self.placed(record.item, bin)
+
+    def _emit_look(self, detections: Detections, positions: Sequence[Array]) -> None:
+        frame = detections.frame
+        found = [
+            {
+                "label": detection.label,
+                "confidence": round(detection.confidence, 4),
+                "box": [round(float(edge), 2) for edge in detection.box],
+                "position": [round(float(value), 4) for value in position],
+            }
+            for detection, position in zip(detections.found, positions, strict=True)
+        ]
+        self._emit(
+            "look", frame=frame.id, camera=frame.camera, view=detections.view, found=found, frame_object=frame
+        )
 
     def _report(self, record: Record) -> None:
         self._emit("item", **_row(record))

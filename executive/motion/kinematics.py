@@ -33,6 +33,7 @@ _FLIPPED[:, [4, 6]] += (BRANCHES[:, 2:] < 0) * math.pi
 _SIGNS = np.ones((8, 7))
 _SIGNS[:, [1, 3, 5]] = BRANCHES
 _IS_Z = (True, False, True, False, True, False, True)
+_ROUNDING = 1e-9  # [m]
 
 
 def wrapped(angle: Array) -> Array:
@@ -165,9 +166,9 @@ class Kinematics:
 
     def _distance(self, X_WT: Pose, line: Array) -> float:
         distance = float(np.linalg.norm(line))
-        if distance > self.farthest:
+        if distance > self.farthest + _ROUNDING:
             how = f"{distance - self.farthest:.3f} m farther than the arm is long ({self.farthest:.2f} m)"
-        elif distance < self.nearest:
+        elif distance < self.nearest - _ROUNDING:
             how = f"{self.nearest - distance:.3f} m nearer than joint 4 can fold ({self.nearest:.2f} m)"
         else:
             return distance
@@ -179,11 +180,8 @@ class Kinematics:
     def _chain(self, qs: Array) -> tuple[Array, Array, Array]:
         """Return rotations `(N, 8, 3, 3)` and positions `(N, 8, 3)` of joints and tool, axes `(N, 7, 3)`."""
         count = len(qs)
-        rotations, axes, positions = (
-            np.empty((count, 8, 3, 3)),
-            np.empty((count, 7, 3)),
-            np.empty((count, 8, 3)),
-        )
+        rotations, positions = np.empty((count, 8, 3, 3)), np.empty((count, 8, 3))
+        axes = np.empty((count, 7, 3))
         R = np.broadcast_to(np.eye(3), (count, 3, 3))
         p = np.broadcast_to(np.array([0.0, 0.0, SHOULDER_HEIGHT]), (count, 3))
         lengths = {3: UPPER_ARM, 5: FOREARM}

@@ -121,7 +121,7 @@ def _checked(waypoints: ArrayLike) -> Array:
     array = np.array(waypoints, dtype=float)
     if array.ndim != 2 or array.shape[0] < 2 or array.shape[1] != JOINTS:
         raise Fault(
-            f"A trajectory needs at least two waypoints of {JOINTS} joints; it got shape {array.shape}."
+            f"A trajectory needs two waypoints or more of {JOINTS} joints, not the shape {array.shape}."
         )
     if not np.all(np.isfinite(array)):
         row, joint = np.argwhere(~np.isfinite(array))[0]

@@ -9,16 +9,14 @@ import numpy as np
 import pybullet
 
 from executive.cell import Motion, ObjectClass, Via
-from executive.cell_config import ArmConfig, CellConfig
+from executive.cell_config import ArmConfig
 from executive.errors import Fault, Unreachable
 from executive.geometry import Array, Pose
-from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
 from executive.motion.stop import brake
 from executive.motion.strokes import UPRIGHT
 from executive.motion.trajectory import JOINTS, Trajectory
-from executive.sim.clearance import PathClearance
 from executive.sim.world import STEP, World
 
 TORQUES = (320.0, 320.0, 176.0, 176.0, 110.0, 40.0, 40.0)
@@ -64,18 +62,6 @@ class SimArm:
         self._fault: str | None = None
         self._command = self.q
         self._send()
-
-    @classmethod
-    def of(cls, world: World, config: CellConfig) -> SimArm:
-        """Return the driver of a world's arm with the planner that the cell file asks for."""
-        limits = JointLimits.of(config.arm.limits)
-        kinematics = Kinematics(config.tool.length, limits.position)
-        planner = Planner(kinematics, limits, PathClearance(config).check)
-        heights = [
-            *(bin.size[2] for bin in config.bins.values()),
-            *(o.height for o in config.objects.values()),
-        ]
-        return cls(world, planner, limits, config.arm, max(heights) + config.motion.clearance)
 
     @property
     def q(self) -> Array:
@@ -148,7 +134,7 @@ class SimArm:
 
     def advance(self) -> None:
         """Send the command for the coming physics step; called once before each."""
-        if self._fault is None:
+        if self._fault is None and self._braking is None:
             self._require_near(self._command, TRACKING_TOLERANCE, "The command is")
             if self._fault is not None:
                 self.stop()
@@ -189,9 +175,7 @@ class SimArm:
         self._raise_fault()
         if self._motion is not None:
             left = self._motion.duration - self._time
-            raise Fault(
-                f"The arm was asked to {wish} while it moves ({left:.2f} s to go); wait for `at_rest`."
-            )
+            raise Fault(f"The arm was asked to {wish} while moving ({left:.2f} s to go); wait for `at_rest`.")
 
     def _raise_fault(self) -> None:
         if self._fault is not None:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from executive.cell import Accounts, Bin, Cell, CellOptions, ObjectClass, Target
-from executive.cell_config import BinConfig, CellConfig
+from executive.cell import Accounts, Cell, CellOptions, KeyPath, ObjectClass, Target
+from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.events import Emit
 from executive.ledger.ledger import ItemLedger
@@ -19,6 +19,8 @@ from executive.sim.audit import audit
 from executive.sim.camera import SimCamera
 from executive.sim.clearance import PathClearance
 from executive.sim.clock import SimClock
+from executive.sim.layout import as_bin, travel_height
+from executive.sim.reach import out_of_reach
 from executive.sim.spawn import spawn
 from executive.sim.tool import SuctionTool
 from executive.sim.view import ArmShadow
@@ -60,7 +62,13 @@ class SimCell:
         self._ledger = ItemLedger(config.ledger, self._bins, routes, emit)
         name, camera = next(iter(config.cameras.items()))
         self._camera = SimCamera(
-            self._world, name, camera, clock, camera_seed, shadow=ArmShadow(self._arm, kinematics, config), epoch=lambda: self._ledger.epoch
+            self._world,
+            name,
+            camera,
+            clock,
+            camera_seed,
+            shadow=ArmShadow(self._arm, kinematics, config),
+            epoch=lambda: self._ledger.epoch,
         )
         self._detectors = build_detectors(config.detectors, camera=camera, clock=clock, base=options.base)
         classes = {
@@ -88,6 +96,11 @@ class SimCell:
             descent_speed=config.motion.descent_speed,
             decided=decided,
         )
+
+    @staticmethod
+    def check(config: CellConfig) -> Iterable[tuple[KeyPath, str]]:
+        """Return what this kind of cell cannot do of a cell file: places out of the arm's reach."""
+        return out_of_reach(config)
 
     @property
     def cell(self) -> Cell:
@@ -122,20 +135,3 @@ class SimCell:
             detector.close()
         self._clearance.close()
         self._world.close()
-
-
-def as_bin(name: str, config: BinConfig) -> Bin:
-    """Return the bin of a cell file with its drop slots spread evenly over the floor."""
-    position, size = np.array(config.position), np.array(config.size)
-    columns, rows = config.slots
-    x = position[0] + size[0] * ((np.arange(columns) + 0.5) / columns - 0.5)
-    y = position[1] + size[1] * ((np.arange(rows) + 0.5) / rows - 0.5)
-    slots = np.array([[column, row] for column in x for row in y])
-    return Bin(name, position, size, slots)
-
-
-def travel_height(config: CellConfig) -> float:
-    """Return the tool height [m] at which the highest load clears the highest wall and object."""
-    tallest = max(kind.height for kind in config.objects.values())
-    wall = max(bin.position[2] + bin.size[2] for bin in config.bins.values())
-    return max(wall, tallest) + tallest + config.motion.clearance

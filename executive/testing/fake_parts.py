@@ -90,7 +90,8 @@ class FakeArm:
             Unreachable: A via is farther than `REACH` from the base.
         """
         del carrying
-        path, here = [], self._tip
+        path: list[Array] = []
+        here = self._tip
         for via in vias:
             distance = float(np.linalg.norm(via.position))
             if distance > REACH:

@@ -177,7 +177,7 @@ def test_every_change_is_told_and_the_books_balance(bench: Bench) -> None:
     bench.ledger.close()
     count = bench.ledger.balance()
     assert count["seen"] == count["placed"] + count["rejected"] + count["lost"] == 3
-    states = [data["state"] for kind, data in bench.events if data["item"] == "cube-1"]
+    states = [data["state"] for kind, data in bench.events if data.get("item") == "cube-1"]
     assert states == ["seen", "seen", "held", "placed"]
 
 

@@ -1,0 +1,162 @@
+"""One mission, many seeds: each run in a process and a run directory of its own."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from executive.campaign.statistics import spread, wilson
+from executive.record.result import FATES, PLACES, ledger_agrees
+
+Result = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run to do: a mission with one seed."""
+
+    mission: str
+    seed: int
+    overrides: Mapping[str, str]
+    runs: Path
+    frames: bool
+
+
+def sweep(
+    mission: str,
+    seeds: Sequence[int],
+    *,
+    overrides: Mapping[str, str],
+    runs: Path,
+    workers: int = 2,
+    frames: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+    work: Callable[[Job], Result] | None = None,
+) -> list[Result]:
+    """Run `mission` once for every seed and return the results in the order of the seeds.
+
+    A run that breaks its process is a result too, with status `FAULT`. After Ctrl-C no further run
+    begins, those under way end, and what there is is returned.
+
+    Args:
+        mission: File or shipped name.
+        seeds: One run each.
+        overrides: Params of the mission and keys of the cell with other values, as given with `--set`.
+        runs: Folder of the run directories.
+        workers: How many processes run at a time.
+        frames: Whether the runs save the pictures behind their decisions; a failing seed can be
+            repeated with them, so a sweep does without.
+        progress: Told how many runs of how many are done.
+        work: What does one job, in a process of its own.
+
+    """
+    jobs = [Job(mission, seed, dict(overrides), runs, frames) for seed in seeds]
+    results: dict[int, Result] = {}
+    # A fork would share the simulator's and the inference library's threads and locks.
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_ignore_interrupts) as pool:
+        futures: dict[Future[Result], Job] = {pool.submit(work or run_job, job): job for job in jobs}
+        with _cancelling(futures):
+            for future in as_completed(futures):
+                if future.cancelled():
+                    continue
+                job = futures[future]
+                error = future.exception()
+                results[job.seed] = future.result() if error is None else _broken(job, error)
+                if progress is not None:
+                    progress(len(results), len(jobs))
+    return [results[seed] for seed in seeds if seed in results]
+
+
+def run_job(job: Job) -> Result:
+    """Do one run and return its result object."""
+    from executive.mission.load import load_mission
+    from executive.record.recorded_run import recorded_run
+    from executive.skill import discover
+
+    skills = discover()
+    loaded = load_mission(job.mission, skills, job.overrides)
+    return recorded_run(loaded, skills, seed=job.seed, runs=job.runs, frames=job.frames)
+
+
+def summarize(results: Sequence[Result]) -> dict[str, Any]:
+    """Return the figures of a sweep: objects sorted right, disagreements, times, and every failure."""
+    audits = [result["audit"] for result in results if result["audit"] is not None]
+    right = sum(audit["right"] for audit in audits)
+    total = sum(audit[place] for audit in audits for place in ("right", "wrong_bin", "left", "elsewhere"))
+    low, high = wilson(right, total)
+    return {
+        "runs": len(results),
+        "succeeded": sum(result["status"] == "SUCCESS" for result in results),
+        "objects": {
+            "right": right,
+            "total": total,
+            "share": round(right / total, 6) if total else 0.0,
+            "interval_95": [round(low, 6), round(high, 6)],
+        },
+        "disagreements": [
+            {key: result[key] for key in ("seed", "items", "audit", "run")}
+            for result in results
+            if not ledger_agrees(result)
+        ],
+        "robot_time_s": spread([result["robot_time_s"] for result in results]),
+        "wall_time_s": spread([result["wall_time_s"] for result in results]),
+        "failures": [
+            {key: result[key] for key in ("seed", "status", "reason", "message", "node", "run")}
+            for result in results
+            if result["status"] != "SUCCESS"
+        ],
+    }
+
+
+def _broken(job: Job, error: BaseException) -> Result:
+    """Return the result of a run that left none."""
+    return {
+        "mission": job.mission,
+        "status": "FAULT",
+        "reason": "fault",
+        "message": f"{type(error).__name__}: {error}",
+        "node": "",
+        "seed": job.seed,
+        "items": dict.fromkeys(FATES, 0),
+        "audit": dict.fromkeys(PLACES, 0),
+        "ticks": 0,
+        "robot_time_s": 0.0,
+        "wall_time_s": 0.0,
+        "trace": "",
+        "run": "",
+    }
+
+
+def _ignore_interrupts() -> None:
+    """Leave Ctrl-C, which reaches every process of the terminal, to the parent alone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@contextmanager
+def _cancelling(futures: Mapping[Future[Result], Job]) -> Iterator[None]:
+    """At the first Ctrl-C begin no further run; at the second end those under way, too."""
+
+    def cancel(number: int, frame: Any) -> None:
+        del number, frame
+        signal.signal(signal.SIGINT, end)
+        for future in futures:
+            future.cancel()
+
+    def end(number: int, frame: Any) -> None:
+        del number, frame
+        for process in multiprocessing.active_children():
+            process.terminate()
+        raise KeyboardInterrupt
+
+    previous = signal.signal(signal.SIGINT, cancel)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)

@@ -1,0 +1,50 @@
+"""Which cell file an argument means."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from executive.cell_config import CellConfig
+
+
+def load_cells(names: tuple[str, ...]) -> dict[str, CellConfig]:
+    """Return the cells by name; each argument is a path or the name of a shipped cell.
+
+    Raises:
+        InputError: There is no such cell, two have one name, or something is wrong with a file.
+
+    """
+    from executive.errors import InputError
+    from executive.mission.cell_file import load_cell
+
+    cells: dict[str, CellConfig] = {}
+    for name in names:
+        config = load_cell(find_cell(name))
+        if config.cell in cells:
+            raise InputError(f'two of the cell files are called "{config.cell}"; give each a name of its own')
+        cells[config.cell] = config
+    return cells
+
+
+def find_cell(name: str) -> Path:
+    """Return the cell file that `name` means.
+
+    Raises:
+        InputError: There is none.
+
+    """
+    from executive.errors import InputError
+    from executive.mission.files import shipped_folder
+    from executive.mission.findings import alternatives
+
+    path = Path(name)
+    if path.is_file():
+        return path
+    folder = shipped_folder() / "cells"
+    shipped = {file.stem: file for file in sorted(folder.glob("*.yaml"))}
+    if name in shipped:
+        return shipped[name]
+    hint = alternatives(name, shipped, "Shipped cells")
+    raise InputError(f'there is no cell file "{name}", and no shipped cell of that name. {hint}')

@@ -1,0 +1,43 @@
+"""`executive dataset`: render labelled images of cells."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from executive.cli.options import seed_option
+from executive.cli.output import stdout_kept_clean
+
+
+@click.command(name="dataset")
+@click.argument("cells", metavar="CELL...", nargs=-1, required=True)
+@click.option(
+    "--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to fill."
+)
+@click.option("--images", type=click.IntRange(min=1), default=1000, show_default=True, help="How many.")
+@seed_option
+@click.option(
+    "--format", "layout", type=click.Choice(["coco", "yolo"]), default="coco", show_default=True,
+    help="Layout of the folder, as Roboflow exports it.",
+)  # fmt: skip
+@click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Processes.")
+@click.option(
+    "--valid", type=click.FloatRange(0, 1), default=0.1, show_default=True, help="Share kept for validation."
+)
+def command(
+    cells: tuple[str, ...], out: Path, images: int, seed: int, layout: str, workers: int, valid: float
+) -> None:
+    """Render random scenes of every CELL, in turn, with the box of every object."""
+    with stdout_kept_clean():
+        from executive.cli.cells import load_cells
+        from executive.cli.progress import bar
+        from executive.sim.scenes import generate
+
+        configs = load_cells(cells)
+        with bar("rendering") as progress:
+            generate(
+                configs, out, images=images, seed=seed, layout=layout, workers=workers, valid=valid,
+                progress=progress,
+            )  # fmt: skip
+        click.echo(f"{images} images in {out}", err=True)

@@ -1,0 +1,109 @@
+"""The command `executive`: finds the command asked for, and turns every error into text and exit code."""
+
+from __future__ import annotations
+
+import difflib
+import sys
+import tempfile
+import traceback
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any
+
+import click
+
+from executive.errors import ExecutiveError
+
+BAD_INPUT, BROKEN, INTERRUPTED = 2, 3, 130
+"""Exit codes of what ends a command early."""
+
+COMMANDS = (
+    "run", "check", "tree", "skills", "dataset", "train", "evaluate", "bench", "sweep", "doctor",
+)  # fmt: skip
+"""Every command, each in the module of its name, in the order in which `--help` lists them."""
+
+
+class Executive(click.Group):
+    """Loads a command only when it is asked for, and ends the process with the documented exit codes."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names of all commands."""
+        del ctx
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return the command of this name, or None."""
+        del ctx
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = import_module(f"executive.cli.{cmd_name}").command
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command that `args` begin with, or say which one may have been meant."""
+        close = difflib.get_close_matches(args[0], COMMANDS, n=1)
+        if args[0] not in COMMANDS and close and not args[0].startswith("-"):
+            ctx.fail(f'there is no command "{args[0]}"; did you mean "{close[0]}"?')
+        return super().resolve_command(ctx, args)
+
+    def main(
+        self,
+        args: Sequence[str] | None = None,
+        prog_name: str | None = None,
+        complete_var: str | None = None,
+        standalone_mode: bool = True,
+        **extra: Any,
+    ) -> Any:
+        """Run a command and exit with its code; tracebacks are shown only where asked for."""
+        del standalone_mode  # This group always stands alone: it is a program, not a part of one.
+        args = list(sys.argv[1:] if args is None else args)
+        debug = "--debug" in args
+        try:
+            code = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
+            sys.exit(code if isinstance(code, int) else 0)
+        except click.ClickException as error:
+            error.show()
+            sys.exit(BAD_INPUT)
+        except (click.Abort, KeyboardInterrupt):
+            click.echo("halted", err=True)
+            sys.exit(INTERRUPTED)
+        except ExecutiveError as error:
+            if debug:
+                traceback.print_exc()
+            click.echo(str(error), err=True)
+            sys.exit(error.exit_code)
+        except Exception as error:
+            if debug:
+                traceback.print_exc()
+            else:
+                click.echo(_apology(error), err=True)
+            sys.exit(BROKEN)
+
+
+def _apology(error: Exception) -> str:
+    """Keep the traceback of `error` in a file and return one sentence that says where."""
+    with tempfile.NamedTemporaryFile(
+        "w", prefix="executive-", suffix=".txt", delete=False, encoding="utf-8"
+    ) as file:
+        traceback.print_exc(file=file)
+    return (
+        f"internal error ({type(error).__name__}: {error}); the details are in {file.name}, "
+        "or on the screen with `executive --debug ...`"
+    )
+
+
+@click.group(cls=Executive, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="executive")
+@click.option("--debug", is_flag=True, help="Show the traceback of an error.")
+def main(debug: bool) -> None:
+    """Run pick-and-place missions written as behaviour trees in YAML.
+
+    Exit codes: 0 success, 1 mission failed, 2 bad input, 3 fault, 130 halted by the user.
+    """
+    del debug  # Read by `Executive.main`, which also sees errors from outside of any command.
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,51 @@
+"""Arguments and options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+
+class Override(click.ParamType):
+    """`KEY=VALUE`."""
+
+    name = "KEY=VALUE"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, str]:
+        """Return the two sides of the first equals sign."""
+        if isinstance(value, tuple):
+            return value
+        key, equals, text = str(value).partition("=")
+        if not key or not equals:
+            self.fail(f'"{value}" is no override; write it as KEY=VALUE, for instance attempts=5', param, ctx)
+        return key, text
+
+
+def _once(ctx: click.Context, param: click.Parameter, values: tuple[tuple[str, str], ...]) -> dict[str, str]:
+    """Return the overrides by key; the same key twice is a mistake, not a choice."""
+    overrides: dict[str, str] = {}
+    for key, text in values:
+        if key in overrides:
+            raise click.BadParameter(f'"{key}" is set twice', ctx, param)
+        overrides[key] = text
+    return overrides
+
+
+MISSION = click.argument("mission", metavar="MISSION")
+
+overrides_option = click.option(
+    "--set", "overrides", type=Override(), multiple=True, callback=_once,
+    help="Give a param another value, or with cell.KEY.KEY the cell; repeatable.",
+)  # fmt: skip
+runs_option = click.option(
+    "--runs", type=click.Path(path_type=Path, file_okay=False), default=Path("runs"), show_default=True,
+    help="Folder of the run directories.",
+)  # fmt: skip
+json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on stdout.")
+seed_option = click.option(
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="What chance draws from."
+)

@@ -1,0 +1,99 @@
+"""`executive sweep`: run a mission for many seeds and say how it did."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import click
+
+from executive.cli.options import MISSION, json_option, overrides_option, runs_option
+from executive.cli.output import print_json, stdout_kept_clean
+
+
+class SeedRange(click.ParamType):
+    """`A-B`, both included, or a single seed."""
+
+    name = "A-B"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> range:
+        """Return the seeds that `value` names."""
+        if isinstance(value, range):
+            return value
+        match = re.fullmatch(r"(\d+)(?:-(\d+))?", str(value))
+        if match is None:
+            self.fail(f'"{value}" is no range of seeds; write it as 0-99', param, ctx)
+        first, last = int(match[1]), int(match[2] or match[1])
+        if last < first:
+            self.fail(f'"{value}" holds no seed: {last} is less than {first}', param, ctx)
+        return range(first, last + 1)
+
+
+@click.command(name="sweep")
+@MISSION
+@click.option("--seeds", type=SeedRange(), required=True, help="First and last seed, for instance 0-99.")
+@click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Runs at a time.")
+@click.option("--frames", is_flag=True, help="Save the pictures behind every decision.")
+@overrides_option
+@runs_option
+@json_option
+@click.pass_context
+def command(
+    ctx: click.Context,
+    mission: str,
+    seeds: range,
+    workers: int,
+    frames: bool,
+    overrides: dict[str, str],
+    runs: Path,
+    as_json: bool,
+) -> None:
+    """Run MISSION once for every seed; exit code 1 if any run did not succeed."""
+    with stdout_kept_clean():
+        from executive.campaign.sweep import summarize, sweep
+        from executive.cli.progress import bar
+        from executive.mission.load import load_mission
+        from executive.skill import discover
+
+        load_mission(mission, discover(), overrides)  # What is wrong with it is told once, not per seed.
+        with bar(mission) as progress:
+            results = sweep(
+                mission, seeds, overrides=overrides, runs=runs, workers=workers, frames=frames,
+                progress=progress,
+            )  # fmt: skip
+        figures = summarize(results)
+        click.echo(_text(figures), err=True)
+    if as_json:
+        print_json({"mission": mission, "seeds": [seeds[0], seeds[-1]], **figures, "results": results})
+    halted = len(results) < len(seeds) or any(result["status"] == "HALTED" for result in results)
+    ctx.exit(130 if halted else int(figures["succeeded"] < figures["runs"]))
+
+
+def _text(figures: dict[str, Any]) -> str:
+    objects, robot, wall = figures["objects"], figures["robot_time_s"], figures["wall_time_s"]
+    low, high = objects["interval_95"]
+    lines = [
+        f"{figures['succeeded']} of {figures['runs']} runs succeeded",
+        f"{objects['right']} of {objects['total']} objects right: {objects['share']:.2%} "
+        f"(95 % interval {low:.2%} to {high:.2%})",
+        f"robot time {robot['median']:.1f} s (median; {robot['least']:.1f} to {robot['most']:.1f}), "
+        f"wall time {wall['median']:.1f} s ({wall['least']:.1f} to {wall['most']:.1f})",
+        f"ledger and audit disagree in {len(figures['disagreements'])} runs",
+    ]
+    lines += [
+        f"  seed {entry['seed']}: the ledger says {_counts(entry['items'])}; "
+        f"the audit {_counts(entry['audit'])}; {entry['run']}"
+        for entry in figures["disagreements"]
+    ]
+    if figures["failures"]:
+        lines.append(f"{len(figures['failures'])} runs did not succeed:")
+    lines += [
+        f"  seed {entry['seed']}: {entry['status']} {entry['reason']}: {entry['message']}; {entry['run']}"
+        for entry in figures["failures"]
+    ]
+    return "\n".join(lines)
+
+
+def _counts(counts: dict[str, int]) -> str:
+    return ", ".join(f"{name} {number}" for name, number in counts.items())

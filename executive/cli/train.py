@@ -1,0 +1,41 @@
+"""`executive train`: train the small detector."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from executive.cli.options import seed_option
+from executive.cli.output import stdout_kept_clean
+
+
+@click.command(name="train")
+@click.option(
+    "--dataset", type=click.Path(path_type=Path, file_okay=False), required=True,
+    help="COCO or YOLO folder, from `executive dataset` or a Roboflow export.",
+)  # fmt: skip
+@click.option(
+    "--out", type=click.Path(path_type=Path, file_okay=False), required=True,
+    help="Folder for checkpoints and figures.",
+)  # fmt: skip
+@click.option(
+    "--from", "start", type=click.Path(path_type=Path, dir_okay=False), metavar="WEIGHTS",
+    help="Checkpoint to fine-tune; random weights without it.",
+)  # fmt: skip
+@click.option("--epochs", type=click.IntRange(min=1), default=20, show_default=True, help="Passes over it.")
+@seed_option
+def command(dataset: Path, out: Path, start: Path | None, epochs: int, seed: int) -> None:
+    """Train the small RF-DETR; needs the extra `train`."""
+    with stdout_kept_clean():
+        from executive.cli.progress import bar
+        from executive.vision.train import train
+
+        with bar("training") as progress:
+
+            def told(epoch: int, metrics: dict[str, float]) -> None:
+                progress(epoch, epochs)
+                figures = ", ".join(f"{name} {value:.4g}" for name, value in metrics.items())
+                click.echo(f"epoch {epoch}: {figures}", err=True)
+
+            train(dataset, out, start=start, epochs=epochs, seed=seed, progress=told)

@@ -1,0 +1,30 @@
+"""The variables of one run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+
+class Scope(Mapping[str, Any]):
+    """The variables of one run by name; skills read them when they start and write them when they succeed.
+
+    One store per run, never one per process: many missions may run side by side. Subtrees share it;
+    their arguments are not variables but are put in when the tree is built.
+    """
+
+    def __init__(self) -> None:
+        self._values: dict[str, Any] = {}
+
+    def __getitem__(self, name: str) -> Any:
+        return self._values[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def write(self, values: Mapping[str, Any]) -> None:
+        """Set all these variables at once."""
+        self._values.update(values)

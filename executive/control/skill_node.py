@@ -1,0 +1,199 @@
+"""A skill as a leaf of the tree."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from executive.cell import Cell, Target
+from executive.control.failure import Failure
+from executive.control.node import Site
+from executive.control.scope import Scope
+from executive.errors import Fault
+from executive.skill import Skill, SkillFailed
+
+ITEM_PORTS = ("item", "held", "placed")
+"""Ports that by convention carry the item a skill works on."""
+
+
+@dataclass(frozen=True)
+class Wiring:
+    """What a mission connects to a skill.
+
+    Attributes:
+        constants: Params and inputs with a value from the mission file.
+        inputs: Variable read by each other input.
+        outputs: Variable written by each output.
+
+    """
+
+    constants: Mapping[str, Any] = field(default_factory=dict)
+    inputs: Mapping[str, str] = field(default_factory=dict)
+    outputs: Mapping[str, str] = field(default_factory=dict)
+
+
+class SkillNode(Behaviour):
+    """Runs one skill: a fresh instance per start, one step of its generator per tick.
+
+    Attributes:
+        path: Unique path from the root of the tree.
+        failure: Why it failed, while its status is FAILURE; else None.
+
+    """
+
+    def __init__(
+        self, site: Site, name: str, skill: type[Skill], wiring: Wiring, cell: Cell, scope: Scope
+    ) -> None:
+        super().__init__(site.label or name)
+        self.path, self.label, self.skill_name = site.path, site.label, name
+        self.failure: Failure | None = None
+        self._emit = site.emit
+        self._type, self._wiring, self._cell, self._scope = skill, wiring, cell, scope
+        self._skill: Skill | None = None
+        self._steps: Iterator[Any] = iter(())
+        self._item = ""
+
+    @property
+    def detail(self) -> str:
+        """The constants and the renamed variables, for outlines."""
+        said = {name: _shown(value) for name, value in self._wiring.constants.items()}
+        wired = {**self._wiring.inputs, **self._wiring.outputs}
+        said |= {port: f"${variable}" for port, variable in wired.items() if port != variable}
+        if self.label:
+            return ", ".join([self.skill_name, *(f"{key}: {value}" for key, value in said.items())])
+        return ", ".join(f"{key}: {value}" for key, value in said.items())
+
+    def tick_once(self) -> None:
+        """Start the skill or go on by one step.
+
+        Raises:
+            Fault: The skill raised anything but a declared failure.
+
+        """
+        try:
+            if self.status is not Status.RUNNING:
+                self._start()
+            yielded = next(self._steps, self)
+        except SkillFailed as failed:
+            self._fail(failed)
+        except Exception as error:
+            text = str(error) if isinstance(error, Fault) else f"{type(error).__name__}: {error}"
+            raise self._fault(text) from error
+        else:
+            if yielded is self:
+                self._succeed()
+            elif yielded is not None:
+                kind = type(yielded).__name__
+                raise self._fault(f'it yielded a {kind}; to run steps of others write "yield from"')
+
+    def update(self) -> Status:
+        """Go on by one tick and return the status: py_trees' name for it."""
+        self.tick_once()
+        return self.status
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Go on by one tick, then yield this node."""
+        self.tick_once()
+        yield self
+
+    def stop(self, new_status: Status = Status.INVALID) -> None:
+        """Close the running skill, so that its `finally` runs; a skill that is not running stays as it is.
+
+        Raises:
+            Fault: The skill raised, or yielded, while it was being closed.
+
+        """
+        if self.status is not Status.RUNNING:
+            self.status = new_status
+            return
+        steps = self._steps
+        self._close(new_status)
+        try:
+            if isinstance(steps, Generator):
+                steps.close()
+        except RuntimeError as error:
+            if "GeneratorExit" not in str(error):
+                raise self._fault(f"RuntimeError while it was halted: {error}") from error
+            raise self._fault('it yielded while it was halted; nothing may wait in "finally"') from error
+        except Exception as error:
+            raise self._fault(f"{type(error).__name__} while it was halted: {error}") from error
+        self._tell(new_status.value)
+
+    def _start(self) -> None:
+        self.failure = None
+        self.status = Status.RUNNING
+        inputs = self._read()
+        self._item = _item_of(inputs)
+        self._tell("RUNNING")
+        self._skill = self._type(**self._wiring.constants, **inputs)
+        # A `run` without any yield is a plain function: it has done its work already.
+        self._steps = iter(self._skill.run(self._cell) or ())
+
+    def _read(self) -> dict[str, Any]:
+        inputs = {}
+        for port, variable in self._wiring.inputs.items():
+            if variable in self._scope:
+                inputs[port] = self._scope[variable]
+            elif self._type.ports[port].required:
+                raise Fault(
+                    f'the input "{port}" reads ${variable}, which nothing has written yet; '
+                    f"written so far: {', '.join(self._scope) or 'nothing'}"
+                )
+        return inputs
+
+    def _succeed(self) -> None:
+        skill = self._skill
+        unset = [port for port in self._wiring.outputs if not hasattr(skill, port)]
+        if unset:
+            raise self._fault(f"it succeeded without setting its output {', '.join(unset)}")
+        outputs = {port: getattr(skill, port) for port in self._wiring.outputs}
+        self._scope.write({self._wiring.outputs[port]: value for port, value in outputs.items()})
+        self._item = _item_of(outputs) or self._item
+        self._close(Status.SUCCESS)
+        self._tell("SUCCESS", outputs=outputs)
+
+    def _fail(self, failed: SkillFailed) -> None:
+        if failed.reason not in self._type.reasons:
+            declared = ", ".join(self._type.reasons) or "none"
+            raise self._fault(
+                f'it failed with the undeclared reason "{failed.reason}"; it declares: {declared}'
+            ) from failed
+        labels = (self.label,) if self.label else ()
+        self.failure = Failure(failed.reason, failed.message, self.skill_name, self.path, labels)
+        self._close(Status.FAILURE)
+        self._tell("FAILURE", reason=failed.reason, message=failed.message)
+
+    def _fault(self, message: str) -> Fault:
+        self._close(Status.INVALID)
+        self._tell("INVALID", reason="fault", message=message)
+        return Fault(f"{self.name}: {message}", self.path)
+
+    def _close(self, status: Status) -> None:
+        self.status, self._steps, self._skill = status, iter(()), None
+
+    def _tell(self, status: str, reason: str = "", message: str = "", **more: Any) -> None:
+        self._emit(
+            "status",
+            node=self.path,
+            status=status,
+            reason=reason,
+            message=message,
+            item=self._item,
+            **more,
+        )
+
+
+def _item_of(values: Mapping[str, Any]) -> str:
+    """Return the item that these port values are about, or ""."""
+    for value in values.values():
+        if isinstance(value, Target):
+            return value.item
+    return next((values[port] for port in ITEM_PORTS if isinstance(values.get(port), str)), "")
+
+
+def _shown(value: Any) -> str:
+    return ", ".join(map(str, value)) if isinstance(value, tuple | list) else str(value)

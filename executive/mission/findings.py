@@ -1,0 +1,107 @@
+"""What is wrong with a mission: findings with their place, and the error that carries them all."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from executive.errors import InputError
+from executive.mission.source import Mark
+
+_WINDOW = 140
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing wrong in a file.
+
+    Attributes:
+        path: File as the user knows it.
+        line: Counted from 1; 0 for the file as a whole.
+        col: Counted from 1.
+        severity: `error` or `warning`.
+        code: Short stable name of the kind of finding.
+        message: What is wrong, one sentence.
+        length: How many characters the caret line underlines.
+        hint: What was allowed and what to do next, or "".
+        excerpt: The source line.
+
+    """
+
+    path: str
+    line: int
+    col: int
+    severity: str
+    code: str
+    message: str
+    length: int = 1
+    hint: str = ""
+    excerpt: str = ""
+
+    def __str__(self) -> str:
+        place = f"{self.path}:{self.line}:{self.col}" if self.line else self.path
+        lines = [f"{place}: {self.severity}[{self.code}]: {self.message}"]
+        if self.line and self.excerpt:
+            number = f"{self.line:4d}"
+            # Of a very long line only what is around the place is shown.
+            begin = max(0, self.col - _WINDOW // 2) if len(self.excerpt) > _WINDOW else 0
+            excerpt, before = self.excerpt[begin : begin + _WINDOW], self.col - 1 - begin
+            # Tabs stay tabs under the text, so that the caret lines up at any tab width.
+            blank = "".join(c if c == "\t" else " " for c in excerpt[:before])
+            room = max(1, min(self.length, len(excerpt) - before))
+            lines.append(f"{number} | {excerpt}")
+            lines.append(f"{' ' * len(number)} | {blank}{'^' * room}")
+        if self.hint:
+            lines.append(f"  {self.hint}")
+        return "\n".join(lines)
+
+
+class MissionError(InputError):
+    """A mission cannot be run; the text renders every finding, in file order.
+
+    Attributes:
+        findings: All of them.
+
+    """
+
+    def __init__(self, findings: Iterable[Finding]) -> None:
+        self.findings = tuple(findings)
+        super().__init__("\n".join(str(finding) for finding in self.findings))
+
+
+def error(mark: Mark, code: str, message: str, hint: str = "") -> Finding:
+    """Return an error at `mark`."""
+    return _finding("error", mark, code, message, hint)
+
+
+def warning(mark: Mark, code: str, message: str, hint: str = "") -> Finding:
+    """Return a warning at `mark`: worth a look, no reason not to run."""
+    return _finding("warning", mark, code, message, hint)
+
+
+def _finding(severity: str, mark: Mark, code: str, message: str, hint: str) -> Finding:
+    source = mark.source
+    excerpt = source.line(mark.line)
+    return Finding(source.path, mark.line, mark.col, severity, code, message, mark.length, hint, excerpt)
+
+
+def in_file_order(findings: Iterable[Finding], first: str) -> tuple[Finding, ...]:
+    """Return the findings without repetitions, those of the file `first` first, each file top to bottom."""
+    unique = dict.fromkeys(findings)
+    return tuple(sorted(unique, key=lambda f: (f.path != first, f.path, f.line, f.col)))
+
+
+def suggest(word: str, known: Iterable[str]) -> str | None:
+    """Return the known word that `word` was probably meant to be, or None."""
+    by_lower = {name.lower(): name for name in known}
+    close = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.6)
+    return by_lower[close[0]] if close else None
+
+
+def alternatives(word: str, known: Iterable[str], lead: str) -> str:
+    """Return a hint: the likely meaning of `word`, then `lead` and every known word."""
+    known = list(known)
+    meant = suggest(word, known)
+    listed = f"{lead}: {', '.join(known) or 'none'}."
+    return f'Did you mean "{meant}"? {listed}' if meant else listed

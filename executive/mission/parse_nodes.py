@@ -1,0 +1,222 @@
+"""From positioned nodes to the nodes of a mission's tree; one function per control node."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+from executive.mission import model
+from executive.mission.fields import Fields, settings_of
+from executive.mission.findings import Finding, alternatives, error
+from executive.mission.source import Mark
+from executive.mission.text import Mapping, Node, Scalar, Sequence, plain
+from executive.mission.words import describe
+
+_LABEL = re.compile(r"[a-z_][a-z0-9_]*")
+_SKILL = re.compile(r"[A-Z][A-Za-z0-9]*")
+_PARTNERS = {"use": ("with",), "try": ("catch", "finally")}
+
+
+class NodeParser:
+    """Reads the nodes of one mission file; what is wrong goes to `findings`.
+
+    A node that cannot be read becomes one that does nothing, so that reading goes on.
+    """
+
+    def __init__(self, findings: list[Finding]) -> None:
+        self.findings = findings
+
+    def node(self, node: Node | None, mark: Mark) -> model.Node:
+        """Return the node that stands in the file, or one that does nothing where there is none."""
+        if node is None or (isinstance(node, Scalar) and node.value is None):
+            if node is not None:
+                self.refuse(mark, "missing-node", "a node is missing here")
+            return _nothing(mark)
+        if isinstance(node, Sequence):
+            return self._list(node)
+        if isinstance(node, Scalar):
+            return self._word(node)
+        return self._mapping(node)
+
+    def nodes(self, node: Node, owner: str) -> tuple[model.Node, ...]:
+        """Return the nodes of a list."""
+        if not isinstance(node, Sequence):
+            self.refuse(
+                node.mark, "wrong-type", f"{owner} takes a list of nodes, not {describe(plain(node))}"
+            )
+            return ()
+        if not node.items:
+            self.refuse(node.mark, "empty-list", f"{owner} needs at least one node")
+        return tuple(self.node(item, item.mark) for item in node.items)
+
+    def refuse(self, mark: Mark, code: str, message: str, hint: str = "") -> None:
+        """Record an error."""
+        self.findings.append(error(mark, code, message, hint))
+
+    def _list(self, node: Sequence) -> model.Node:
+        return model.SequenceNode(node.mark, "", self.nodes(node, "a list of steps"))
+
+    def _word(self, node: Scalar) -> model.Node:
+        word = node.text
+        if word == "succeed":
+            return model.SucceedNode(node.mark, "", None)
+        if isinstance(node.value, str) and _SKILL.fullmatch(word):
+            return model.SkillNode(node.mark, "", word, {})
+        if word in CONTROL:
+            self.refuse(node.mark, "missing-node", f'"{word}" needs a body: write {word}: ...')
+        else:
+            self._unknown(node.mark, word)
+        return _nothing(node.mark)
+
+    def _mapping(self, node: Mapping) -> model.Node:
+        label = self._label(node)
+        words = [entry for entry in node.entries if entry.key.text != "as"]
+        heads = [e for e in words if e.key.text in CONTROL or _SKILL.fullmatch(e.key.text)]
+        if not heads:
+            for entry in words:
+                self._unknown(entry.key.mark, entry.key.text)
+            if not words:
+                self.refuse(node.mark, "missing-node", "a node is missing here: the mapping names none")
+            return _nothing(node.mark)
+        head, *others = heads
+        for entry in others:
+            message = f'"{head.key.text}" and "{entry.key.text}" stand in one node; a node has one name'
+            self.refuse(entry.key.mark, "two-nodes", message, "Write a list to run one after the other.")
+        name = head.key.text
+        allowed = (name, "as", *_PARTNERS.get(name, ()))
+        for entry in words:
+            if entry not in heads and entry.key.text not in allowed:
+                hint = alternatives(entry.key.text, allowed[1:], f"Beside {name} may stand")
+                message = f'"{entry.key.text}" may not stand beside "{name}"'
+                self.refuse(entry.key.mark, "unknown-key", message, hint)
+        if name in CONTROL:
+            return CONTROL[name](self, Head(node, head.key.mark, label, head.value))
+        settings = settings_of(head.value, name, self.findings)
+        return model.SkillNode(head.key.mark, label, name, settings)
+
+    def _label(self, node: Mapping) -> str:
+        written = node.get("as")
+        if written is None:
+            return ""
+        if isinstance(written, Scalar) and isinstance(written.value, str) and _LABEL.fullmatch(written.text):
+            return written.text
+        shown = f'"{written.text}"' if isinstance(written, Scalar) else describe(plain(written))
+        message = f"a label is a lower-case word, not {shown}"
+        self.refuse(written.mark, "bad-label", message)
+        return ""
+
+    def _unknown(self, mark: Mark, word: str) -> None:
+        hint = alternatives(word, CONTROL, "Skills begin with a capital letter; control nodes are")
+        self.refuse(mark, "unknown-node", f'there is no control node "{word}"', hint)
+
+
+class Head:
+    """One control node in the file: the mapping it stands in, its word, its label, its value."""
+
+    def __init__(self, node: Mapping, mark: Mark, label: str, value: Node) -> None:
+        self.node, self.mark, self.label, self.value = node, mark, label, value
+
+
+def _nothing(mark: Mark) -> model.Node:
+    return model.SucceedNode(mark, "", None)
+
+
+def _fields(parser: NodeParser, head: Head, owner: str, *known: str) -> Fields:
+    return Fields(owner, head.mark, head.value, known, parser.findings)
+
+
+def _sequence(parser: NodeParser, head: Head) -> model.Node:
+    return model.SequenceNode(head.mark, head.label, parser.nodes(head.value, "sequence"), listed=False)
+
+
+def _fallback(parser: NodeParser, head: Head) -> model.Node:
+    return model.FallbackNode(head.mark, head.label, parser.nodes(head.value, "fallback"))
+
+
+def _retry(parser: NodeParser, head: Head) -> model.Node:
+    fields = _fields(parser, head, "retry", "attempts", "on", "recover", "do")
+    fields.required("attempts")
+    attempts = fields.value("attempts") or model.Literal(1, head.mark)
+    recover = fields.get("recover")
+    return model.RetryNode(
+        head.mark,
+        head.label,
+        attempts,
+        fields.matches("on"),
+        None if recover is None else parser.node(recover, fields.key_mark("recover")),
+        parser.node(fields.required("do"), fields.key_mark("do")),
+    )
+
+
+def _repeat(parser: NodeParser, head: Head) -> model.Node:
+    fields = _fields(parser, head, "repeat", "until", "times", "do")
+    times, until = fields.value("times"), fields.matches("until")
+    if fields.sound and (times is None) == (fields.get("until") is None):
+        message = 'repeat needs one of "until" and "times", to know when it is done'
+        parser.refuse(head.mark, "missing-key", message)
+    body = parser.node(fields.required("do"), fields.key_mark("do"))
+    return model.RepeatNode(head.mark, head.label, times, until, body)
+
+
+def _try(parser: NodeParser, head: Head) -> model.Node:
+    catches = []
+    caught, finish = head.node.get("catch"), head.node.get("finally")
+    if caught is None and finish is None:
+        parser.refuse(head.mark, "missing-key", 'try needs a "catch" or a "finally" beside it')
+    if caught is not None and not isinstance(caught, Sequence):
+        message = f'catch takes a list of "on" and "do", not {describe(plain(caught))}'
+        parser.refuse(caught.mark, "wrong-type", message)
+    for item in caught.items if isinstance(caught, Sequence) else ():
+        fields = Fields("catch", item.mark, item, ("on", "do"), parser.findings)
+        fields.required("on")
+        body = parser.node(fields.required("do"), fields.key_mark("do"))
+        catches.append(model.Catch(fields.matches("on"), body))
+    return model.TryNode(
+        head.mark,
+        head.label,
+        parser.node(head.value, head.mark),
+        tuple(catches),
+        None if finish is None else parser.node(finish, finish.mark),
+    )
+
+
+def _timeout(parser: NodeParser, head: Head) -> model.Node:
+    fields = _fields(parser, head, "timeout", "seconds", "do")
+    fields.required("seconds")
+    seconds = fields.value("seconds") or model.Literal(1.0, head.mark)
+    body = parser.node(fields.required("do"), fields.key_mark("do"))
+    return model.TimeoutNode(head.mark, head.label, seconds, body)
+
+
+def _invert(parser: NodeParser, head: Head) -> model.Node:
+    return model.InvertNode(head.mark, head.label, parser.node(head.value, head.mark))
+
+
+def _succeed(parser: NodeParser, head: Head) -> model.Node:
+    empty = isinstance(head.value, Scalar) and head.value.value is None
+    body = None if empty else parser.node(head.value, head.mark)
+    return model.SucceedNode(head.mark, head.label, body)
+
+
+def _use(parser: NodeParser, head: Head) -> model.Node:
+    arguments = head.node.get("with")
+    settings = {} if arguments is None else settings_of(arguments, "with", parser.findings)
+    if not (isinstance(head.value, Scalar) and isinstance(head.value.value, str)):
+        message = f"use takes the name of a subtree, not {describe(plain(head.value))}"
+        parser.refuse(head.value.mark, "wrong-type", message)
+        return _nothing(head.mark)
+    return model.UseNode(head.value.mark, head.label, head.value.text, settings)
+
+
+CONTROL: dict[str, Callable[[NodeParser, Head], model.Node]] = {
+    "sequence": _sequence,
+    "fallback": _fallback,
+    "retry": _retry,
+    "repeat": _repeat,
+    "try": _try,
+    "timeout": _timeout,
+    "invert": _invert,
+    "succeed": _succeed,
+    "use": _use,
+}
+"""Every control node by its word in the file."""

@@ -1,0 +1,46 @@
+"""Where a piece of text stands: the file, the line, the column and how long it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A text and the name it is shown under.
+
+    Attributes:
+        path: Name in front of every position, for instance `missions/sort.yaml` or `--set`.
+        text: The whole text.
+
+    """
+
+    path: str
+    text: str
+
+    def line(self, number: int) -> str:
+        """Return line `number`, counted from 1, or "" beyond the end."""
+        lines = self.text.splitlines()
+        return lines[number - 1] if 1 <= number <= len(lines) else ""
+
+    def mark(self, line: int = 0, col: int = 0, length: int = 0) -> Mark:
+        """Return the place at `line` and `col`, counted from 1; line 0 is the text as a whole."""
+        return Mark(self, line, col, length)
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A place in a source.
+
+    Attributes:
+        source: The text.
+        line: Counted from 1; 0 means the text as a whole.
+        col: Counted from 1, in characters.
+        length: How many characters the caret line underlines.
+
+    """
+
+    source: Source
+    line: int
+    col: int
+    length: int

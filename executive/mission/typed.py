@@ -1,0 +1,54 @@
+"""Values of a mission as the types that skills declare."""
+
+from __future__ import annotations
+
+import functools
+import json
+import math
+import types
+import typing
+from typing import Any, Union, get_args, get_origin
+
+from pydantic import TypeAdapter, ValidationError
+
+from executive.mission.words import violation
+
+_SCALARS = (str, int, float, bool, type(None), Any)
+_CONTAINERS = (tuple, list, dict, frozenset, set)
+
+
+class WrongType(Exception):
+    """A value is not of the declared type; the text follows the value's name in a sentence."""
+
+
+def is_plain(declared: Any) -> bool:
+    """Tell whether values of this type can be written in a mission file."""
+    if declared in _SCALARS or declared in _CONTAINERS or declared is Ellipsis:
+        return True
+    origin = get_origin(declared)
+    if origin is typing.Literal:
+        return True
+    if origin in (Union, types.UnionType) or origin in _CONTAINERS:
+        return all(is_plain(part) for part in get_args(declared))
+    return False
+
+
+def convert(value: Any, declared: Any) -> Any:
+    """Return a plain value as the declared type: lists become tuples, whole numbers floats.
+
+    Raises:
+        WrongType: The value does not fit.
+
+    """
+    if isinstance(value, float) and not math.isfinite(value):
+        raise WrongType(f"must be a finite number, not {value}")
+    try:
+        return _adapter(declared).validate_json(json.dumps(value), strict=True)
+    except ValidationError as problems:
+        first, *_ = problems.errors(include_url=False)
+        raise WrongType(violation(first)) from None
+
+
+@functools.lru_cache(maxsize=256)
+def _adapter(declared: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(declared)

@@ -1,0 +1,47 @@
+"""What a mission's settings of a skill mean: constants, variables read and variables written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from executive.mission.model import Literal, Reference, SkillNode
+from executive.mission.source import Mark
+from executive.skill import Direction, Port, Skill
+
+
+@dataclass(frozen=True)
+class Wire:
+    """A port and the variable it is connected to.
+
+    Attributes:
+        port: The skill's port.
+        variable: Name of the variable.
+        mark: Where the mission says so, or the skill itself where the port goes by its own name.
+        explicit: True where the mission names the variable.
+
+    """
+
+    port: Port
+    variable: str
+    mark: Mark
+    explicit: bool
+
+
+def wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Iterator[Wire]:
+    """Yield how every port of this direction is connected; an input with a value of its own is not."""
+    for port in skill.ports.values():
+        if port.direction is not direction:
+            continue
+        setting = node.settings.get(port.name)
+        if setting is None:
+            yield Wire(port, port.name, node.mark, explicit=False)
+        elif isinstance(setting.value, Reference):
+            yield Wire(port, setting.value.name, setting.value.mark, explicit=True)
+
+
+def literals(node: SkillNode) -> Iterator[tuple[str, Literal]]:
+    """Yield every setting with a value instead of a variable."""
+    for name, setting in node.settings.items():
+        if isinstance(setting.value, Literal):
+            yield name, setting.value

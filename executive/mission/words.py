@@ -1,0 +1,69 @@
+"""Findings in our own words: what a value is, and what pydantic found wrong with one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from executive.mission.findings import suggest
+
+_WANTED = {
+    "string_type": "a text",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "float_type": "a number",
+    "bool_type": "true or false",
+    "list_type": "a list",
+    "tuple_type": "a list",
+    "set_type": "a list",
+    "dict_type": "a mapping",
+    "model_type": "a mapping",
+    "model_attributes_type": "a mapping",
+    "dataclass_type": "a mapping",
+    "none_required": "left empty",
+}
+_BOUNDS = {
+    "greater_than": ("more than", "gt"),
+    "greater_than_equal": ("at least", "ge"),
+    "less_than": ("less than", "lt"),
+    "less_than_equal": ("at most", "le"),
+}
+
+
+def describe(value: Any) -> str:
+    """Return what a plain value is, for the end of a sentence."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int | float):
+        return f"{value:g}" if isinstance(value, float) else str(value)
+    if isinstance(value, str):
+        return f'the text "{value}"'
+    return "a mapping" if isinstance(value, Mapping) else f"a list of {len(value)}"
+
+
+def violation(problem: Mapping[str, Any]) -> str:
+    """Return what one of pydantic's errors says, to follow the name of the value."""
+    kind, given = problem["type"], problem["input"]
+    context = problem.get("ctx", {})
+    if kind in _WANTED:
+        return f"must be {_WANTED[kind]}, not {describe(given)}"
+    if kind in _BOUNDS:
+        words, key = _BOUNDS[kind]
+        return f"must be {words} {context[key]:g}, not {describe(given)}"
+    if kind == "literal_error":
+        meant = suggest(given, _quoted(context["expected"])) if isinstance(given, str) else None
+        question = f' (did you mean "{meant}"?)' if meant else ""
+        return f"must be {context['expected'].replace(chr(39), chr(34))}, not {describe(given)}{question}"
+    if kind == "too_short":
+        return f"needs at least {context['min_length']}, has {context['actual_length']}"
+    if kind == "too_long":
+        return f"takes at most {context['max_length']}, has {len(given)}"
+    if kind == "value_error":
+        return str(context["error"])
+    return f"is not allowed here: {problem['msg'][:1].lower()}{problem['msg'][1:]}"
+
+
+def _quoted(expected: str) -> list[str]:
+    return expected.split("'")[1::2]

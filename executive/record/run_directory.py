@@ -1,0 +1,110 @@
+"""The directory a run leaves: named by the wall clock, filled with what is needed to repeat the run."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from executive.errors import InputError
+from executive.record.plain import plain
+
+
+@dataclass(frozen=True)
+class RunDirectory:
+    """Where one run keeps its files.
+
+    Attributes:
+        path: `RUNS/<YYYY-MM-DD>/<HH-MM-SS>_<mission>_s<seed>`.
+
+    """
+
+    path: Path
+
+    @property
+    def journal(self) -> Path:
+        """File with everything that happened, one JSON object per line."""
+        return self.path / "journal.jsonl"
+
+    @property
+    def result(self) -> Path:
+        """File with the object that `executive run --json` prints."""
+        return self.path / "result.json"
+
+    @property
+    def frames(self) -> Path:
+        """Folder of the camera images behind the decisions."""
+        return self.path / "frames"
+
+    @staticmethod
+    def create(runs: Path, *, mission: str, seed: int, started: datetime) -> RunDirectory:
+        """Make a new directory below `runs`, point `runs/latest` at it and return it.
+
+        `started` only names it. A second run in the same second gets the suffix `-2`, a third `-3`.
+
+        Raises:
+            InputError: `runs` cannot be written to.
+
+        """
+        day = runs / started.strftime("%Y-%m-%d")
+        name = f"{started.strftime('%H-%M-%S')}_{mission}_s{seed}"
+        try:
+            day.mkdir(parents=True, exist_ok=True)
+            path = _make_unique(day, name)
+        except OSError as error:
+            raise InputError(
+                f'cannot make a run directory below "{runs}": {_reason(error)}; '
+                "free some space or name another place with --runs DIR"
+            ) from error
+        _point_latest(runs, path)
+        return RunDirectory(path)
+
+    def save_inputs(self, *, mission: str, params: Mapping[str, Any], cell: Mapping[str, Any]) -> None:
+        """Write the mission's text as it was read, the params as they were resolved, and the cell.
+
+        Raises:
+            InputError: The directory cannot be written to.
+
+        """
+        try:
+            (self.path / "mission.yaml").write_text(mission, encoding="utf-8")
+            for name, content in (("params.yaml", params), ("cell.yaml", cell)):
+                text = yaml.safe_dump(plain(content), sort_keys=False, allow_unicode=True)
+                (self.path / name).write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise InputError(
+                f'cannot write to the run directory "{self.path}": {_reason(error)}; '
+                "free some space or name another place with --runs DIR"
+            ) from error
+
+
+def _make_unique(day: Path, name: str) -> Path:
+    """Make and return `day/name`, or the first free `day/name-2`, `-3`, ...; safe between processes."""
+    number = 1
+    while True:
+        path = day / (name if number == 1 else f"{name}-{number}")
+        try:
+            path.mkdir()
+        except FileExistsError:
+            number += 1
+        else:
+            return path
+
+
+def _point_latest(runs: Path, path: Path) -> None:
+    """Make `runs/latest` a link to `path`, in one step, so that no reader finds it missing."""
+    fresh = runs / f".latest-{os.getpid()}"
+    # The link is a convenience: a file system without links must not cost the run.
+    with contextlib.suppress(OSError):
+        fresh.symlink_to(path.relative_to(runs), target_is_directory=True)
+        fresh.replace(runs / "latest")
+
+
+def _reason(error: OSError) -> str:
+    return (error.strerror or str(error)).lower()

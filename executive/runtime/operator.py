@@ -1,0 +1,79 @@
+"""The person beside the cell: a script's list of requests, or somebody at the terminal."""
+
+from __future__ import annotations
+
+import select
+import sys
+from collections.abc import Callable, Sequence
+
+from executive.errors import InputError
+from executive.events import Emit
+
+RESCAN = "rescan"
+SLICE = 0.1
+"""How long a wait for the keyboard lasts before it looks for an interrupt [s]."""
+
+
+class ScriptedOperator:
+    """Asks for what a list says, then quits; every request is recorded."""
+
+    def __init__(self, requests: Sequence[str], emit: Emit) -> None:
+        self._requests = list(requests)
+        self._emit = emit
+
+    def ask(self, choices: Sequence[str]) -> str | None:
+        """Return the next request, or None at the end of the list.
+
+        Raises:
+            InputError: The request names no class of the mission.
+        """
+        if not self._requests:
+            return None
+        word = self._requests.pop(0)
+        answer = understood(word, choices)
+        if answer == "":
+            raise InputError(f'cannot pick "{word}"; ask for one of: {", ".join(choices)}')
+        self._emit("request", wanted=answer)
+        return answer
+
+
+class TerminalOperator:
+    """Asks at the terminal; the run's clock stands still meanwhile, Ctrl-C works."""
+
+    def __init__(self, emit: Emit, interrupted: Callable[[], bool]) -> None:
+        self._emit = emit
+        self._interrupted = interrupted
+
+    def ask(self, choices: Sequence[str]) -> str | None:
+        """Return the class typed, `rescan`, or None for `q`, end of input or Ctrl-C."""
+        numbered = "  ".join(f"{number} {label}" for number, label in enumerate(choices))
+        while not self._interrupted():
+            sys.stderr.write(f"pick what?  {numbered}  s rescan  q quit > ")
+            sys.stderr.flush()
+            line = self._line()
+            if not line or line.strip().lower() in ("q", "quit"):
+                return None
+            answer = understood(line.strip(), choices)
+            if answer:
+                self._emit("request", wanted=answer)
+                return answer
+            sys.stderr.write(f'cannot pick "{line.strip()}"\n')
+        return None
+
+    def _line(self) -> str:
+        while not self._interrupted():
+            if select.select([sys.stdin], [], [], SLICE)[0]:
+                return sys.stdin.readline()
+        return ""
+
+
+def understood(word: str, choices: Sequence[str]) -> str | None:
+    """Return what a typed word means: a class, `rescan`, None for `q`; "" if it means nothing."""
+    word = word.lower()
+    if word in ("q", "quit"):
+        return None
+    if word in ("s", RESCAN):
+        return RESCAN
+    if word.isdigit() and int(word) < len(choices):
+        return choices[int(word)]
+    return word if word in choices else ""

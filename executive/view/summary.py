@@ -1,0 +1,35 @@
+"""The last words of a run: how it ended, how long it took, where the record is and how to repeat it."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from executive.view.items import ItemTable
+
+
+def repeat_command(
+    mission: str, *, seed: int, overrides: Mapping[str, str], requests: Iterable[str] = ()
+) -> str:
+    """Return the command line that repeats a run exactly."""
+    words = ["executive", "run", mission, "--seed", str(seed)]
+    for key, value in overrides.items():
+        words += ["--set", f"{key}={value}"]
+    for request in requests:
+        words += ["--request", request]
+    return shlex.join(words)
+
+
+def summary(result: Mapping[str, Any], items: ItemTable, repeat: str) -> str:
+    """Return three lines, then one for each bin and for each other fate of an item."""
+    verdict = " ".join(part for part in (result["status"], result["reason"]) if part)
+    where = f" at {result['node']}" if result["node"] else ""
+    why = f": {result['message']}" if result["message"] else ""
+    lines = [
+        f"{verdict}{where}{why}",
+        f"{result['robot_time_s']:.1f} s on the robot's clock, {result['wall_time_s']:.1f} s of waiting",
+        f"{result['run']}  (repeat: {repeat})",
+    ]
+    lines += [f"  {fate}: {', '.join(names)}" for fate, names in sorted(items.by_fate().items())]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,122 @@
+"""The live view in a terminal: the tree with its running path, the items, and the clock."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+
+from py_trees.behaviour import Behaviour
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from executive.events import Event
+from executive.mission.outline import OutlineNode, outline
+from executive.view.items import ItemTable
+from executive.view.outline import branches, opened
+
+PAUSE = 0.1
+"""Shortest time between two redraws [s]."""
+
+_MARKS = {
+    "RUNNING": ("▶", "bold yellow"),
+    "SUCCESS": ("✓", "green"),
+    "FAILURE": ("✗", "red"),
+    "INVALID": ("·", "dim"),
+}
+_STATES = {"placed": "green", "rejected": "red", "lost": "red", "held": "yellow", "dropped": "yellow"}
+
+
+class Terminal:
+    """Redraws when something changed, at most ten times a second, from a thread of its own.
+
+    The tick thread only notes what happened, so a slow terminal cannot slow the run down.
+    """
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._outline: Sequence[OutlineNode] = ()
+        self._status: dict[str, str] = {}
+        self._why: dict[str, str] = {}
+        self._header = ""
+        self._clock = 0.0
+        self._lock = threading.Lock()
+        self._changed = threading.Event()
+        self._closed = threading.Event()
+        self._live = Live(console=console, auto_refresh=False, transient=True)
+        self._drawer: threading.Thread | None = None
+        self.items = ItemTable()
+
+    def open(self, root: Behaviour) -> None:
+        """Draw the tree and begin to follow the run."""
+        with self._lock:
+            self._outline = outline(root)
+        self._live.start()
+        self._drawer = threading.Thread(target=self._redraw, name="terminal", daemon=True)
+        self._drawer.start()
+        self._changed.set()
+
+    def __call__(self, event: Event) -> None:
+        """Note what `event` changes."""
+        data = event.data
+        with self._lock:
+            self._clock = event.clock
+            if event.kind == "run":
+                self._header = f"{data.get('mission', '')}  seed {data.get('seed', 0)}"
+            elif event.kind == "status":
+                node = str(data.get("node", ""))
+                self._status[node] = str(data.get("status", ""))
+                self._why[node] = str(data.get("reason") or data.get("item") or "")
+            elif event.kind == "item":
+                self.items(event)
+            else:
+                return
+        self._changed.set()
+
+    def close(self) -> None:
+        """Take the view away; what remains to be said is the summary's."""
+        self._closed.set()
+        self._changed.set()
+        if self._drawer is not None:
+            self._drawer.join()
+            self._drawer = None
+            self._live.stop()
+
+    def note(self, sentence: str) -> None:
+        """Write `sentence` on a line of its own."""
+        self._console.print(Text(f"note: {sentence}", style="yellow"))
+
+    def render(self) -> RenderableType:
+        """Return the view of this moment."""
+        with self._lock:
+            page = Table.grid(padding=(0, 4))
+            page.add_row(self._tree(), self._items())
+            return Group(Text(f"{self._header}  {self._clock:.1f} s", style="bold"), page)
+
+    def _redraw(self) -> None:
+        while not self._closed.is_set():
+            self._changed.wait()
+            self._changed.clear()
+            self._live.update(self.render(), refresh=True)
+            self._closed.wait(PAUSE)
+
+    def _tree(self) -> RenderableType:
+        """Return the running path and its surroundings: a whole mission is taller than a terminal."""
+        shown = opened(self._outline, {path for path, status in self._status.items() if status == "RUNNING"})
+        lines = Text()
+        for node, branch in zip(shown, branches(shown), strict=True):
+            mark, style = _MARKS.get(self._status.get(node.path, ""), ("·", "dim"))
+            lines.append(branch, style="dim")
+            lines.append(f"{mark} {node.name}", style=style)
+            lines.append(f"  {self._why.get(node.path, '')}\n", style="dim")
+        return lines
+
+    def _items(self) -> RenderableType:
+        table = Table(box=None, header_style="dim", padding=(0, 1))
+        for column in ("item", "class", "state", "bin"):
+            table.add_column(column)
+        for row in self.items.rows:
+            state = Text(row.state, style=_STATES.get(row.state, ""))
+            table.add_row(Text(row.item), Text(row.label), state, Text(row.bin))
+        return table

@@ -1,0 +1,1 @@
+"""Detectors: who finds objects in a frame, beside the tick loop."""

@@ -1,0 +1,70 @@
+"""One training run: RF-DETR's trainer with our data, model and settings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytorch_lightning
+import torch
+from rfdetr.training import build_trainer
+
+from executive.vision.training.architecture import create
+from executive.vision.training.lightning import Model, Progress, Report, SymmetricData
+
+BATCH = 16
+LEARNING_RATE = 3e-4
+THREADS = 2
+
+
+def fit(dataset: Path, out: Path, *, start: Path | None, epochs: int, seed: int, progress: Progress) -> None:
+    """Train and leave checkpoints, `labels.txt` and `metrics.csv` in `out`."""
+    cuda = torch.cuda.is_available()
+    if not cuda:
+        torch.set_num_threads(THREADS)
+    pytorch_lightning.seed_everything(seed, workers=True, verbose=False)
+    labels = class_names(dataset)
+    detector = create(len(labels), start, "cuda" if cuda else "cpu")
+    config = detector.get_train_config(
+        dataset_dir=str(dataset),
+        output_dir=str(out),
+        epochs=epochs,
+        batch_size=BATCH,
+        lr=LEARNING_RATE,
+        # The stock settings slow the encoder down to spare pretrained weights. Here there are none.
+        lr_encoder=LEARNING_RATE,
+        lr_vit_layer_decay=1.0,
+        lr_component_decay=1.0,
+        lr_scheduler="cosine",
+        warmup_epochs=0.5,
+        checkpoint_interval=1,
+        use_ema=False,
+        # Boxes must stay exact to a fraction of a pixel: no resampling, no crops.
+        multi_scale=False,
+        expanded_scales=False,
+        scale_jitter=False,
+        aug_config={},
+        pack_targets=False,
+        num_workers=0,
+        tensorboard=False,
+        seed=seed,
+    )
+    model = Model(detector.model_config, config, reduced=not cuda and has_bfloat16())
+    data = SymmetricData(detector.model_config, config)
+    trainer = build_trainer(config, detector.model_config, accelerator="gpu" if cuda else "cpu")
+    trainer.callbacks.append(Report(progress))
+    trainer.fit(model, data)
+    (out / "labels.txt").write_text("".join(f"{label}\n" for label in labels), encoding="utf-8")
+
+
+def class_names(dataset: Path) -> list[str]:
+    """Return the classes of a COCO or YOLO folder in the order of the model's outputs."""
+    from rfdetr import RFDETR
+
+    # Roboflow's exports hold a parent category that is no class; this drops it as training does.
+    return list(RFDETR._load_classes(str(dataset)))
+
+
+def has_bfloat16() -> bool:
+    """Tell whether this CPU multiplies bfloat16 matrices in hardware; emulated, that would be slow."""
+    capabilities = torch.cpu.get_capabilities()
+    return bool(capabilities.get("avx512_bf16") or capabilities.get("amx_bf16"))

@@ -1,0 +1,90 @@
+"""Many seeds of one mission."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from executive.campaign.statistics import spread, wilson
+from executive.campaign.sweep import Job, summarize, sweep
+
+
+def result(seed: int, status: str = "SUCCESS", right: int = 4, left: int = 0, **more) -> dict:
+    return {
+        "seed": seed,
+        "status": status,
+        "reason": "" if status == "SUCCESS" else "Grasp.missed",
+        "message": "",
+        "node": "",
+        "items": {"seen": right + left, "placed": right, "rejected": left, "lost": 0, "phantom": 0},
+        "audit": {"right": right, "wrong_bin": 0, "left": left, "elsewhere": 0, "unseen": 0},
+        "robot_time_s": 30.0 + seed,
+        "wall_time_s": 6.0,
+        "run": f"runs/{seed}",
+        **more,
+    }
+
+
+def work(job: Job) -> dict:
+    """Do a run in another process, in a way that the seed says."""
+    if job.seed == 3:
+        raise ValueError("seed three")
+    return result(job.seed, process=os.getpid(), overrides=dict(job.overrides))
+
+
+def test_every_seed_is_run_once_in_another_process():
+    told = []
+    results = sweep(
+        "sort", range(1, 5), overrides={"a": "1"}, runs=Path("runs"), work=work,
+        progress=lambda done, total: told.append((done, total)),
+    )  # fmt: skip
+    assert [entry["seed"] for entry in results] == [1, 2, 3, 4]
+    assert results[0]["process"] != os.getpid()
+    assert results[0]["overrides"] == {"a": "1"}
+    assert results[2]["status"] == "FAULT"
+    assert results[2]["message"] == "ValueError: seed three"
+    assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
+
+
+def test_the_summary_counts_objects_and_lists_what_went_wrong():
+    wrong = result(2, right=3)
+    wrong["audit"] = {"right": 2, "wrong_bin": 1, "left": 0, "elsewhere": 0, "unseen": 0}
+    figures = summarize([result(0), result(1, "FAILURE", right=3, left=1), wrong])
+    assert (figures["runs"], figures["succeeded"]) == (3, 2)
+    assert figures["objects"]["right"] == 9
+    assert figures["objects"]["total"] == 11
+    assert [entry["seed"] for entry in figures["disagreements"]] == [2]
+    assert [(entry["seed"], entry["reason"]) for entry in figures["failures"]] == [(1, "Grasp.missed")]
+    assert figures["robot_time_s"] == {"least": 30.0, "median": 31.0, "mean": 31.0, "most": 32.0}
+
+
+def test_a_run_without_an_audit_counts_no_objects():
+    figures = summarize([result(0, audit=None)])
+    assert figures["objects"]["total"] == 0
+    assert figures["disagreements"] == []
+
+
+@pytest.mark.parametrize(
+    ("successes", "total", "low", "high"),
+    # Newcombe, Statistics in Medicine 17 (1998), table I, method 3.
+    [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611), (1, 29, 0.0061, 0.1718)],
+)
+def test_the_interval_is_the_published_one(successes, total, low, high):
+    assert wilson(successes, total) == pytest.approx((low, high), abs=5e-5)
+
+
+@given(st.integers(0, 500), st.integers(0, 500))
+def test_the_interval_holds_the_share_and_stays_inside(successes, failures):
+    total = successes + failures
+    low, high = wilson(successes, total)
+    assert 0.0 <= low <= high <= 1.0
+    if total:
+        assert low - 1e-12 <= successes / total <= high + 1e-12
+
+
+def test_the_spread_of_nothing_is_zero():
+    assert spread([]) == {"least": 0.0, "median": 0.0, "mean": 0.0, "most": 0.0}

@@ -1,0 +1,272 @@
+"""The commands: what they print, where, and how they end."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from types import ModuleType, SimpleNamespace
+
+import pytest
+from click.testing import CliRunner
+
+from executive.cli.main import COMMANDS, main
+from executive.errors import Fault, InputError
+from executive.mission.findings import Finding, MissionError
+from executive.skill import In, Metres, Skill, param
+
+
+class Reach(Skill):
+    """Bring the tool to a place.
+
+    Succeeds when it is there.
+    """
+
+    place: In[str]
+    clearance: Metres = param(0.1, ge=0, le=0.5, doc="height over the place")
+    reasons = ("unreachable",)
+    uses = ("arm",)
+
+
+RESULT = {
+    "mission": "sort",
+    "status": "SUCCESS",
+    "reason": "",
+    "message": "",
+    "node": "",
+    "seed": 7,
+    "items": {"seen": 1, "placed": 1, "rejected": 0, "lost": 0, "phantom": 0},
+    "audit": {"right": 1, "wrong_bin": 0, "left": 0, "elsewhere": 0, "unseen": 0},
+    "robot_time_s": 30.0,
+    "wall_time_s": 6.0,
+    "trace": "0123456789abcdef",
+    "run": "runs/x",
+}
+
+
+@pytest.fixture
+def project(monkeypatch):
+    """Stands for everything below the commands; tests say what it answers and read what it was asked."""
+    asked = SimpleNamespace(load=[], run=[], load_error=None, run_error=None, result=dict(RESULT))
+
+    def load_mission(mission, skills, overrides=None):
+        asked.load.append((mission, overrides))
+        if asked.load_error is not None:
+            raise asked.load_error
+        return SimpleNamespace(mission=SimpleNamespace(name=mission))
+
+    def recorded_run(loaded, skills, **options):
+        asked.run.append(options)
+        os.write(1, b"noise from a library\n")
+        if asked.run_error is not None:
+            raise asked.run_error
+        return asked.result
+
+    for name, function in (("mission.load", load_mission), ("record.recorded_run", recorded_run)):
+        module = ModuleType(f"executive.{name}")
+        setattr(module, function.__name__, function)
+        monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.setattr("executive.skill.discover", lambda: {"Reach": Reach})
+    return asked
+
+
+def invoke(*words: str):
+    return CliRunner().invoke(main, words)
+
+
+def test_help_names_every_command_and_every_exit_code():
+    shown = invoke("--help")
+    assert shown.exit_code == 0
+    assert all(f"  {command} " in shown.stdout for command in COMMANDS)
+    assert "0 success, 1 mission failed, 2 bad input, 3 fault, 130 halted" in shown.stdout
+
+
+def test_help_loads_nothing_heavy():
+    code = (
+        "import sys; from executive.cli.main import main\n"
+        "try: main(['--help'])\nexcept SystemExit: print(*sys.modules)"
+    )
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert "click" in loaded
+    assert not {"numpy", "pydantic", "py_trees", "pybullet", "cv2", "rich", "yaml"} & set(loaded)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_explains_itself(command):
+    assert invoke(command, "--help").exit_code == 0
+
+
+def test_a_misspelt_command_is_recognized():
+    shown = invoke("chekc", "x")
+    assert shown.exit_code == 2
+    assert 'there is no command "chekc"; did you mean "check"?' in shown.stderr
+
+
+@pytest.mark.parametrize(("status", "code"), [("SUCCESS", 0), ("FAILURE", 1), ("FAULT", 3), ("HALTED", 130)])
+def test_a_run_ends_with_the_exit_code_of_its_outcome(project, status, code):
+    project.result["status"] = status
+    assert invoke("run", "sort", "--quiet").exit_code == code
+
+
+def test_a_run_passes_on_everything_it_was_asked_for(project):
+    invoke(
+        "run", "sort", "--seed", "7", "--set", "a=1", "--set", "b=x=y", "--runs", "out", "--realtime",
+        "--request", "cube", "--request", "duck",
+    )  # fmt: skip
+    assert project.load == [("sort", {"a": "1", "b": "x=y"})]
+    (options,) = project.run
+    assert (options["seed"], str(options["runs"]), options["gui"], options["realtime"]) == (
+        7,
+        "out",
+        False,
+        True,
+    )
+    assert options["requests"] == ("cube", "duck")
+    assert options["view"] is not None
+
+
+def test_without_requests_the_operator_is_asked(project):
+    invoke("run", "sort")
+    assert project.run[0]["requests"] is None
+
+
+def test_json_is_the_only_thing_on_standard_output(project, tmp_path):
+    shown = invoke("run", "sort", "--json")
+    assert json.loads(shown.stdout) == RESULT
+    assert "repeat: executive run sort --seed 0" in shown.stderr
+
+
+def test_quiet_is_silent(project):
+    shown = invoke("run", "sort", "--quiet")
+    assert shown.output == ""
+    assert project.run[0]["view"] is None
+
+
+def test_what_libraries_print_does_not_reach_standard_output(capfd):
+    from executive.cli.output import stdout_kept_clean
+
+    with stdout_kept_clean():
+        os.write(1, b"from C\n")
+        print("from Python")  # noqa: T201
+    os.write(1, b"result\n")
+    out, err = capfd.readouterr()
+    assert out == "result\n"
+    assert "from C" in err
+
+
+@pytest.mark.parametrize("override", ["novalue", "=1"])
+def test_an_override_without_key_or_value_is_explained(project, override):
+    shown = invoke("run", "sort", "--set", override)
+    assert shown.exit_code == 2
+    assert f'"{override}" is no override; write it as KEY=VALUE' in shown.stderr
+
+
+def test_an_override_given_twice_is_refused(project):
+    shown = invoke("run", "sort", "--set", "a=1", "--set", "a=2")
+    assert shown.exit_code == 2
+    assert '"a" is set twice' in shown.stderr
+
+
+def test_bad_input_is_its_text_and_nothing_else(project):
+    project.load_error = InputError('there is no mission "sort"')
+    shown = invoke("run", "sort")
+    assert (shown.exit_code, shown.stdout, shown.stderr) == (2, "", 'there is no mission "sort"\n')
+
+
+def test_a_fault_outside_of_the_tree_ends_with_its_code(project):
+    project.run_error = Fault("the simulator is gone")
+    shown = invoke("run", "sort", "--quiet")
+    assert (shown.exit_code, shown.stderr) == (3, "the simulator is gone\n")
+
+
+def test_a_second_ctrl_c_ends_with_130(project):
+    project.run_error = KeyboardInterrupt()
+    assert invoke("run", "sort", "--quiet").exit_code == 130
+
+
+def test_a_bug_is_one_sentence_that_says_where_the_details_are(project):
+    project.run_error = ZeroDivisionError("division by zero")
+    shown = invoke("run", "sort", "--quiet")
+    assert shown.exit_code == 3
+    assert "Traceback" not in shown.stderr
+    assert "internal error (ZeroDivisionError: division by zero)" in shown.stderr
+    path = shown.stderr.split("the details are in ")[1].split(",")[0]
+    with open(path) as file:
+        assert "Traceback" in file.read()
+    os.remove(path)
+
+
+def test_debug_shows_the_traceback(project):
+    project.run_error = ZeroDivisionError("division by zero")
+    shown = invoke("--debug", "run", "sort", "--quiet")
+    assert shown.exit_code == 3
+    assert "Traceback" in shown.stderr
+
+
+def test_check_tells_every_finding(project):
+    project.load_error = MissionError(
+        [Finding("sort.yaml", 3, 5, "error", "unknown-skill", 'no skill "Grap"')]
+    )
+    shown = invoke("check", "sort.yaml")
+    assert shown.exit_code == 2
+    assert 'sort.yaml:3:5: error[unknown-skill]: no skill "Grap"' in shown.stderr
+
+
+def test_check_as_json_is_one_array(project):
+    project.load_error = MissionError([Finding("sort.yaml", 3, 5, "error", "unknown-skill", "no")])
+    shown = invoke("check", "a.yaml", "b.yaml", "--json")
+    reports = json.loads(shown.stdout)
+    assert [report["mission"] for report in reports] == ["a.yaml", "b.yaml"]
+    assert reports[0]["findings"][0]["line"] == 3
+    assert shown.exit_code == 2
+
+
+def test_check_says_that_all_is_well(project):
+    shown = invoke("check", "sort")
+    assert (shown.exit_code, shown.stderr) == (0, "sort: ok\n")
+
+
+def test_skills_lists_every_skill_with_its_first_line(project):
+    shown = invoke("skills").stdout
+    assert "Reach           Bring the tool to a place." in shown
+    assert "place -> - | params: clearance | reasons: unreachable" in shown
+
+
+def test_skills_tells_everything_about_one(project):
+    shown = invoke("skills", "Reach").stdout
+    assert "Succeeds when it is there." in shown
+    assert "clearance: float [m], default 0.1, at least 0, at most 0.5. height over the place" in shown
+    assert "may fail with: unreachable" in shown
+
+
+def test_an_unknown_skill_is_recognized(project):
+    shown = invoke("skills", "Reech")
+    assert shown.exit_code == 2
+    assert 'Did you mean "Reach"?' in shown.stderr
+
+
+@pytest.mark.parametrize(("seeds", "words"), [("3-1", "holds no seed"), ("a-b", "is no range of seeds")])
+def test_a_range_of_seeds_is_checked(project, seeds, words):
+    shown = invoke("sweep", "sort", "--seeds", seeds)
+    assert shown.exit_code == 2
+    assert words in shown.stderr
+
+
+@pytest.mark.parametrize(
+    ("statuses", "code"), [(["SUCCESS"], 0), (["SUCCESS", "FAILURE"], 1), (["HALTED"], 130)]
+)
+def test_a_sweep_ends_by_its_worst_run(project, monkeypatch, statuses, code):
+    results = [{**RESULT, "seed": seed, "status": status} for seed, status in enumerate(statuses)]
+    monkeypatch.setattr("executive.campaign.sweep.sweep", lambda *args, **options: results)
+    shown = invoke("sweep", "sort", "--seeds", f"0-{len(statuses) - 1}", "--json")
+    assert shown.exit_code == code
+    assert json.loads(shown.stdout)["results"] == results
+
+
+def test_an_unknown_cell_is_recognized():
+    shown = invoke("dataset", "overhed", "--out", "x")
+    assert shown.exit_code == 2
+    assert 'Did you mean "overhead"?' in shown.stderr

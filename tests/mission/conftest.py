@@ -1,0 +1,75 @@
+"""Throw-away skills and a way to load a mission from text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, ClassVar
+
+import pytest
+
+from executive.mission.load import LoadedMission, load_mission
+from executive.skill import In, Metres, Out, Skill, param, port
+
+
+class Look(Skill):
+    """See something."""
+
+    view: str = param("table", choices=("table", "full"))
+    detector: str = param("", refers="detector")
+    pose: str = param("auto", refers="pose", choices=("auto", "next"))
+    classes: tuple[str, ...] = param((), refers="class")
+    seen: Out[list[int]]
+    reasons: ClassVar = ("unsure", "hidden")
+
+    def run(self, cell: Any) -> Any:
+        yield
+        self.seen = [1]
+
+
+class Pick(Skill):
+    """Take something."""
+
+    seen: In[list[int]]
+    only: In[str | None] = port(default=None)
+    height: Metres = param(0.1, ge=0, le=0.5)
+    tries: int = param(1, ge=1)
+    held: Out[str]
+    reasons: ClassVar = ("missed",)
+
+    def run(self, cell: Any) -> Any:
+        yield
+        self.held = "thing"
+
+
+class Drop(Skill):
+    """Put something into a bin."""
+
+    held: In[str]
+    bin: str = param(refers="bin", doc="where it goes")
+    reasons: ClassVar = ("stuck",)
+
+    def run(self, cell: Any) -> Any:
+        yield
+
+
+SKILLS: dict[str, type[Skill]] = {"Look": Look, "Pick": Pick, "Drop": Drop}
+
+HEAD = "mission: m\ncell: cells/overhead.yaml\n"
+
+
+@pytest.fixture
+def skills() -> dict[str, type[Skill]]:
+    return dict(SKILLS)
+
+
+@pytest.fixture
+def load(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., LoadedMission]:
+    """Write the text as `m.yaml` into an empty folder, go there and load it."""
+    monkeypatch.chdir(tmp_path)
+
+    def load(text: str, overrides: dict[str, str] | None = None, **more: Any) -> LoadedMission:
+        Path("m.yaml").write_text(text)
+        return load_mission("m.yaml", SKILLS, overrides, **more)
+
+    return load

@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+import pybullet
+import pybullet_data
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pybullet_utils.bullet_client import BulletClient
+
+from executive.errors import Unreachable
+from executive.geometry import Pose, tool_down
+from executive.motion.kinematics import Kinematics
+
+LIMIT = np.radians([170, 120, 170, 120, 170, 120, 175])
+ARM = Kinematics(0.12, LIMIT)
+postures = st.tuples(*(st.floats(-limit, limit) for limit in LIMIT)).map(np.array)
+
+
+def assert_same(one: Pose, other: Pose, tolerance: float = 1e-7) -> None:
+    assert np.abs(one.position - other.position).max() < tolerance
+    assert np.abs(one.rotation - other.rotation).max() < tolerance
+
+
+@given(postures)
+@settings(max_examples=40, deadline=None)
+def test_every_solution_of_a_reachable_pose_reaches_it_inside_the_limits(q) -> None:
+    goal = ARM.forward(q)
+    found = ARM.grid(goal, np.array([ARM.swivel(q), 0.7])).reshape(-1, 7)
+    for solution in found:
+        assert_same(ARM.forward(solution), goal, 1e-6)
+    try:
+        inside = ARM.solutions(goal)
+    except Unreachable:
+        return  # a swivel window narrower than the grid
+    assert np.all(np.abs(inside) <= LIMIT)
+
+
+@given(postures)
+@settings(max_examples=40, deadline=None)
+def test_branch_and_swivel_of_a_posture_lead_back_to_it(q) -> None:
+    if min(abs(math.sin(q[i])) for i in (1, 3, 5)) < 1e-3:
+        return  # straight joints: the posture is not one of a few
+    found = ARM.grid(ARM.forward(q), np.array([ARM.swivel(q)]))[ARM.branch(q), 0]
+    assert np.abs(found - q).max() < 1e-5
+
+
+def test_forward_kinematics_agree_with_pybullet() -> None:
+    client = BulletClient(pybullet.DIRECT)
+    arm = client.loadURDF(f"{pybullet_data.getDataPath()}/kuka_iiwa/model.urdf", useFixedBase=True)
+    rng = np.random.default_rng(1)
+    for q in rng.uniform(-LIMIT, LIMIT, (50, 7)):
+        for joint, angle in enumerate(q):
+            client.resetJointState(arm, joint, angle)
+        state = client.getLinkState(arm, 6, computeForwardKinematics=True)
+        assert_same(ARM.flange(q), Pose.of(*state[4:6]) @ Pose.of([0, 0, 0.045]), 1e-5)
+        assert_same(ARM.forward(q), Pose.of(*state[4:6]) @ Pose.of([0, 0, 0.165]), 1e-5)
+    client.disconnect()
+
+
+def test_every_reachable_tool_down_pose_is_reached() -> None:
+    rng = np.random.default_rng(2)
+    reached = 0
+    while reached < 300:
+        goal = tool_down(rng.uniform([0.2, -0.5, 0.02], [0.7, 0.5, 0.3]), rng.uniform(-math.pi, math.pi))
+        distance = np.linalg.norm(goal.position + np.array([0, 0, ARM.reach - 0.36]))
+        if not ARM.nearest < distance < ARM.farthest:
+            continue
+        try:
+            found = ARM.nearest_solution(goal, np.zeros(7))
+        except Unreachable:
+            # Then no swivel at all works, looked at ten times as finely.
+            every = ARM.grid(goal, np.radians(np.arange(0, 360, 0.025))).reshape(-1, 7)
+            assert not np.any(np.all(np.abs(every) <= LIMIT, axis=1))
+            continue
+        assert_same(ARM.forward(found), goal)
+        reached += 1
+
+
+def test_velocities_are_the_derivative_of_positions() -> None:
+    rng = np.random.default_rng(3)
+    qs, qds = rng.uniform(-LIMIT, LIMIT, (20, 7)), rng.normal(size=(20, 7))
+    h = 1e-6
+    measured = (ARM.positions(qs + h * qds) - ARM.positions(qs - h * qds)) / (2 * h)
+    assert np.abs(measured - ARM.velocities(qs, qds)).max() < 1e-6
+
+
+def test_a_pose_too_far_away_says_by_how_much() -> None:
+    with pytest.raises(Unreachable, match=re.escape("0.080 m farther than the arm is long (0.82 m)")):
+        ARM.solutions(tool_down([0.9, 0.0, 0.114]))
+
+
+def test_a_pose_too_near_says_by_how_much() -> None:
+    with pytest.raises(Unreachable, match=re.escape("0.110 m nearer than joint 4 can fold (0.41 m)")):
+        ARM.solutions(tool_down([0.3, 0.0, 0.114]))
+
+
+def test_a_pose_outside_the_limits_names_the_joint() -> None:
+    narrow = Kinematics(0.12, np.radians([170, 120, 170, 120, 170, 20, 175]))
+    with pytest.raises(Unreachable, match=r"leaves joint 6 \d+\.\d° outside ±20°"):
+        narrow.solutions(tool_down([0.5, 0.0, 0.1]))

@@ -1,0 +1,69 @@
+"""The result of a run."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from executive.errors import ExecutiveError
+from executive.record.result import ledger_agrees, result_of, write_result
+
+
+@dataclass(frozen=True)
+class Ended:
+    status: str = "SUCCESS"
+    reason: str = ""
+    message: str = ""
+    node: str = ""
+    ticks: int = 240
+    robot_time: float = 1.0
+
+
+ITEMS = {"seen": 3, "placed": 2, "rejected": 1, "lost": 0, "phantom": 1, "rows": [{}]}
+AUDIT = {"right": 2, "wrong_bin": 0, "left": 1, "elsewhere": 0, "unseen": 0}
+
+
+def result(items=ITEMS, audit=AUDIT) -> dict:
+    return result_of(
+        mission="sort", seed=7, outcome=Ended(), items=items, audit=audit, wall_time=0.5,
+        trace="ab", run=Path("r"),
+    )  # fmt: skip
+
+
+def test_has_every_field_that_is_promised():
+    made = result()
+    assert set(made) >= {"mission", "status", "reason", "seed", "robot_time_s", "wall_time_s", "trace", "run"}
+    assert made["items"] == {"seen": 3, "placed": 2, "rejected": 1, "lost": 0, "phantom": 1}
+    assert made["audit"] == AUDIT
+
+
+def test_is_written_whole_and_can_be_read_again(tmp_path):
+    write_result(tmp_path / "result.json", result())
+    assert json.loads((tmp_path / "result.json").read_text()) == result()
+    assert [path.name for path in tmp_path.iterdir()] == ["result.json"]
+
+
+def test_a_disk_that_does_not_take_it_is_a_sentence(tmp_path):
+    with pytest.raises(ExecutiveError, match=r"cannot write the result .* the journal beside it"):
+        write_result(tmp_path / "nowhere" / "result.json", result())
+
+
+def test_ledger_and_audit_agree():
+    assert ledger_agrees(result())
+    assert ledger_agrees(result(audit=None))
+
+
+@pytest.mark.parametrize(
+    "audit",
+    [
+        {"right": 1, "wrong_bin": 1, "left": 1, "elsewhere": 0, "unseen": 0},
+        {"right": 3, "wrong_bin": 0, "left": 0, "elsewhere": 0, "unseen": 0},
+        {"right": 2, "wrong_bin": 0, "left": 0, "elsewhere": 1, "unseen": 0},
+        {"right": 2, "wrong_bin": 0, "left": 1, "elsewhere": 0, "unseen": 1},
+    ],
+)
+def test_every_disagreement_is_noticed(audit):
+    assert not ledger_agrees(result(audit=audit))

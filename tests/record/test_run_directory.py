@@ -1,0 +1,62 @@
+"""The directory a run leaves."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+
+import pytest
+import yaml
+
+from executive.errors import InputError
+from executive.record.run_directory import RunDirectory
+
+STARTED = datetime(2026, 11, 21, 3, 15, 42)
+
+
+def create(runs: Path) -> RunDirectory:
+    return RunDirectory.create(runs, mission="sort", seed=7, started=STARTED)
+
+
+def test_is_named_after_time_mission_and_seed(tmp_path):
+    assert create(tmp_path / "runs").path == tmp_path / "runs" / "2026-11-21" / "03-15-42_sort_s7"
+
+
+def test_runs_of_the_same_second_do_not_share_a_directory(tmp_path):
+    names = [create(tmp_path).path.name for _ in range(3)]
+    assert names == ["03-15-42_sort_s7", "03-15-42_sort_s7-2", "03-15-42_sort_s7-3"]
+
+
+def test_latest_points_to_the_last_run_and_survives_moving_the_folder(tmp_path):
+    create(tmp_path / "runs")
+    last = create(tmp_path / "runs")
+    (last.path / "mark").touch()
+    (tmp_path / "runs").rename(tmp_path / "moved")
+    assert (tmp_path / "moved" / "latest" / "mark").exists()
+
+
+def test_keeps_the_mission_verbatim_and_the_rest_as_yaml(tmp_path):
+    directory = create(tmp_path)
+    directory.save_inputs(mission="mission: sort  # mine\n", params={"attempts": 3}, cell={"size": (1, 2)})
+    assert (directory.path / "mission.yaml").read_text() == "mission: sort  # mine\n"
+    assert yaml.safe_load((directory.path / "params.yaml").read_text()) == {"attempts": 3}
+    assert yaml.safe_load((directory.path / "cell.yaml").read_text()) == {"size": [1, 2]}
+
+
+def test_a_place_that_cannot_be_written_to_is_a_sentence(tmp_path):
+    (tmp_path / "runs").write_text("a file, no folder")
+    with pytest.raises(InputError) as raised:
+        create(tmp_path / "runs")
+    assert "cannot make a run directory below" in str(raised.value)
+    assert "--runs DIR" in str(raised.value)
+
+
+def test_a_full_disk_is_a_sentence(tmp_path, monkeypatch):
+    directory = create(tmp_path)
+
+    def full(*args, **kwargs):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", full)
+    with pytest.raises(InputError, match="no space left on device; free some space"):
+        directory.save_inputs(mission="", params={}, cell={})

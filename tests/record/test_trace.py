@@ -1,0 +1,74 @@
+"""The hash over every decision of a run."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from executive.events import Event
+from executive.record.trace import Trace
+
+STATUS = {
+    "node": "sort/Grasp",
+    "status": "FAILURE",
+    "reason": "missed",
+    "message": "no seal",
+    "item": "cube-1",
+    "outputs": {"p": np.array([0.1, 0.2])},
+}
+
+
+def digest(*events: Event) -> str:
+    trace = Trace()
+    for event in events:
+        trace(event)
+    return trace.hexdigest()
+
+
+def test_is_sixteen_hexadecimal_digits():
+    assert len(digest()) == 16
+    assert int(digest(), 16) >= 0
+
+
+def test_equal_events_give_equal_traces():
+    assert digest(Event("status", 3, 0.1, STATUS)) == digest(Event("status", 3, 0.1, dict(STATUS)))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"node": "sort/Other"},
+        {"status": "SUCCESS"},
+        {"reason": "other"},
+        {"item": "cube-2"},
+        {"outputs": {"p": np.array([0.1, 0.20001])}},
+    ],
+)
+def test_every_decision_counts(change):
+    assert digest(Event("status", 3, 0.1, STATUS)) != digest(Event("status", 3, 0.1, {**STATUS, **change}))
+
+
+def test_the_tick_and_the_order_count():
+    first, second = Event("status", 3, 0.1, STATUS), Event("status", 4, 0.1, STATUS)
+    assert digest(first) != digest(second)
+    assert digest(first, second) != digest(second, first)
+
+
+def test_wording_and_noise_below_a_micrometre_do_not_count():
+    other = {**STATUS, "message": "no seal 0.1 s after contact", "outputs": {"p": [0.1 + 1e-9, 0.2]}}
+    assert digest(Event("status", 3, 0.1, STATUS)) == digest(Event("status", 3, 0.1, other))
+
+
+@pytest.mark.parametrize("kind", ["run", "look", "intent", "request", "end"])
+def test_what_decides_nothing_does_not_count(kind):
+    assert digest(Event(kind, 3, 0.1, {"run": "/tmp/x", "item": "cube-1"})) == digest()
+
+
+def test_what_becomes_of_items_and_what_is_chosen_count():
+    placed = {"item": "cube-1", "state": "placed", "bin": "red_bin", "label": "cube", "position": (0, 0, 0)}
+    assert digest(Event("item", 1, 0.0, placed)) != digest(
+        Event("item", 1, 0.0, {**placed, "bin": "blue_bin"})
+    )
+    chosen = {"item": "cube-1", "label": "cube", "frame": 1}
+    other = {**chosen, "item": "cube-2"}
+    assert digest(Event("decision", 1, 0.0, chosen)) != digest(Event("decision", 1, 0.0, other))

@@ -1,0 +1,170 @@
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+from py_trees.common import Status
+
+from executive.errors import InputError
+from executive.events import Event
+from executive.mission.load import load_mission
+from executive.runtime.run import Run
+from executive.skill import discover
+from executive.testing.fake_cell import FakeCell
+
+
+def make(
+    missions: Path, name: str = "sort_overhead", seed: int = 3, **options: Any
+) -> tuple[Run, list[Event]]:
+    events: list[Event] = []
+    loaded = load_mission(missions / f"{name}.yaml", discover())
+    observers = [events.append, *options.pop("observers", [])]
+    return Run(
+        loaded, discover(), seed=seed, observers=observers, kind=FakeCell.from_config, **options
+    ), events
+
+
+def fake_of(run: Run) -> FakeCell:
+    assert isinstance(run.workcell, FakeCell)
+    return run.workcell
+
+
+def running(run: Run) -> list[str]:
+    return [node.name for node in run.root.iterate() if node.status is Status.RUNNING]
+
+
+def test_everything_ends_in_its_bin_and_the_books_agree_with_the_world(missions: Path) -> None:
+    run, _ = make(missions)
+    outcome = run.execute()
+    items, audit = run.items(), run.audit()
+    assert (outcome.status, outcome.reason) == ("SUCCESS", "")
+    assert items["placed"] == items["seen"] == audit["right"] == len(fake_of(run).world.objects)
+
+
+def test_two_runs_of_one_seed_tell_the_same_story(missions: Path) -> None:
+    stories = []
+    for _ in range(2):
+        run, events = make(missions, seed=11)
+        run.execute()
+        stories.append([(e.kind, e.tick, str({**e.data, "frame_object": 0})) for e in events])
+    assert stories[0] == stories[1]
+
+
+def test_a_missed_grasp_is_tried_again_elsewhere_and_succeeds(missions: Path) -> None:
+    run, events = make(missions)
+    tries = iter([False, False])
+    fake_of(run).tool.seals = lambda: next(tries, True)
+    assert run.execute().status == "SUCCESS"
+    reasons = [e.data["reason"] for e in events if e.data.get("status") == "FAILURE"]
+    assert reasons.count("missed") == 2
+
+
+def test_an_object_that_cannot_be_had_is_rejected_and_the_others_go_on(missions: Path) -> None:
+    run, _ = make(missions)
+    fake = fake_of(run)
+    stubborn = fake.world.objects[0]
+    fake.tool.seals = lambda: fake.world.under(fake.arm.tool_pose.position) is not stubborn
+    outcome, items, audit = run.execute(), run.items(), run.audit()
+    assert outcome.status == "SUCCESS"
+    assert (items["rejected"], audit["left"]) == (1, 1)
+    assert items["placed"] == audit["right"] == items["seen"] - 1
+    rejected = next(row for row in items["rows"] if row["state"] == "rejected")
+    assert rejected["why"] == "could not be picked (3 failed attempts)"
+
+
+def test_an_object_dropped_outside_the_workspace_is_found_by_the_full_look(missions: Path) -> None:
+    run, events = make(missions)
+    fake = fake_of(run)
+
+    def drop_once(event: Event) -> None:
+        # Half-way over, the seal breaks: the object falls beside the bin.
+        tip = fake.arm.tool_pose.position
+        if not dropped and fake.tool.holding and abs(tip[1]) > 0.28 and tip[2] > 0.12:
+            dropped.append(1)
+            fake.tool.open()
+
+    dropped: list[int] = []
+    advance = fake.advance
+
+    def watched() -> None:
+        advance()
+        drop_once(Event("", 0, 0.0))
+
+    fake.advance = watched  # type: ignore[method-assign]
+    outcome, items, audit = run.execute(), run.items(), run.audit()
+    assert dropped
+    assert outcome.status == "SUCCESS", outcome
+    assert items["placed"] == audit["right"] == items["seen"]
+    assert any(e.data.get("reason") == "dropped" for e in events)
+
+
+def test_a_reason_nobody_catches_ends_the_mission(missions: Path) -> None:
+    run, _ = make(missions)
+    fake_of(run).detector.answers = lambda look, true: "the server is gone"
+    outcome = run.execute()
+    assert (outcome.status, outcome.reason) == ("FAILURE", "Detect.unavailable")
+    assert outcome.message == "detector embedded: the server is gone"
+    assert outcome.node.endswith("Detect")
+
+
+def test_a_bug_in_a_part_is_a_fault_and_the_arm_is_at_rest(missions: Path) -> None:
+    run, events = make(missions)
+    fake = fake_of(run)
+
+    def broken() -> bool:
+        raise ZeroDivisionError("vacuum gauge")
+
+    fake.tool.seals = broken
+    outcome = run.execute()
+    assert outcome.status == "FAULT"
+    assert "vacuum gauge" in outcome.message
+    assert outcome.node.endswith("Grasp")
+    assert fake.arm.at_rest
+    assert running(run) == []
+    assert events[-1].kind == "end"
+
+
+def test_ctrl_c_halts_every_node_and_brakes_the_arm(missions: Path) -> None:
+    def interrupt(event: Event) -> None:
+        if event.kind == "intent" or (event.tick > 100 and event.kind == "status" and not sent):
+            sent.append(1)
+            os.kill(os.getpid(), signal.SIGINT)
+
+    sent: list[int] = []
+    before = signal.getsignal(signal.SIGINT)
+    run, events = make(missions, observers=[interrupt])
+    outcome = run.execute()
+    assert (outcome.status, outcome.message) == ("HALTED", "halted by the user")
+    assert fake_of(run).arm.at_rest
+    assert running(run) == []
+    assert events[-1].kind == "end"
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_requests_are_served_in_order_and_the_rest_is_left(missions: Path) -> None:
+    run, events = make(missions, "pick_on_request", requests=["cube", "s", "0", "q"])
+    fake = fake_of(run)
+    fake.world.objects.clear()
+    for label, x, y in (("cube", 0.45, -0.1), ("cube", 0.55, 0.1), ("duck", 0.5, 0.0)):
+        fake.world.put(label, x, y)
+    outcome, items, audit = run.execute(), run.items(), run.audit()
+    assert outcome.status == "SUCCESS"
+    assert [e.data["wanted"] for e in events if e.kind == "request"] == ["cube", "rescan", "cube", None]
+    assert (items["placed"], items["rejected"]) == (2, 1) == (audit["right"], audit["left"])
+
+
+def test_a_request_for_nothing_known_says_what_there_is(missions: Path) -> None:
+    run, _ = make(missions, "pick_on_request", requests=["banana"])
+    outcome = run.execute()
+    assert outcome.message.endswith('cannot pick "banana"; ask for one of: cube, sphere, duck')
+
+
+def test_an_unknown_kind_of_cell_names_the_installed_ones(missions: Path) -> None:
+    loaded = load_mission(missions / "sort_overhead.yaml", discover(), {"cell.kind": "hardware"})
+    with pytest.raises(
+        InputError, match='no installed package offers cells of kind "hardware"; installed: sim'
+    ):
+        Run(loaded, discover(), seed=1)

@@ -1,0 +1,123 @@
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from executive.cell_config import CellConfig, NoiseConfig
+from executive.geometry import Pose, about_z
+from executive.sim.camera import CELL_LIGHT, SimCamera, camera_pose, render
+from executive.sim.models import load_mesh
+from executive.sim.world import World
+from executive.vision.camera_model import camera_matrix, project
+
+Build = Callable[[CellConfig], World]
+
+
+@dataclass
+class StoppedClock:
+    now: float = 1.5
+    step: float = 1 / 240
+
+    def sleep(self, duration: float) -> Iterator[None]:
+        yield from ()
+
+
+def at_scan_pose(build: Build, config: CellConfig) -> tuple[World, str]:
+    (name,) = config.cameras
+    world = build(config)
+    world.set_arm(np.radians(config.arm.poses_deg[config.cameras[name].scan_poses[0]]))
+    return world, name
+
+
+@pytest.mark.parametrize("cell", ["overhead", "wrist"])
+def test_projected_meshes_agree_with_the_rendered_silhouettes(
+    build: Build, cell: str, request: pytest.FixtureRequest
+) -> None:
+    config: CellConfig = request.getfixturevalue(cell)
+    world, name = at_scan_pose(build, config)
+    camera = config.cameras[name]
+    for i in range(9):
+        label = list(config.objects)[i % 3]
+        mesh = load_mesh(config.objects[label])
+        place = np.array([0.44 + 0.09 * (i % 3), -0.18 + 0.18 * (i // 3), -mesh.bottom])
+        world.add_object(label, Pose(about_z(0.7 * i), place), (1, 0, 0))
+    matrix, X_WC = camera_matrix(camera.width, camera.height, camera.fov_deg), camera_pose(world, camera)
+    left, top, _, _ = camera.table_view
+    bodies = render(world, matrix, X_WC, camera.table_view, CELL_LIGHT).bodies
+    for body, label in world.bodies.items():
+        rows, columns = np.nonzero(bodies == body)
+        seen = [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
+        pixels = project(
+            matrix, X_WC, world.object_pose(body).apply(load_mesh(config.objects[label]).vertices)
+        )
+        expected = [*(pixels.min(axis=0) - (left, top)), *(pixels.max(axis=0) - (left, top))]
+        # Half a pixel is what sampling at pixel centres costs on a straight edge, a bit more on a tip.
+        assert np.abs(np.array(seen) - expected).max() < 1.0, label
+        assert abs(np.mean(np.array(seen) - expected)) < 0.3, label
+
+
+@pytest.mark.parametrize("cell", ["overhead", "wrist"])
+def test_the_workspace_lies_inside_the_table_view_from_every_scan_pose(
+    build: Build, cell: str, request: pytest.FixtureRequest
+) -> None:
+    config: CellConfig = request.getfixturevalue(cell)
+    world, name = at_scan_pose(build, config)
+    camera = config.cameras[name]
+    corners = [(x, y, z) for x in config.table.x for y in config.table.y for z in (0.0, 0.06)]
+    left, top, right, bottom = camera.table_view
+    assert right - left == bottom - top
+    for pose in camera.scan_poses:
+        world.set_arm(np.radians(config.arm.poses_deg[pose]))
+        matrix = camera_matrix(camera.width, camera.height, camera.fov_deg)
+        pixels = project(matrix, camera_pose(world, camera), corners)
+        assert (pixels > (left, top)).all()
+        assert (pixels < (right, bottom)).all()
+
+
+def test_the_wrist_camera_shows_the_side_away_from_the_robot_at_the_top(
+    build: Build, wrist: CellConfig
+) -> None:
+    world, name = at_scan_pose(build, wrist)
+    X_WC = camera_pose(world, wrist.cameras[name])
+    assert X_WC.position == pytest.approx([0.53, 0.0, 0.55], abs=1e-3)
+    assert X_WC.rotation[:, 1] == pytest.approx([-1, 0, 0], abs=1e-4)
+    matrix = camera_matrix(640, 480, wrist.cameras[name].fov_deg)
+    bodies = render(world, matrix, X_WC, (0, 0, 640, 480), CELL_LIGHT).bodies
+    assert not (bodies == world.arm).any(), "the camera sees its own tool"
+
+
+def test_two_frames_of_one_scene_differ_and_a_seed_repeats_them(build: Build, overhead: CellConfig) -> None:
+    world, name = at_scan_pose(build, overhead)
+    one, same, other = (
+        SimCamera(world, name, overhead.cameras[name], StoppedClock(), seed) for seed in (7, 7, 8)
+    )
+    first, second = one.capture(), one.capture()
+    assert (first.id, second.id) == (1, 2)
+    assert np.abs(first.image.astype(int) - second.image).mean() > 0.5
+    assert (same.capture().image == first.image).all()
+    assert (other.capture().image != first.image).any()
+
+
+def test_a_frame_carries_what_is_needed_to_use_it_later(build: Build, overhead: CellConfig) -> None:
+    class Half:
+        def visible(self, matrix: np.ndarray, X_WC: Pose, size: tuple[int, int]) -> np.ndarray:
+            mask = np.ones(size[::-1], np.bool_)
+            mask[:240] = False
+            return mask
+
+        def sees_table(self, matrix: np.ndarray, X_WC: Pose, size: tuple[int, int]) -> bool:
+            return False
+
+    world, name = at_scan_pose(build, overhead)
+    config = overhead.cameras[name].model_copy(update={"noise": NoiseConfig(gain=0, read=0)})
+    camera = SimCamera(world, name, config, StoppedClock(), 1, shadow=Half(), epoch=lambda: 4)
+    frame = camera.capture()
+    assert (frame.camera, frame.stamp, frame.epoch, frame.depth) == (name, 1.5, 4, None)
+    assert frame.image.shape == (480, 640, 3)
+    assert (frame.visible.sum(), frame.visible.shape) == (240 * 640, (480, 640))
+    assert frame.X_WC.position == pytest.approx(config.position)
+    assert not camera.sees_table()
+    assert SimCamera(world, name, config, StoppedClock(), 1).sees_table()

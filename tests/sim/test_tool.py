@@ -1,0 +1,235 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pybullet
+import pytest
+import yaml
+
+from executive.cell_config import CellConfig
+from executive.geometry import Array, Pose, tool_down
+from executive.motion.kinematics import Kinematics
+from executive.sim.tool import SuctionTool
+from executive.sim.world import World
+
+CELL = Path(__file__).parents[2] / "missions" / "cells" / "overhead.yaml"
+X, Y = 0.5, 0.05
+CUBE = 0.05
+GOOD_PLACE = {"cube": 0.0, "sphere": 0.0, "duck": -0.01}
+"""Where along x from its origin an object is held well [m]: the duck at the top of its head."""
+
+
+class Bench:
+    """A tool over one object on the table, and an arm that is simply put where it should be."""
+
+    def __init__(self, label: str) -> None:
+        config = CellConfig(**yaml.safe_load(CELL.read_text(encoding="utf-8")))
+        self.world = World(config)
+        self.config = config.tool
+        self.events: list[dict[str, Any]] = []
+        self.tool = SuctionTool(self.world, config.tool, self.emit)
+        self.kinematics = Kinematics(
+            tool_length=config.tool.length, position_limit=np.radians(config.arm.limits.position_deg)
+        )
+        self.q: Array = np.radians(config.arm.poses_deg["home"])
+        self.body = self.world.add_object(label, Pose.of([X - GOOD_PLACE[label], Y, CUBE / 2]), (1, 1, 1))
+        self.steps(120)
+        self.top = float(self.world.client.rayTest([X, Y, 0.3], [X, Y, 0.0])[0][3][2])
+
+    def emit(self, kind: str, **data: Any) -> None:
+        self.events.append({"kind": kind, **data})
+
+    def put(self, height: float, dx: float = 0.0) -> None:
+        """Put the lip `height` [m] over the object's top, `dx` [m] beside its good place."""
+        self.q = self.kinematics.nearest_solution(tool_down([X + dx, Y, self.top + height]), self.q)
+        self.world.set_arm(self.q)
+        self.steps(1)
+
+    def raise_by(self, height: float, steps: int = 240) -> None:
+        """Lift the tool smoothly."""
+        start = self.world.tool_pose().position
+        for i in range(1, steps + 1):
+            s = i / steps
+            goal = start + np.array([0, 0, height * s * s * (3 - 2 * s)])
+            self.q = self.kinematics.nearest_solution(tool_down(goal), self.q)
+            self.steps(1)
+
+    def steps(self, count: int, pull: float = 0.0) -> None:
+        """Make physics steps with the arm held still and `pull` [N] downwards on the object."""
+        for _ in range(count):
+            self.world.client.setJointMotorControlArray(
+                self.world.arm, range(7), pybullet.POSITION_CONTROL, self.q, positionGains=[1.0] * 7
+            )
+            if pull:
+                at = self.world.client.getBasePositionAndOrientation(self.body)[0]
+                self.world.client.applyExternalForce(self.body, -1, [0, 0, -pull], at, pybullet.WORLD_FRAME)
+            self.world.step()
+            self.tool.advance()
+
+    def hang(self) -> None:
+        """Seal the object on at its good place and lift it into the air."""
+        self.put(0.0012)
+        self.tool.close()
+        assert self.tool.holding
+        self.raise_by(0.1)
+        self.steps(60)
+
+    def pose_in_tool(self) -> Pose:
+        """Return the object's pose in the tool's frame."""
+        X_WB = Pose.of(*self.world.client.getBasePositionAndOrientation(self.body))
+        return self.world.tool_pose().inverse() @ X_WB
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    bench = Bench("cube")
+    yield bench
+    bench.world.close()
+
+
+@pytest.mark.parametrize(("height", "touching"), [(0.05, False), (0.0014, False), (0.0006, True)])
+def test_the_lip_feels_a_surface_within_a_millimetre(bench: Bench, height: float, touching: bool) -> None:
+    bench.put(height)
+    assert bench.tool.touching is touching
+
+
+def test_the_lip_feels_the_table_too(bench: Bench) -> None:
+    bench.put(0.0007 - bench.top, dx=0.09)
+    assert bench.tool.touching
+    bench.tool.close()
+    assert not bench.tool.holding
+
+
+def test_the_shaft_of_the_tool_beside_an_object_is_no_touch_of_the_lip(bench: Bench) -> None:
+    bench.put(-0.03, dx=CUBE / 2 + 0.0125)
+    near = bench.world.client.getClosestPoints(
+        bench.world.arm, bench.body, 0.001, linkIndexA=bench.world.tool
+    )
+    assert near and not bench.tool.touching
+
+
+def test_a_cube_seals_at_its_middle_but_not_beyond_its_edge(bench: Bench) -> None:
+    bench.put(0.0008, dx=CUBE / 2 - 0.002)
+    bench.tool.close()
+    assert bench.tool.touching and not bench.tool.holding
+    bench.tool.open()
+    bench.put(0.0008)
+    bench.tool.close()
+    assert bench.tool.holding
+    assert bench.tool.held_body == bench.body
+
+
+def test_closing_in_the_air_holds_nothing_and_says_what_it_meant(bench: Bench) -> None:
+    bench.put(0.01)
+    bench.tool.close()
+    bench.tool.open()
+    assert not bench.tool.holding
+    assert bench.events == [{"kind": "intent", "action": "close"}, {"kind": "intent", "action": "open"}]
+
+
+def test_a_vacuum_already_on_seals_on_what_comes_within_reach(bench: Bench) -> None:
+    bench.put(0.01)
+    bench.tool.close()
+    bench.put(0.0025)
+    assert not bench.tool.holding
+    bench.put(0.0015)
+    assert bench.tool.holding
+
+
+@pytest.mark.parametrize("label", ["cube", "sphere", "duck"])
+def test_a_held_object_keeps_the_pose_it_had_at_contact_and_pulls_with_its_weight(label: str) -> None:
+    bench = Bench(label)
+    bench.put(0.0012)
+    before = bench.pose_in_tool()
+    bench.tool.close()
+    bench.raise_by(0.1)
+    bench.steps(60)
+    after = bench.pose_in_tool()
+    assert bench.tool.holding
+    assert after.position == pytest.approx(before.position, abs=2e-4)
+    assert after.rotation == pytest.approx(before.rotation, abs=5e-3)
+    assert bench.tool.pull == pytest.approx(0.1 * 9.81, rel=0.05)
+    bench.world.close()
+
+
+def test_an_object_pulled_harder_than_the_seal_bears_comes_off(bench: Bench) -> None:
+    bench.hang()
+    weight = 0.1 * 9.81
+    bench.steps(60, pull=0.9 * bench.config.force - weight)
+    assert bench.tool.holding
+    bench.steps(60, pull=1.1 * bench.config.force - weight)
+    assert not bench.tool.holding
+    bench.steps(120)
+    assert bench.pose_in_tool().position[2] > 0.1
+
+
+def test_a_weak_seal_comes_off_under_a_load_that_a_good_one_bears() -> None:
+    held = {}
+    for dx in (0.0, 0.018):
+        bench = Bench("sphere")
+        drop = 0.03 - np.sqrt(0.03**2 - max(0.0, dx - bench.config.cup_radius) ** 2)
+        bench.put(0.0008 - drop, dx=dx)
+        bench.tool.close()
+        assert bench.tool.holding
+        bench.raise_by(0.05)
+        bench.steps(60, pull=3.0)
+        held[dx] = bench.tool.holding
+        bench.world.close()
+    assert held == {0.0: True, 0.018: False}
+
+
+def test_a_blow_of_a_single_step_does_not_break_the_seal(bench: Bench) -> None:
+    bench.hang()
+    bench.steps(1, pull=2 * bench.config.force)
+    bench.steps(30)
+    assert bench.tool.holding
+
+
+def test_a_seal_that_gave_way_forms_again_only_after_the_vacuum_was_off_or_the_cup_clear(
+    bench: Bench,
+) -> None:
+    bench.put(0.0005)
+    bench.tool.close()
+    bench.raise_by(0.0003, steps=10)
+    bench.steps(30, pull=1.5 * bench.config.force)
+    assert not bench.tool.holding
+    bench.steps(60)
+    assert bench.tool.touching and not bench.tool.holding
+    bench.tool.open()
+    bench.tool.close()
+    assert bench.tool.holding
+
+
+def test_a_lost_object_can_be_picked_again_with_the_vacuum_left_on(bench: Bench) -> None:
+    bench.hang()
+    bench.steps(30, pull=2 * bench.config.force)
+    assert not bench.tool.holding
+    bench.steps(240)
+    bench.put(0.0008)
+    assert bench.tool.holding
+
+
+def test_opening_drops_the_object_and_lets_it_collide_with_the_tool_again(bench: Bench) -> None:
+    bench.hang()
+    assert not bench.world.client.getContactPoints(bench.world.arm, bench.body)
+    bench.tool.open()
+    assert not bench.tool.holding
+    assert bench.tool.pull == 0
+    assert bench.tool.held_body is None
+    bench.steps(240)
+    assert bench.pose_in_tool().position[2] > 0.1
+    bench.put(-0.0005)
+    assert bench.world.client.getContactPoints(bench.world.arm, bench.body)
+
+
+def test_two_runs_of_the_same_commands_end_in_the_same_bits() -> None:
+    ends = []
+    for _ in range(2):
+        bench = Bench("duck")
+        bench.hang()
+        ends.append(bench.world.client.getBasePositionAndOrientation(bench.body))
+        bench.world.close()
+    assert ends[0] == ends[1]

@@ -1,0 +1,90 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from executive.cell_config import CellConfig
+from executive.errors import InputError
+from executive.geometry import Pose, about_z, tool_down
+from executive.sim.models import find_model, load_mesh
+from executive.sim.spawn import spawn
+from executive.sim.world import World
+
+Build = Callable[[CellConfig], World]
+
+
+def test_the_table_top_is_at_height_zero_and_the_bin_floors_just_above(
+    build: Build, overhead: CellConfig
+) -> None:
+    world = build(overhead)
+    hits = world.client.rayTestBatch([[0.5, 0, 1], [0.2, 0.44, 1]], [[0.5, 0, -1], [0.2, 0.44, -1]])
+    assert [hit[0] for hit in hits] == [world.table, world.bins["blue_bin"][0]]
+    assert [hit[3][2] for hit in hits] == pytest.approx([0.0, 0.005], abs=1e-6)
+
+
+def test_the_tool_ends_where_the_tool_centre_point_is(build: Build, wrist: CellConfig) -> None:
+    world = build(wrist)
+    world.set_arm(np.radians(wrist.arm.poses_deg["scan"]))
+    X_WT = world.tool_pose()
+    assert X_WT.rotation == pytest.approx(tool_down([0, 0, 0]).rotation, abs=1e-5)
+    low, high = world.client.getAABB(world.arm, world.tool)
+    assert low[2] == pytest.approx(X_WT.position[2], abs=2e-3)
+    assert high[2] - low[2] == pytest.approx(wrist.tool.length, abs=5e-3)
+
+
+def test_the_tool_stays_on_the_flange_without_slip(build: Build, overhead: CellConfig) -> None:
+    world = build(overhead)
+    for _ in range(50):
+        world.step()
+    X_FT = world.flange_pose().inverse() @ world.tool_pose()
+    tool = world.client.getLinkState(world.arm, world.tool, computeForwardKinematics=True)[4]
+    assert X_FT.position == pytest.approx([0, 0, overhead.tool.length])
+    assert np.array(tool) == pytest.approx(world.flange_pose().position, abs=1e-6)
+
+
+@pytest.mark.parametrize("label", ["cube", "sphere", "duck"])
+def test_an_object_lies_as_high_and_wide_as_the_cell_file_says(
+    build: Build, overhead: CellConfig, label: str
+) -> None:
+    world, model = build(overhead), overhead.objects[label]
+    mesh = load_mesh(model)
+    body = world.add_object(label, Pose.of([0.5, 0, 0.001 - mesh.bottom]), (1, 1, 1))
+    for _ in range(240):
+        world.step()
+    vertices = world.object_pose(body).apply(mesh.vertices)
+    centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+    (hit,) = world.client.rayTest([*centre[:2], 1], [*centre[:2], -1])
+    assert hit[0] == body
+    assert hit[3][2] == pytest.approx(model.height, abs=1e-3)
+    assert np.hypot(*(vertices - centre)[:, :2].T).max() == pytest.approx(model.radius, abs=1e-3)
+
+
+def test_an_object_is_where_it_was_put_and_can_be_put_elsewhere(build: Build, overhead: CellConfig) -> None:
+    world = build(overhead)
+    first, second = Pose(about_z(0.7), np.array([0.5, 0.1, 0.2])), Pose.of([0.4, 0, 0.3])
+    body = world.add_object("duck", first, (1, 1, 1))
+    assert world.object_pose(body).rounded() == pytest.approx(first.rounded(), abs=1e-6)
+    world.place_object(body, second)
+    assert world.object_pose(body).rounded() == pytest.approx(second.rounded(), abs=1e-6)
+    world.remove_object(body)
+    assert world.bodies == {}
+
+
+def test_rebuilding_gives_the_same_bits(build: Build, overhead: CellConfig) -> None:
+    def outcome() -> list[tuple[float, ...]]:
+        world = build(overhead)
+        bodies = spawn(world, overhead, seed=5)
+        for _ in range(60):
+            world.step()
+        return [world.client.getBasePositionAndOrientation(body)[0] for body in bodies]
+
+    assert outcome() == outcome()
+
+
+def test_a_model_that_is_nowhere_is_named() -> None:
+    with pytest.raises(
+        InputError, match=r"the model unicorn\.urdf is neither a file nor part of pybullet_data"
+    ):
+        find_model("unicorn.urdf")

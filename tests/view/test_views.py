@@ -1,0 +1,198 @@
+"""What a person watches while a mission runs."""
+
+from __future__ import annotations
+
+import io
+import itertools
+import time
+
+import py_trees
+import pytest
+from py_trees.behaviour import Behaviour
+from rich.console import Console
+
+from executive.events import Event
+from executive.mission.outline import outline
+from executive.view.items import ItemTable
+from executive.view.lines import Lines
+from executive.view.outline import branches, drawn, opened, skills
+from executive.view.summary import repeat_command, summary
+from executive.view.terminal import Terminal
+
+GRASP = "tree/sort/repeat/Grasp"
+
+
+def node(name: str, path: str, *children: Behaviour, detail: str = "") -> Behaviour:
+    """Return a node as the executive builds them: named, with a path and some words about it."""
+    made = py_trees.composites.Sequence(name, memory=True, children=list(children))
+    made.path, made.detail = path, detail
+    return made
+
+
+TREE = node(
+    "sort",
+    "tree/sort",
+    node("repeat", "tree/sort/repeat", node("Detect", "tree/sort/repeat/Detect"), node("Grasp", GRASP)),
+    node("Release", "tree/sort/Release", detail="slot: 1"),
+)
+
+
+def item(state: str, **data) -> Event:
+    return Event(
+        "item", 9, 1.5, {"item": "cube-1", "label": "cube", "state": state, "bin": "", "why": "", **data}
+    )
+
+
+def status(node: str, status: str, clock: float = 1.0, **data) -> Event:
+    return Event("status", 1, clock, {"node": node, "status": status, **data})
+
+
+def test_the_tree_is_drawn_with_every_node_under_its_parent():
+    assert drawn(outline(TREE)).splitlines() == [
+        "sort",
+        "├─ repeat",
+        "│  ├─ Detect",
+        "│  └─ Grasp",
+        "└─ Release  (slot: 1)",
+    ]
+
+
+def test_a_branch_ends_where_its_parent_has_no_more_children():
+    tree = node("a", "a", node("b", "a/b"), node("c", "a/c", node("d", "a/c/d")))
+    assert branches(outline(tree)) == ["", "├─ ", "└─ ", "   └─ "]
+
+
+def test_skills_are_the_leaves():
+    assert skills(outline(TREE)) == {
+        "tree/sort/repeat/Detect": "Detect", GRASP: "Grasp", "tree/sort/Release": "Release"
+    }  # fmt: skip
+
+
+def test_what_rests_is_folded():
+    nodes = outline(TREE)
+    assert [node.path for node in opened(nodes, set())] == ["tree/sort"]
+    assert [node.name for node in opened(nodes, {"tree/sort"})] == ["sort", "repeat", "Release"]
+    assert opened(nodes, {"tree/sort", "tree/sort/repeat"}) == nodes
+    assert [node.name for node in opened(nodes, {"tree/sort/repeat"})] == ["sort"]
+
+
+@pytest.fixture
+def lines():
+    stream = io.StringIO()
+    view = Lines(stream)
+    view.open(TREE)
+    return view, stream
+
+
+def test_a_skill_gets_a_line_when_it_starts_and_one_when_it_ends(lines):
+    view, stream = lines
+    view(status(GRASP, "RUNNING", 1.0, item="cube-1"))
+    view(status(GRASP, "FAILURE", 1.1, item="cube-1", reason="missed", message="no seal 0.1 s after contact"))
+    assert stream.getvalue().splitlines() == [
+        "     1.00 s  Grasp [cube-1] ...",
+        "     1.10 s  Grasp [cube-1] failed: missed: no seal 0.1 s after contact",
+    ]
+
+
+def test_control_nodes_say_only_what_they_decide(lines):
+    view, stream = lines
+    view(status("tree/sort/repeat", "RUNNING"))
+    view(
+        Event(
+            "choice",
+            1,
+            2.0,
+            {"node": "tree/sort/repeat", "choice": "attempt 2 of 3", "reason": "Grasp.missed"},
+        )
+    )
+    view(status("tree/sort/repeat", "FAILURE", reason="Grasp.missed"))
+    assert stream.getvalue() == "     2.00 s  repeat: attempt 2 of 3, after Grasp.missed\n"
+
+
+def test_an_item_is_told_when_its_state_changes_and_not_at_every_look(lines):
+    view, stream = lines
+    for event in (item("seen"), item("seen", looks=2), item("placed", bin="red_bin")):
+        view(event)
+    assert [line[13:] for line in stream.getvalue().splitlines()] == [
+        "cube-1 seen",
+        "cube-1 placed in red_bin",
+    ]
+
+
+def test_the_live_view_shows_the_running_path_the_items_and_the_clock():
+    stream = io.StringIO()
+    view = Terminal(Console(file=stream, force_terminal=True, width=100, color_system=None))
+    view.open(TREE)
+    view(Event("run", 0, 0.0, {"mission": "sort", "seed": 7}))
+    view(status("tree/sort", "RUNNING"))
+    view(status("tree/sort/repeat", "RUNNING"))
+    view(status(GRASP, "FAILURE", reason="missed"))
+    view(item("placed", bin="red_bin"))
+    page = Console(file=io.StringIO(), width=100)
+    page.print(view.render())
+    view.close()
+    shown = page.file.getvalue()
+    assert "sort  seed 7  1.5 s" in shown
+    assert "▶ repeat" in shown
+    assert "✗ Grasp  missed" in shown
+    assert "cube-1" in shown and "placed" in shown and "red_bin" in shown
+
+
+def test_the_live_view_redraws_on_change_only_and_at_most_ten_times_a_second(monkeypatch):
+    view = Terminal(Console(file=io.StringIO(), force_terminal=True, width=100))
+    renders = []
+    render = view.render
+    monkeypatch.setattr(view, "render", lambda: renders.append(time.perf_counter()) or render())
+    view.open(TREE)
+    for tick in range(300):
+        view(status("tree/sort/repeat/Detect", "RUNNING", tick / 240))
+        time.sleep(0.001)
+    time.sleep(0.35)
+    settled = len(renders)
+    time.sleep(0.25)
+    assert 1 < settled == len(renders) < 20
+    view.close()
+    gaps = [later - earlier for earlier, later in itertools.pairwise(renders)]
+    assert min(gaps) > 0.09
+
+
+def test_closing_a_view_that_never_opened_is_harmless():
+    Terminal(Console(file=io.StringIO())).close()
+    Lines(io.StringIO()).close()
+
+
+RESULT = {
+    "status": "FAILURE",
+    "reason": "Transit.dropped",
+    "message": "lost at 1.2 m/s",
+    "node": "sort/0/3",
+    "robot_time_s": 34.25,
+    "wall_time_s": 6.84,
+    "run": "runs/latest",
+}
+
+
+def test_the_summary_says_how_it_ended_how_long_it_took_and_how_to_repeat_it():
+    items = ItemTable()
+    items(item("placed", bin="red_bin"))
+    items(item("placed", item="cube-2", bin="red_bin"))
+    items(item("rejected", item="duck-1", why="three misses"))
+    repeat = repeat_command("sort", seed=7, overrides={"attempts": "5"}, requests=["cube"])
+    assert summary(RESULT, items, repeat).splitlines() == [
+        "FAILURE Transit.dropped at sort/0/3: lost at 1.2 m/s",
+        "34.2 s on the robot's clock, 6.8 s of waiting",
+        "runs/latest  (repeat: executive run sort --seed 7 --set attempts=5 --request cube)",
+        "  red_bin: cube-1, cube-2",
+        "  rejected: duck-1 (three misses)",
+    ]
+
+
+def test_a_success_has_nothing_to_explain():
+    result = {**RESULT, "status": "SUCCESS", "reason": "", "node": "", "message": ""}
+    assert summary(result, ItemTable(), "").splitlines()[0] == "SUCCESS"
+
+
+def test_the_repeat_command_survives_a_shell():
+    assert repeat_command("my mission.yaml", seed=0, overrides={"a": "x y"}) == (
+        "executive run 'my mission.yaml' --seed 0 --set 'a=x y'"
+    )
