@@ -1,1 +1,3 @@
 """The PyBullet work cell."""
+
+from executive.sim import silence as silence

@@ -154,11 +154,17 @@ class SimCamera:
         self._epoch = epoch
         self._light = light
         self._frames = 0
+        self._turn = 0
 
     @property
     def scan_poses(self) -> Sequence[str]:
         """Names of the arm poses from which it sees the table, best first."""
         return self.config.scan_poses
+
+    def next_pose(self) -> str:
+        """Return the scan pose after the one this returned last, for a look from elsewhere."""
+        self._turn += 1
+        return self.scan_poses[self._turn % len(self.scan_poses)]
 
     def area(self, view: str) -> Box:
         """Return the part of the image [pixel] that `view` (`table` or `full`) means."""

@@ -55,9 +55,8 @@ class SimCell:
         limits = JointLimits.of(config.arm.limits)
         kinematics = Kinematics(config.tool.length, limits.position)
         self._clearance = PathClearance(config)
-        self._arm = SimArm(
-            self._world, Planner(kinematics, limits, self._clearance.check), limits, config.arm
-        )
+        planner = Planner(kinematics, limits, self._clearance.check)
+        self._arm = SimArm(self._world, planner, limits, config.arm, travel_height(config))
         self._tool = SuctionTool(self._world, config.tool, emit)
         self._ledger = ItemLedger(config.ledger, self._bins, routes, emit)
         name, camera = next(iter(config.cameras.items()))

@@ -82,8 +82,7 @@ class World:
         body = self.client.loadURDF(
             str(find_model(model.urdf)), X_WL.position, X_WL.quaternion, globalScaling=model.scale
         )
-        # Without the models' textures: these would tell the classes apart, and darken the colour.
-        self.client.changeVisualShape(body, -1, textureUniqueId=-1, rgbaColor=[*colour, 1])
+        self.client.changeVisualShape(body, -1, rgbaColor=[*colour, 1])
         # Without these a ball set down at rest creeps, and a released one never stops.
         self.client.changeDynamics(body, -1, rollingFriction=0.0005, spinningFriction=0.0005)
         self.bodies[body] = label
