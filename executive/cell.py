@@ -268,6 +268,9 @@ class Camera(Protocol):
     def scan_poses(self) -> Sequence[str]:
         """Names of the arm poses from which it sees the table, best first."""
 
+    def next_pose(self) -> str:
+        """Return the scan pose after the one this returned last, for a look from elsewhere."""
+
     def area(self, view: str) -> Box:
         """Return the part of the image [pixel] that `view` (`table` or `full`) means."""
 
@@ -321,10 +324,6 @@ class Ledger(Protocol):
     @property
     def epoch(self) -> int:
         """How often the table has been changed by the robot so far."""
-
-    @property
-    def looks(self) -> int:
-        """How many looks were recorded so far."""
 
     def is_current(self, frame: Frame) -> bool:
         """Tell whether nothing has put the whole table in doubt since the frame was taken."""

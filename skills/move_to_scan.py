@@ -40,9 +40,8 @@ class MoveToScan(Skill):
             raise self.failed("blocked", str(error)) from error
 
     def _name(self, cell: Cell) -> str:
-        poses = cell.camera.scan_poses
         if self.pose == "auto":
-            return poses[0]
+            return cell.camera.scan_poses[0]
         if self.pose == "next":
-            return poses[(cell.ledger.looks + 1) % len(poses)]
+            return cell.camera.next_pose()
         return self.pose

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
+import threading
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,7 +44,7 @@ def sweep(
     """Run `mission` once for every seed and return the results in the order of the seeds.
 
     A run that breaks its process is a result too, with status `FAULT`. After Ctrl-C no further run
-    begins, those under way end, and what there is is returned.
+    begins, those under way halt or end, and the results so far are returned.
 
     Args:
         mission: File or shipped name.
@@ -56,21 +58,29 @@ def sweep(
         work: What does one job, in a process of its own.
 
     """
-    jobs = [Job(mission, seed, dict(overrides), runs, frames) for seed in seeds]
+    jobs = deque(Job(mission, seed, dict(overrides), runs, frames) for seed in seeds)
     results: dict[int, Result] = {}
-    # A fork would share the simulator's and the inference library's threads and locks.
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_ignore_interrupts) as pool:
-        futures: dict[Future[Result], Job] = {pool.submit(work or run_job, job): job for job in jobs}
-        with _cancelling(futures):
-            for future in as_completed(futures):
-                if future.cancelled():
-                    continue
-                job = futures[future]
-                error = future.exception()
-                results[job.seed] = future.result() if error is None else _broken(job, error)
-                if progress is not None:
-                    progress(len(results), len(jobs))
+    running: dict[Future[Result], Job] = {}
+    pool, broken = _pool(workers), False
+    try:
+        with _halting() as halted:
+            while running or (jobs and not halted.is_set()):
+                # No job waits in the pool: one that does could not be taken back.
+                while jobs and len(running) < workers and not (broken or halted.is_set()):
+                    job = jobs.popleft()
+                    running[pool.submit(work or run_job, job)] = job
+                done, _ = wait(running, return_when=FIRST_COMPLETED)
+                for future in done:
+                    job, error = running.pop(future), future.exception()
+                    results[job.seed] = future.result() if error is None else _broken(job, error)
+                    if progress is not None:
+                        progress(len(results), len(seeds))
+                    broken = broken or isinstance(error, BrokenExecutor)
+                if broken and not running:
+                    pool.shutdown()
+                    pool, broken = _pool(workers), False
+    finally:
+        pool.shutdown()
     return [results[seed] for seed in seeds if seed in results]
 
 
@@ -134,29 +144,32 @@ def _broken(job: Job, error: BaseException) -> Result:
     }
 
 
+def _pool(workers: int) -> ProcessPoolExecutor:
+    # A fork would share the simulator's and the inference library's threads and locks.
+    context = multiprocessing.get_context("spawn")
+    return ProcessPoolExecutor(workers, mp_context=context, initializer=_ignore_interrupts)
+
+
 def _ignore_interrupts() -> None:
-    """Leave Ctrl-C, which reaches every process of the terminal, to the parent alone."""
+    """Leave Ctrl-C, which reaches every process of the terminal, to the parent and to runs under way."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 @contextmanager
-def _cancelling(futures: Mapping[Future[Result], Job]) -> Iterator[None]:
-    """At the first Ctrl-C begin no further run; at the second end those under way, too."""
+def _halting() -> Iterator[threading.Event]:
+    """Set the event at the first Ctrl-C; at the second, end the runs under way, too."""
+    halted = threading.Event()
 
-    def cancel(number: int, frame: Any) -> None:
+    def halt(number: int, frame: Any) -> None:
         del number, frame
-        signal.signal(signal.SIGINT, end)
-        for future in futures:
-            future.cancel()
+        if halted.is_set():
+            for process in multiprocessing.active_children():
+                process.terminate()
+            raise KeyboardInterrupt
+        halted.set()
 
-    def end(number: int, frame: Any) -> None:
-        del number, frame
-        for process in multiprocessing.active_children():
-            process.terminate()
-        raise KeyboardInterrupt
-
-    previous = signal.signal(signal.SIGINT, cancel)
+    previous = signal.signal(signal.SIGINT, halt)
     try:
-        yield
+        yield halted
     finally:
         signal.signal(signal.SIGINT, previous)

@@ -20,21 +20,25 @@ def command(ctx: click.Context, missions: tuple[str, ...], as_json: bool) -> Non
         from executive.errors import InputError
         from executive.mission.findings import MissionError
         from executive.mission.load import load_mission
+        from executive.runtime.cells import robot_check
         from executive.skill import discover
 
         skills = discover()
-        reports = []
+        reports, texts = [], []
         for mission in missions:
-            findings, text = [], ""
+            ok = False
             try:
-                load_mission(mission, skills)
+                found = load_mission(mission, skills, robot_check=robot_check).warnings
+                findings, text = [asdict(finding) for finding in found], "\n".join(map(str, found))
+                ok = True
             except MissionError as error:
                 findings, text = [asdict(finding) for finding in error.findings], str(error)
             except InputError as error:
                 findings, text = [{"path": mission, "severity": "error", "message": str(error)}], str(error)
-            reports.append({"mission": mission, "ok": not text, "findings": findings})
-            if not as_json:
-                click.echo(text or f"{mission}: ok", err=True)
+            reports.append({"mission": mission, "ok": ok, "findings": findings})
+            texts.append(text or f"{mission}: ok")
     if as_json:
         print_json(reports)
+    else:
+        click.echo("\n".join(texts))
     ctx.exit(0 if all(report["ok"] for report in reports) else 2)

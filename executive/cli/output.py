@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import json
 import os
 import sys
@@ -14,20 +15,27 @@ import click
 
 @contextlib.contextmanager
 def stdout_kept_clean() -> Iterator[None]:
-    """Send what is printed meanwhile to stderr, also by libraries that write to the file descriptor."""
+    """Send what Python prints meanwhile to stderr, and drop what C libraries print to stdout.
+
+    pybullet does so whenever a world is made; there is nothing in it that anybody needs.
+    """
     sys.stdout.flush()
     try:
         kept = os.dup(1)
     except OSError:  # There is no standard output, so nothing can be printed on it.
         yield
         return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(2, 1)
+        os.dup2(nowhere, 1)
         with contextlib.redirect_stdout(sys.stderr):
             yield
     finally:
+        # What waits in the C library's buffer would come out later, on the real standard output.
+        ctypes.CDLL(None).fflush(None)
         os.dup2(kept, 1)
         os.close(kept)
+        os.close(nowhere)
 
 
 def print_json(value: Any) -> None:

@@ -46,12 +46,16 @@ def command(
         from executive.mission.load import load_mission
         from executive.record.recorded_run import recorded_run
         from executive.record.result import EXIT_CODES
+        from executive.runtime.cells import robot_check
         from executive.skill import discover
         from executive.view.summary import repeat_command, summary
 
         skills = discover()
-        loaded = load_mission(mission, skills, overrides)
+        loaded = load_mission(mission, skills, overrides, robot_check)
         view = None if quiet else _view()
+        if view is not None:
+            for warning in loaded.warnings:
+                click.echo(str(warning), err=True)
         result = recorded_run(
             loaded, skills, seed=seed, runs=runs, view=view, gui=gui, realtime=realtime,
             requests=requests or None,

@@ -54,9 +54,11 @@ def command(
         from executive.campaign.sweep import summarize, sweep
         from executive.cli.progress import bar
         from executive.mission.load import load_mission
+        from executive.runtime.cells import robot_check
         from executive.skill import discover
 
-        load_mission(mission, discover(), overrides)  # What is wrong with it is told once, not per seed.
+        # What is wrong with the mission is told once, not for every seed.
+        load_mission(mission, discover(), overrides, robot_check)
         with bar(mission) as progress:
             results = sweep(
                 mission, seeds, overrides=overrides, runs=runs, workers=workers, frames=frames,
@@ -71,6 +73,8 @@ def command(
 
 
 def _text(figures: dict[str, Any]) -> str:
+    from executive.view.summary import verdict
+
     objects, robot, wall = figures["objects"], figures["robot_time_s"], figures["wall_time_s"]
     low, high = objects["interval_95"]
     lines = [
@@ -88,10 +92,7 @@ def _text(figures: dict[str, Any]) -> str:
     ]
     if figures["failures"]:
         lines.append(f"{len(figures['failures'])} runs did not succeed:")
-    lines += [
-        f"  seed {entry['seed']}: {entry['status']} {entry['reason']}: {entry['message']}; {entry['run']}"
-        for entry in figures["failures"]
-    ]
+    lines += [f"  seed {entry['seed']}: {verdict(entry)}; {entry['run']}" for entry in figures["failures"]]
     return "\n".join(lines)
 
 

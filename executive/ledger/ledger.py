@@ -35,7 +35,6 @@ class ItemLedger:
         self._counts: Counter[str] = Counter()
         self._freshness = Freshness()
         self._empty_looks = 0
-        self._looks = 0
 
     @property
     def records(self) -> Sequence[Record]:
@@ -47,18 +46,12 @@ class ItemLedger:
         """How often the table has been changed by the robot so far."""
         return self._freshness.epoch
 
-    @property
-    def looks(self) -> int:
-        """How many looks were recorded so far."""
-        return self._looks
-
     def is_current(self, frame: Frame) -> bool:
         """Tell whether nothing has put the whole table in doubt since the frame was taken."""
         return self._freshness.anywhere_holds(frame.epoch)
 
     def observe(self, detections: Detections, positions: Sequence[Array]) -> Sequence[Target]:
         """Record a look and return one target per detection that is not inside a bin."""
-        self._looks += 1
         outside = [i for i, position in enumerate(positions) if self._bin_at(position) is None]
         inside = [i for i in range(len(positions)) if i not in outside]
         found = [detections.found[i] for i in outside]

@@ -7,13 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from py_trees.behaviour import Behaviour
-
 from executive.cell import Cell
 from executive.control.attempt import Try
 from executive.control.fallback import Fallback
 from executive.control.invert import Invert
-from executive.control.node import Site
+from executive.control.node import ControlNode, Site
 from executive.control.repeat import Repeat
 from executive.control.retry import Retry
 from executive.control.scope import Scope
@@ -28,10 +26,13 @@ from executive.mission.typed import convert
 from executive.mission.wiring import literals, wires
 from executive.skill import Direction, Param, Port, Skill
 
+TreeNode = ControlNode | SkillNode
+"""What a mission's tree is made of: py_trees behaviours that know their `path` and their `failure`."""
+
 
 def build(
     loaded: LoadedMission, skills: Mapping[str, type[Skill]], cell: Cell, scope: Scope, emit: Emit
-) -> Behaviour:
+) -> TreeNode:
     """Return the root of a fresh tree of py_trees behaviours; every node has a unique, readable `path`.
 
     A path names what is on the way: `tree/repeat/do/2:try/retry/do/Grasp`. A skill goes by its name or
@@ -49,7 +50,7 @@ class Builder:
     scope: Scope
     emit: Emit
 
-    def node(self, node: model.Node, parent: str, slot: str, name: str | None = None) -> Behaviour:
+    def node(self, node: model.Node, parent: str, slot: str, name: str | None = None) -> TreeNode:
         """Return the behaviour for a node that stands in `slot` of `parent`.
 
         A bare list is the slot itself; any other node adds its own name to the path.
@@ -64,7 +65,7 @@ class Builder:
         """Return where a behaviour stands."""
         return Site(path, node.label, self.emit)
 
-    def list(self, nodes: Sequence[model.Node], parent: str) -> list[Behaviour]:
+    def list(self, nodes: Sequence[model.Node], parent: str) -> list[TreeNode]:
         """Return the behaviours of a list, named so that no two have the same path."""
         names = [name_of(node) for node in nodes]
         count = Counter(names)
@@ -76,24 +77,24 @@ class Builder:
             )
         return children
 
-    def _sequence(self, node: Any, path: str) -> Behaviour:
+    def _sequence(self, node: Any, path: str) -> TreeNode:
         return SequenceOf(self.site(node, path), self.list(node.steps, path))
 
-    def _fallback(self, node: Any, path: str) -> Behaviour:
+    def _fallback(self, node: Any, path: str) -> TreeNode:
         return Fallback(self.site(node, path), self.list(node.choices, path))
 
-    def _retry(self, node: Any, path: str) -> Behaviour:
+    def _retry(self, node: Any, path: str) -> TreeNode:
         recover = None if node.recover is None else self.node(node.recover, path, "recover")
         body = self.node(node.do, path, "do")
         attempts = convert(node.attempts.value, int)
         return Retry(self.site(node, path), body, attempts, _names(node.on), recover)
 
-    def _repeat(self, node: Any, path: str) -> Behaviour:
+    def _repeat(self, node: Any, path: str) -> TreeNode:
         body = self.node(node.do, path, "do")
         times = None if node.times is None else convert(node.times.value, int)
         return Repeat(self.site(node, path), body, times, _names(node.until))
 
-    def _try(self, node: Any, path: str) -> Behaviour:
+    def _try(self, node: Any, path: str) -> TreeNode:
         listed = isinstance(node.do, model.SequenceNode) and node.do.listed
         body = self.node(node.do, path, "do" if listed else "")
         handlers = [
@@ -103,17 +104,17 @@ class Builder:
         finish = None if node.finish is None else self.node(node.finish, path, "finally")
         return Try(self.site(node, path), body, handlers, finish)
 
-    def _timeout(self, node: Any, path: str) -> Behaviour:
+    def _timeout(self, node: Any, path: str) -> TreeNode:
         body = self.node(node.do, path, "do")
         return Timeout(self.site(node, path), body, convert(node.seconds.value, float), self.cell.clock)
 
-    def _invert(self, node: Any, path: str) -> Behaviour:
+    def _invert(self, node: Any, path: str) -> TreeNode:
         return Invert(self.site(node, path), self.node(node.do, path, "do"))
 
-    def _succeed(self, node: Any, path: str) -> Behaviour:
+    def _succeed(self, node: Any, path: str) -> TreeNode:
         return Succeed(self.site(node, path), None if node.do is None else self.node(node.do, path, "do"))
 
-    def _use(self, node: Any, path: str) -> Behaviour:
+    def _use(self, node: Any, path: str) -> TreeNode:
         parent, _, name = path.rpartition("/")
         body = node.body
         if node.label:
@@ -122,7 +123,7 @@ class Builder:
             return self._sequence(body, path)
         return self.node(body, parent, name)
 
-    def _skill(self, node: Any, path: str) -> Behaviour:
+    def _skill(self, node: Any, path: str) -> TreeNode:
         skill = self.skills[node.skill]
         declared: dict[str, Param | Port] = {**skill.params, **skill.ports}
         wiring = Wiring(
@@ -157,7 +158,7 @@ _WORDS: Mapping[type, str] = {
     model.SucceedNode: "succeed",
 }
 
-_BUILDERS: Mapping[type, Callable[[Builder, Any, str], Behaviour]] = {
+_BUILDERS: Mapping[type, Callable[[Builder, Any, str], TreeNode]] = {
     model.SkillNode: Builder._skill,
     model.SequenceNode: Builder._sequence,
     model.FallbackNode: Builder._fallback,

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import pickle
-import signal
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -93,7 +92,5 @@ def serve(stream: Any) -> None:
 
 
 if __name__ == "__main__":
-    # Ctrl-C reaches the whole process group; the pictures of a halted run are wanted all the more.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(5)  # The tick loop goes first.
     serve(sys.stdin.buffer)

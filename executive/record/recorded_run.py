@@ -8,7 +8,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from executive.events import Event
+from executive.events import Event, Observer
 from executive.record.recorder import Recorder
 from executive.record.result import result_of, write_result
 from executive.record.run_directory import RunDirectory
@@ -63,7 +63,7 @@ def recorded_run(
         mission=loaded.text, params=loaded.params, cell=loaded.cell_config.model_dump(mode="json")
     )
     recorder = Recorder(directory, frames=frames)
-    observers = [recorder] if view is None else [recorder, view]
+    observers: list[Observer] = [recorder] if view is None else [recorder, view]
     completed = False
     try:
         run = Run(

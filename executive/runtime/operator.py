@@ -15,24 +15,22 @@ SLICE = 0.1
 
 
 class ScriptedOperator:
-    """Asks for what a list says, then quits; every request is recorded."""
+    """Asks for what a list says, then quits; every request is recorded.
 
-    def __init__(self, requests: Sequence[str], emit: Emit) -> None:
+    Raises:
+        InputError: A request names none of the `choices`.
+    """
+
+    def __init__(self, requests: Sequence[str], choices: Sequence[str], emit: Emit) -> None:
+        for word in requests:
+            if understood(word, choices) == "":
+                raise InputError(f'cannot pick "{word}"; ask for one of: {", ".join(choices)}')
         self._requests = list(requests)
         self._emit = emit
 
     def ask(self, choices: Sequence[str]) -> str | None:
-        """Return the next request, or None at the end of the list.
-
-        Raises:
-            InputError: The request names no class of the mission.
-        """
-        if not self._requests:
-            return None
-        word = self._requests.pop(0)
-        answer = understood(word, choices)
-        if answer == "":
-            raise InputError(f'cannot pick "{word}"; ask for one of: {", ".join(choices)}')
+        """Return the next request, or None at the end of the list."""
+        answer = understood(self._requests.pop(0), choices) if self._requests else None
         self._emit("request", wanted=answer)
         return answer
 
@@ -46,15 +44,14 @@ class TerminalOperator:
 
     def ask(self, choices: Sequence[str]) -> str | None:
         """Return the class typed, `rescan`, or None for `q`, end of input or Ctrl-C."""
+        self._emit("asking", choices=list(choices))
         numbered = "  ".join(f"{number} {label}" for number, label in enumerate(choices))
         while not self._interrupted():
             sys.stderr.write(f"pick what?  {numbered}  s rescan  q quit > ")
             sys.stderr.flush()
             line = self._line()
-            if not line or line.strip().lower() in ("q", "quit"):
-                return None
-            answer = understood(line.strip(), choices)
-            if answer:
+            answer = understood(line.strip(), choices) if line else None
+            if answer != "":
                 self._emit("request", wanted=answer)
                 return answer
             sys.stderr.write(f'cannot pick "{line.strip()}"\n')

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import threading
 import time
+import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -14,6 +15,7 @@ from typing import Any
 from py_trees.common import Status
 
 from executive.cell import CellOptions, Operator, Workcell
+from executive.control.failure import Failure
 from executive.control.halting import halt
 from executive.control.scope import Scope
 from executive.errors import ExecutiveError, Fault
@@ -26,6 +28,16 @@ from executive.skill import Skill
 
 LONGEST_BRAKING = 2.0
 """Time after which an arm that was told to brake must be at rest [s]."""
+
+
+@dataclass(frozen=True)
+class _Ending:
+    """How the tick loop ended; see `Outcome`."""
+
+    status: str
+    reason: str = ""
+    message: str = ""
+    node: str = ""
 
 
 @dataclass(frozen=True)
@@ -63,7 +75,7 @@ class Run:
         kind: Makes the work cell; by default the installed kind that the cell file names.
 
     Raises:
-        InputError: The cell is of a kind that is not installed.
+        InputError: The cell is of a kind that is not installed, or a request names no class.
     """
 
     def __init__(
@@ -86,15 +98,16 @@ class Run:
         self._interrupted = False
         self._workcell: Workcell | None = None
         kind = kind or cell_kind(loaded.cell_config.kind)
+        routes = {route.label: route.bin for route in loaded.mission.routes}
         operator: Operator
         if requests is None:
             operator = TerminalOperator(self._emit, interrupted=lambda: self._interrupted)
         else:
-            operator = ScriptedOperator(requests, self._emit)
+            operator = ScriptedOperator(requests, tuple(routes), self._emit)
         self._workcell = kind(
             loaded.cell_config,
             seed=seed,
-            routes={route.label: route.bin for route in loaded.mission.routes},
+            routes=routes,
             emit=self._emit,
             options=CellOptions(operator, base=loaded.cell_path.parent, gui=gui),
         )
@@ -111,23 +124,18 @@ class Run:
 
         Ctrl-C halts the tree and brakes the arm; a second one ends the process at once.
         """
-        self._emit(
-            "run",
-            mission=self._loaded.mission.name,
-            seed=self._seed,
-            params=dict(self._loaded.mission.params),
-        )
+        self._emit("run", mission=self._loaded.mission.name, seed=self._seed, params=self._loaded.params)
         with self._interruptible():
-            status, reason, message, node = self._loop()
-            problems = halt(self.root)
-            problems += self._brake()
-        if problems and status != "FAULT":
-            status, reason, message, node = "FAULT", "", problems[0], node
+            ending = self._loop()
+            problems = [*halt(self.root), *self._brake()]
+        if problems and ending.status != "FAULT":
+            ending = _Ending("FAULT", "fault", problems[0])
         self.workcell.accounts.close()
         lost = self.workcell.accounts.balance()["lost"]
-        if status == "SUCCESS" and lost:
-            status, reason, message = "FAILURE", "lost", f"{lost} object(s) were lost and not found again"
-        outcome = Outcome(status, reason, message, node, self._tick, round(self.workcell.cell.clock.now, 6))
+        if ending.status == "SUCCESS" and lost:
+            ending = _Ending("FAILURE", "lost", f"{lost} object(s) were lost and not found again")
+        now = round(self.workcell.cell.clock.now, 6)
+        outcome = Outcome(**asdict(ending), ticks=self._tick, robot_time=now)
         self._emit("end", **asdict(outcome))
         return outcome
 
@@ -144,7 +152,7 @@ class Run:
         """Give the cell back."""
         self.workcell.close()
 
-    def _loop(self) -> tuple[str, str, str, str]:
+    def _loop(self) -> _Ending:
         began = time.monotonic()
         try:
             while not self._interrupted:
@@ -155,19 +163,17 @@ class Run:
                 self._tick += 1
                 if self._realtime:
                     time.sleep(max(0.0, began + self.workcell.cell.clock.now - time.monotonic()))
-        except Fault as fault:
-            return "FAULT", "fault", str(fault), fault.node
-        except ExecutiveError as error:
-            return "FAULT", "fault", str(error), ""
         except Exception as error:
-            return "FAULT", "fault", f"{type(error).__name__}: {error}", ""
-        return "HALTED", "halted", "halted by the user", ""
+            self._emit("fault", traceback=traceback.format_exc())
+            named = str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"
+            return _Ending("FAULT", "fault", named, error.node if isinstance(error, Fault) else "")
+        return _Ending("HALTED", "halted", "halted by the user")
 
-    def _verdict(self) -> tuple[str, str, str, str]:
-        if self.root.status is Status.SUCCESS:
-            return "SUCCESS", "", "", ""
-        failure = self.root.failure
-        return "FAILURE", f"{failure.source}.{failure.reason}", failure.message, failure.path
+    def _verdict(self) -> _Ending:
+        failure: Failure | None = self.root.failure
+        if failure is None:
+            return _Ending("SUCCESS")
+        return _Ending("FAILURE", str(failure), failure.message, failure.path)
 
     def _brake(self) -> list[str]:
         """Let the arm come to rest; return what went wrong on the way."""

@@ -180,6 +180,10 @@ class FakeCamera:
         """Names of the arm poses from which it sees the table."""
         return ("home",)
 
+    def next_pose(self) -> str:
+        """Return the only one."""
+        return "home"
+
     def area(self, view: str) -> Box:
         """Return the part of the image [pixel] that `view` means."""
         return (192.0, 100.0, 448.0, 356.0) if view == "table" else (0.0, 0.0, 640.0, 480.0)

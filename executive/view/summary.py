@@ -21,13 +21,20 @@ def repeat_command(
     return shlex.join(words)
 
 
-def summary(result: Mapping[str, Any], items: ItemTable, repeat: str) -> str:
-    """Return three lines, then one for each bin and for each other fate of an item."""
-    verdict = " ".join(part for part in (result["status"], result["reason"]) if part)
+def verdict(result: Mapping[str, Any]) -> str:
+    """Return how a run ended in one line: status, reason, node and sentence."""
+    # The reason of a fault or a halt is the status once more.
+    told = result["reason"] and result["reason"].upper() != result["status"]
+    reason = f" {result['reason']}" if told else ""
     where = f" at {result['node']}" if result["node"] else ""
     why = f": {result['message']}" if result["message"] else ""
+    return f"{result['status']}{reason}{where}{why}"
+
+
+def summary(result: Mapping[str, Any], items: ItemTable, repeat: str) -> str:
+    """Return three lines, then one for each bin and for each other fate of an item."""
     lines = [
-        f"{verdict}{where}{why}",
+        verdict(result),
         f"{result['robot_time_s']:.1f} s on the robot's clock, {result['wall_time_s']:.1f} s of waiting",
         f"{result['run']}  (repeat: {repeat})",
     ]

@@ -45,6 +45,8 @@ class Terminal:
         self._changed = threading.Event()
         self._closed = threading.Event()
         self._live = Live(console=console, auto_refresh=False, transient=True)
+        self._drawing = threading.Lock()
+        self._shown = False
         self._drawer: threading.Thread | None = None
         self.items = ItemTable()
 
@@ -52,13 +54,15 @@ class Terminal:
         """Draw the tree and begin to follow the run."""
         with self._lock:
             self._outline = outline(root)
-        self._live.start()
+        self._show(True)
         self._drawer = threading.Thread(target=self._redraw, name="terminal", daemon=True)
         self._drawer.start()
         self._changed.set()
 
     def __call__(self, event: Event) -> None:
-        """Note what `event` changes."""
+        """Note what `event` changes; step aside while the operator is asked something."""
+        if event.kind in ("asking", "request"):
+            self._show(event.kind == "request")
         data = event.data
         with self._lock:
             self._clock = event.clock
@@ -81,7 +85,7 @@ class Terminal:
         if self._drawer is not None:
             self._drawer.join()
             self._drawer = None
-            self._live.stop()
+            self._show(False)
 
     def note(self, sentence: str) -> None:
         """Write `sentence` on a line of its own."""
@@ -98,8 +102,19 @@ class Terminal:
         while not self._closed.is_set():
             self._changed.wait()
             self._changed.clear()
-            self._live.update(self.render(), refresh=True)
+            with self._drawing:
+                if self._shown:
+                    self._live.update(self.render(), refresh=True)
             self._closed.wait(PAUSE)
+
+    def _show(self, wanted: bool) -> None:
+        """Take the terminal, or leave it to whoever wants to write there."""
+        with self._drawing:
+            if wanted and not self._shown:
+                self._live.start()
+            elif self._shown and not wanted:
+                self._live.stop()
+            self._shown = wanted
 
     def _tree(self) -> RenderableType:
         """Return the running path and its surroundings: a whole mission is taller than a terminal."""

@@ -80,6 +80,7 @@ def write_annotations(root: Path, layout: str, entries: Sequence[Entry], classes
     """
     if layout not in ("coco", "yolo"):
         raise InputError(f'the dataset layout "{layout}" is unknown; there are coco and yolo')
+    root.mkdir(parents=True, exist_ok=True)
     splits = [split for split in SPLITS if any(entry.split == split for entry in entries)]
     for split in splits:
         mine = [entry for entry in entries if entry.split == split]

@@ -73,7 +73,7 @@ class Evaluation:
         map50_95: The same, averaged over overlaps from 0.5 to 0.95.
         recall_by_class: Recall of each class.
         centre: Distance between the centres of found and true box [pixel].
-        position: What that is in the world, at the height of the object [mm]; None without a renderer's truth.
+        position: That in the world, at the height of the object [mm]; None without a renderer's truth.
         latency: Time of one detection [ms].
     """
 

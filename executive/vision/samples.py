@@ -32,7 +32,7 @@ class LabelledImage:
         labels: Class of each object.
         boxes: Their boxes [pixel], one to one.
         ignored: Boxes of objects that a detector may find or not.
-        truth: What the renderer knows beyond that: `camera`, `part`, `matrix`, `X_WC`, `positions`, `centres`.
+        truth: What the renderer knows beyond that: `camera`, `part`, `matrix`, `X_WC`, `positions`, …
     """
 
     file: str

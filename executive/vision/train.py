@@ -6,8 +6,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 from executive.errors import InputError
+from executive.vision.detectors.onnx_model import read_labels
+from executive.vision.evaluate import evaluate_folder
+from executive.vision.model_card import ModelCard, read_epochs
 
 Progress = Callable[[int, dict[str, float]], None]
+
+CARD_THRESHOLD = 0.5
+"""Confidence at which the card states precision and recall."""
 
 
 def train(
@@ -19,12 +25,16 @@ def train(
     seed: int = 0,
     progress: Progress = lambda _epoch, _metrics: None,
 ) -> None:
-    """Leave `out/checkpoint_best_total.pth`, `out/labels.txt` and `out/metrics.csv` behind.
+    """Leave a trained model in `out`.
+
+    `model.onnx` and `labels.txt` are what a detector of kind `rfdetr` needs, `card.md` says how good it
+    is on the validation images; `checkpoint_best_total.pth` is what a further training can start from,
+    `metrics.csv` the course of this one.
 
     Args:
         dataset: Folder as Roboflow exports it: `train/` and `valid/`, each with `_annotations.coco.json`, or
             a `data.yaml` for YOLO.
-        out: Folder for checkpoints, one an epoch, and figures; made if missing.
+        out: Folder to fill; made if missing.
         start: Checkpoint to fine-tune; None trains from random weights.
         epochs: Number of passes over the data.
         seed: Seed of weights, order and augmentation.
@@ -32,13 +42,14 @@ def train(
 
     Raises:
         InputError: The folder is no data set, or the training packages are not installed.
-
     """
     _check(dataset, start)
     try:
         from executive.vision.training.torchvision_ops import declare_missing
 
         declare_missing()
+        from executive.vision.training.architecture import describe
+        from executive.vision.training.export import STORAGE, export_onnx
         from executive.vision.training.run import fit
     except ImportError as error:
         raise InputError(
@@ -46,6 +57,22 @@ def train(
         ) from error
     out.mkdir(parents=True, exist_ok=True)
     fit(dataset, out, start=start, epochs=epochs, seed=seed, progress=progress)
+    model, labels = out / "model.onnx", out / "labels.txt"
+    export_onnx(out / "checkpoint_best_total.pth", len(read_labels(labels)), model, STORAGE)
+    card = ModelCard(
+        title=f"Small RF-DETR trained on {dataset.name}",
+        summary=f"Finds {', '.join(read_labels(labels))} in square images.",
+        settings={
+            **describe(),
+            "start": "random weights" if start is None else start.name,
+            "epochs": str(epochs),
+            "seed": str(seed),
+            "weights stored as": STORAGE,
+        },
+        epochs=read_epochs(out / "metrics.csv"),
+        measured={"validation images": evaluate_folder(model, labels, _validation(dataset), CARD_THRESHOLD)},
+    )
+    (out / "card.md").write_text(card.text(), encoding="utf-8")
 
 
 def _check(dataset: Path, start: Path | None) -> None:
@@ -58,3 +85,8 @@ def _check(dataset: Path, start: Path | None) -> None:
             f"{dataset} is not a data set: it needs train/_annotations.coco.json and "
             "valid/_annotations.coco.json (COCO), or data.yaml (YOLO); a Roboflow export has one of them"
         )
+
+
+def _validation(dataset: Path) -> Path:
+    """Return the split that is looked at between epochs; YOLO folders call it `valid` or `val`."""
+    return next(path for path in (dataset / "valid", dataset / "val", dataset) if path.is_dir())

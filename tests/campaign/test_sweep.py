@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import signal
+import time
 from pathlib import Path
 
 import pytest
@@ -48,6 +50,34 @@ def test_every_seed_is_run_once_in_another_process():
     assert results[2]["status"] == "FAULT"
     assert results[2]["message"] == "ValueError: seed three"
     assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
+
+
+def interrupt(job: Job) -> dict:
+    """Do a run during which somebody presses Ctrl-C."""
+    os.kill(os.getppid(), signal.SIGINT)
+    time.sleep(0.2)
+    return result(job.seed)
+
+
+def test_after_ctrl_c_no_further_run_begins_and_the_results_so_far_are_kept():
+    results = sweep("sort", range(9), overrides={}, runs=Path("runs"), workers=1, work=interrupt)
+    assert [entry["seed"] for entry in results] == [0]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def die(job: Job) -> dict:
+    """Take the process down with the run, if the seed says so."""
+    if job.seed == 0:
+        os._exit(1)
+    return result(job.seed)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_run_that_takes_its_process_down_costs_only_what_runs_beside_it(workers):
+    results = sweep("sort", range(4), overrides={}, runs=Path("runs"), workers=workers, work=die)
+    assert [entry["seed"] for entry in results] == [0, 1, 2, 3]
+    assert [entry["status"] for entry in results[workers:]] == ["SUCCESS"] * (4 - workers)
+    assert "BrokenProcessPool" in results[0]["message"]
 
 
 def test_the_summary_counts_objects_and_lists_what_went_wrong():

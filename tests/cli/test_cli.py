@@ -48,13 +48,15 @@ RESULT = {
 @pytest.fixture
 def project(monkeypatch):
     """Stands for everything below the commands; tests say what it answers and read what it was asked."""
-    asked = SimpleNamespace(load=[], run=[], load_error=None, run_error=None, result=dict(RESULT))
+    asked = SimpleNamespace(
+        load=[], run=[], load_error=None, warnings=(), run_error=None, result=dict(RESULT)
+    )
 
-    def load_mission(mission, skills, overrides=None):
+    def load_mission(mission, skills, overrides=None, robot_check=None):
         asked.load.append((mission, overrides))
         if asked.load_error is not None:
             raise asked.load_error
-        return SimpleNamespace(mission=SimpleNamespace(name=mission))
+        return SimpleNamespace(mission=SimpleNamespace(name=mission), warnings=asked.warnings)
 
     def recorded_run(loaded, skills, **options):
         asked.run.append(options)
@@ -145,16 +147,20 @@ def test_quiet_is_silent(project):
     assert project.run[0]["view"] is None
 
 
-def test_what_libraries_print_does_not_reach_standard_output(capfd):
-    from executive.cli.output import stdout_kept_clean
-
-    with stdout_kept_clean():
-        os.write(1, b"from C\n")
-        print("from Python")  # noqa: T201
-    os.write(1, b"result\n")
-    out, err = capfd.readouterr()
-    assert out == "result\n"
-    assert "from C" in err
+def test_what_libraries_print_does_not_reach_standard_output():
+    code = """
+import ctypes, os
+from executive.cli.output import print_json, stdout_kept_clean
+libc = ctypes.CDLL(None)
+with stdout_kept_clean():
+    os.write(1, b"unbuffered\\n")
+    libc.puts(b"buffered by C")
+    print("from Python")
+print_json([1])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert json.loads(done.stdout) == [1]
+    assert done.stderr == "from Python\n"
 
 
 @pytest.mark.parametrize("override", ["novalue", "=1"])
@@ -212,7 +218,7 @@ def test_check_tells_every_finding(project):
     )
     shown = invoke("check", "sort.yaml")
     assert shown.exit_code == 2
-    assert 'sort.yaml:3:5: error[unknown-skill]: no skill "Grap"' in shown.stderr
+    assert 'sort.yaml:3:5: error[unknown-skill]: no skill "Grap"' in shown.stdout
 
 
 def test_check_as_json_is_one_array(project):
@@ -226,7 +232,17 @@ def test_check_as_json_is_one_array(project):
 
 def test_check_says_that_all_is_well(project):
     shown = invoke("check", "sort")
-    assert (shown.exit_code, shown.stderr) == (0, "sort: ok\n")
+    assert (shown.exit_code, shown.stdout) == (0, "sort: ok\n")
+
+
+def test_a_warning_is_told_and_stops_nothing(project):
+    project.warnings = (Finding("sort.yaml", 3, 5, "warning", "unused", "no skill reads it"),)
+    shown = invoke("check", "sort.yaml")
+    assert shown.exit_code == 0
+    assert "sort.yaml:3:5: warning[unused]: no skill reads it" in shown.stdout
+    shown = invoke("run", "sort.yaml")
+    assert shown.exit_code == 0
+    assert "warning[unused]" in shown.stderr
 
 
 def test_skills_lists_every_skill_with_its_first_line(project):

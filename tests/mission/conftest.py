@@ -55,7 +55,7 @@ class Drop(Skill):
 
 SKILLS: dict[str, type[Skill]] = {"Look": Look, "Pick": Pick, "Drop": Drop}
 
-HEAD = "mission: m\ncell: cells/overhead.yaml\n"
+SMALL_CELL = Path(__file__).with_name("small_cell.yaml").read_text()
 
 
 @pytest.fixture
@@ -64,9 +64,16 @@ def skills() -> dict[str, type[Skill]]:
 
 
 @pytest.fixture
+def small_cell() -> str:
+    return SMALL_CELL
+
+
+@pytest.fixture
 def load(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., LoadedMission]:
-    """Write the text as `m.yaml` into an empty folder, go there and load it."""
+    """Write the text as `m.yaml` beside `cells/small.yaml`, go there and load it."""
     monkeypatch.chdir(tmp_path)
+    Path("cells").mkdir()
+    Path("cells/small.yaml").write_text(SMALL_CELL)
 
     def load(text: str, overrides: dict[str, str] | None = None, **more: Any) -> LoadedMission:
         Path("m.yaml").write_text(text)

@@ -1,3 +1,4 @@
+# ruff: noqa: E501 - findings are quoted as they are printed
 """Findings about the form of a mission file, word for word."""
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ CASES = {
     "unknown top key": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tre: Look
         tree: Look
         """,
@@ -55,7 +56,7 @@ CASES = {
     "duplicate key": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: Look
         tree: Pick
         """,
@@ -68,7 +69,7 @@ CASES = {
     "bad mission name": (
         """
         mission: ../m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: Look
         """,
         """
@@ -91,7 +92,7 @@ CASES = {
     "unknown control": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree:
           rety: {attempts: 2, do: Look}
         """,
@@ -105,7 +106,7 @@ CASES = {
     "unknown control key": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree:
           retry: {attemps: 2, do: Look}
         """,
@@ -122,7 +123,7 @@ CASES = {
     "bare control": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: [retry]
         """,
         """
@@ -134,7 +135,7 @@ CASES = {
     "two nodes": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: {Look: {}, Pick: {}}
         """,
         """
@@ -147,7 +148,7 @@ CASES = {
     "beside": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: {retry: {attempts: 2, do: Look}, catch: []}
         """,
         """
@@ -160,7 +161,7 @@ CASES = {
     "empty list": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: []
         """,
         """
@@ -172,7 +173,7 @@ CASES = {
     "missing node": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree:
           - Look
           -
@@ -186,7 +187,7 @@ CASES = {
     "bad label": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: {Look: {}, as: First}
         """,
         """
@@ -198,7 +199,7 @@ CASES = {
     "repeat neither": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: {repeat: {do: Look}}
         """,
         """
@@ -210,7 +211,7 @@ CASES = {
     "try alone": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: {try: Look}
         """,
         """
@@ -222,7 +223,7 @@ CASES = {
     "with not mapping": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: {use: look, with: full}
         trees: {look: Look}
         """,
@@ -235,7 +236,7 @@ CASES = {
     "skill not mapping": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: {Look: full}
         """,
         """
@@ -247,7 +248,7 @@ CASES = {
     "subtree without do": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: Look
         trees:
           other: {doc: Nothing., args: {}}
@@ -261,7 +262,7 @@ CASES = {
     "retry not mapping": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree:
           retry: 3
         """,
@@ -275,7 +276,7 @@ CASES = {
     "route type": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         routes: {cube: [red_bin]}
         tree: Look
         """,
@@ -288,7 +289,7 @@ CASES = {
     "match form": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: {retry: {attempts: 2, on: unsure, do: Look}}
         """,
         """
@@ -300,7 +301,7 @@ CASES = {
     "bad reference": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree:
           - Look: {classes: [$kind]}
         """,

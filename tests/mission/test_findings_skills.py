@@ -1,3 +1,4 @@
+# ruff: noqa: E501 - findings are quoted as they are printed
 """Findings about skills, their params and their ports, word for word."""
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ CASES = {
     "unknown skill": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree:
           - Lok
         """,
@@ -28,7 +29,7 @@ CASES = {
     "unknown setting": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree:
           - Look: {veiw: full}
         """,
@@ -42,7 +43,7 @@ CASES = {
     "attempts zero": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: {retry: {attempts: 0, do: Look}}
         """,
         """
@@ -54,7 +55,7 @@ CASES = {
     "attempts param": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         params: {tries: many}
         tree: {retry: {attempts: $tries, do: Look}}
         """,
@@ -67,7 +68,7 @@ CASES = {
     "attempts variable": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: {retry: {attempts: $seen, do: Look}}
         """,
         """
@@ -79,7 +80,7 @@ CASES = {
     "timeout zero": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: {timeout: {seconds: 0, do: Look}}
         """,
         """
@@ -91,7 +92,7 @@ CASES = {
     "wrong type": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: [Look, {Pick: {height: tall}}]
         """,
         """
@@ -103,7 +104,7 @@ CASES = {
     "int for fraction": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: [Look, {Pick: {tries: 1.5}}]
         """,
         """
@@ -115,7 +116,7 @@ CASES = {
     "out of range": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: [Look, {Pick: {height: 2}}]
         """,
         """
@@ -127,7 +128,7 @@ CASES = {
     "not a choice": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree:
           - Look: {view: ful}
         """,
@@ -140,7 +141,7 @@ CASES = {
     "missing param": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: [Look, Pick, Drop]
         """,
         """
@@ -153,7 +154,7 @@ CASES = {
     "param variable": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         params: {hight: 0.2}
         tree: [Look, {Pick: {height: $higt}}]
         """,
@@ -167,7 +168,7 @@ CASES = {
     "input literal": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: [Look, {Pick: {seen: seen}}]
         """,
         """
@@ -180,7 +181,7 @@ CASES = {
     "output literal": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree:
           - Look: {seen: other}
         """,
@@ -193,7 +194,7 @@ CASES = {
     "unwritten": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree:
           - Pick
         """,
@@ -207,7 +208,7 @@ CASES = {
     "unwritten explicit": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         tree: [Look, {Pick: {seen: $sen}}]
         """,
         """
@@ -220,7 +221,7 @@ CASES = {
     "shadowed": (
         """
         mission: m
-        cell: cells/overhead.yaml
+        cell: cells/small.yaml
         params: {seen: 1}
         tree: Look
         """,

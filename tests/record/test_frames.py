@@ -61,18 +61,26 @@ def test_only_the_chosen_box_is_highlighted():
     [
         ((CUBE, DUCK), {}, 0),
         ((CUBE, NEAR), {"position": (0.5, -0.09, 0.02)}, 1),
-        (({**CUBE, "item": "cube-2"}, {**NEAR, "item": "cube-1"}), {}, 1),
         ((CUBE, NEAR), {}, None),
         ((DUCK,), {}, None),
     ],
 )
-def test_the_chosen_box_is_the_bound_one_else_the_nearest_else_the_only_one(
+def test_the_chosen_box_is_the_nearest_else_the_only_one_of_its_class(
     tmp_path, drawn, found, chosen, expected
 ):
     frames = Frames(tmp_path)
     frames(look(1, *found))
     frames(decision(**chosen))
     assert drawn[0].chosen == expected
+
+
+def test_an_item_is_where_the_ledger_last_said(tmp_path, drawn):
+    frames = Frames(tmp_path)
+    frames(Event("item", 1, 0.0, {"item": "cube-1", "position": (0.5, -0.1, 0.02)}))
+    frames(look(1, CUBE, NEAR))
+    frames(decision())
+    assert drawn[0].chosen == 1
+    assert drawn[0].captions == ["cube 0.90", "cube-1 0.80"]
 
 
 def test_an_earlier_look_is_found_again_and_old_ones_are_forgotten(tmp_path, drawn):

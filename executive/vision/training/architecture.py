@@ -47,3 +47,12 @@ def create(classes: int, start: Path | None = None, device: str = "cpu") -> Any:
             device=device,
             **ARCHITECTURE,
         )
+
+
+def describe() -> dict[str, str]:
+    """Return the architecture as texts for a model card."""
+    return {
+        "architecture": "RF-DETR Nano (rfdetr), "
+        + ", ".join(f"{name} {value}" for name, value in ARCHITECTURE.items()),
+        "input": f"{RESOLUTION} x {RESOLUTION} pixel, RGB",
+    }

@@ -36,7 +36,8 @@ def fit(dataset: Path, out: Path, *, start: Path | None, epochs: int, seed: int,
         lr_component_decay=1.0,
         lr_scheduler="cosine",
         warmup_epochs=0.5,
-        checkpoint_interval=1,
+        # `last.ckpt` is renewed every epoch; an archive of each would fill the disk.
+        checkpoint_interval=epochs + 1,
         use_ema=False,
         # Boxes must stay exact to a fraction of a pixel: no resampling, no crops.
         multi_scale=False,

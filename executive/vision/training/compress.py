@@ -1,0 +1,80 @@
+"""Smaller ONNX files: weights stored in fewer bits and widened again when the model is loaded.
+
+The arithmetic stays in float32. Widening is written as `Cast` (and `Mul`), which onnxruntime folds into
+plain weights at load time; `DequantizeLinear` it would execute anew for every image.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+import onnx
+from numpy.typing import NDArray
+from onnx import TensorProto, helper, numpy_helper
+
+Storage = Literal["float16", "int8"]
+
+SMALLEST = 2048
+"""Number of values from which a weight is worth narrowing."""
+
+
+def compress(model: onnx.ModelProto, storage: Storage) -> onnx.ModelProto:
+    """Return a copy of `model` whose large weights are stored as `storage`.
+
+    int8 keeps one scale per output channel. Weights that are not matrices or filters become float16.
+    """
+    small = onnx.ModelProto()
+    small.CopyFrom(model)
+    graph = small.graph
+    channels = _output_axes(graph)
+    widening: list[Any] = []
+    kept: list[onnx.TensorProto] = []
+    for tensor in graph.initializer:
+        values = numpy_helper.to_array(tensor)
+        if tensor.data_type != TensorProto.FLOAT or values.size < SMALLEST:
+            kept.append(tensor)
+        elif storage == "int8" and tensor.name in channels:
+            kept += _store_int8(tensor.name, values, channels[tensor.name], widening)
+        else:
+            kept += _store_half(tensor.name, values, widening)
+    _replace(graph.initializer, kept)
+    _replace(graph.node, [*widening, *graph.node])
+    return small
+
+
+def _store_half(name: str, values: NDArray[np.float32], widening: list[Any]) -> list[onnx.TensorProto]:
+    stored = numpy_helper.from_array(values.astype(np.float16), f"{name}_half")
+    widening.append(helper.make_node("Cast", [stored.name], [name], to=TensorProto.FLOAT))
+    return [stored]
+
+
+def _store_int8(
+    name: str, values: NDArray[np.float32], axis: int, widening: list[Any]
+) -> list[onnx.TensorProto]:
+    others = tuple(i for i in range(values.ndim) if i != axis)
+    scale = np.abs(values).max(axis=others, keepdims=True) / 127
+    scale = np.where(scale == 0, 1, scale).astype(np.float32)
+    stored = numpy_helper.from_array(np.round(values / scale).astype(np.int8), f"{name}_int8")
+    scales = numpy_helper.from_array(scale, f"{name}_scale")
+    widening.append(helper.make_node("Cast", [stored.name], [f"{name}_wide"], to=TensorProto.FLOAT))
+    widening.append(helper.make_node("Mul", [f"{name}_wide", scales.name], [name]))
+    return [stored, scales]
+
+
+def _output_axes(graph: Any) -> dict[str, int]:
+    """Return the axis of the output channel of every weight of a matrix product or convolution."""
+    axes: dict[str, int] = {}
+    names = {tensor.name: len(tensor.dims) for tensor in graph.initializer}
+    for node in graph.node:
+        if node.op_type not in ("MatMul", "Gemm", "Conv") or node.input[1] not in names:
+            continue
+        transposed = any(attribute.name == "transB" and attribute.i for attribute in node.attribute)
+        rows_first = node.op_type == "Conv" or transposed
+        axes[node.input[1]] = 0 if rows_first else names[node.input[1]] - 1
+    return axes
+
+
+def _replace(field: Any, values: list[Any]) -> None:
+    del field[:]
+    field.extend(values)

@@ -1,0 +1,217 @@
+"""A skill as a leaf: fresh instances, committed outputs, faults, halting."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from py_trees.common import Status
+
+from executive.cell import Target
+from executive.control.halting import halt
+from executive.control.scope import Scope
+from executive.control.skill_node import SkillNode, Wiring
+from executive.errors import Fault
+from executive.skill import In, Out, Skill, param, port
+
+CLEANED: list[str] = []
+
+
+class Worker(Skill):
+    """Does what `way` says."""
+
+    given: In[str]
+    extra: In[str | None] = port(default=None)
+    made: Out[str]
+    way: str = param("ok")
+    reasons: ClassVar = ("bad",)
+
+    def run(self, cell: Any) -> Iterator[None]:
+        assert not hasattr(self, "made"), "a used instance"
+        try:
+            self.made = f"{self.given} {self.extra}"
+            yield
+            if self.way == "fail":
+                raise self.failed("bad", "3 mm off")
+            if self.way == "undeclared":
+                raise self.failed("worse", "")
+            if self.way == "break":
+                raise ValueError("a bug")
+            if self.way == "forget":
+                del self.made
+            if self.way == "yield":
+                yield iter(())  # type: ignore[misc]
+            self.given = "changed inside"
+        finally:
+            CLEANED.append(self.way)
+            if self.way == "linger":
+                yield
+            if self.way == "break late":
+                raise ValueError("a late bug")
+
+
+@pytest.fixture
+def make(site: Any) -> Any:
+    CLEANED.clear()
+
+    def make(way: str = "ok", scope: Scope | None = None, skill: type[Skill] = Worker) -> SkillNode:
+        if scope is None:
+            scope = Scope()
+            scope.write({"input": "stone"})
+        inputs = {"given": "input", "extra": "extra"} if skill is Worker else {}
+        outputs = {"made": "result"} if skill is Worker else {}
+        wiring = Wiring({"way": way} if skill is Worker else {}, inputs, outputs)
+        return SkillNode(site("tree/Worker"), skill.__name__, skill, wiring, None, scope)  # type: ignore[arg-type]
+
+    return make
+
+
+def test_outputs_are_committed_on_success_only(make: Any) -> None:
+    scope = Scope()
+    scope.write({"input": "stone"})
+    node = make("ok", scope)
+    node.tick_once()
+    assert node.status is Status.RUNNING and "result" not in scope
+    node.tick_once()
+    assert node.status is Status.SUCCESS
+    assert dict(scope) == {"input": "stone", "result": "stone None"}
+
+
+def test_a_failure_writes_nothing_and_says_why(make: Any, ticks: Any) -> None:
+    scope = Scope()
+    scope.write({"input": "stone"})
+    node = make("fail", scope)
+    assert ticks(node) == "RF"
+    assert (str(node.failure), node.failure.message, node.failure.path) == (
+        "Worker.bad", "3 mm off", "tree/Worker",
+    )  # fmt: skip
+    assert "result" not in scope
+
+
+def test_every_start_gets_a_fresh_instance_and_fresh_inputs(make: Any, ticks: Any) -> None:
+    scope = Scope()
+    scope.write({"input": "stone"})
+    node = make("ok", scope)
+    ticks(node)
+    scope.write({"input": "brick", "extra": "new"})
+    assert ticks(node) == "RS"
+    assert scope["result"] == "brick new"
+
+
+def test_inputs_are_those_of_the_start(make: Any, ticks: Any) -> None:
+    scope = Scope()
+    scope.write({"input": "stone"})
+    node = make("ok", scope)
+    node.tick_once()
+    scope.write({"input": "brick"})
+    node.tick_once()
+    assert scope["result"] == "stone None"
+
+
+@pytest.mark.parametrize(
+    ("way", "sentence"),
+    [
+        ("break", "Worker: ValueError: a bug"),
+        ("undeclared", 'Worker: Worker raised the undeclared reason "worse"; it declares: bad'),
+        ("forget", "Worker: it succeeded without setting its output made"),
+        ("yield", 'Worker: it yielded a tuple_iterator; to run steps of others write "yield from"'),
+    ],
+)
+def test_a_bug_in_a_skill_is_a_fault(make: Any, way: str, sentence: str, events: Any) -> None:
+    node = make(way)
+    node.tick_once()
+    with pytest.raises(Fault) as caught:
+        node.tick_once()
+    assert (str(caught.value), caught.value.node) == (sentence, "tree/Worker")
+    assert node.status is Status.INVALID
+    assert (events[-1]["status"], events[-1]["reason"]) == ("INVALID", "fault")
+
+
+def test_the_original_error_is_kept(make: Any) -> None:
+    node = make("break")
+    node.tick_once()
+    with pytest.raises(Fault) as caught:
+        node.tick_once()
+    assert isinstance(caught.value.__cause__, ValueError)
+
+
+def test_a_missing_input_is_a_fault_that_names_it(make: Any) -> None:
+    with pytest.raises(Fault) as caught:
+        make("ok", Scope()).tick_once()
+    assert str(caught.value) == (
+        'Worker: the input "given" reads $input, which nothing has written yet; written so far: nothing'
+    )
+
+
+def test_halting_runs_the_finally_of_the_skill(make: Any, events: Any) -> None:
+    node = make("ok")
+    node.tick_once()
+    assert halt(node) == []
+    assert CLEANED == ["ok"]
+    assert (node.status, events[-1]["status"]) == (Status.INVALID, "INVALID")
+
+
+def test_a_skill_that_ended_is_not_halted_again(make: Any, ticks: Any, events: Any) -> None:
+    node = make("ok")
+    ticks(node)
+    before = len(events)
+    node.stop(Status.INVALID)
+    assert CLEANED == ["ok"] and len(events) == before
+
+
+@pytest.mark.parametrize(
+    ("way", "problem"),
+    [
+        ("linger", 'tree/Worker: Worker: it yielded while it was halted; nothing may wait in "finally"'),
+        ("break late", "tree/Worker: Worker: ValueError while it was halted: a late bug"),
+    ],
+)
+def test_a_skill_that_does_not_stop_cleanly_is_reported(make: Any, way: str, problem: str) -> None:
+    node = make(way)
+    node.tick_once()
+    assert halt(node) == [problem]
+    assert node.status is Status.INVALID
+
+
+def test_a_skill_without_a_yield_is_done_at_once(make: Any, ticks: Any) -> None:
+    class AtOnce(Skill):
+        """Nothing to wait for."""
+
+        def run(self, cell: Any) -> Iterator[None]:
+            CLEANED.append("done")
+            return None  # type: ignore[return-value]
+
+    assert ticks(make(skill=AtOnce)) == "S"
+    assert CLEANED == ["done"]
+
+
+def test_events_say_what_happened_to_which_item(site: Any, events: Any) -> None:
+    class Take(Skill):
+        """Take the target."""
+
+        target: In[Target]
+        held: Out[str]
+
+        def run(self, cell: Any) -> Iterator[None]:
+            yield
+            self.held = self.target.item
+
+    scope = Scope()
+    scope.write({"target": Target("cube-2", "cube", np.zeros(3), 0.9, 1, 0, 0.0)})
+    wiring = Wiring({}, {"target": "target"}, {"held": "held"})
+    node = SkillNode(site("tree/Take"), "Take", Take, wiring, None, scope)  # type: ignore[arg-type]
+    node.tick_once()
+    node.tick_once()
+    common = {"kind": "status", "node": "tree/Take", "reason": "", "message": "", "item": "cube-2"}
+    assert events == [
+        {**common, "status": "RUNNING"},
+        {**common, "status": "SUCCESS", "outputs": {"held": "cube-2"}},
+    ]
+
+
+def test_scopes_share_nothing() -> None:
+    first, second = Scope(), Scope()
+    first.write({"a": 1})
+    assert (dict(first), dict(second)) == ({"a": 1}, {})

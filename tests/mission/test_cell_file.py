@@ -1,0 +1,105 @@
+# ruff: noqa: E501 - findings are quoted as they are printed
+"""Cell files: typed, with findings at the right place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from executive.errors import InputError
+from executive.mission.cell_file import load_cell
+from executive.mission.files import shipped_folder
+from executive.mission.findings import MissionError
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def complaint(text: str, overrides: dict[str, str] | None = None) -> str:
+    Path("c.yaml").write_text(text)
+    with pytest.raises(MissionError) as caught:
+        load_cell(Path("c.yaml"), overrides)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("path", sorted((shipped_folder() / "cells").glob("*.yaml")), ids=lambda p: p.stem)
+def test_shipped_cells_load(path: Path) -> None:
+    assert load_cell(path).bins
+
+
+def test_a_missing_file_is_named() -> None:
+    with pytest.raises(InputError, match=r"there is no file nowhere\.yaml"):
+        load_cell(Path("nowhere.yaml"))
+
+
+def test_bytes_that_are_no_text_are_refused() -> None:
+    Path("c.yaml").write_bytes(b"cell: \xff\n")
+    with pytest.raises(InputError, match=r"c\.yaml is not UTF-8 text: byte 6 does not fit"):
+        load_cell(Path("c.yaml"))
+
+
+def test_a_huge_file_is_refused() -> None:
+    Path("c.yaml").write_bytes(b"#" * 1_000_001)
+    with pytest.raises(InputError, match="larger than 1000000 bytes"):
+        load_cell(Path("c.yaml"))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("table: {x: [0.4", "tabel: {x: [0.4", 'c.yaml:13:1: error[unknown-key]: the file has no key "tabel"\n'),
+        ("cup_radius", "cup_radios", 'c.yaml:12:8: error[unknown-key]: tool has no key "cup_radios"\n'),
+        ("cup_radius", "cup_radios", 'error[missing-key]: tool needs the key "cup_radius"\n'),
+        ("cup_radius", "cup_radios", '  Did you mean "cup_radius"? tool takes: length, cup_radius'),
+        ("force: 12.0", "force: strong", 'c.yaml:12:34: error[wrong-type]: tool.force must be a number, not the text "strong"\n'),
+        ("force: 12.0", "force: '12'", 'tool.force must be a number, not the text "12"\n'),
+        ("force: 12.0", "force: 0", "error[out-of-range]: tool.force must be more than 0, not 0\n"),
+        ("force: 12.0", "force: .inf", 'error[not-finite]: ".inf" is not a number one can reach\n'),
+        ("x: [0.4, 0.6]", "x: [0.4]", "c.yaml:13:9: error[wrong-length]: table.x has 1 of the 2 values it needs\n"),
+        ("x: [0.4, 0.6]", "x: [0.4, b]", 'c.yaml:13:18: error[wrong-type]: table.x[1] must be a number, not the text "b"\n'),
+        ("mount: fixed", "mount: fixd", 'cameras.top.mount must be "fixed" or "wrist", not the text "fixd" (did you mean "fixed"?)\n'),
+        ("{home: [0, 0", "{hme: [0, 0", 'arm needs a pose named "home"; there are: hme, scan\n'),
+        ("scan_poses: [home]", "scan_poses: [hom]", 'c.yaml:25:18: error[unknown-pose]: the arm has no pose "hom"; arm.poses_deg has: home, scan\n'),
+        ("cube_small.urdf", "../cube.urdf", 'error[outside]: "../cube.urdf" must be a relative path without ".."\n'),
+        ("safe_place:", "safeplace:", 'error[missing-key]: the file needs the key "safe_place"\n'),
+    ],
+)  # fmt: skip
+def test_findings_say_what_and_where(old: str, new: str, expected: str, small_cell: str) -> None:
+    assert expected in complaint(small_cell.replace(old, new, 1))
+
+
+def test_a_finding_shows_line_and_caret(small_cell: str) -> None:
+    text = small_cell.replace("source: a test\n    position", "sorce: a test\n    position")
+    assert complaint(text).endswith(
+        'c.yaml:4:5: error[unknown-key]: arm.limits has no key "sorce"\n'
+        "   4 |     sorce: a test\n"
+        "     |     ^^^^^\n"
+        '  Did you mean "source"? arm.limits takes: source, position_deg, velocity_deg, acceleration, jerk, '
+        "stop_acceleration, stop_jerk."
+    )
+
+
+def test_overrides_replace_values_of_the_file(small_cell: str) -> None:
+    Path("c.yaml").write_text(small_cell)
+    cell = load_cell(Path("c.yaml"), {"cell.table.objects": "[5, 5]", "cell.tool.force": "1e1"})
+    assert cell.table.objects == (5, 5)
+    assert cell.tool.force == 10.0
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "expected"),
+    [
+        ("cell.table.objects", "[5]", "--set:1:20: error[wrong-length]: table.objects has 1 of the 2 values it needs\n"),
+        ("cell.tool.force", "yes", 'cell.tool.force=yes\n     |                 ^^^'),
+        ("cell.tabel.x", "1", 'the cell has no key "tabel"'),
+        ("cell.table.objects", "[5", "not valid YAML"),
+        ("cell.kind.x", "5", 'there is no key "x" there'),
+    ],
+)  # fmt: skip
+def test_findings_about_overrides_show_the_override(
+    key: str, value: str, expected: str, small_cell: str
+) -> None:
+    assert expected in complaint(small_cell + "kind: sim\n", {key: value})

@@ -1,0 +1,172 @@
+# ruff: noqa: E501 - findings are quoted as they are printed
+"""Loading missions: overrides, files, and what is put in the place of names."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import pytest
+
+from executive.cell_config import CellConfig
+from executive.errors import InputError
+from executive.mission import model
+from executive.mission.files import find_mission, shipped_folder
+from executive.mission.findings import MissionError
+from executive.mission.load import LoadedMission, load_mission
+from executive.skill import Skill
+
+Load = Callable[..., LoadedMission]
+
+HEAD = "mission: m\ncell: cells/small.yaml\n"
+PARAMS = HEAD + "params: {tries: 2, high: 0.2, name: a, wide: true, kinds: [cube]}\ntree: Look\n"
+
+
+def skill(loaded: LoadedMission, name: str) -> model.SkillNode:
+    nodes = loaded.tree.walk()
+    return next(node for node in nodes if isinstance(node, model.SkillNode) and node.skill == name)
+
+
+def test_a_mission_knows_its_files(load: Load) -> None:
+    text = HEAD + "description: A test.\nroutes: {cube: red_bin}\ntree: Look\n"
+    loaded = load(text)
+    assert (loaded.mission.name, loaded.mission.description) == ("m", "A test.")
+    assert loaded.text == text
+    assert (loaded.path, loaded.cell_path) == (Path("m.yaml"), Path("cells/small.yaml"))
+    assert loaded.routes == {"cube": "red_bin"}
+
+
+def test_overrides_take_the_type_of_the_default(load: Load) -> None:
+    given = {"tries": "5", "high": "1", "name": "007", "wide": "false", "kinds": "[cube, sphere]"}
+    params = load(PARAMS, given).params
+    assert params == {
+        "tries": 5, "high": 1.0, "name": "007", "wide": False, "kinds": ["cube", "sphere"],
+    }  # fmt: skip
+    assert isinstance(params["high"], float)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "expected"),
+    [
+        ("tries", "many", "--set:1:7: error[wrong-type]: tries must be of the kind of its default, 2, not the text \"many\""),
+        ("tries", "1.5", "tries must be of the kind of its default, 2, not 1.5"),
+        ("wide", "yes", 'wide must be of the kind of its default, true, not the text "yes"'),
+        ("trys", "1", '--set:1:1: error[unknown-param]: the mission has no param "trys"\n   1 | trys=1\n     | ^^^^\n  Did you mean "tries"?'),
+    ],
+)  # fmt: skip
+def test_wrong_overrides_are_findings(load: Load, key: str, value: str, expected: str) -> None:
+    with pytest.raises(MissionError) as caught:
+        load(PARAMS, {key: value})
+    assert expected in str(caught.value)
+
+
+def test_an_override_out_of_range_is_shown_where_it_was_given(load: Load) -> None:
+    text = HEAD + "params: {tries: 2}\ntree: {retry: {attempts: $tries, do: Look}}\n"
+    with pytest.raises(MissionError) as caught:
+        load(text, {"tries": "0"})
+    assert str(caught.value) == (
+        "--set:1:7: error[out-of-range]: retry.attempts must be at least 1, not 0 (it is $tries in line 4)\n"
+        "   1 | tries=0\n"
+        "     |       ^"
+    )
+
+
+def test_cell_overrides_reach_the_cell(load: Load) -> None:
+    assert load(HEAD + "tree: Look\n", {"cell.table.objects": "[5, 5]"}).cell_config.table.objects == (5, 5)
+
+
+def test_all_findings_come_at_once_and_in_order(load: Load, small_cell: str) -> None:
+    text = HEAD + "routes: {cube: rad_bin}\ntree: [Lok, {Pick: {height: 9}}]\nextra: 1\n"
+    with pytest.raises(MissionError) as caught:
+        load(text, {"cell.tool.force": "0"})
+    found = [(finding.path, finding.line, finding.code) for finding in caught.value.findings]
+    assert found == [
+        ("m.yaml", 4, "unknown-skill"),
+        ("m.yaml", 4, "out-of-range"),
+        ("m.yaml", 5, "unknown-key"),
+        ("--set", 1, "out-of-range"),
+    ]
+
+
+def test_findings_of_the_robot_stand_in_the_cell_file(load: Load) -> None:
+    def unreachable(cell: CellConfig) -> Iterable[tuple[tuple[str | int, ...], str]]:
+        yield ("bins", "blue_bin", "position"), "0.3 m out of reach"
+
+    with pytest.raises(MissionError) as caught:
+        load(HEAD + "tree: Look\n", robot_check=unreachable)
+    assert str(caught.value).startswith("cells/small.yaml:16:14: error[robot]: 0.3 m out of reach\n")
+
+
+def test_a_missing_cell_file_is_a_finding_at_its_key(load: Load) -> None:
+    with pytest.raises(MissionError) as caught:
+        load("mission: m\ncell: cells/smal.yaml\ntree: Look\n")
+    text = str(caught.value)
+    assert text.startswith('m.yaml:2:7: error[no-cell]: there is no file "cells/smal.yaml" beside this one')
+    assert 'Did you mean "cells/small.yaml"?' in text
+
+
+def test_a_link_out_of_the_folder_is_refused(load: Load, tmp_path: Path, small_cell: str) -> None:
+    outside = tmp_path.parent / f"{tmp_path.name}_outside.yaml"
+    outside.write_text(small_cell)
+    Path("link.yaml").symlink_to(outside)
+    with pytest.raises(MissionError, match=r'"link\.yaml" is a link out of'):
+        load("mission: m\ncell: link.yaml\ntree: Look\n")
+
+
+def test_warnings_do_not_stop_a_mission(load: Load) -> None:
+    (warning,) = load(HEAD + "tree: Look\ntrees: {other: Look}\n").warnings
+    assert str(warning).startswith('m.yaml:4:9: warning[unused-tree]: nothing uses the subtree "other"')
+
+
+def test_arguments_are_put_in_and_defaults_stand_in_for_them(load: Load) -> None:
+    trees = "trees: {look: {args: {view: table}, do: {Look: {view: $view}}}}\n"
+    assert skill(load(HEAD + "tree: {use: look}\n" + trees), "Look").settings["view"].value.value == "table"
+    given = HEAD + "tree: {use: look, with: {view: full}}\n" + trees
+    assert skill(load(given), "Look").settings["view"].value.value == "full"
+
+
+def test_an_argument_may_be_a_variable(load: Load) -> None:
+    text = HEAD + (
+        "tree: [{Look: {seen: $first}}, {use: pick, with: {what: $first}}]\n"
+        "trees: {pick: {args: [what], returns: [held], do: {Pick: {seen: $what}}}}\n"
+    )
+    assert skill(load(text), "Pick").settings["seen"].value.name == "first"
+
+
+def test_a_doubled_dollar_is_a_dollar(load: Load) -> None:
+    text = HEAD + "tree: [Look, {Pick: {only: $$5}}]\n"
+    assert skill(load(text), "Pick").settings["only"].value.value == "$5"
+
+
+def test_subtrees_cannot_blow_up_the_tree(load: Load) -> None:
+    trees = "".join(f"  t{i}: [{', '.join([f'{{use: t{i + 1}}}'] * 10)}]\n" for i in range(8))
+    with pytest.raises(MissionError, match=r"error\[too-large\].*grows more than to 5000 nodes"):
+        load(HEAD + "tree: {use: t0}\ntrees:\n" + trees + "  t8: Look\n")
+
+
+def test_a_deep_tree_is_refused_without_a_traceback(load: Load) -> None:
+    with pytest.raises(MissionError, match="grows more than 40 levels deep"):
+        load(HEAD + "tree: " + "{invert: " * 45 + "Look" + "}" * 45 + "\n")
+
+
+def test_an_unknown_mission_names_the_shipped_ones(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(
+        InputError, match=r'there is no mission file "sort_overhed".*Did you mean "sort_overhead"'
+    ):
+        find_mission("sort_overhed")
+
+
+@pytest.mark.parametrize("name", ["sort_overhead", "sort_overhead.yaml", "missions/sort_overhead.yaml"])
+def test_shipped_missions_go_by_name(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert find_mission(name) == shipped_folder() / "sort_overhead.yaml"
+
+
+def test_a_hundred_nodes_load_in_a_tenth_of_a_second(load: Load, skills: dict[str, type[Skill]]) -> None:
+    step = "  - {retry: {attempts: 3, on: [Pick.missed], do: [Look, {Pick: {height: 0.2}}]}}\n"
+    load(HEAD + "tree:\n" + step * 25)
+    began = time.process_time()
+    load_mission("m.yaml", skills)
+    assert time.process_time() - began < 0.1

@@ -1,0 +1,105 @@
+# ruff: noqa: E501 - findings are quoted as they are printed
+"""YAML 1.2 text with positions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from executive.mission.scalars import core_value
+from executive.mission.source import Source
+from executive.mission.text import Mapping, Scalar, parse_yaml, plain
+
+
+def read(text: str) -> tuple[Any, list[str]]:
+    root, findings = parse_yaml(Source("a.yaml", text))
+    return (None if root is None else plain(root)), [str(finding) for finding in findings]
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1e-3", 0.001), ("no", "no"), ("yes", "yes"), ("on", "on"), ("12:30", "12:30"), ("010", 10),
+        ("0o17", 15), ("0x1F", 31), (".5", 0.5), ("-3", -3), ("true", True), ("~", None), ("1_000", "1_000"),
+        ("2026-11-21", "2026-11-21"), ("-", "-"), ("+.inf", float("inf")), ("1.", 1.0), ("9" * 400, "9" * 400),
+    ],
+)  # fmt: skip
+def test_plain_scalars_follow_yaml_1_2(text: str, value: object) -> None:
+    read_value = core_value(text)
+    assert read_value == value and type(read_value) is type(value)
+
+
+def test_quoted_scalars_stay_text() -> None:
+    assert read("a: '1'\nb: \"no\"\n") == ({"a": "1", "b": "no"}, [])
+
+
+def test_the_key_on_is_text() -> None:
+    assert read("on: [a]\nyes: 1\n")[0] == {"on": ["a"], "yes": 1}
+
+
+def test_every_key_and_value_knows_its_place() -> None:
+    root, _ = parse_yaml(Source("a.yaml", "a:\n  bcd: 'e f'\n"))
+    assert isinstance(root, Mapping)
+    inner = root.get("a")
+    assert isinstance(inner, Mapping)
+    (entry,) = inner.entries
+    assert isinstance(entry.value, Scalar)
+    assert (entry.key.mark.line, entry.key.mark.col, entry.key.mark.length) == (2, 3, 3)
+    assert (entry.value.mark.line, entry.value.mark.col, entry.value.mark.length) == (2, 8, 5)
+
+
+def test_aliases_stand_for_what_is_marked() -> None:
+    assert read("a: &x [1]\nb: *x\n") == ({"a": [1], "b": [1]}, [])
+
+
+def test_a_billion_laughs_are_refused() -> None:
+    lines = ["a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]"]
+    lines += [f"a{i + 1}: &a{i + 1} [{', '.join([f'*a{i}'] * 10)}]" for i in range(9)]
+    root, (finding,) = read("\n".join(lines))
+    assert root is None
+    assert "error[too-large]: with its aliases written out, the file has more than 100000 values" in finding
+
+
+def test_an_alias_of_itself_is_refused() -> None:
+    assert "nothing above is marked" in read("a: &x [*x]\n")[1][0]
+
+
+def test_aliases_cannot_nest_deeper_than_text() -> None:
+    lines = ["a0: &a0 [1]"] + [f"a{i + 1}: &a{i + 1} [*a{i}]" for i in range(2000)]
+    assert "nested more than 60 levels deep" in read("\n".join(lines))[1][0]
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "the file is empty"),
+        ("# nothing\n", "the file is empty"),
+        ("a: 1\n---\nb: 2\n", "a second document starts here"),
+        ("a: !!python/object:os.system x\n", "is not allowed"),
+        ("a: !x 1\n", 'the tag "!x" is not allowed'),
+        ("<<: {a: 1}\n", 'the merge key "<<" is not allowed'),
+        ("? [a]\n: b\n", "a key must be a single word"),
+        ("a:\n\t- b\n", "found character '\\t' that cannot start any token"),
+        ("a: \x07\n", "the character '\\x07' is not allowed in YAML"),
+        ("[" * 100, "nested more than 60 levels deep"),
+        ("a: b: c\n", "mapping values are not allowed here"),
+    ],
+)
+def test_what_a_mission_cannot_use_is_refused(text: str, sentence: str) -> None:
+    assert sentence in read(text)[1][0]
+
+
+def test_all_duplicates_are_found_at_once() -> None:
+    _, findings = read("a: 1\na: 2\nb: {c: 1, c: 2}\n")
+    assert [finding.split(":")[1] for finding in findings] == ["2", "3"]
+
+
+@given(st.text(max_size=60))
+def test_no_text_breaks_the_reader(text: str) -> None:
+    root, findings = parse_yaml(Source("a.yaml", text))
+    assert (root is None) <= bool(findings)
+    for finding in findings:
+        str(finding)

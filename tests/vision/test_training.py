@@ -1,0 +1,88 @@
+"""Training: what is refused, and the parts that need torch or onnx, where they are installed."""
+
+from __future__ import annotations
+
+import importlib.util
+
+import numpy as np
+import pytest
+
+from executive.errors import InputError
+from executive.vision.train import train
+
+
+def test_a_folder_that_is_no_data_set_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"not a data set: it needs train/_annotations\.coco\.json"):
+        train(tmp_path, tmp_path / "out")
+
+
+def test_a_missing_checkpoint_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"no checkpoint .*old\.pth to start from"):
+        train(tmp_path, tmp_path / "out", start=tmp_path / "old.pth")
+
+
+@pytest.mark.skipif(importlib.util.find_spec("torch") is not None, reason="the extra is installed")
+def test_training_without_the_extra_says_how_to_install_it(tmp_path):
+    (tmp_path / "data.yaml").write_text("names: [cube]\n")
+    with pytest.raises(InputError, match='package "torch"; install the extra: uv sync --extra train'):
+        train(tmp_path, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("element", range(8))
+def test_a_symmetry_moves_boxes_with_the_pixels(element):
+    torch = pytest.importorskip("torch")
+    from executive.vision.training.symmetry import transform_boxes, transform_image
+
+    image = torch.zeros(3, 64, 64)
+    image[:, 10:20, 30:50] = 1
+    box = torch.tensor([[40, 15, 20, 10]]) / 64
+    rows, columns = np.nonzero(transform_image(image, element)[0].numpy())
+    x, y, width, height = (transform_boxes(box, element)[0] * 64).tolist()
+    assert (columns.min(), columns.max() + 1) == pytest.approx((x - width / 2, x + width / 2))
+    assert (rows.min(), rows.max() + 1) == pytest.approx((y - height / 2, y + height / 2))
+    assert transform_boxes(torch.zeros(0, 4), element).shape == (0, 4)
+
+
+def test_the_symmetries_are_eight_different_ones():
+    torch = pytest.importorskip("torch")
+    from executive.vision.training.symmetry import ELEMENTS, transform_image
+
+    image = torch.arange(16.0).reshape(4, 4)
+    assert (
+        len({tuple(transform_image(image, element).flatten().tolist()) for element in range(ELEMENTS)}) == 8
+    )
+
+
+@pytest.mark.parametrize(("storage", "size", "error"), [("float16", 0.52, 1e-3), ("int8", 0.3, 2e-2)])
+def test_narrow_weights_are_smaller_and_give_nearly_the_same_outputs(storage, size, error):
+    onnx = pytest.importorskip("onnx")
+    import onnxruntime
+
+    from executive.vision.training.compress import compress
+
+    rng = np.random.default_rng(0)
+    weights = {
+        "wide": rng.normal(size=(64, 128)).astype(np.float32),
+        "transposed": rng.normal(size=(32, 128)).astype(np.float32),
+    }
+    nodes = [
+        onnx.helper.make_node("MatMul", ["x", "wide"], ["hidden"]),
+        onnx.helper.make_node("Gemm", ["hidden", "transposed"], ["y"], transB=1),
+    ]
+    graph = onnx.helper.make_graph(
+        nodes,
+        "tiny",
+        [onnx.helper.make_tensor_value_info("x", onnx.TensorProto.FLOAT, [4, 64])],
+        [onnx.helper.make_tensor_value_info("y", onnx.TensorProto.FLOAT, [4, 32])],
+        [onnx.numpy_helper.from_array(value, name) for name, value in weights.items()],
+    )
+    model = onnx.helper.make_model(graph, opset_imports=[onnx.helper.make_opsetid("", 17)], ir_version=10)
+    small = compress(model, storage)
+    x = rng.normal(size=(4, 64)).astype(np.float32)
+    runs = [
+        onnxruntime.InferenceSession(one.SerializeToString()).run(None, {"x": x})[0] for one in (model, small)
+    ]
+    assert small.ByteSize() < size * model.ByteSize()
+    assert runs[1] == pytest.approx(runs[0], abs=error * float(np.abs(runs[0]).max()))
+    assert not np.array_equal(*runs)
