@@ -26,7 +26,7 @@ class Approach(Skill):
 
     target: In[Target] = port(doc="where to go")
     overtravel: Metres = param(0.015, ge=0, le=0.03, doc="how far below the expected surface to feel")
-    offset: Metres = param(0.004, ge=0, le=0.02, doc="spacing of the spiral of further attempts")
+    offset: Metres = param(0.0025, ge=0, le=0.02, doc="spacing of the spiral of further attempts")
     reasons: ClassVar = ("unreachable", "blocked", "no_contact")
     uses: ClassVar = ("arm", "tool")
     moves: ClassVar = True

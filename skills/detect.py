@@ -20,6 +20,11 @@ class Detect(Skill):
     view: str = param(
         "table", choices=("table", "full"), doc="`table`: the workspace; `full`: everything the camera sees"
     )
+    doubtful: str = param(
+        "fail",
+        choices=("fail", "pass"),
+        doc="boxes only below the threshold: `fail` as unsure, or `pass` as nothing found",
+    )
     reasons: ClassVar = ("unsure", "hidden", "unavailable")
     uses: ClassVar = ("camera",)
     senses: ClassVar = True
@@ -39,7 +44,7 @@ class Detect(Skill):
         except Unavailable as error:
             raise self.failed("unavailable", f"detector {name}: {error}") from error
         found = tuple(detection for detection in answer if detection.confidence >= detector.threshold)
-        if not found and answer:
+        if not found and answer and self.doubtful == "fail":
             best = answer[0]
             raise self.failed(
                 "unsure",

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from py_trees.common import Status
 
+from executive.cell import Detection
 from executive.errors import InputError
 from executive.events import Event
 from executive.mission.load import load_mission
@@ -72,7 +73,7 @@ def test_an_object_that_cannot_be_had_is_rejected_and_the_others_go_on(missions:
     assert (items["rejected"], audit["left"]) == (1, 1)
     assert items["placed"] == audit["right"] == items["seen"] - 1
     rejected = next(row for row in items["rows"] if row["state"] == "rejected")
-    assert rejected["why"] == "could not be picked (3 failed attempts)"
+    assert rejected["why"] == "could not be picked (4 failed attempts)"
 
 
 def test_an_object_dropped_outside_the_workspace_is_found_by_the_full_look(missions: Path) -> None:
@@ -167,3 +168,12 @@ def test_an_unknown_kind_of_cell_names_the_installed_ones(missions: Path) -> Non
         InputError, match='no installed package offers cells of kind "hardware"; installed: sim'
     ):
         Run(loaded, discover(), seed=1)
+
+
+def test_a_box_that_stays_in_doubt_ends_in_an_empty_table_and_not_in_a_failure(missions: Path) -> None:
+    run, events = make(missions)
+    ghost = Detection("duck", 0.4, (300, 200, 320, 220))
+    fake_of(run).detector.answers = lambda look, true: [*true, ghost]
+    fake_of(run).world.objects.clear()
+    assert run.execute().status == "SUCCESS"
+    assert sum(e.data.get("reason") == "unsure" and e.data["node"].endswith("Detect") for e in events) >= 6

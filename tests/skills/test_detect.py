@@ -43,3 +43,9 @@ def test_a_detector_without_an_answer_is_unavailable_with_its_sentence(fake: Fak
     fake.detector.answers = lambda look, true: "no answer within 1.0 s"
     result = run_skill(Detect(), fake)
     assert (result.reason, result.message) == ("unavailable", "detector embedded: no answer within 1.0 s")
+
+
+def test_doubtful_boxes_pass_as_nothing_found_where_the_mission_says_so(fake: FakeCell) -> None:
+    fake.detector.answers = lambda look, true: [Detection("duck", 0.4, (0, 0, 9, 9))]
+    result = run_skill(Detect(doubtful="pass"), fake)
+    assert (result.status, result.outputs["detections"].found) == ("SUCCESS", ())
