@@ -141,9 +141,9 @@ class Bin:
     size: Array
     slots: Array
 
-    def contains(self, position: Array, margin: float = 0.0) -> bool:
-        """Tell whether a point `(3,)` [m] lies over the floor, walls widened by `margin` [m]."""
-        return bool(np.all(np.abs(position[:2] - self.position[:2]) <= self.size[:2] / 2 + margin))
+    def contains(self, position: Array) -> bool:
+        """Tell whether a point `(3,)` [m] lies over the floor."""
+        return bool(np.all(np.abs(position[:2] - self.position[:2]) <= self.size[:2] / 2))
 
 
 @dataclass(frozen=True)
@@ -341,7 +341,7 @@ class Ledger(Protocol):
         """Tell whether the item still waits to be sorted: neither placed, rejected, held nor lost."""
 
     def believes_empty(self) -> bool:
-        """Tell whether enough looks at the full frame agree that nothing is left to sort."""
+        """Tell whether enough looks at the full frame agree that nothing with a route is left."""
 
     def touched(self, item: Item) -> None:
         """Record that the tool met the item, which proves that it exists."""

@@ -6,10 +6,24 @@ end in `_deg` are in degrees, where the field says so.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+Number = TypeVar("Number", int, float)
+
+
+def _rising(pair: tuple[Number, Number]) -> tuple[Number, Number]:
+    if pair[0] > pair[1]:
+        raise ValueError(f"must not fall: {pair[0]:g} stands before {pair[1]:g}")
+    return pair
+
+
+Length = Annotated[float, Field(gt=0)]
+Count = Annotated[int, Field(ge=1)]
+Natural = Annotated[int, Field(ge=0)]
+Range = Annotated[tuple[float, float], AfterValidator(_rising)]
 Vector = Annotated[tuple[float, float, float], Field(description="x, y, z [m]")]
 Joints = tuple[float, float, float, float, float, float, float]
 Colour = tuple[float, float, float]
@@ -43,9 +57,9 @@ class BinConfig(Section):
 
     position: Vector
     """Centre of the floor's underside."""
-    size: Vector
+    size: tuple[Length, Length, Length]
     """Inner length along x, inner width along y, wall height [m]."""
-    slots: tuple[int, int] = (2, 3)
+    slots: tuple[Count, Count] = (2, 3)
     """Drop positions along x and y."""
     colour: Colour = (0.6, 0.6, 0.6)
     """Colour of the walls."""
@@ -54,11 +68,11 @@ class BinConfig(Section):
 class TableConfig(Section):
     """The table and the part of it where objects lie."""
 
-    x: tuple[float, float] = (0.42, 0.64)
+    x: Range = (0.42, 0.64)
     """Range of the workspace along x [m]."""
-    y: tuple[float, float] = (-0.22, 0.22)
+    y: Range = (-0.22, 0.22)
     """Range of the workspace along y [m]."""
-    objects: tuple[int, int] = (3, 6)
+    objects: Annotated[tuple[Natural, Natural], AfterValidator(_rising)] = (3, 6)
     """Fewest and most objects that spawning puts there."""
     gap: float = Field(0.012, ge=0)
     """Smallest distance between the outlines of two objects when spawned [m]."""
@@ -97,6 +111,19 @@ class CameraConfig(Section):
     noise: NoiseConfig = NoiseConfig()
     """Its sensor noise."""
 
+    @model_validator(mode="after")
+    def _can_be_set_up(self) -> CameraConfig:
+        left, top, right, bottom = self.table_view
+        square = 0 <= left < right <= self.width and 0 <= top < bottom <= self.height
+        if not square or right - left != bottom - top:
+            raise ValueError(
+                f"needs a table_view that is a square inside its image of {self.width} x {self.height} "
+                f"pixels, not {list(self.table_view)}"
+            )
+        if np.linalg.norm(np.cross(np.subtract(self.look_at, self.position), self.up)) < 1e-9:
+            raise ValueError("needs a look_at other than its position, and an up that is not on its axis")
+        return self
+
 
 class DetectorConfig(Section):
     """A detector: what kind, and what it needs."""
@@ -111,6 +138,12 @@ class DetectorConfig(Section):
     """Confidence under which a box is ignored altogether."""
     latency: float = Field(0.05, ge=0)
     """Time from a frame to its answer on the run's clock [s]."""
+
+    @model_validator(mode="after")
+    def _is_floored(self) -> DetectorConfig:
+        if self.floor > self.threshold:
+            raise ValueError(f"needs a floor up to its threshold, {self.threshold:g}, not {self.floor:g}")
+        return self
 
     @property
     def options(self) -> dict[str, Any]:

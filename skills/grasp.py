@@ -24,9 +24,15 @@ class Grasp(Skill):
     def run(self, cell: Cell) -> Steps:
         """Switch the vacuum on and ask the sensor."""
         cell.tool.close()
-        yield from cell.clock.sleep(self.settle)
-        if not cell.tool.holding:
-            cell.tool.open()
+        sealed = False
+        try:
+            yield from cell.clock.sleep(self.settle)
+            sealed = cell.tool.holding
+        finally:
+            # Whoever takes the skill away would otherwise leave in the tool what nobody knows of.
+            if not sealed:
+                cell.tool.open()
+        if not sealed:
             cell.ledger.missed(self.target.item)
             raise self.failed("missed", f"no seal on {self.target.item} {self.settle:.2f} s after contact")
         cell.ledger.held(self.target.item)

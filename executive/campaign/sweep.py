@@ -56,7 +56,6 @@ def sweep(
             repeated with them, so a sweep does without.
         progress: Told how many runs of how many are done.
         work: What does one job, in a process of its own.
-
     """
     jobs = deque(Job(mission, seed, dict(overrides), runs, frames) for seed in seeds)
     results: dict[int, Result] = {}
@@ -67,8 +66,12 @@ def sweep(
             while running or (jobs and not halted.is_set()):
                 # No job waits in the pool: one that does could not be taken back.
                 while jobs and len(running) < workers and not (broken or halted.is_set()):
-                    job = jobs.popleft()
-                    running[pool.submit(work or run_job, job)] = job
+                    try:
+                        running[pool.submit(work or run_job, jobs[0])] = jobs[0]
+                    except BrokenExecutor:  # The process died since its last result was looked at.
+                        broken = True
+                    else:
+                        jobs.popleft()
                 done, _ = wait(running, return_when=FIRST_COMPLETED)
                 for future in done:
                     job, error = running.pop(future), future.exception()

@@ -14,7 +14,6 @@ def load_cells(names: tuple[str, ...]) -> dict[str, CellConfig]:
 
     Raises:
         InputError: There is no such cell, two have one name, or something is wrong with a file.
-
     """
     from executive.errors import InputError
     from executive.mission.cell_file import load_cell
@@ -33,7 +32,6 @@ def find_cell(name: str) -> Path:
 
     Raises:
         InputError: There is none.
-
     """
     from executive.errors import InputError
     from executive.mission.files import shipped_folder

@@ -1,1 +1,1 @@
-"""Control nodes on the mission clock."""
+"""Control nodes on the mission clock, skills as leaves, variables and halting."""

@@ -16,7 +16,6 @@ class Failure:
         source: Name of the skill, or the word of the control node, that failed.
         path: Path of the node that failed.
         labels: Labels of that node and of the nodes above it that passed the failure on.
-
     """
 
     reason: str

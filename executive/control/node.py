@@ -28,7 +28,6 @@ class Site:
         path: Unique path from the root of the tree.
         label: What the mission calls it with `as:`, or "".
         emit: Takes its `status` and `choice` events.
-
     """
 
     path: str
@@ -43,7 +42,6 @@ class ControlNode(Composite):
         word: What the node is called in a mission; the source of failures of its own.
         path: Unique path from the root of the tree.
         failure: Why it failed, while its status is FAILURE; else None.
-
     """
 
     word = "node"
@@ -87,7 +85,6 @@ class ControlNode(Composite):
 
         Raises:
             Fault: The clean-up of a node below failed; all the others were halted none the less.
-
         """
         was_running = self.status is Status.RUNNING
         problems = [problem for child in self.children for problem in halt(child)]
@@ -110,7 +107,6 @@ class ControlNode(Composite):
 
         Raises:
             Fault: Its clean-up failed.
-
         """
         if problems := halt(child):
             raise Fault("; ".join(problems), self.path)

@@ -28,7 +28,6 @@ class Wiring:
         constants: Params and inputs with a value from the mission file.
         inputs: Variable read by each other input.
         outputs: Variable written by each output.
-
     """
 
     constants: Mapping[str, Any] = field(default_factory=dict)
@@ -42,7 +41,6 @@ class SkillNode(Behaviour):
     Attributes:
         path: Unique path from the root of the tree.
         failure: Why it failed, while its status is FAILURE; else None.
-
     """
 
     def __init__(
@@ -72,7 +70,6 @@ class SkillNode(Behaviour):
 
         Raises:
             Fault: The skill raised anything but a declared failure.
-
         """
         try:
             if self.status is not Status.RUNNING:
@@ -105,7 +102,6 @@ class SkillNode(Behaviour):
 
         Raises:
             Fault: The skill raised, or yielded, while it was being closed.
-
         """
         if self.status is not Status.RUNNING:
             self.status = new_status

@@ -20,9 +20,10 @@ def bind(
 ) -> dict[int, Record]:
     """Return the item of each detection that belongs to a known one, by the detection's index.
 
-    Four rounds, each over what is left: items that nothing has disturbed, within `gate` [m], of the
-    same class and then of any (the class is evidence, not identity); items that were dropped, of the
-    same class, anywhere on the table; items that may have been pushed, of the same class, anywhere.
+    Each round is over what the ones before have left. Items that nothing has disturbed come first, within
+    `gate` [m], of the same class and then of any (the class is evidence, not identity). Then, of the same
+    class, those that may have been pushed and are where they were; those that were dropped, anywhere;
+    those that may have been pushed, anywhere. Last, one of any class where a pushed item was.
     """
     bound: dict[int, Record] = {}
 
@@ -50,4 +51,5 @@ def bind(
     assign(pushed, gate, same_class=True)
     assign(dropped, np.inf, same_class=True)
     assign(pushed, np.inf, same_class=True)
+    assign(pushed, gate, same_class=False)
     return bound

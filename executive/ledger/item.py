@@ -25,7 +25,7 @@ class State(Enum):
     LOST = "lost"
     """Known to exist, and nowhere to be found."""
     PHANTOM = "phantom"
-    """Believed for one look, never confirmed: no object at all."""
+    """Believed for one look, contradicted by others: no object at all."""
 
 
 OPEN = (State.SEEN, State.DROPPED)
@@ -56,7 +56,7 @@ class Record:
     first: Array
     epoch: int
     state: State = State.SEEN
-    looks: int = 1
+    looks: int = 0
     absent: int = 0
     touched: bool = False
     attempts: int = 0

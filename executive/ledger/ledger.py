@@ -34,6 +34,7 @@ class ItemLedger:
         self._records: dict[Item, Record] = {}
         self._counts: Counter[str] = Counter()
         self._freshness = Freshness()
+        self._frame = 0
         self._empty_looks = 0
 
     @property
@@ -51,27 +52,34 @@ class ItemLedger:
         return self._freshness.anywhere_holds(frame.epoch)
 
     def observe(self, detections: Detections, positions: Sequence[Array]) -> Sequence[Target]:
-        """Record a look and return one target per detection that is not inside a bin."""
-        outside = [i for i, position in enumerate(positions) if self._bin_at(position) is None]
-        inside = [i for i in range(len(positions)) if i not in outside]
+        """Record a look and return one target per detection outside the bins.
+
+        A detection where the robot has changed the table since the frame was taken shows what is no
+        longer there, and gives none. The same frame a second time is no second look.
+        """
+        frame = detections.frame
+        inside = [i for i, position in enumerate(positions) if self._bin_at(position) is not None]
+        outside = [
+            i
+            for i, position in enumerate(positions)
+            if i not in inside and self._freshness.holds(position, frame.epoch)
+        ]
+        again, self._frame = frame.id == self._frame, frame.id
         found = [detections.found[i] for i in outside]
         places = [positions[i] for i in outside]
-        records = [record for record in self._records.values() if record.state in (*ON_TABLE, State.LOST)]
+        records = [record for record in self._records.values() if record.state in ON_TABLE]
         bound = bind(
             records, [detection.label for detection in found], places, gate=self._config.gate,
             settled=lambda record: self._freshness.holds(record.position, record.epoch),
         )  # fmt: skip
-        frame = detections.frame
         targets = []
         for index, (detection, place) in enumerate(zip(found, places, strict=True)):
-            record = bound.get(index)
-            if record is None:
-                record = self._enter(detection.label, place)
-            else:
+            record = bound.get(index) or self._enter(detection.label, place)
+            if not again or not record.looks:
                 record.looks += 1
-            record.votes[detection.label] += detection.confidence
+                record.votes[detection.label] += detection.confidence
             record.position, record.epoch, record.absent = place, frame.epoch, 0
-            if record.state in (State.DROPPED, State.LOST):
+            if record.state is State.DROPPED:
                 record.state = State.SEEN
             self._report(record)
             targets.append(
@@ -80,14 +88,16 @@ class ItemLedger:
                 )
             )
         self._emit_look(detections, positions)
-        seen = {target.item for target in targets}
-        for record in records:
-            if record.item not in seen and detections.searched(record.position):
-                record.absent += 1
         if detections.view == "full":
             self._recognize_in_bins([(detections.found[i].label, positions[i]) for i in inside])
-        waiting = any(self.is_open(target.item) for target in targets)
-        if waiting or frame.epoch != self.epoch:
+        if again:
+            return targets
+        seen = {target.item for target in targets}
+        for record in records:
+            missing = record.item not in seen and self._freshness.holds(record.position, frame.epoch)
+            if missing and detections.searched(record.position):
+                record.absent += 1
+        if frame.epoch != self.epoch or any(self._waits(target.item) for target in targets):
             self._empty_looks = 0
         elif detections.view == "full":
             self._empty_looks += 1
@@ -102,7 +112,7 @@ class ItemLedger:
         return self._record(item).state in OPEN
 
     def believes_empty(self) -> bool:
-        """Tell whether enough looks at the full frame agree that nothing is left to sort."""
+        """Tell whether enough looks at the full frame agree that nothing with a route is left."""
         return self._empty_looks >= self._config.looks_to_believe
 
     def touched(self, item: Item) -> None:
@@ -159,7 +169,7 @@ class ItemLedger:
         """Decide what became of everything still open: the run is over.
 
         An item seen where it was left is rejected, one that is known to exist and was not found again is
-        lost, one that a single look believed in is a phantom.
+        lost, one that a single look believed in and another one did not is a phantom.
         """
         for record in self._records.values():
             if record.state is State.HELD:
@@ -167,7 +177,7 @@ class ItemLedger:
                 self._change(record.item, State.REJECTED)
             elif record.state not in ON_TABLE:
                 continue
-            elif not record.exists:
+            elif not record.exists and record.absent:
                 self._change(record.item, State.PHANTOM)
             elif record.state is State.REJECTED:
                 continue
@@ -175,7 +185,8 @@ class ItemLedger:
                 record.why = "known to exist, not found again"
                 self._change(record.item, State.LOST)
             else:
-                record.why = "the run ended before its turn"
+                routed = record.label in self._routes
+                record.why = "the run ended before its turn" if routed else "the mission has no route for it"
                 self._change(record.item, State.REJECTED)
 
     def balance(self) -> dict[str, int]:
@@ -196,6 +207,11 @@ class ItemLedger:
     def rows(self) -> list[dict[str, object]]:
         """Return a plain row per item, in the order of first sight."""
         return [_row(record) for record in self._records.values()]
+
+    def _waits(self, item: Item) -> bool:
+        """Tell whether the mission still has to do something about the item."""
+        record = self._record(item)
+        return record.state in OPEN and record.label in self._routes
 
     def _enter(self, label: str, position: Array) -> Record:
         self._counts[label] += 1

@@ -20,7 +20,6 @@ class Case:
         unused: Expanded subtrees that nothing uses.
         skills: Installed skills by name.
         cell: The cell, or None where its file has findings of its own.
-
     """
 
     mission: Mission

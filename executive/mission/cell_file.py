@@ -22,7 +22,6 @@ class CellFile:
     Attributes:
         config: Its content, or None where findings say why not.
         root: Its nodes, for placing findings that come later; None where it is no YAML.
-
     """
 
     config: CellConfig | None
@@ -42,16 +41,20 @@ def load_cell(path: Path, overrides: Mapping[str, str] | None = None) -> CellCon
     Raises:
         MissionError: Something is wrong with it; every finding is in the text.
         InputError: There is no such file.
-
     """
-    file = read_cell(read_source(path), overrides or {})
+    file = read_cell(path, overrides or {})
     if file.config is None or file.findings:
         raise MissionError(in_file_order(file.findings, str(path)))
     return file.config
 
 
-def read_cell(source: Source, overrides: Mapping[str, str]) -> CellFile:
-    """Return what a cell file says and everything that is wrong with it."""
+def read_cell(path: Path, overrides: Mapping[str, str]) -> CellFile:
+    """Return what a cell file says and everything that is wrong with it.
+
+    Raises:
+        InputError: There is no such file.
+    """
+    source = read_source(path)
     root, findings = parse_yaml(source)
     if root is None:
         return CellFile(None, source, None, tuple(findings))
@@ -61,7 +64,8 @@ def read_cell(source: Source, overrides: Mapping[str, str]) -> CellFile:
     if validated.model is None:
         return file
     later = (*_links(file, validated.model), *_assets(file, validated.model))
-    return CellFile(validated.model, source, root, (*file.findings, *later))
+    found = _models_found(validated.model, path.parent)
+    return CellFile(found, source, root, (*file.findings, *later))
 
 
 def _links(file: CellFile, config: CellConfig) -> Iterator[Finding]:
@@ -74,8 +78,20 @@ def _links(file: CellFile, config: CellConfig) -> Iterator[Finding]:
                 yield file.finding(("cameras", name, "scan_poses", index), "unknown-pose", message)
 
 
+def _models_found(config: CellConfig, folder: Path) -> CellConfig:
+    """Return the cell with the models that lie in `folder` by their full path; others stay as named."""
+
+    def found(urdf: str) -> dict[str, str]:
+        path = (folder / urdf).resolve()
+        return {"urdf": str(path) if path.is_file() else urdf}
+
+    objects = {label: kind.model_copy(update=found(kind.urdf)) for label, kind in config.objects.items()}
+    arm = config.arm.model_copy(update=found(config.arm.urdf))
+    return config.model_copy(update={"arm": arm, "objects": objects})
+
+
 def _assets(file: CellFile, config: CellConfig) -> Iterator[Finding]:
-    """Yield every model file that does not lie below the cell's own folder or pybullet_data."""
+    """Yield every model file that cannot lie below the cell's own folder or pybullet_data."""
     named: list[tuple[KeyPath, str]] = [(("arm", "urdf"), config.arm.urdf)]
     named += [(("objects", label, "urdf"), shape.urdf) for label, shape in config.objects.items()]
     for path, urdf in named:

@@ -27,7 +27,6 @@ class Expanded:
     Attributes:
         tree: The tree that runs, or None where it could not be expanded.
         unused: Subtrees that nothing uses, with their default arguments.
-
     """
 
     tree: Node | None

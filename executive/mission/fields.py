@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.model import Literal, Match, Reference, Setting, Value
 from executive.mission.source import Mark
-from executive.mission.text import Mapping, Node, Scalar, Sequence, plain
+from executive.mission.text import Mapping, Node, Scalar, Sequence, plain, scalars
 from executive.mission.words import describe
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -21,7 +21,6 @@ class Fields:
     Attributes:
         owner: What the mapping belongs to, for sentences.
         mark: Where the owner stands, for what is missing.
-
     """
 
     def __init__(
@@ -147,14 +146,8 @@ def value_of(node: Node, findings: list[Finding]) -> Value | None:
 
 def _misplaced_dollars(node: Node) -> Iterator[Finding]:
     """Find every `$` that would be taken for text: in the wrong form, or inside a list or mapping."""
-    if isinstance(node, Scalar):
-        if isinstance(node.value, str) and node.value.startswith("$"):
-            message = f'"{node.text}" is no reference: only a whole value can be one, as in key: $name'
-            hint = f'For the text itself write "${node.text}".'
-            yield error(node.mark, "bad-reference", message, hint)
-    elif isinstance(node, Sequence):
-        for item in node.items:
-            yield from _misplaced_dollars(item)
-    else:
-        for entry in node.entries:
-            yield from _misplaced_dollars(entry.value)
+    for scalar in scalars(node):
+        if isinstance(scalar.value, str) and scalar.value.startswith("$"):
+            message = f'"{scalar.text}" is no reference: only a whole value can be one, as in key: $name'
+            hint = f'For the text itself write "${scalar.text}".'
+            yield error(scalar.mark, "bad-reference", message, hint)

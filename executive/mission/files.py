@@ -29,7 +29,6 @@ def find_mission(name: str | Path) -> Path:
 
     Raises:
         InputError: There is neither.
-
     """
     path = Path(name)
     if path.is_file():
@@ -48,7 +47,6 @@ def below(folder: Path, reference: str) -> Path:
 
     Raises:
         InputError: The reference leaves the folder, or there is no such file.
-
     """
     written = PurePosixPath(reference)
     if written.is_absolute() or ".." in written.parts or "\\" in reference:
@@ -73,7 +71,6 @@ def read_source(path: Path) -> Source:
 
     Raises:
         InputError: It is missing, too large, or no UTF-8 text.
-
     """
     try:
         if path.stat().st_size > _LARGEST:

@@ -26,7 +26,6 @@ class Finding:
         length: How many characters the caret line underlines.
         hint: What was allowed and what to do next, or "".
         excerpt: The source line.
-
     """
 
     path: str
@@ -62,7 +61,6 @@ class MissionError(InputError):
 
     Attributes:
         findings: All of them.
-
     """
 
     def __init__(self, findings: Iterable[Finding]) -> None:

@@ -37,7 +37,6 @@ class LoadedMission:
         path: Where it was found.
         cell_path: Where the cell file was found.
         warnings: Findings that are no reason not to run.
-
     """
 
     mission: Mission
@@ -76,7 +75,6 @@ def load_mission(
     Raises:
         MissionError: Something is wrong with mission or cell; every finding is in it.
         InputError: There is no such mission.
-
     """
     overrides = overrides or {}
     file = find_mission(path)
@@ -109,7 +107,7 @@ def _cell(
         return None, None
     try:
         path = below(folder, mission.cell)
-        cell = read_cell(read_source(path), overrides)
+        cell = read_cell(path, overrides)
     except InputError as problem:
         findings.append(error(mission.cell_mark, "no-cell", str(problem)))
         return None, None

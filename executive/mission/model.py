@@ -17,7 +17,6 @@ class Literal:
         value: Plain value: nothing, truth value, number, text, list or mapping.
         mark: Where it stands.
         origin: How the reader sees it where that is not the value itself, for instance `$attempts`.
-
     """
 
     value: Any
@@ -63,7 +62,6 @@ class Node:
     Attributes:
         mark: The word that names the node in the file.
         label: What `as:` calls it, or "".
-
     """
 
     mark: Mark
@@ -120,7 +118,6 @@ class RetryNode(Node):
 
     Attributes:
         on: What is worth another attempt; empty means every failure.
-
     """
 
     attempts: Value
@@ -214,7 +211,6 @@ class UseNode(Node):
 
     Attributes:
         body: The subtree with the arguments put in; None until the mission is expanded.
-
     """
 
     name: str
@@ -242,7 +238,6 @@ class Subtree:
     Attributes:
         mark: Its name in the file.
         returns: Variables that it promises to write, each with its place.
-
     """
 
     name: str
@@ -274,7 +269,6 @@ class Mission:
         params: The mission's constants, overrides applied.
         tree: The tree as written; None where it could not be read.
         trees: The subtrees by name.
-
     """
 
     name: str

@@ -20,7 +20,6 @@ class OutlineNode:
         name: What it is called, after what it is to its parent: `Grasp`, `recover: look`, `do`.
         depth: How many nodes are above it.
         detail: What the mission says about it, in a few words.
-
     """
 
     path: str
@@ -32,15 +31,6 @@ class OutlineNode:
 def outline(root: Behaviour) -> list[OutlineNode]:
     """Return every node of the tree in the order of the mission, parents before children."""
     return list(_outline(root, "tree", 0))
-
-
-def outline_text(root: Behaviour) -> str:
-    """Return the outline as indented text, one node a line."""
-    lines = []
-    for node in outline(root):
-        detail = f" ({node.detail})" if node.detail else ""
-        lines.append(f"{'  ' * node.depth}{node.name}{detail}")
-    return "\n".join(lines)
 
 
 def _outline(node: Behaviour, parent: str, depth: int) -> Iterator[OutlineNode]:

@@ -12,7 +12,6 @@ class Source:
     Attributes:
         path: Name in front of every position, for instance `missions/sort.yaml` or `--set`.
         text: The whole text.
-
     """
 
     path: str
@@ -37,7 +36,6 @@ class Mark:
         line: Counted from 1; 0 means the text as a whole.
         col: Counted from 1, in characters.
         length: How many characters the caret line underlines.
-
     """
 
     source: Source

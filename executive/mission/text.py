@@ -19,6 +19,13 @@ from executive.mission.source import Mark, Source
 
 _DEEPEST = 60
 _MOST_NODES = 100_000
+_ADVICE = {
+    "mapping values are not allowed here": (
+        'A text that holds ": " needs quotes. Otherwise compare the indentation with the line above.'
+    ),
+    "found character '\\t' that cannot start any token": "Indent with blanks instead of tabs.",
+}
+"""What to do about problems that PyYAML names in words of its own trade."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +85,15 @@ def plain(node: Node) -> Any:
     if isinstance(node, Sequence):
         return [plain(item) for item in node.items]
     return {entry.key.text: plain(entry.value) for entry in node.entries}
+
+
+def scalars(node: Node) -> Iterator[Scalar]:
+    """Yield every single value of the node and below it, in the order of the text; keys are none."""
+    if isinstance(node, Scalar):
+        yield node
+        return
+    for part in node.items if isinstance(node, Sequence) else (entry.value for entry in node.entries):
+        yield from scalars(part)
 
 
 def parse_yaml(source: Source) -> tuple[Node | None, list[Finding]]:
@@ -211,7 +227,8 @@ def _syntax(source: Source, problem: yaml.MarkedYAMLError) -> Finding:
     context = f" {problem.context}" if problem.context else ""
     began = problem.context_mark
     since = f" that began in line {began.line + 1}" if context and began and began is not place else ""
-    return error(mark, "yaml", f"not valid YAML:{context}{since}: {problem.problem}".replace("::", ":"))
+    message = f"not valid YAML:{context}{since}: {problem.problem}".replace("::", ":")
+    return error(mark, "yaml", message, _ADVICE.get(str(problem.problem), ""))
 
 
 def _unreadable(source: Source, problem: yaml.reader.ReaderError) -> Finding:

@@ -38,7 +38,6 @@ def convert(value: Any, declared: Any) -> Any:
 
     Raises:
         WrongType: The value does not fit.
-
     """
     if isinstance(value, float) and not math.isfinite(value):
         raise WrongType(f"must be a finite number, not {value}")

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.source import Mark
-from executive.mission.text import Mapping, Node, Scalar, Sequence, plain
+from executive.mission.text import Mapping, Node, Scalar, Sequence, plain, scalars
 from executive.mission.words import violation
 
 M = TypeVar("M", bound=BaseModel)
@@ -121,12 +121,6 @@ def _length(model: type[BaseModel], path: KeyPath) -> int:
 
 
 def _infinite(node: Node) -> Iterator[Finding]:
-    if isinstance(node, Scalar):
-        if isinstance(node.value, float) and not math.isfinite(node.value):
-            yield error(node.mark, "not-finite", f'"{node.text}" is not a number one can reach')
-    elif isinstance(node, Sequence):
-        for item in node.items:
-            yield from _infinite(item)
-    else:
-        for entry in node.entries:
-            yield from _infinite(entry.value)
+    for scalar in scalars(node):
+        if isinstance(scalar.value, float) and not math.isfinite(scalar.value):
+            yield error(scalar.mark, "not-finite", f'"{scalar.text}" is not a number one can reach')

@@ -19,7 +19,6 @@ class Wire:
         variable: Name of the variable.
         mark: Where the mission says so, or the skill itself where the port goes by its own name.
         explicit: True where the mission names the variable.
-
     """
 
     port: Port

@@ -20,8 +20,11 @@ from numpy.typing import ArrayLike
 from executive.errors import Unreachable
 from executive.geometry import Array, Pose
 
-SHOULDER_HEIGHT, UPPER_ARM, FOREARM, WRIST_TO_FLANGE = 0.36, 0.42, 0.40, 0.081 + 0.045
-"""[m]; pybullet_data kuka_iiwa/model.urdf, and the flange's outer face 0.045 m beyond its last link frame."""
+FLANGE_OFFSET = 0.045
+"""From the origin of link 7 to the flange's outer face along its z axis [m]."""
+
+SHOULDER_HEIGHT, UPPER_ARM, FOREARM, WRIST_TO_FLANGE = 0.36, 0.42, 0.40, 0.081 + FLANGE_OFFSET
+"""[m]; pybullet_data kuka_iiwa/model.urdf."""
 
 BRANCHES = np.array([[s, e, w] for s in (1, -1) for e in (1, -1) for w in (1, -1)])
 """Signs of joints 2, 4 and 6 in the eight solutions of one swivel angle, `(8, 3)`."""
@@ -48,7 +51,6 @@ class Kinematics:
         reach: From the wrist to the tool centre point [m].
         position_limit: Largest joint angle to either side `(7,)` [rad].
         nearest, farthest: Smallest and largest distance of the wrist from the shoulder [m].
-
     """
 
     def __init__(self, tool_length: float, position_limit: ArrayLike) -> None:
@@ -105,7 +107,6 @@ class Kinematics:
 
         Raises:
             Unreachable: The wrist is too near to or too far from the shoulder.
-
         """
         wrist = X_WT.position - self.reach * X_WT.rotation[:, 2]
         line = wrist - (0.0, 0.0, SHOULDER_HEIGHT)
@@ -139,7 +140,6 @@ class Kinematics:
 
         Raises:
             Unreachable: There is none; the text says what is too short, too long or outside its limit.
-
         """
         for swivels in (self._swivels, self._fine_swivels):
             found = self.grid(X_WT, swivels).reshape(-1, 7)
@@ -159,9 +159,9 @@ class Kinematics:
         best = excess[np.argmin(np.max(excess, axis=1))]
         joint = int(np.argmax(best))
         return Unreachable(
-            f"The tool cannot reach {_text(X_WT)}: no swivel of the elbow keeps every joint inside its "
+            f"the tool cannot reach {_text(X_WT)}: no swivel of the elbow keeps every joint inside its "
             f"limits; the best one leaves joint {joint + 1} {math.degrees(best[joint]):.1f}° outside "
-            f"±{math.degrees(self.position_limit[joint]):.0f}°."
+            f"±{math.degrees(self.position_limit[joint]):.0f}°"
         )
 
     def _distance(self, X_WT: Pose, line: Array) -> float:
@@ -173,8 +173,8 @@ class Kinematics:
         else:
             return distance
         raise Unreachable(
-            f"The tool cannot reach {_text(X_WT)}: its wrist would be {distance:.3f} m from the shoulder, "
-            f"{how}."
+            f"the tool cannot reach {_text(X_WT)}: its wrist would be {distance:.3f} m from the shoulder, "
+            f"{how}"
         )
 
     def _chain(self, qs: Array) -> tuple[Array, Array, Array]:

@@ -22,7 +22,6 @@ class JointLimits:
         stop_acceleration: Largest acceleration while braking [rad/s²].
         stop_jerk: Largest jerk while braking [rad/s³].
         source: Where the figures were taken from.
-
     """
 
     position: Array

@@ -54,10 +54,9 @@ class Planner:
         Raises:
             Unreachable: A via has no joint solution inside the limits.
             Blocked: Every joint path tried comes too close to something; the text is the fastest one's.
-
         """
         if not vias:
-            raise Fault("A motion was asked for without any via to go through.")
+            raise Fault("a motion was asked for without any via to go through")
         speeds = [via.speed for via in vias]
         return self._first_free(self._joint_paths(np.asarray(q_start, dtype=float), vias), speeds, carrying)
 
@@ -75,7 +74,6 @@ class Planner:
         Raises:
             Unreachable: A via has no joint solution inside the limits, or the goal is outside them.
             Blocked: It comes too close to something.
-
         """
         start, goal = np.asarray(q_start, dtype=float), np.asarray(q_goal, dtype=float)
         paths = self._joint_paths(start, first)
@@ -87,7 +85,6 @@ class Planner:
 
         Raises:
             Unreachable: One cannot; the text says how far off it is.
-
         """
         for stroke in strokes(vias):
             find_postures(self.kinematics, stroke, np.zeros(7))
@@ -106,7 +103,7 @@ class Planner:
                 blocked.append(error)
                 continue
             return trajectory
-        others = f" Of {len(blocked)} ways tried none is free." if len(blocked) > 1 else ""
+        others = f"; of {len(blocked)} ways tried none is free" if len(blocked) > 1 else ""
         raise Blocked(f"{blocked[0]}{others}")
 
     def _rates(self, path: Array, speeds: Sequence[float | None]) -> list[float]:

@@ -27,7 +27,6 @@ class Postures:
     Attributes:
         chains: Joint positions `(N, G, 7)` [rad]; joint 7 relative to the first via.
         lowest, highest: Range of joint 7 at the first via `(N,)` [rad]; equal where the yaw is given.
-
     """
 
     chains: Array
@@ -49,7 +48,6 @@ def find_postures(kinematics: Kinematics, stroke: Stroke, q_start: Array) -> Pos
 
     Raises:
         Unreachable: There is none; the text says at which via and why.
-
     """
     swivel = kinematics.swivel(q_start)
     for spacing, margin in ((COARSE, LIMIT_MARGIN), (FINE, 0.0)):
@@ -97,6 +95,6 @@ def _why_not(kinematics: Kinematics, stroke: Stroke, grids: list[Array]) -> Unre
     x, y, _ = stroke.poses[0].position
     heights = ", ".join(f"{pose.position[2]:.3f}" for pose in stroke.poses)
     return Unreachable(
-        f"The tool can reach each of the heights {heights} m above ({x:.3f}, {y:.3f}) m, but no single "
-        f"posture of the arm reaches all: split the move."
+        f"the tool can reach each of the heights {heights} m above ({x:.3f}, {y:.3f}) m, but no single "
+        f"posture of the arm reaches all: split the move"
     )

@@ -24,7 +24,6 @@ class Stroke:
         poses: Tool poses `X_WT` of the vias, at yaw 0.
         yaw: The yaw they share [rad], or None where it is free.
         continues: True if the tool already points down above the same point when it begins.
-
     """
 
     poses: tuple[Pose, ...]

@@ -32,7 +32,6 @@ def path_limits(change: Array, limits: JointLimits, rate: ArrayLike = np.inf) ->
         change: Joint differences `(..., 7)` [rad].
         limits: The joints' limits.
         rate: Largest rate of the path parameter besides, `(...)` [1/s].
-
     """
     far = np.abs(change)
     return PathLimits(

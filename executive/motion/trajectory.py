@@ -28,7 +28,6 @@ class Trajectory:
     Attributes:
         waypoints: Joint positions passed `(N, 7)` [rad], the first where it starts, the last where it ends.
         rests: Path times at which it is at rest, one per waypoint [s].
-
     """
 
     def __init__(
@@ -43,7 +42,6 @@ class Trajectory:
 
         Raises:
             Fault: The waypoints have the wrong shape or are not numbers, or ruckig finds no profile.
-
         """
         self.waypoints = _checked(waypoints)
         rates = [math.inf] * (len(self.waypoints) - 1) if rates is None else rates
@@ -76,7 +74,7 @@ class Trajectory:
         Before the start and after the end it rests.
         """
         if not math.isfinite(s):  # ruckig would end the process
-            raise Fault(f"A trajectory was asked for the time {s}; its times are 0 to {self.duration:.3f} s.")
+            raise Fault(f"a trajectory was asked for the time {s}; its times are 0 to {self.duration:.3f} s")
         segment = min(bisect_right(self.rests, s), len(self._profiles)) - 1
         profile = self._profiles[max(segment, 0)]
         if profile is None or s <= 0 or s >= self.duration:
@@ -97,7 +95,6 @@ class Trajectory:
 
         Raises:
             Unreachable: One would; the text names it.
-
         """
         for profile in filter(None, self._profiles):
             bounds = profile.position_extrema
@@ -111,8 +108,8 @@ def _require_inside(extremes: Array, limits: JointLimits) -> None:
     joint = int(np.argmax(excess))
     if excess[joint] > _STILL:
         raise Unreachable(
-            f"The motion would take joint {joint + 1} to {math.degrees(extremes[joint]):.1f}°; "
-            f"its limit is ±{math.degrees(limits.position[joint]):.0f}°."
+            f"the motion would take joint {joint + 1} to {math.degrees(extremes[joint]):.1f}°; "
+            f"its limit is ±{math.degrees(limits.position[joint]):.0f}°"
         )
 
 
@@ -121,11 +118,11 @@ def _checked(waypoints: ArrayLike) -> Array:
     array = np.array(waypoints, dtype=float)
     if array.ndim != 2 or array.shape[0] < 2 or array.shape[1] != JOINTS:
         raise Fault(
-            f"A trajectory needs two waypoints or more of {JOINTS} joints, not the shape {array.shape}."
+            f"a trajectory needs two waypoints or more of {JOINTS} joints, not the shape {array.shape}"
         )
     if not np.all(np.isfinite(array)):
         row, joint = np.argwhere(~np.isfinite(array))[0]
-        raise Fault(f"Waypoint {row} of a trajectory has {array[row, joint]} for joint {joint + 1}.")
+        raise Fault(f"waypoint {row} of a trajectory has {array[row, joint]} for joint {joint + 1}")
     return array
 
 
@@ -135,7 +132,7 @@ def _straight(start: Array, end: Array, limits: JointLimits, rate: float) -> Pro
     if np.max(np.abs(change)) < _STILL:
         return None
     if not rate > 0:
-        raise Fault(f"The rate of a segment is {rate}; it must be positive.")
+        raise Fault(f"the rate of a segment is {rate}; it must be positive")
     inverse = path_limits(change, limits, rate)
     # All joints' limits in proportion to their way: then phase synchronization is always possible and
     # never falls back to a curved path.
@@ -152,7 +149,7 @@ def _straight(start: Array, end: Array, limits: JointLimits, rate: float) -> Pro
     try:
         result = Ruckig(JOINTS).calculate(inputs, profile)
     except (RuckigError, ValueError) as error:
-        raise Fault(f"Ruckig finds no profile {where}: {error}") from error
+        raise Fault(f"ruckig finds no profile {where}: {error}") from error
     if result not in (Result.Working, Result.Finished):
-        raise Fault(f"Ruckig finds no profile {where}: {result}.")
+        raise Fault(f"ruckig finds no profile {where}: {result}")
     return profile

@@ -35,7 +35,6 @@ class Journal:
         Raises:
             Fault: The disk does not take it; the run must not go on unrecorded. Later events are
                 dropped without another fault, so that the arm can be brought to rest.
-
         """
         if self._file is None:
             return
@@ -75,7 +74,6 @@ def read_journal(path: Path) -> list[dict[str, Any]]:
 
     Raises:
         InputError: The file is missing, or another line than the last is broken.
-
     """
     try:
         lines = path.read_bytes().split(b"\n")

@@ -33,7 +33,6 @@ class Picture:
         boxes: Left, top, right, bottom [pixel] of every detection.
         captions: One text per box.
         chosen: Number of the chosen box, or None.
-
     """
 
     path: Path
@@ -73,7 +72,6 @@ def save(picture: Picture) -> None:
 
     Raises:
         ExecutiveError: The file cannot be written.
-
     """
     import cv2
 

@@ -53,7 +53,6 @@ def recorded_run(
     Raises:
         InputError: The run directory cannot be made, or the cell cannot be built.
         ExecutiveError: The result cannot be written.
-
     """
     from executive.runtime.run import Run
 

@@ -61,7 +61,6 @@ def write_result(path: Path, result: Mapping[str, Any]) -> None:
 
     Raises:
         ExecutiveError: The disk does not take it.
-
     """
     fresh = path.with_name(f".{path.name}.part")
     try:

@@ -22,7 +22,6 @@ class RunDirectory:
 
     Attributes:
         path: `RUNS/<YYYY-MM-DD>/<HH-MM-SS>_<mission>_s<seed>`.
-
     """
 
     path: Path
@@ -50,7 +49,6 @@ class RunDirectory:
 
         Raises:
             InputError: `runs` cannot be written to.
-
         """
         day = runs / started.strftime("%Y-%m-%d")
         name = f"{started.strftime('%H-%M-%S')}_{mission}_s{seed}"
@@ -70,7 +68,6 @@ class RunDirectory:
 
         Raises:
             InputError: The directory cannot be written to.
-
         """
         try:
             (self.path / "mission.yaml").write_text(mission, encoding="utf-8")

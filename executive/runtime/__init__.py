@@ -1,1 +1,1 @@
-"""The tick loop, halting and the variables of a running mission."""
+"""The tick loop, the person beside the cell, and the installed kinds of cells."""

@@ -71,6 +71,6 @@ def understood(word: str, choices: Sequence[str]) -> str | None:
         return None
     if word in ("s", RESCAN):
         return RESCAN
-    if word.isdigit() and int(word) < len(choices):
+    if word.isdecimal() and int(word) < len(choices):
         return choices[int(word)]
     return word if word in choices else ""

@@ -157,6 +157,9 @@ class Run:
         try:
             while not self._interrupted:
                 self.root.tick_once()
+                if self._interrupted:
+                    # At a question to the operator Ctrl-C looks like their wish to quit: it is none.
+                    break
                 if self.root.status is not Status.RUNNING:
                     return self._verdict()
                 self.workcell.advance()

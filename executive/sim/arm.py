@@ -36,7 +36,6 @@ class SimArm:
 
     Attributes:
         planner: Plans its motions.
-
     """
 
     def __init__(
@@ -80,7 +79,6 @@ class SimArm:
 
         Raises:
             Fault: The arm has left its commanded path since the last question.
-
         """
         self._raise_fault()
         return self._motion is None
@@ -92,7 +90,6 @@ class SimArm:
             Unreachable: A via has no joint solution inside the limits.
             Blocked: The way comes too close to something.
             Fault: The arm is moving.
-
         """
         self._require_rest("plan a motion")
         return self.planner.plan(self._command, vias, carrying)
@@ -101,7 +98,7 @@ class SimArm:
         """Return a motion to the named joint pose of the cell file; raises as `plan` does."""
         self._require_rest("plan a motion")
         if name not in self._poses:
-            raise Fault(f'The cell file has no arm pose "{name}"; it has {", ".join(sorted(self._poses))}.')
+            raise Fault(f'the cell file has no arm pose "{name}"; it has {", ".join(sorted(self._poses))}')
         goal = self._poses[name]
         X_WT = self.planner.kinematics.forward(self._command)
         x, y, z = X_WT.position
@@ -118,12 +115,11 @@ class SimArm:
 
         Raises:
             Fault: The arm is moving, or is elsewhere, or `motion` was not planned by this arm.
-
         """
         self._require_rest("start a motion")
         if not isinstance(motion, Trajectory):
-            raise Fault(f"The simulated arm follows its own planned motions, not a {type(motion).__name__}.")
-        self._require_near(motion.start, START_TOLERANCE, "The motion starts")
+            raise Fault(f"the simulated arm follows its own planned motions, not a {type(motion).__name__}")
+        self._require_near(motion.start, START_TOLERANCE, "the motion starts")
         self._raise_fault()
         self._motion, self._time = motion, 0.0
 
@@ -135,7 +131,7 @@ class SimArm:
     def advance(self) -> None:
         """Send the command for the coming physics step; called once before each."""
         if self._fault is None and self._braking is None:
-            self._require_near(self._command, TRACKING_TOLERANCE, "The command is")
+            self._require_near(self._command, TRACKING_TOLERANCE, "the command is")
             if self._fault is not None:
                 self.stop()
         if self._motion is None:
@@ -168,14 +164,14 @@ class SimArm:
         if error[joint] > tolerance:
             self._fault = (
                 f"{what} {math.degrees(error[joint]):.2f}° away from where joint {joint + 1} of the arm is; "
-                f"{math.degrees(tolerance):.1f}° are allowed."
+                f"{math.degrees(tolerance):.1f}° are allowed"
             )
 
     def _require_rest(self, wish: str) -> None:
         self._raise_fault()
         if self._motion is not None:
             left = self._motion.duration - self._time
-            raise Fault(f"The arm was asked to {wish} while moving ({left:.2f} s to go); wait for `at_rest`.")
+            raise Fault(f"the arm was asked to {wish} while moving ({left:.2f} s to go); wait for `at_rest`")
 
     def _raise_fault(self) -> None:
         if self._fault is not None:

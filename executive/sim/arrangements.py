@@ -14,10 +14,11 @@ import numpy as np
 
 from executive.cell_config import BinConfig, CameraConfig, CellConfig, Colour
 from executive.geometry import Array, Pose, about_z, rotation_from_quaternion, tool_down
+from executive.motion.kinematics import FLANGE_OFFSET
 from executive.sim.camera import CELL_LIGHT, Light
 from executive.sim.models import Mesh
 from executive.sim.piles import settle
-from executive.sim.world import BIN_THICKNESS, FLANGE_OFFSET, World
+from executive.sim.world import BIN_THICKNESS, World
 
 COUNTS = (0.08, 0.14, 0.17, 0.17, 0.15, 0.13, 0.10, 0.06)
 """Probability of 0, 1, … 7 objects."""
@@ -134,7 +135,6 @@ def arrange(
         footprint: Corners `(N, 2)` [m] of what the image shows of the table.
         plain_view: True where the image shows the workspace: then most objects lie there.
         rng: Source of everything random.
-
     """
     labels = [str(label) for label in rng.choice(list(meshes), rng.choice(len(COUNTS), p=COUNTS))]
     low = np.maximum(footprint.min(axis=0), (TABLE_X[0], TABLE_Y[0]))

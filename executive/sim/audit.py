@@ -22,10 +22,12 @@ def audit(
     bins: Mapping[str, Bin],
     routes: Mapping[str, str],
     reach: float,
+    held: int | None = None,
 ) -> dict[str, int]:
     """Return how many bodies ended `right`, `wrong_bin`, `left` on the table, or `elsewhere`.
 
-    `unseen` counts the bodies that no item of the ledger was first seen near.
+    What is still in the tool was let go nowhere and is `left`, also over a bin. `unseen` counts the
+    bodies that no item of the ledger was first seen near.
 
     Args:
         world: The simulated world as the run left it.
@@ -34,6 +36,7 @@ def audit(
         bins: The cell's bins.
         routes: Class to bin.
         reach: How far from a body's first place an item may have been seen first [m].
+        held: Body in the tool, or None.
     """
     counts = {"right": 0, "wrong_bin": 0, "left": 0, "elsewhere": 0, "unseen": 0}
     real = [record for record in records if record.state is not State.PHANTOM]
@@ -42,7 +45,7 @@ def audit(
         inside = next((name for name, bin in bins.items() if bin.contains(position)), None)
         if position[2] < FLOOR:
             counts["elsewhere"] += 1
-        elif inside is not None:
+        elif inside is not None and body != held:
             counts["right" if inside == routes.get(label) else "wrong_bin"] += 1
         else:
             counts["left"] += 1

@@ -29,7 +29,6 @@ class Light:
         colour: Red, green and blue, 0 to 1.
         ambient, diffuse, specular: Shares of the three terms of Phong's reflection model.
         shadow: Whether things cast shadows.
-
     """
 
     direction: tuple[float, float, float] = (0.3, 0.2, 1.0)
@@ -51,7 +50,6 @@ class Render:
     Attributes:
         image: `(h, w, 3)` uint8, RGB.
         bodies: `(h, w)` body seen at each pixel, -1 where there is none.
-
     """
 
     image: Image
@@ -116,7 +114,6 @@ class SimCamera:
         name: Its name in the cell file.
         config: Its section of the cell file.
         matrix: Camera matrix `(3, 3)` [pixel].
-
     """
 
     def __init__(
@@ -142,7 +139,6 @@ class SimCamera:
             shadow: Tells what the arm hides; by default it hides nothing, and the table is always seen.
             epoch: Tells the ledger's count of changes of the table.
             light: How the scene is lit.
-
         """
         self.name = name
         self.config = config
@@ -181,12 +177,10 @@ class SimCamera:
         """Return a fresh frame of what the camera sees now."""
         self._frames += 1
         X_WC = self._pose()
-        clean = render(self._world, self.matrix, X_WC, (0, 0, *self._size), self._light).image
-        rng = np.random.default_rng([self._seed, self._frames])
         return Frame(
             id=self._frames,
             camera=self.name,
-            image=add_noise(clean, self.config.noise, rng),
+            image=self._image(X_WC),
             depth=None,
             matrix=self.matrix,
             X_WC=X_WC,
@@ -201,6 +195,10 @@ class SimCamera:
 
     def _pose(self) -> Pose:
         return camera_pose(self._world, self.config)
+
+    def _image(self, X_WC: Pose) -> Image:
+        clean = render(self._world, self.matrix, X_WC, (0, 0, *self._size), self._light).image
+        return add_noise(clean, self.config.noise, np.random.default_rng([self._seed, self._frames]))
 
     def _visible(self, X_WC: Pose) -> Mask:
         if self._shadow is None:

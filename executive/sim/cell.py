@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
@@ -20,24 +20,42 @@ from executive.sim.camera import SimCamera
 from executive.sim.clearance import PathClearance
 from executive.sim.clock import SimClock
 from executive.sim.layout import as_bin, travel_height
+from executive.sim.models import missing_models
 from executive.sim.reach import out_of_reach
 from executive.sim.spawn import spawn
 from executive.sim.tool import SuctionTool
 from executive.sim.view import ArmShadow
 from executive.sim.world import STEP, World
-from executive.vision.detectors.registry import build_detectors
+from executive.vision.detectors.registry import ClosableDetector, build_detectors
 from executive.vision.localize import PlaneLocalizer
 
 
 class SimCell:
     """A cell file brought to life; implements `executive.cell.Workcell`.
 
+    Args:
+        config: The cell file.
+        seed: Decides which objects lie where, and the camera's noise.
+        routes: Class label to bin name.
+        emit: Tells the run what happens.
+        options: How the run wants its cell.
+        camera: Makes the camera.
+        detectors: Makes the detectors; by default the installed kinds that the cell file names.
+
     Raises:
         InputError: The cell asks for something the simulated cell cannot do yet.
     """
 
     def __init__(
-        self, config: CellConfig, *, seed: int, routes: Mapping[str, str], emit: Emit, options: CellOptions
+        self,
+        config: CellConfig,
+        *,
+        seed: int,
+        routes: Mapping[str, str],
+        emit: Emit,
+        options: CellOptions,
+        camera: Callable[..., SimCamera] = SimCamera,
+        detectors: Callable[..., Mapping[str, ClosableDetector]] = build_detectors,
     ) -> None:
         if config.localization != "plane":
             raise InputError(
@@ -59,17 +77,17 @@ class SimCell:
         self._arm = SimArm(self._world, planner, limits, config.arm, travel_height(config))
         self._tool = SuctionTool(self._world, config.tool, emit)
         self._ledger = ItemLedger(config.ledger, self._bins, routes, emit)
-        name, camera = next(iter(config.cameras.items()))
-        self._camera = SimCamera(
+        name, camera_config = next(iter(config.cameras.items()))
+        self._camera = camera(
             self._world,
             name,
-            camera,
+            camera_config,
             clock,
             camera_seed,
             shadow=ArmShadow(self._arm, kinematics, config),
             epoch=lambda: self._ledger.epoch,
         )
-        self._detectors = build_detectors(config.detectors, camera=camera, clock=clock, base=options.base)
+        self._detectors = detectors(config.detectors, camera=camera_config, clock=clock, base=options.base)
         classes = {
             label: ObjectClass(label, kind.height, kind.radius) for label, kind in config.objects.items()
         }
@@ -98,8 +116,8 @@ class SimCell:
 
     @staticmethod
     def check(config: CellConfig) -> Iterable[tuple[KeyPath, str]]:
-        """Return what this kind of cell cannot do of a cell file: places out of the arm's reach."""
-        return out_of_reach(config)
+        """Return what this kind of cell cannot do of a cell file: models it lacks, places out of reach."""
+        return (*missing_models(config), *out_of_reach(config))
 
     @property
     def cell(self) -> Cell:
@@ -126,6 +144,7 @@ class SimCell:
             self._bins,
             self._routes,
             self._config.ledger.gate,
+            held=self._tool.held_body,
         )
 
     def close(self) -> None:

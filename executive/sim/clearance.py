@@ -52,7 +52,6 @@ class PathClearance:
 
         Raises:
             Blocked: They do not; the text names the two bodies, the distance and the place.
-
         """
         start: dict[tuple[str, str], float] = {}
         for near in self._near(path[0], carrying):
@@ -76,8 +75,8 @@ class PathClearance:
         x, y, z = self._world.tool_pose().position
         how = f"{near.distance:.3f} m from" if near.distance >= 0 else f"{-near.distance:.3f} m into"
         return (
-            f"The motion would bring {near.part} {how} {near.body}, with the tool at "
-            f"({x:.3f}, {y:.3f}, {z:.3f}) m; {self._margin:.3f} m must stay free."
+            f"the motion would bring {near.part} {how} {near.body}, with the tool at "
+            f"({x:.3f}, {y:.3f}, {z:.3f}) m; {self._margin:.3f} m must stay free"
         )
 
     def _near(self, q: Array, carrying: ObjectClass | None) -> Iterator[Approach]:

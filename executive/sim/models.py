@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -13,7 +14,8 @@ import numpy as np
 import pybullet_data
 from numpy.typing import NDArray
 
-from executive.cell_config import ObjectConfig
+from executive.cell import KeyPath
+from executive.cell_config import CellConfig, ObjectConfig
 from executive.errors import InputError
 from executive.geometry import Array, Pose
 
@@ -25,7 +27,6 @@ class Mesh:
     Attributes:
         vertices: `(N, 3)` [m].
         triangles: `(M, 3)` indices into `vertices`.
-
     """
 
     vertices: Array
@@ -53,17 +54,26 @@ class Mesh:
 
 
 def find_model(urdf: str) -> Path:
-    """Return the path of a URDF: as given if it exists, otherwise from pybullet_data.
+    """Return the path of a URDF: a full path as it is, any other name as one of pybullet_data's.
 
     Raises:
-        InputError: It is in neither place.
-
+        InputError: There is no such file.
     """
-    shipped = Path(pybullet_data.getDataPath()) / urdf
-    for path in (Path(urdf), shipped):
-        if path.is_file():
-            return path.resolve()
-    raise InputError(f"the model {urdf} is neither a file nor part of pybullet_data ({shipped.parent})")
+    path = Path(pybullet_data.getDataPath()) / urdf
+    if path.is_file():
+        return path.resolve()
+    raise InputError(f"there is no model {urdf}, neither beside the cell file nor in pybullet_data")
+
+
+def missing_models(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Yield the key of every model of a cell file that does not exist, and a sentence."""
+    named: list[tuple[KeyPath, str]] = [(("arm", "urdf"), config.arm.urdf)]
+    named += [(("objects", label, "urdf"), kind.urdf) for label, kind in config.objects.items()]
+    for key, urdf in named:
+        try:
+            find_model(urdf)
+        except InputError as error:
+            yield key, str(error)
 
 
 def upright(config: ObjectConfig) -> Pose:
@@ -76,7 +86,6 @@ def load_mesh(config: ObjectConfig) -> Mesh:
 
     Raises:
         InputError: The model has no mesh in Wavefront format to look at.
-
     """
     path = find_model(config.urdf)
     vertices: list[Array] = []

@@ -56,7 +56,6 @@ class Sample:
         part: Part of the camera's image shown (left, top, right, bottom [pixel]).
         matrix: Camera matrix of the whole image.
         X_WC: Where the camera was.
-
     """
 
     image: Image
@@ -199,7 +198,6 @@ def generate(
 
     Raises:
         InputError: The layout is unknown, the cells differ in their classes, or a file cannot be written.
-
     """
     cells = list(configs.values())
     classes = list(cells[0].objects)

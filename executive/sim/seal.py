@@ -29,7 +29,6 @@ class Seal:
             not over the body.
         tilt: Angle between the tool axis and the normal of the plane fitted to the surface under the
             cup [rad]: how far the bellows had to lean.
-
     """
 
     body: int
@@ -51,7 +50,6 @@ def measure(client: Any, X_WT: Pose, bodies: Collection[int], cup_radius: float,
         bodies: Ids of the bodies that can be sealed on.
         cup_radius: Radius of the lip [m].
         reach: Largest distance at which a lip still closes on a surface [m].
-
     """
     face = _face(cup_radius)
     hits, heights = _cast(client, X_WT, bodies, face, reach, reach + 2 * cup_radius)

@@ -48,7 +48,6 @@ class Row:
         tilt_p10, tilt_median, tilt_p90: Quantiles of the tilt [rad].
         sealed: Share of placements whose breakaway force reaches the tool's `least_force`.
         force_p10, force_median, force_p90: Quantiles of the breakaway force [N].
-
     """
 
     label: str

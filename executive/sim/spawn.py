@@ -33,7 +33,6 @@ def spawn(world: World, config: CellConfig, seed: int, count: int | None = None)
 
     Raises:
         InputError: The workspace has no room for so many.
-
     """
     rng = np.random.default_rng(seed)
     table = config.table

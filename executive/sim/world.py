@@ -16,6 +16,7 @@ from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell_config import BinConfig, CellConfig
 from executive.geometry import Array, Pose
+from executive.motion.kinematics import FLANGE_OFFSET
 from executive.sim.models import find_model, upright
 
 STEP = 1 / 240
@@ -24,8 +25,6 @@ TABLE_HEIGHT = 0.625
 """Height of the top of pybullet_data's table over its feet [m]."""
 TABLE_CENTRE = (0.40, 0.0)
 """Centre of the table top [m]; it is 1.0 m long along x and 1.5 m along y."""
-FLANGE_OFFSET = 0.045
-"""From the origin of link 7 to the flange along its z axis [m]."""
 TOOL_RADIUS = 0.012
 """Radius of the tool's body [m]."""
 LIP_LENGTH = 0.015
@@ -44,13 +43,12 @@ class World:
     Attributes:
         client: The connection to the physics server.
         arm: Body of the arm, fixed at the origin.
-        flange: Index of the arm's link 7; the flange is 0.045 m along its z axis.
+        flange: Index of the arm's link 7; the flange is `FLANGE_OFFSET` along its z axis.
         tool: Index of the tool's link, whose frame is the flange's.
         table, plane: Bodies of the table and of the floor under it.
         bins: Bodies of each bin.
         bodies: Label of every loose object, by body.
         steps: Physics steps made so far.
-
     """
 
     flange = 6

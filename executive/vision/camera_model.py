@@ -25,7 +25,6 @@ def camera_matrix(width: int, height: int, fov_deg: float) -> Array:
         width: Image width [pixel].
         height: Image height [pixel].
         fov_deg: Vertical field of view [degree].
-
     """
     focal = height / 2 / math.tan(math.radians(fov_deg) / 2)
     return np.array([[focal, 0.0, width / 2], [0.0, focal, height / 2], [0.0, 0.0, 1.0]])
@@ -38,7 +37,6 @@ def looking_at(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> Pose:
 
     Raises:
         ValueError: The three do not determine a pose.
-
     """
     origin = np.asarray(position, dtype=float)
     axis = np.asarray(target, dtype=float) - origin
@@ -75,7 +73,6 @@ def on_plane(matrix: Array, X_WC: Pose, pixel: ArrayLike, z: float) -> Array:
 
     Raises:
         ValueError: The camera does not look towards that height there.
-
     """
     ray = pixel_ray(matrix, X_WC, pixel)
     drop = z - X_WC.position[2]

@@ -11,7 +11,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import cv2
 import numpy as np
@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from executive.cell import Box
 from executive.errors import InputError
 
-Layout = Literal["coco", "yolo"]
 SPLITS = ("train", "valid", "test")
 QUALITY = 95
 """JPEG quality of the images."""
@@ -39,7 +38,6 @@ class Entry:
         boxes: Their boxes, one to one.
         ignored: Boxes of objects that are neither labelled nor background.
         truth: Anything else worth keeping for measurements, as plain values.
-
     """
 
     split: str
@@ -61,7 +59,6 @@ def save_image(path: Path, image: NDArray[np.uint8]) -> None:
 
     Raises:
         InputError: The file cannot be written.
-
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     if not cv2.imwrite(str(path), image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY]):
@@ -76,7 +73,6 @@ def write_annotations(root: Path, layout: str, entries: Sequence[Entry], classes
 
     Raises:
         InputError: The layout is unknown.
-
     """
     if layout not in ("coco", "yolo"):
         raise InputError(f'the dataset layout "{layout}" is unknown; there are coco and yolo')

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from executive.geometry import Array, Pose
 
-LINK_RADIUS = 0.09
-"""Radius of the circle around a link's cross-section, iiwa 14 housing [m]."""
+LINK_SHADOW = 0.09
+"""Radius of the spheres that stand for a link: the circle around the iiwa 14's housing [m]."""
 
-TOOL_RADIUS = 0.02
-"""Radius of the suction tool's tube with its fittings [m]."""
+TOOL_SHADOW = 0.02
+"""Radius of the spheres that stand for the tool: its tube with fittings [m]."""
 
 
 def hidden(
@@ -31,7 +31,7 @@ def hidden(
         size: Image width and height [pixel].
     """
     mask = np.zeros((size[1], size[0]), dtype=np.uint8)
-    for points, radius in ((joints, LINK_RADIUS), (tool, TOOL_RADIUS)):
+    for points, radius in ((joints, LINK_SHADOW), (tool, TOOL_SHADOW)):
         for start, end in itertools.pairwise(points):
             for share in np.linspace(0.0, 1.0, 9):
                 x, y, z = X_WC.inverse().apply(start + share * (end - start))

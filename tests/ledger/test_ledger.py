@@ -97,6 +97,13 @@ def test_an_object_that_jumps_without_the_robots_doing_is_another_item(bench: Be
     assert bench.look(("cube", 0.60, -0.1))[0].item == "cube-2"
 
 
+def test_an_object_under_a_missed_grasp_stays_itself_when_its_class_reads_differently(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0))
+    bench.look(("cube", 0.50, 0.0))
+    bench.ledger.missed("cube-1")
+    assert [t.item for t in bench.look(("duck", 0.505, 0.0))] == ["cube-1"]
+
+
 def test_a_dropped_item_is_recognized_where_it_lies(bench: Bench) -> None:
     bench.look(("cube", 0.50, 0.0), ("cube", 0.6, 0.1))
     bench.ledger.held("cube-1")
@@ -136,11 +143,46 @@ def test_a_frame_from_before_a_change_says_nothing_about_emptiness(bench: Bench)
     assert not bench.ledger.believes_empty()
 
 
+def test_objects_that_the_mission_has_no_route_for_are_nothing_left_to_sort(bench: Bench) -> None:
+    bench.look(("duck", 0.50, 0.0), view="full")
+    bench.look(("duck", 0.50, 0.0), view="full")
+    assert bench.ledger.believes_empty()
+    bench.ledger.close()
+    assert bench.ledger.rows()[0]["why"] == "the mission has no route for it"
+
+
+def test_the_same_frame_twice_is_one_look(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0), view="full")
+    bench.frames -= 1
+    bench.look(("cube", 0.50, 0.0), view="full")
+    assert bench.ledger.rows()[0]["looks"] == 1
+
+
+def test_an_empty_frame_twice_is_no_proof_that_nothing_is_left(bench: Bench) -> None:
+    bench.look(view="full")
+    bench.frames -= 1
+    bench.look(view="full")
+    assert not bench.ledger.believes_empty()
+
+
+def test_a_frame_from_before_a_pick_brings_nothing_back(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0), ("cube", 0.60, 0.2))
+    bench.ledger.held("cube-1")
+    assert [t.item for t in bench.look(("cube", 0.50, 0.0), ("cube", 0.60, 0.2), epoch=0)] == ["cube-2"]
+    assert bench.ledger.balance()["seen"] == 2
+
+
 def test_what_one_look_believed_and_no_other_is_a_phantom(bench: Bench) -> None:
     bench.look(("cube", 0.50, 0.0))
     bench.look(view="full")
     bench.ledger.close()
     assert bench.ledger.balance() == {"seen": 0, "placed": 0, "rejected": 0, "lost": 0, "phantom": 1}
+
+
+def test_what_the_only_look_showed_is_left_and_no_phantom(bench: Bench) -> None:
+    bench.look(("duck", 0.50, 0.0))
+    bench.ledger.close()
+    assert bench.ledger.balance() == {"seen": 1, "placed": 0, "rejected": 1, "lost": 0, "phantom": 0}
 
 
 def test_what_two_looks_agreed_on_and_then_vanished_is_lost(bench: Bench) -> None:

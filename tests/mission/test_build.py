@@ -14,7 +14,7 @@ from executive.events import ignore
 from executive.mission.build import build
 from executive.mission.files import shipped_folder
 from executive.mission.load import LoadedMission
-from executive.mission.outline import outline, outline_text
+from executive.mission.outline import outline
 from executive.skill import Skill
 
 HEAD = "mission: m\ncell: cells/small.yaml\n"
@@ -84,7 +84,11 @@ def test_paths_are_readable_and_unique(built: Any) -> None:
 
 
 def test_the_outline_reads_like_the_mission(built: Any) -> None:
-    assert outline_text(built(EVERYTHING)).splitlines() == [
+    lines = [
+        "  " * node.depth + node.name + (f" ({node.detail})" if node.detail else "")
+        for node in outline(built(EVERYTHING))
+    ]
+    assert lines == [
         "repeat (2 times)",
         "  do",
         "    look: Look (view: table)",

@@ -64,6 +64,12 @@ def test_a_huge_file_is_refused() -> None:
         ("{home: [0, 0", "{hme: [0, 0", 'arm needs a pose named "home"; there are: hme, scan\n'),
         ("scan_poses: [home]", "scan_poses: [hom]", 'c.yaml:25:18: error[unknown-pose]: the arm has no pose "hom"; arm.poses_deg has: home, scan\n'),
         ("cube_small.urdf", "../cube.urdf", 'error[outside]: "../cube.urdf" must be a relative path without ".."\n'),
+        ("y: [-0.2, 0.2]", "y: [-0.2, 0.2], objects: [5, 3]", "error[wrong-value]: table.objects must not fall: 5 stands before 3\n"),
+        ("0.06]}", "0.06], slots: [0, 3]}", "error[out-of-range]: bins.red_bin.slots[0] must be at least 1, not 0\n"),
+        ("table_view: [192, 100, 448, 356]", "table_view: [192, 100, 748, 656]", "needs a table_view that is a square inside its image of 640 x 480 pixels, not [192, 100, 748, 656]\n"),
+        ("table_view: [192, 100, 448, 356]", "table_view: [192, 100, 448, 350]", "needs a table_view that is a square inside its image"),
+        ("up: [1, 0, 0]", "up: [0, 0, 1]", "cameras.top needs a look_at other than its position, and an up that is not on its axis\n"),
+        ("kind: embedded", "kind: embedded, floor: 0.7", "needs a floor up to its threshold, 0.5, not 0.7\n"),
         ("safe_place:", "safeplace:", 'error[missing-key]: the file needs the key "safe_place"\n'),
     ],
 )  # fmt: skip
@@ -80,6 +86,17 @@ def test_a_finding_shows_line_and_caret(small_cell: str) -> None:
         '  Did you mean "source"? arm.limits takes: source, position_deg, velocity_deg, acceleration, jerk, '
         "stop_acceleration, stop_jerk."
     )
+
+
+def test_a_model_beside_the_cell_file_is_found_wherever_the_command_is_given(small_cell: str) -> None:
+    folder = Path("cells/models")
+    folder.mkdir(parents=True)
+    (folder / "cup.urdf").write_text("<robot/>")
+    path = Path("cells/c.yaml")
+    path.write_text(small_cell.replace("cube_small.urdf", "models/cup.urdf", 1))
+    config = load_cell(path)
+    assert config.objects["cube"].urdf == str((folder / "cup.urdf").resolve())
+    assert config.arm.urdf == "kuka_iiwa/model.urdf"
 
 
 def test_overrides_replace_values_of_the_file(small_cell: str) -> None:

@@ -67,7 +67,7 @@ def test_leaving_a_joints_range_names_the_joint(limits) -> None:
 
 
 def test_what_would_crash_ruckig_is_refused_with_a_sentence(limits) -> None:
-    with pytest.raises(Fault, match=r"Waypoint 1 of a trajectory has nan for joint 3"):
+    with pytest.raises(Fault, match=r"waypoint 1 of a trajectory has nan for joint 3"):
         Trajectory([np.zeros(7), [0, 0, math.nan, 0, 0, 0, 0]], limits)
     with pytest.raises(Fault, match=r"7 joints, not the shape \(2, 6\)"):
         Trajectory(np.zeros((2, 6)), limits)
@@ -78,5 +78,5 @@ def test_what_would_crash_ruckig_is_refused_with_a_sentence(limits) -> None:
 
 
 def test_a_motion_too_slow_for_ruckig_is_a_fault_with_a_sentence(limits) -> None:
-    with pytest.raises(Fault, match="Ruckig finds no profile from"):
+    with pytest.raises(Fault, match="ruckig finds no profile from"):
         Trajectory(WAYPOINTS[:2], limits, [1e-5])

@@ -116,7 +116,7 @@ def test_an_arm_pushed_off_its_path_brakes_and_says_so(rig: Rig) -> None:
     rig.step(30)
     rig.world.set_arm(rig.arm.q + np.radians([0, 3, 0, 0, 0, 0, 0]))
     rig.step(2)
-    with pytest.raises(Fault, match=r"The command is \d\.\d\d° away from where joint 2 of the arm is; 0\.5°"):
+    with pytest.raises(Fault, match=r"the command is \d\.\d\d° away from where joint 2 of the arm is; 0\.5°"):
         _ = rig.arm.at_rest
     assert rig.run() <= 120
 
@@ -133,5 +133,5 @@ def test_it_goes_up_before_it_leaves_for_a_named_pose(rig: Rig) -> None:
 
 
 def test_an_unknown_pose_is_a_fault_that_lists_the_known_ones(rig: Rig) -> None:
-    with pytest.raises(Fault, match='no arm pose "hime"; it has home'):
+    with pytest.raises(Fault, match='no arm pose "hime"; it has aside, home'):
         rig.arm.plan_to_pose("hime")

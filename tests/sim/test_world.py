@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +9,8 @@ import pytest
 from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.geometry import Pose, about_z, tool_down
+from executive.mission.cell_file import load_cell
+from executive.sim.cell import SimCell
 from executive.sim.models import find_model, load_mesh
 from executive.sim.spawn import spawn
 from executive.sim.world import World
@@ -85,6 +88,18 @@ def test_rebuilding_gives_the_same_bits(build: Build, overhead: CellConfig) -> N
 
 def test_a_model_that_is_nowhere_is_named() -> None:
     with pytest.raises(
-        InputError, match=r"the model unicorn\.urdf is neither a file nor part of pybullet_data"
+        InputError,
+        match=r"there is no model unicorn\.urdf, neither beside the cell file nor in pybullet_data",
     ):
         find_model("unicorn.urdf")
+
+
+def test_a_missing_model_is_found_before_anything_is_loaded(missions: Path) -> None:
+    overrides = {"cell.objects.duck.urdf": "unicorn.urdf"}
+    config = load_cell(missions / "cells" / "overhead.yaml", overrides)
+    assert list(SimCell.check(config)) == [
+        (
+            ("objects", "duck", "urdf"),
+            "there is no model unicorn.urdf, neither beside the cell file nor in pybullet_data",
+        )
+    ]

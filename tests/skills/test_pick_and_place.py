@@ -87,6 +87,15 @@ def test_a_grasp_without_a_seal_is_missed_and_lets_go(fake: FakeCell, target: Ta
     assert not fake.ledger.is_fresh(target)
 
 
+def test_a_halted_grasp_leaves_nothing_in_the_tool_that_the_ledger_does_not_know_of(
+    fake: FakeCell, target: Target
+) -> None:
+    run_skill(Approach(target=target), fake)
+    assert run_skill(Grasp(target=target), fake, halt_at=10).status == "HALTED"
+    assert not fake.tool.holding
+    assert fake.ledger.is_open("cube-1")
+
+
 def test_transit_hangs_the_item_over_a_slot_of_the_bin(fake: FakeCell, held: str) -> None:
     assert run_skill(Transit(held=held, bin="red_bin"), fake).status == "SUCCESS"
     tip = fake.arm.tool_pose.position

@@ -13,6 +13,8 @@ from executive.vision.training.lightning import Model, Progress, Report, Symmetr
 
 BATCH = 16
 LEARNING_RATE = 3e-4
+FINE_TUNING_RATE = 1e-4
+"""From weights that are good already, larger steps would first undo them."""
 THREADS = 2
 
 
@@ -24,14 +26,15 @@ def fit(dataset: Path, out: Path, *, start: Path | None, epochs: int, seed: int,
     pytorch_lightning.seed_everything(seed, workers=True, verbose=False)
     labels = class_names(dataset)
     detector = create(len(labels), start, "cuda" if cuda else "cpu")
+    rate = LEARNING_RATE if start is None else FINE_TUNING_RATE
     config = detector.get_train_config(
         dataset_dir=str(dataset),
         output_dir=str(out),
         epochs=epochs,
         batch_size=BATCH,
-        lr=LEARNING_RATE,
+        lr=rate,
         # The stock settings slow the encoder down to spare pretrained weights. Here there are none.
-        lr_encoder=LEARNING_RATE,
+        lr_encoder=rate,
         lr_vit_layer_decay=1.0,
         lr_component_decay=1.0,
         lr_scheduler="cosine",

@@ -1,0 +1,152 @@
+"""A simulated cell that knows instead of seeing: real physics and motion, detections from the truth.
+
+A whole simulated sort costs about a second of computing this way, and never fails for what a network
+took for a duck. The truth goes with the frame, as an image does, so nothing knows more than its look.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from executive.cell import Clock, Detection, Frame
+from executive.cell_config import CameraConfig, DetectorConfig
+from executive.geometry import Array, Pose
+from executive.sim.camera import Image, SimCamera
+from executive.sim.cell import SimCell
+from executive.sim.models import Mesh, load_mesh
+from executive.sim.silhouette import outline_box
+from executive.sim.world import World
+from executive.vision.camera_model import NEAR, project
+from executive.vision.detectors.requests import Pending
+
+CONFIDENCE = 0.9
+"""What an oracle says of everything it sees."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrueFrame(Frame):
+    """A frame that says what it shows.
+
+    Attributes:
+        truth: The box around the outline of every loose object before the lens, hidden or not.
+    """
+
+    truth: tuple[Detection, ...]
+
+
+class TruthCamera(SimCamera):
+    """A simulated camera whose frames carry the truth; they are black unless `rendered`."""
+
+    def __init__(self, world: World, *args: Any, rendered: bool = False, **options: Any) -> None:
+        super().__init__(world, *args, **options)
+        self._rendered = rendered
+        self._meshes: dict[str, Mesh] = {}
+
+    def capture(self) -> TrueFrame:
+        """Return a fresh frame of what the camera sees now, and the truth about it."""
+        frame = super().capture()
+        return TrueFrame(**vars(frame), truth=self._truth(frame))
+
+    def _image(self, X_WC: Pose) -> Image:
+        if self._rendered:
+            return super()._image(X_WC)
+        return np.zeros((self.config.height, self.config.width, 3), np.uint8)
+
+    def _truth(self, frame: Frame) -> tuple[Detection, ...]:
+        found = []
+        for body, label in self._world.bodies.items():
+            outline = self._world.object_pose(body).apply(self._mesh(label).vertices)
+            if np.all(frame.X_WC.inverse().apply(outline)[:, 2] > NEAR):
+                box = outline_box(project(frame.matrix, frame.X_WC, outline))
+                found.append(Detection(label, CONFIDENCE, box))
+        return tuple(found)
+
+    def _mesh(self, label: str) -> Mesh:
+        if label not in self._meshes:
+            self._meshes[label] = load_mesh(self._world.config.objects[label])
+        return self._meshes[label]
+
+
+class Oracle:
+    """A detector that answers with the truth of a `TrueFrame`; implements `executive.cell.Detector`.
+
+    It reports what has the centre of its box in the searched part of the image and not behind the arm.
+
+    Args:
+        config: Its threshold and latency count; its kind does not.
+        camera: The camera whose frames it searches.
+        clock: The run's clock.
+        jitter: Standard deviation of each side of a box [pixel].
+        seed: Decides the jitter, together with the number of the frame.
+    """
+
+    def __init__(
+        self, config: DetectorConfig, camera: CameraConfig, clock: Clock, *, jitter: float, seed: int
+    ) -> None:
+        self._config = config
+        self._camera = camera
+        self._clock = clock
+        self._jitter = jitter
+        self._seed = seed
+
+    @property
+    def threshold(self) -> float:
+        """Confidence from which a detection counts."""
+        return self._config.threshold
+
+    def request(self, frame: Frame, view: str) -> Pending:
+        """Return the truth about `frame`, visible as late as a real detector's answer."""
+        assert isinstance(frame, TrueFrame), "an oracle needs the frames of a TruthCamera"
+        random = np.random.default_rng([self._seed, frame.id])
+        found = []
+        for true in frame.truth:
+            box = np.array(true.box) + random.normal(0.0, self._jitter, 4)
+            seen = Detection(true.label, true.confidence, (box[0], box[1], box[2], box[3]))
+            if self._shows(frame, view, np.array(seen.centre)):
+                found.append(seen)
+        answer: Future[Sequence[Detection]] = Future()
+        answer.set_result(found)
+        return Pending(answer, frame.stamp + self._config.latency, self._clock)
+
+    def close(self) -> None:
+        """Have nothing to give back."""
+
+    def _shows(self, frame: Frame, view: str, pixel: Array) -> bool:
+        height, width = frame.visible.shape
+        area = np.array(self._camera.table_view if view == "table" else (0, 0, width, height))
+        if np.any(pixel < area[:2]) or np.any(pixel >= area[2:]):
+            return False
+        column, row = pixel.astype(int)
+        return bool(frame.visible[row, column])
+
+
+def oracle_cell(*, jitter: float = 0.7, seed: int = 0, rendered: bool = False) -> Callable[..., SimCell]:
+    """Return a kind of cell, for `Run(kind=...)`: the simulated one with oracles for detectors.
+
+    Args:
+        jitter: Standard deviation of each side of a box [pixel].
+        seed: Decides the jitter.
+        rendered: Draw the camera's images, for whoever looks at them.
+    """
+    camera = partial(TruthCamera, rendered=rendered)
+    return partial(SimCell, camera=camera, detectors=partial(_oracles, jitter=jitter, seed=seed))
+
+
+def _oracles(
+    configs: Mapping[str, DetectorConfig],
+    *,
+    camera: CameraConfig,
+    clock: Clock,
+    base: Path,
+    jitter: float,
+    seed: int,
+) -> dict[str, Oracle]:
+    del base
+    return {name: Oracle(c, camera, clock, jitter=jitter, seed=seed) for name, c in configs.items()}

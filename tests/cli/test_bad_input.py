@@ -1,0 +1,295 @@
+# ruff: noqa: E501 - findings are quoted as they are printed
+"""What a user reads who gave something wrong: one sentence at the right place, never a traceback.
+
+Every case changes the shipped mission or its cell in one place and runs the real commands on it.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from textwrap import dedent
+
+import pytest
+from click.testing import CliRunner, Result
+
+from executive.cli.main import main
+
+MISSION = """\
+mission: small
+description: Put everything into its bin.
+cell: cells/overhead.yaml
+params: {attempts: 4}
+routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}
+
+tree:
+  - MoveToScan
+  - Detect
+  - Localize
+  - SelectTarget: {prefer: nearest}
+  - retry:
+      attempts: $attempts
+      on: [Grasp.missed]
+      do: [Approach, Grasp]
+  - Transit
+  - Release
+"""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One mistake.
+
+    Attributes:
+        expected: All that is printed; LINE stands for the line in which the cell file is changed.
+        mission: Text in the mission file, and what stands there instead.
+        cell: The same for the cell file.
+    """
+
+    expected: str
+    mission: tuple[str, str] = ("", "")
+    cell: tuple[str, str] = ("", "")
+
+
+CASES = {
+    "a YAML syntax error": Case(
+        """
+        m.yaml:5:7: error[yaml]: not valid YAML: while parsing a flow mapping that began in line 4: expected ',' or '}', but got ':'
+           5 | routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}
+             |       ^
+        """,
+        mission=("{attempts: 4}", "{attempts: 4"),
+    ),
+    "a colon in a text": Case(
+        """
+        m.yaml:2:18: error[yaml]: not valid YAML: mapping values are not allowed here
+           2 | description: Sort: everything into its bin.
+             |                  ^
+          A text that holds ": " needs quotes. Otherwise compare the indentation with the line above.
+        """,
+        mission=("Put everything", "Sort: everything"),
+    ),
+    "a tab": Case(
+        """
+        m.yaml:8:1: error[yaml]: not valid YAML: while scanning for the next token: found character '\\t' that cannot start any token
+           8 | \t- MoveToScan
+             | ^
+          Indent with blanks instead of tabs.
+        """,
+        mission=("  - MoveToScan", "\t- MoveToScan"),
+    ),
+    "an unknown skill": Case(
+        """
+        m.yaml:10:5: error[unknown-skill]: there is no skill "Localise"
+          10 |   - Localise
+             |     ^^^^^^^^
+          Did you mean "Localize"? Installed skills: Approach, AwaitRequest, Detect, Grasp, Localize, MoveToScan, PutDown, RejectTarget, Release, SelectTarget, Transit.
+        """,
+        mission=("- Localize", "- Localise"),
+    ),
+    "a route to an unknown bin": Case(
+        """
+        m.yaml:5:16: error[unknown-bin]: the cell has no bin "rde_bin"
+           5 | routes: {cube: rde_bin, sphere: blue_bin, duck: yellow_bin}
+             |                ^^^^^^^
+          Did you mean "red_bin"? Its bins: red_bin, blue_bin, yellow_bin.
+        """,
+        mission=("red_bin", "rde_bin"),
+    ),
+    "a param of the wrong type": Case(
+        """
+        m.yaml:4:20: error[wrong-type]: retry.attempts must be a whole number, not the text "many" (it is $attempts in line 13)
+           4 | params: {attempts: many}
+             |                    ^^^^
+        """,
+        mission=("attempts: 4", "attempts: many"),
+    ),
+    "a value out of range": Case(
+        """
+        m.yaml:16:21: error[out-of-range]: Transit.drop must be at most 0.1 m, not 0.4
+          16 |   - Transit: {drop: 0.4}
+             |                     ^^^
+        """,
+        mission=("- Transit", "- Transit: {drop: 0.4}"),
+    ),
+    "a word that is none of the choices": Case(
+        """
+        m.yaml:9:20: error[wrong-value]: Detect.view must be "table" or "full", not the text "ful" (did you mean "full"?)
+           9 |   - Detect: {view: ful}
+             |                    ^^^
+        """,
+        mission=("- Detect", "- Detect: {view: ful}"),
+    ),
+    "a key twice": Case(
+        """
+        m.yaml:5:1: error[duplicate-key]: the key "params" stands here twice; the first is in line 4
+           5 | params: {attempts: 5}
+             | ^^^^^^
+        """,
+        mission=("params: {attempts: 4}", "params: {attempts: 4}\nparams: {attempts: 5}"),
+    ),
+    "a cell file that is not there": Case(
+        """
+        m.yaml:3:7: error[no-cell]: there is no file "cells/overhed.yaml" beside this one, and none is shipped. Did you mean "cells/overhead.yaml"? There are: cells/overhead.yaml, cells/wrist.yaml.
+           3 | cell: cells/overhed.yaml
+             |       ^^^^^^^^^^^^^^^^^^
+        """,
+        mission=("overhead", "overhed"),
+    ),
+    "an unknown key in the cell file": Case(
+        """
+        cells/overhead.yaml:LINE:1: error[unknown-key]: the file has no key "ledgre"
+        LINE | ledgre: {gate: 0.03}
+             | ^^^^^^
+          Did you mean "ledger"? the file takes: cell, description, kind, arm, tool, motion, table, bins, cameras, detectors, localization, objects, ledger, safe_place.
+        """,
+        cell=("safe_place:", "ledgre: {gate: 0.03}\nsafe_place:"),
+    ),
+    "a bin out of reach": Case(
+        """
+        cells/overhead.yaml:LINE:13: error[robot]: the bin "red_bin" is out of reach: the tool cannot reach (1.480, -0.580, 0.160) m: its wrist would be 1.590 m from the shoulder, 0.770 m farther than the arm is long (0.82 m)
+        LINE |   red_bin: {position: [1.54, -0.48, 0.0], size: [0.24, 0.30, 0.06], colour: [0.75, 0.15, 0.15]}
+             |             ^^^^^^^^
+        """,
+        cell=("red_bin: {position: [0.24,", "red_bin: {position: [1.54,"),
+    ),
+}
+
+
+@pytest.fixture
+def write(tmp_path: Path, missions: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., int]:
+    """Write the mission as m.yaml beside its cell file, each changed in one place, and go there.
+
+    The function returns the line in which the cell file was changed.
+    """
+    monkeypatch.chdir(tmp_path)
+    Path("cells").mkdir()
+    original = (missions / "cells" / "overhead.yaml").read_text()
+
+    def write(mission: tuple[str, str] = ("", ""), cell: tuple[str, str] = ("", "")) -> int:
+        assert mission[0] in MISSION
+        assert cell[0] in original
+        Path("m.yaml").write_text(MISSION.replace(*mission, 1))
+        Path("cells/overhead.yaml").write_text(original.replace(*cell, 1))
+        return original[: original.index(cell[0])].count("\n") + 1
+
+    return write
+
+
+def invoke(*words: str) -> Result:
+    return CliRunner().invoke(main, words)
+
+
+def test_the_mission_that_all_cases_change_is_sound(write: Callable[..., int]) -> None:
+    write()
+    assert invoke("check", "m.yaml").stdout == "m.yaml: ok\n"
+
+
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_a_mistake_in_a_file_is_told_once_and_nothing_moves(write: Callable[..., int], case: Case) -> None:
+    line = write(case.mission, case.cell)
+    expected = dedent(case.expected).lstrip("\n").replace(":LINE:", f":{line}:").replace("LINE", f"{line:4}")
+    checked = invoke("check", "m.yaml")
+    assert (checked.exit_code, checked.stderr) == (2, "")
+    assert checked.stdout == expected
+    ran = invoke("run", "m.yaml", "--runs", "runs")
+    assert (ran.exit_code, ran.stdout) == (2, "")
+    assert ran.stderr == expected
+    assert not Path("runs").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("sort_overhed", 'there is no mission file "sort_overhed", and no shipped mission of that name. Did you mean "sort_overhead"? Shipped missions: pick_on_request, sort_overhead, sort_wrist.\n'),
+        ("nowhere.yaml", 'there is no mission file "nowhere.yaml", and no shipped mission of that name. Shipped missions: pick_on_request, sort_overhead, sort_wrist.\n'),
+        ("cells", '"cells" is a folder; name one of its files\n'),
+    ],
+)  # fmt: skip
+def test_a_mission_that_is_not_there_is_told_with_those_that_are(
+    write: Callable[..., int], name: str, expected: str
+) -> None:
+    write()
+    ran = invoke("run", name)
+    assert (ran.exit_code, ran.stdout, ran.stderr) == (2, "", expected)
+    checked = invoke("check", name)
+    assert (checked.exit_code, checked.stdout, checked.stderr) == (2, expected, "")
+
+
+@pytest.mark.parametrize(
+    ("override", "expected"),
+    [
+        (
+            "atempts=5",
+            """
+            --set:1:1: error[unknown-param]: the mission has no param "atempts"
+               1 | atempts=5
+                 | ^^^^^^^
+              Did you mean "attempts"? The mission's params: attempts.
+            """,
+        ),
+        (
+            "attempts=many",
+            """
+            --set:1:10: error[wrong-type]: attempts must be of the kind of its default, 4, not the text "many"
+               1 | attempts=many
+                 |          ^^^^
+            """,
+        ),
+        (
+            "attempts=0",
+            """
+            --set:1:10: error[out-of-range]: retry.attempts must be at least 1, not 0 (it is $attempts in line 13)
+               1 | attempts=0
+                 |          ^
+            """,
+        ),
+        (
+            "cell.tols.cup_radius=0.01",
+            """
+            --set:1:22: error[unknown-key]: the cell has no key "tols"
+               1 | cell.tols.cup_radius=0.01
+                 |                      ^^^^
+              Did you mean "tool"? The file has: cell, description, kind, arm, tool, table, bins, cameras, detectors, objects, safe_place.
+            """,
+        ),
+    ],
+)
+def test_a_wrong_override_is_shown_as_it_was_given(
+    write: Callable[..., int], override: str, expected: str
+) -> None:
+    write()
+    ran = invoke("run", "m.yaml", "--set", override)
+    assert (ran.exit_code, ran.stdout) == (2, "")
+    assert ran.stderr == dedent(expected).lstrip("\n")
+
+
+def test_a_request_for_nothing_known_is_told_with_what_there_is(write: Callable[..., int]) -> None:
+    write()
+    ran = invoke("run", "m.yaml", "--runs", "runs", "--request", "cube", "--request", "banana")
+    assert (ran.exit_code, ran.stdout) == (2, "")
+    assert ran.stderr == 'cannot pick "banana"; ask for one of: cube, sphere, duck\n'
+
+
+def test_several_mistakes_are_told_at_once_in_the_order_of_the_file(write: Callable[..., int]) -> None:
+    write(("- Detect\n  - Localize", "- Detct\n  - Localise"))
+    shown = invoke("check", "m.yaml").stdout
+    assert [line.split(" ")[0] for line in shown.splitlines() if "error[" in line] == [
+        "m.yaml:9:5:",
+        "m.yaml:10:5:",
+    ]
+
+
+def test_a_whole_process_says_the_same_and_ends_with_the_same_code(write: Callable[..., int]) -> None:
+    write(("- Localize", "- Localise"))
+    done = subprocess.run(
+        [sys.executable, "-m", "executive.cli.main", "run", "m.yaml"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == dedent(CASES["an unknown skill"].expected).lstrip("\n")

@@ -1,0 +1,172 @@
+"""The simulated cell as a whole: what a seed decides, what the audit counts, what the camera can see."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from executive.cell import CellOptions, Detections, Via
+from executive.errors import InputError
+from executive.events import ignore
+from executive.geometry import Pose
+from executive.mission.cell_file import load_cell
+from executive.sim.cell import SimCell
+from executive.testing.fake_cell import ROUTES, SilentOperator
+from executive.testing.oracle import oracle_cell
+
+Build = Callable[..., SimCell]
+
+
+@pytest.fixture
+def build_cell(missions: Path, request: pytest.FixtureRequest) -> Build:
+    """Build simulated cells whose detectors are oracles; they are closed after the test."""
+
+    def build_cell(name: str = "overhead", seed: int = 4, **changes: Any) -> SimCell:
+        path = missions / "cells" / f"{name}.yaml"
+        config = load_cell(path).model_copy(update=changes)
+        options = CellOptions(SilentOperator(), base=path.parent)
+        made = oracle_cell(jitter=0.0)(config, seed=seed, routes=ROUTES, emit=ignore, options=options)
+        request.addfinalizer(made.close)
+        return made
+
+    return build_cell
+
+
+def placements(made: SimCell) -> list[tuple[str, list[float]]]:
+    world = made._world
+    poses = [(label, world.object_pose(body)) for body, label in world.bodies.items()]
+    return [(label, [*pose.position, *pose.rotation.ravel()]) for label, pose in poses]
+
+
+def look(made: SimCell) -> None:
+    """Let the ledger see everything the camera sees."""
+    cell = made.cell
+    frame = cell.camera.capture()
+    request = cell.detectors["embedded"].request(frame, "full")
+    while not request.ready:
+        made.advance()
+    found = tuple(request.result())
+    positions = [cell.localizer.locate(detection, frame) for detection in found]
+    cell.ledger.observe(Detections(frame, found, "full", cell.camera.area("full")), positions)
+
+
+def put(made: SimCell, body: int, place: tuple[float, float, float]) -> None:
+    made._world.place_object(body, Pose.of(place))
+
+
+def test_a_seed_decides_which_objects_lie_where_to_the_last_bit(build_cell: Build) -> None:
+    one, again, other = (placements(build_cell(seed=seed)) for seed in (4, 4, 5))
+    assert one == again
+    assert one != other
+
+
+def test_the_objects_of_every_seed_lie_still_within_the_workspace(build_cell: Build) -> None:
+    for seed in range(3):
+        made = build_cell(seed=seed)
+        table = made._config.table
+        before = placements(made)
+        assert table.objects[0] <= len(before) <= table.objects[1]
+        for _ in range(60):
+            made.advance()
+        for (_, was), (_, now) in zip(before, placements(made), strict=True):
+            assert table.x[0] < now[0] < table.x[1]
+            assert table.y[0] < now[1] < table.y[1]
+            assert np.allclose(was[:3], now[:3], atol=5e-4)
+
+
+def test_the_audit_counts_every_body_once_by_where_it_really_is(build_cell: Build) -> None:
+    made = build_cell(seed=0)
+    look(made)
+    assert made.audit() == {"right": 0, "wrong_bin": 0, "left": 4, "elsewhere": 0, "unseen": 0}
+
+    one, two, three, _ = made._world.bodies
+    home = made.cell.bins[ROUTES[made._world.bodies[one]]].position
+    put(made, one, (home[0] + 0.05, home[1] - 0.05, 0.04))
+    assert made.audit() == {"right": 1, "wrong_bin": 0, "left": 3, "elsewhere": 0, "unseen": 0}
+
+    strange = next(b for n, b in made.cell.bins.items() if n != ROUTES[made._world.bodies[two]]).position
+    put(made, two, (strange[0], strange[1] + 0.03, 0.04))
+    assert made.audit() == {"right": 1, "wrong_bin": 1, "left": 2, "elsewhere": 0, "unseen": 0}
+
+    put(made, three, (1.4, 0.0, -0.6))
+    assert made.audit() == {"right": 1, "wrong_bin": 1, "left": 1, "elsewhere": 1, "unseen": 0}
+
+    # Under a bin is not in it.
+    put(made, one, (home[0], home[1], -0.6))
+    assert made.audit() == {"right": 0, "wrong_bin": 1, "left": 1, "elsewhere": 2, "unseen": 0}
+
+
+def test_beside_a_bin_or_on_the_table_at_large_counts_as_left(build_cell: Build) -> None:
+    made = build_cell(seed=0)
+    one, two, *_ = made._world.bodies
+    bin = made.cell.bins["red_bin"]
+    put(made, one, (bin.position[0] + bin.size[0] / 2 + 0.04, bin.position[1], 0.03))
+    put(made, two, (0.75, 0.0, 0.03))
+    assert made.audit()["left"] == 4
+
+
+def test_what_the_ledger_never_saw_is_unseen_wherever_it_ends(build_cell: Build) -> None:
+    made = build_cell(seed=0)
+    assert made.audit()["unseen"] == 4
+    hidden, *_ = made._world.bodies
+    lay = made._world.object_pose(hidden)
+    put(made, hidden, (0.0, 0.0, 0.03))  # in the foot of the arm, where no camera looks
+    look(made)
+    made._world.place_object(hidden, lay)
+    assert made.audit()["unseen"] == 1
+
+
+def test_the_balance_is_of_the_ledger_alone_and_the_audit_is_not(build_cell: Build) -> None:
+    made = build_cell(seed=0)
+    look(made)
+    look(made)
+    for body in list(made._world.bodies):
+        put(made, body, (0.24, 0.48, 0.04))
+    assert made.accounts.balance()["seen"] == 4
+    assert made.accounts.balance()["placed"] == 0
+    assert made.audit()["left"] == 0
+
+
+@pytest.mark.parametrize("name", ["overhead", "wrist"])
+def test_the_table_is_seen_from_every_scan_pose(build_cell: Build, name: str) -> None:
+    made = build_cell(name)
+    camera = made.cell.camera
+    for pose in camera.scan_poses:
+        made._world.set_arm(np.radians(made._config.arm.poses_deg[pose]))
+        assert camera.sees_table(), pose
+
+
+def test_the_table_is_hidden_while_the_arm_is_over_it(build_cell: Build) -> None:
+    made = build_cell()
+    cell = made.cell
+    assert cell.camera.sees_table()
+    motion = cell.arm.plan([Via(np.array([0.53, 0.0, cell.travel_height]))])
+    cell.arm.start(motion)
+    while not cell.arm.at_rest:
+        made.advance()
+    assert not cell.camera.sees_table()
+    frame = cell.camera.capture()
+    left, top, right, bottom = (int(side) for side in cell.camera.area("table"))
+    hidden = ~frame.visible[top:bottom, left:right]
+    assert 0.05 < hidden.mean() < 0.9
+    x, y, z = frame.matrix @ frame.X_WC.inverse().apply(cell.arm.tool_pose.position)
+    assert not frame.visible[int(y / z), int(x / z)]
+
+
+def test_time_passes_by_physics_steps_alone(build_cell: Build) -> None:
+    made = build_cell()
+    assert made.cell.clock.now == 0.0
+    for _ in range(24):
+        made.advance()
+    made.cell.camera.capture()
+    assert made.cell.clock.now == pytest.approx(0.1)
+
+
+def test_a_way_of_localizing_that_it_lacks_is_named_with_one_that_it_has(build_cell: Build) -> None:
+    with pytest.raises(InputError) as caught:
+        build_cell(localization="depth")
+    assert str(caught.value) == 'cell overhead: localization "depth" is not available; use "plane"'
