@@ -7,7 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from executive.cell import Arm, Cell, Motion, Steps, Via
+from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
+from executive.skill import Skill
 
 
 def settle(arm: Arm) -> Steps:
@@ -29,6 +31,20 @@ def follow(arm: Arm, motion: Motion, until: Callable[[], bool] = lambda: False) 
     finally:
         arm.stop()
     yield from settle(arm)
+
+
+def planned(skill: Skill, plan: Callable[[], Motion]) -> Motion:
+    """Return the motion that `plan` returns.
+
+    Raises:
+        SkillFailed: There is none; the reason is the skill's `unreachable` or `blocked`.
+    """
+    try:
+        return plan()
+    except Unreachable as error:
+        raise skill.failed("unreachable", str(error)) from error
+    except Blocked as error:
+        raise skill.failed("blocked", str(error)) from error
 
 
 def travel(cell: Cell, over: Array) -> list[Via]:

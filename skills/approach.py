@@ -7,10 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from executive.cell import Cell, Steps, Target, Via
-from executive.errors import Blocked, Unreachable
+from executive.cell import Cell, Steps, Via
 from executive.geometry import Array
-from executive.moving import follow, settle, travel
+from executive.messages import Target
+from executive.moving import follow, planned, settle, travel
 from executive.skill import EMPTY, In, Metres, Skill, param, port
 
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
@@ -41,13 +41,9 @@ class Approach(Skill):
         lowest = max(surface - self.overtravel, kind.height / 4)
         above = Via(np.array([*place, surface + cell.descent]))
         down = Via(np.array([*place, lowest]), speed=cell.descent_speed)
-        try:
-            yield from follow(cell.arm, cell.arm.plan([*travel(cell, place), above]))
-            yield from follow(cell.arm, cell.arm.plan([down]), until=lambda: cell.tool.touching)
-        except Unreachable as error:
-            raise self.failed("unreachable", str(error)) from error
-        except Blocked as error:
-            raise self.failed("blocked", str(error)) from error
+        yield from follow(cell.arm, planned(self, lambda: cell.arm.plan([*travel(cell, place), above])))
+        descent = planned(self, lambda: cell.arm.plan([down]))
+        yield from follow(cell.arm, descent, until=lambda: cell.tool.touching)
         height = float(cell.arm.tool_pose.position[2])
         if not cell.tool.touching:
             cell.ledger.missed(self.target.item)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from executive.cell import Cell, Detections, Steps
+from executive.cell import Cell, Steps
 from executive.errors import Unavailable
+from executive.messages import Detections
 from executive.skill import Out, Skill, param, port
 
 
@@ -43,6 +44,8 @@ class Detect(Skill):
             answer = request.result()
         except Unavailable as error:
             raise self.failed("unavailable", f"detector {name}: {error}") from error
+        # A model may know more classes than the cell: what the cell does not handle is no object of its.
+        answer = [detection for detection in answer if detection.label in cell.classes]
         found = tuple(detection for detection in answer if detection.confidence >= detector.threshold)
         if not found and answer and self.doubtful == "fail":
             best = answer[0]

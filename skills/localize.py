@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from executive.cell import Cell, Detections, Steps, Target
+from executive.cell import Cell, Steps
 from executive.errors import NoDepth
+from executive.messages import Detections, Target
 from executive.skill import In, Out, Skill, port
 
 

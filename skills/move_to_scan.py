@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from executive.cell import Cell, Steps
-from executive.errors import Blocked, Unreachable
-from executive.moving import follow, settle
+from executive.moving import follow, planned, settle
 from executive.skill import Skill, param
 
 
@@ -32,12 +31,8 @@ class MoveToScan(Skill):
         yield from settle(cell.arm)
         if self.pose == "auto" and cell.camera.sees_table():
             return
-        try:
-            yield from follow(cell.arm, cell.arm.plan_to_pose(self._name(cell)))
-        except Unreachable as error:
-            raise self.failed("unreachable", str(error)) from error
-        except Blocked as error:
-            raise self.failed("blocked", str(error)) from error
+        name = self._name(cell)
+        yield from follow(cell.arm, planned(self, lambda: cell.arm.plan_to_pose(name)))
 
     def _name(self, cell: Cell) -> str:
         if self.pose == "auto":

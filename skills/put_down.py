@@ -6,9 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from executive.cell import Cell, Item, Steps, Via
-from executive.errors import Blocked, Unreachable
-from executive.moving import follow, settle, travel
+from executive.cell import Cell, Steps, Via
+from executive.messages import Item
+from executive.moving import follow, planned, settle, travel
 from executive.skill import EMPTY, HOLDING, In, Metres, Seconds, Skill, param, port
 
 
@@ -29,12 +29,7 @@ class PutDown(Skill):
         kind = cell.classes[cell.ledger.label(self.held)]
         low = float(cell.safe_place[2]) + kind.height + self.drop
         way = [*travel(cell, cell.safe_place), Via(np.array([*cell.safe_place[:2], low]))]
-        try:
-            motion = cell.arm.plan(way, carrying=kind)
-        except Unreachable as error:
-            raise self.failed("unreachable", str(error)) from error
-        except Blocked as error:
-            raise self.failed("blocked", str(error)) from error
+        motion = planned(self, lambda: cell.arm.plan(way, carrying=kind))
         yield from follow(cell.arm, motion)
         cell.tool.open()
         yield from cell.clock.sleep(self.settle)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from executive.cell import Cell, Item, Steps
+from executive.cell import Cell, Steps
+from executive.messages import Item
 from executive.skill import In, Skill, param, port
 
 

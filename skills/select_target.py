@@ -6,7 +6,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from executive.cell import Cell, Item, Steps, Target
+from executive.cell import Cell, Steps
+from executive.messages import Item, Target
 from executive.skill import In, Out, Skill, param, port
 
 

@@ -6,9 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from executive.cell import Cell, Item, Steps, Via
-from executive.errors import Blocked, Unreachable
-from executive.moving import follow, settle, travel
+from executive.cell import Cell, Steps, Via
+from executive.messages import Item
+from executive.moving import follow, planned, settle, travel
 from executive.skill import HOLDING, In, Metres, Skill, param, port
 
 
@@ -37,12 +37,7 @@ class Transit(Skill):
         over = bin.slots[place]
         low = float(bin.position[2]) + kind.height * (1 + layer) + self.drop
         way = [*travel(cell, over), Via(np.array([*over, min(low, cell.travel_height)]))]
-        try:
-            motion = cell.arm.plan(way, carrying=kind)
-        except Unreachable as error:
-            raise self.failed("unreachable", str(error)) from error
-        except Blocked as error:
-            raise self.failed("blocked", str(error)) from error
+        motion = planned(self, lambda: cell.arm.plan(way, carrying=kind))
         yield from follow(cell.arm, motion, until=lambda: not cell.tool.holding)
         if not cell.tool.holding:
             x, y, z = cell.arm.tool_pose.position

@@ -11,7 +11,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from executive.cell import Target
+from executive.messages import Target
 from executive.mission.load import load_mission
 from executive.runtime.cells import robot_check
 from executive.skill import discover

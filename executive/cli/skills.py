@@ -82,4 +82,4 @@ def _param(param: Param) -> str:
 def _type(declared: Port | Param) -> str:
     kind: Any = declared.type
     name = kind.__name__ if isinstance(kind, type) and not hasattr(kind, "__args__") else str(kind)
-    return name.replace("typing.", "").replace("executive.cell.", "")
+    return name.replace("typing.", "").replace("executive.messages.", "")

@@ -9,11 +9,12 @@ from typing import Any
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.cell import Cell, Target
+from executive.cell import Cell
 from executive.control.failure import Failure
 from executive.control.node import Site
 from executive.control.scope import Scope
 from executive.errors import Fault
+from executive.messages import Target
 from executive.skill import Skill, SkillFailed
 
 ITEM_PORTS = ("item", "held", "placed")

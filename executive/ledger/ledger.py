@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from executive.cell import Bin, Detections, Frame, Item, Target
 from executive.cell_config import LedgerConfig
 from executive.errors import Fault
 from executive.events import Emit
@@ -16,6 +15,7 @@ from executive.geometry import Array
 from executive.ledger.binding import bind
 from executive.ledger.freshness import Freshness
 from executive.ledger.item import ON_TABLE, OPEN, Record, State
+from executive.messages import Bin, Detections, Frame, Item, Target
 
 
 class ItemLedger:

@@ -13,9 +13,10 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from executive.cell import ObjectClass, Via
+from executive.cell import Via
 from executive.errors import Blocked, Fault
 from executive.geometry import Array
+from executive.messages import ObjectClass
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.postures import find_postures

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from executive.cell import Frame
 from executive.geometry import Pose
+from executive.messages import Frame
 
 DIGITS = 6
 """Decimal places kept: a micrometre, a microradian, a microsecond."""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from executive.events import Event, Observer
+from executive.events import Event
 from executive.record.recorder import Recorder
 from executive.record.result import result_of, write_result
 from executive.record.run_directory import RunDirectory
@@ -57,30 +58,26 @@ def recorded_run(
     from executive.runtime.run import Run
 
     began = time.perf_counter()
-    directory = RunDirectory.create(runs, mission=loaded.mission.name, seed=seed, started=datetime.now())
-    directory.save_inputs(
-        mission=loaded.text, params=loaded.params, cell=loaded.cell_config.model_dump(mode="json")
-    )
-    recorder = Recorder(directory, frames=frames)
-    observers: list[Observer] = [recorder] if view is None else [recorder, view]
-    completed = False
-    try:
-        run = Run(
-            loaded, skills, seed=seed, observers=observers, gui=gui, realtime=realtime, requests=requests
-        )  # fmt: skip
+    with closing(Run(loaded, skills, seed=seed, gui=gui, realtime=realtime, requests=requests)) as run:
+        directory = RunDirectory.create(runs, mission=loaded.mission.name, seed=seed, started=datetime.now())
+        directory.save_inputs(
+            mission=loaded.text, params=loaded.params, cell=loaded.cell_config.model_dump(mode="json")
+        )
+        recorder = Recorder(directory, frames=frames)
+        run.observe(recorder)
+        completed = False
         try:
             if view is not None:
+                run.observe(view)
                 view.open(run.root)
             outcome = run.execute()
             items, audit = run.items(), run.audit()
+            completed = True
         finally:
-            run.close()
-        completed = True
-    finally:
-        if view is not None:
-            view.close()
-        # Whoever ends a run by force does not want to wait for its pictures.
-        recorder.close(wait=completed)
+            if view is not None:
+                view.close()
+            # Whoever ends a run by force does not want to wait for its pictures.
+            recorder.close(wait=completed)
     result = result_of(
         mission=loaded.mission.name, seed=seed, outcome=outcome, items=items, audit=audit,
         wall_time=time.perf_counter() - began, trace=recorder.trace, run=directory.path,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from importlib.metadata import entry_points
 
-from executive.cell import CellKind, KeyPath
 from executive.cell_config import CellConfig
 from executive.errors import InputError
+from executive.workcell import CellKind, KeyPath
 
 GROUP = "executive.cells"
 

@@ -73,4 +73,4 @@ def understood(word: str, choices: Sequence[str]) -> str | None:
         return RESCAN
     if word.isdecimal() and int(word) < len(choices):
         return choices[int(word)]
-    return word if word in choices else ""
+    return next((label for label in choices if label.lower() == word), "")

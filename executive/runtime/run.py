@@ -14,7 +14,7 @@ from typing import Any
 
 from py_trees.common import Status
 
-from executive.cell import CellOptions, Operator, Workcell
+from executive.cell import Operator
 from executive.control.failure import Failure
 from executive.control.halting import halt
 from executive.control.scope import Scope
@@ -25,6 +25,7 @@ from executive.mission.load import LoadedMission
 from executive.runtime.cells import cell_kind
 from executive.runtime.operator import ScriptedOperator, TerminalOperator
 from executive.skill import Skill
+from executive.workcell import CellOptions, Workcell
 
 LONGEST_BRAKING = 2.0
 """Time after which an arm that was told to brake must be at rest [s]."""
@@ -38,6 +39,7 @@ class _Ending:
     reason: str = ""
     message: str = ""
     node: str = ""
+    traceback: str = ""
 
 
 @dataclass(frozen=True)
@@ -113,6 +115,10 @@ class Run:
         )
         self.root = build(loaded, skills, self._workcell.cell, Scope(), self._emit)
 
+    def observe(self, observer: Observer) -> None:
+        """Tell `observer` of every event from now on."""
+        self._observers.append(observer)
+
     @property
     def workcell(self) -> Workcell:
         """The cell this run drives."""
@@ -128,6 +134,9 @@ class Run:
         with self._interruptible():
             ending = self._loop()
             problems = [*halt(self.root), *self._brake()]
+        if ending.traceback:
+            # Only now: a record that cannot be written must not keep the arm from braking.
+            self._emit("fault", traceback=ending.traceback)
         if problems and ending.status != "FAULT":
             ending = _Ending("FAULT", "fault", problems[0])
         self.workcell.accounts.close()
@@ -135,7 +144,9 @@ class Run:
         if ending.status == "SUCCESS" and lost:
             ending = _Ending("FAILURE", "lost", f"{lost} object(s) were lost and not found again")
         now = round(self.workcell.cell.clock.now, 6)
-        outcome = Outcome(**asdict(ending), ticks=self._tick, robot_time=now)
+        outcome = Outcome(
+            ending.status, ending.reason, ending.message, ending.node, ticks=self._tick, robot_time=now
+        )
         self._emit("end", **asdict(outcome))
         return outcome
 
@@ -167,9 +178,9 @@ class Run:
                 if self._realtime:
                     time.sleep(max(0.0, began + self.workcell.cell.clock.now - time.monotonic()))
         except Exception as error:
-            self._emit("fault", traceback=traceback.format_exc())
             named = str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"
-            return _Ending("FAULT", "fault", named, error.node if isinstance(error, Fault) else "")
+            node = error.node if isinstance(error, Fault) else ""
+            return _Ending("FAULT", "fault", named, node, traceback.format_exc())
         return _Ending("HALTED", "halted", "halted by the user")
 
     def _verdict(self) -> _Ending:

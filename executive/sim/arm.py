@@ -8,10 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 import pybullet
 
-from executive.cell import Motion, ObjectClass, Via
+from executive.cell import Motion, Via
 from executive.cell_config import ArmConfig
 from executive.errors import Fault, Unreachable
 from executive.geometry import Array, Pose
+from executive.messages import ObjectClass
 from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
 from executive.motion.stop import brake

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from executive.cell import Bin
 from executive.geometry import Array
 from executive.ledger.item import Record, State
+from executive.messages import Bin
 from executive.sim.world import World
 
 FLOOR = -0.05

@@ -10,9 +10,10 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from executive.cell import Box, Clock, Frame
+from executive.cell import Clock
 from executive.cell_config import CameraConfig, NoiseConfig
 from executive.geometry import Array, Pose
+from executive.messages import Box, Frame
 from executive.sim.world import World
 from executive.vision.camera_model import camera_matrix, looking_at, projection_matrix, view_matrix
 

@@ -6,11 +6,12 @@ from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
-from executive.cell import Accounts, Cell, CellOptions, KeyPath, ObjectClass, Target
+from executive.cell import Cell
 from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.events import Emit
 from executive.ledger.ledger import ItemLedger
+from executive.messages import ObjectClass, Target
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
@@ -28,10 +29,11 @@ from executive.sim.view import ArmShadow
 from executive.sim.world import STEP, World
 from executive.vision.detectors.registry import ClosableDetector, build_detectors
 from executive.vision.localize import PlaneLocalizer
+from executive.workcell import Accounts, CellOptions, KeyPath
 
 
 class SimCell:
-    """A cell file brought to life; implements `executive.cell.Workcell`.
+    """A cell file brought to life; implements `executive.workcell.Workcell`.
 
     Args:
         config: The cell file.

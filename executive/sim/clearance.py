@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import pybullet
 
-from executive.cell import ObjectClass
 from executive.cell_config import CellConfig
 from executive.errors import Blocked
 from executive.geometry import Array, Pose
+from executive.messages import ObjectClass
 from executive.sim.world import BIN_THICKNESS, World
 
 FIRST_MOVING = 1

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from executive.cell import Bin
 from executive.cell_config import BinConfig, CellConfig
+from executive.messages import Bin
 
 
 def as_bin(name: str, config: BinConfig) -> Bin:

@@ -14,10 +14,10 @@ import numpy as np
 import pybullet_data
 from numpy.typing import NDArray
 
-from executive.cell import KeyPath
 from executive.cell_config import CellConfig, ObjectConfig
 from executive.errors import InputError
 from executive.geometry import Array, Pose
+from executive.workcell import KeyPath
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from executive.cell import KeyPath, Via
+from executive.cell import Via
 from executive.cell_config import CellConfig
 from executive.errors import Unreachable
 from executive.geometry import Array
@@ -14,6 +14,7 @@ from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
 from executive.sim.layout import as_bin, travel_height
+from executive.workcell import KeyPath
 
 
 def out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:

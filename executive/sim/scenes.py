@@ -16,10 +16,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell import Box
 from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.geometry import Array, Pose
+from executive.messages import Box
 from executive.sim.arrangements import Arrangement, arrange, random_light, random_part, random_tint, reach
 from executive.sim.camera import Image, add_noise, camera_pose, render
 from executive.sim.models import load_mesh

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell import Box
 from executive.geometry import Array
+from executive.messages import Box
 from executive.sim.models import Mesh
 
 FINE = 4

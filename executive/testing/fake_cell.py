@@ -7,13 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from executive.cell import Bin, Cell, CellOptions, ObjectClass, Operator, Target
+from executive.cell import Cell, Operator
 from executive.cell_config import CellConfig, LedgerConfig
 from executive.events import Emit, ignore
 from executive.ledger.ledger import ItemLedger
+from executive.messages import Bin, ObjectClass, Target
 from executive.testing.fake_parts import FakeArm, FakeCamera, FakeClock, FakeDetector, FakeTool
 from executive.testing.fake_world import FakeWorld
 from executive.vision.localize import PlaneLocalizer
+from executive.workcell import CellOptions
 
 CLASSES = {
     "cube": ObjectClass("cube", 0.05, 0.035),
@@ -37,7 +39,7 @@ class SilentOperator:
 
 
 class FakeCell:
-    """A fake work cell; implements `executive.cell.Workcell`.
+    """A fake work cell; implements `executive.workcell.Workcell`.
 
     Attributes:
         world, arm, tool, camera, detector, ledger: The fake parts, for a test to arrange and inspect.

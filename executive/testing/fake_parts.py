@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from executive.cell import Box, Detection, Frame, Motion, ObjectClass, Request, Steps, Via
+from executive.cell import Motion, Request, Steps, Via
 from executive.errors import Fault, Unavailable, Unreachable
 from executive.geometry import Array, Pose, looking_down, tool_down
+from executive.messages import Box, Detection, Frame, ObjectClass
 from executive.testing.fake_world import STEP, FakeWorld
 
 REACH = 0.85

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from executive.cell import ObjectClass
 from executive.geometry import Array
+from executive.messages import ObjectClass
 
 STEP = 1 / 240
 """Length of one control step [s]."""

@@ -15,9 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from executive.cell import Clock, Detection, Frame
+from executive.cell import Clock
 from executive.cell_config import CameraConfig, DetectorConfig
 from executive.geometry import Array, Pose
+from executive.messages import Detection, Frame
 from executive.sim.camera import Image, SimCamera
 from executive.sim.cell import SimCell
 from executive.sim.models import Mesh, load_mesh

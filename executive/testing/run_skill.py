@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from executive.cell import Workcell
 from executive.skill import Direction, Skill, SkillFailed
+from executive.workcell import Workcell
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from executive.cell import Box
 from executive.geometry import Array, Pose
+from executive.messages import Box
 
 NEAR, FAR = 0.02, 5.0
 """Clipping planes of rendered cameras [m]."""

@@ -18,8 +18,8 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from executive.cell import Box
 from executive.errors import InputError
+from executive.messages import Box
 
 SPLITS = ("train", "valid", "test")
 QUALITY = 95

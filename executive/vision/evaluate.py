@@ -11,8 +11,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell import Box, Detection
 from executive.geometry import Array, Pose
+from executive.messages import Box, Detection
 from executive.vision.camera_model import on_plane
 from executive.vision.detectors.onnx_model import OnnxModel, read_labels
 from executive.vision.detectors.views import iou

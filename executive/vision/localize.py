@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from executive.cell import Detection, Frame, ObjectClass
 from executive.errors import NoDepth
 from executive.geometry import Array
+from executive.messages import Detection, Frame, ObjectClass
 
 
 class PlaneLocalizer:

@@ -13,8 +13,8 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from executive.cell import Box
 from executive.errors import InputError
+from executive.messages import Box
 
 ANNOTATIONS = "_annotations.coco.json"
 SPLITS = ("test", "valid", "val", "train")

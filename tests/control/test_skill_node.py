@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from py_trees.common import Status
 
-from executive.cell import Target
 from executive.control.halting import halt
 from executive.control.scope import Scope
 from executive.control.skill_node import SkillNode, Wiring
 from executive.errors import Fault
+from executive.messages import Target
 from executive.skill import In, Out, Skill, param, port
 
 CLEANED: list[str] = []

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from executive.cell import Bin, Detection, Detections, Frame, Target
 from executive.cell_config import LedgerConfig
 from executive.errors import Fault
 from executive.geometry import looking_down
 from executive.ledger.ledger import ItemLedger
+from executive.messages import Bin, Detection, Detections, Frame, Target
 
 Thing = tuple[str, float, float]
 

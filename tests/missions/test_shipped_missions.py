@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-from executive.cell import Workcell
 from executive.mission.load import LoadedMission, load_mission
 from executive.record.result import ledger_agrees
 from executive.runtime.cells import robot_check
@@ -16,6 +15,7 @@ from executive.runtime.run import Outcome, Run
 from executive.skill import discover
 from executive.testing.fake_cell import FakeCell
 from executive.testing.oracle import oracle_cell
+from executive.workcell import Workcell
 
 MISSIONS = sorted((Path(__file__).parents[2] / "missions").glob("*.yaml"))
 

@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from executive.cell import Frame
 from executive.events import Event
 from executive.geometry import Pose
+from executive.messages import Frame
 from executive.record.frames import KEPT, Frames
 from executive.record.overlay import Picture, draw
 

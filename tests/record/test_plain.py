@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.cell import Frame
 from executive.geometry import Pose
+from executive.messages import Frame
 from executive.record.plain import plain
 
 

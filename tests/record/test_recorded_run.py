@@ -32,8 +32,11 @@ class PretendedRun:
     closed = 0
     root = "the tree"
 
-    def __init__(self, loaded, skills, *, seed, observers, gui, realtime, requests):
-        self._observers = observers
+    def __init__(self, loaded, skills, *, seed, gui, realtime, requests):
+        self._observers = []
+
+    def observe(self, observer):
+        self._observers.append(observer)
 
     def execute(self):
         for event in (Event("run", 0, 0.0, {"seed": 7}), Event("decision", 3, 0.1, {"item": "cube-1"})):

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 from py_trees.common import Status
 
-from executive.cell import Detection
 from executive.errors import InputError
 from executive.events import Event
+from executive.messages import Detection
 from executive.mission.load import load_mission
 from executive.runtime.run import Run
 from executive.skill import discover

@@ -8,10 +8,11 @@ import pybullet
 import pytest
 import yaml
 
-from executive.cell import ObjectClass, Via
+from executive.cell import Via
 from executive.cell_config import CellConfig
 from executive.errors import Blocked
 from executive.geometry import tool_down
+from executive.messages import ObjectClass
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner

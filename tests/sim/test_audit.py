@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from executive.cell import Bin
 from executive.geometry import Pose
+from executive.messages import Bin
 from executive.sim.audit import audit
 
 

@@ -9,14 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from executive.cell import CellOptions, Detections, Via
+from executive.cell import Via
 from executive.errors import InputError
 from executive.events import ignore
 from executive.geometry import Pose
+from executive.messages import Detections
 from executive.mission.cell_file import load_cell
 from executive.sim.cell import SimCell
 from executive.testing.fake_cell import ROUTES, SilentOperator
 from executive.testing.oracle import oracle_cell
+from executive.workcell import CellOptions
 
 Build = Callable[..., SimCell]
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from executive.cell import Target
+from executive.messages import Target
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.detect import Detect

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from executive.cell import Detection
+from executive.messages import Detection
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.detect import Detect

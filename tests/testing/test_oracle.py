@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from executive.cell import CellOptions, Detection
 from executive.events import ignore
 from executive.geometry import Pose
+from executive.messages import Detection
 from executive.mission.cell_file import load_cell
 from executive.sim.cell import SimCell
 from executive.testing.fake_cell import ROUTES, SilentOperator
 from executive.testing.oracle import TrueFrame, oracle_cell
+from executive.workcell import CellOptions
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ import threading
 
 import pytest
 
-from executive.cell import Detection
 from executive.errors import Unavailable
+from executive.messages import Detection
 from executive.vision.detectors.requests import Worker
 
 ANSWER = [Detection("cube", 0.9, (0.0, 0.0, 1.0, 1.0))]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from executive.cell import Detection
+from executive.messages import Detection
 from executive.vision.evaluate import Spread, evaluate
 from executive.vision.samples import LabelledImage
 

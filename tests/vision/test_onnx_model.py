@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from executive.cell import Detection
 from executive.errors import InputError
+from executive.messages import Detection
 from executive.vision.detectors.embedded import LABELS, MODEL
 from executive.vision.detectors.onnx_model import OnnxModel, read_labels, without_duplicates
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from executive.cell import Detection, Frame
 from executive.cell_config import CameraConfig, DetectorConfig
 from executive.errors import InputError
 from executive.geometry import Pose
+from executive.messages import Detection, Frame
 from executive.vision.detectors.embedded import LABELS, MODEL, EmbeddedDetector
 from executive.vision.detectors.rfdetr import RfdetrDetector
 

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.cell import Detection
 from executive.errors import InputError
+from executive.messages import Detection
 from executive.vision.detectors.views import Finding, iou, merge, parts_of
 
 TABLE = (192, 100, 448, 356)

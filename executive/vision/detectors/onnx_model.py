@@ -14,9 +14,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell import Box, Detection
 from executive.errors import InputError, Unavailable
 from executive.geometry import Array
+from executive.messages import Box, Detection
 from executive.vision.detectors.views import iou
 
 MEAN = np.array([0.485, 0.456, 0.406], dtype=np.float32)

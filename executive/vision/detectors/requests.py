@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, TimeoutError
 
-from executive.cell import Clock, Detection
+from executive.cell import Clock
+from executive.messages import Detection
 
 Search = Callable[[], Sequence[Detection]]
 

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, ValidationError
 
-from executive.cell import Clock, Detection, Frame
+from executive.cell import Clock
 from executive.cell_config import CameraConfig, DetectorConfig, Section
 from executive.errors import InputError
+from executive.messages import Detection, Frame
 from executive.vision.detectors.onnx_model import OnnxModel, read_labels
 from executive.vision.detectors.requests import Pending, Worker
 from executive.vision.detectors.views import Finding, Part, merge, parts_of

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from executive.cell import Box, Detection
 from executive.errors import InputError
+from executive.messages import Box, Detection
 
 Part = tuple[int, int, int, int]
 """Left, top, right, bottom [pixel] of a part of an image."""

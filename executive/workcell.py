@@ -1,0 +1,76 @@
+"""What the runtime drives: a cell together with the world it acts in, and how one is made."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from executive.cell import Cell, Operator
+from executive.events import Emit
+
+
+class Accounts(Protocol):
+    """What the runtime asks of a ledger when a run is over."""
+
+    def close(self) -> None:
+        """Decide what became of everything still open."""
+
+    def balance(self) -> dict[str, int]:
+        """Return the counts `seen, placed, rejected, lost, phantom`."""
+
+    def rows(self) -> list[dict[str, object]]:
+        """Return a plain row per item, in the order of first sight."""
+
+
+class Workcell(Protocol):
+    """What the runtime drives: a cell together with the world it acts in."""
+
+    @property
+    def cell(self) -> Cell:
+        """What skills see."""
+
+    @property
+    def accounts(self) -> Accounts:
+        """The books of the cell's ledger."""
+
+    def advance(self) -> None:
+        """Let one control step pass."""
+
+    def audit(self) -> Mapping[str, int] | None:
+        """Return what really became of the objects, or None where nobody can know (real hardware)."""
+
+    def close(self) -> None:
+        """Give everything back; the cell cannot be used afterwards."""
+
+
+@dataclass(frozen=True)
+class CellOptions:
+    """How a run wants its cell.
+
+    Attributes:
+        operator: Who is asked for requests.
+        base: Folder that paths in the cell file start from.
+        gui: Show the world in a window.
+    """
+
+    operator: Operator
+    base: Path
+    gui: bool = False
+
+
+KeyPath = tuple[str | int, ...]
+"""Keys that lead to a value in a cell file, outermost first."""
+
+
+class CellKind(Protocol):
+    """A class that makes work cells; found by its name in the entry-point group `executive.cells`."""
+
+    def __call__(
+        self, config: Any, *, seed: int, routes: Mapping[str, str], emit: Emit, options: CellOptions
+    ) -> Workcell:
+        """Return a cell made from a cell file (`executive.cell_config.CellConfig`)."""
+
+    def check(self, config: Any) -> Iterable[tuple[KeyPath, str]]:
+        """Return what is wrong with a cell file beyond its form: the key it is about, and a sentence."""
