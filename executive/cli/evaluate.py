@@ -39,6 +39,10 @@ if TYPE_CHECKING:
     "--threshold", type=click.FloatRange(0, 1), default=0.5, show_default=True,
     help="Confidence from which a detection counts.",
 )  # fmt: skip
+@click.option(
+    "--as-run", is_flag=True,
+    help="Scenes as a run begins with, instead of ones varied as widely as in training.",
+)  # fmt: skip
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Processes.")
 @json_option
 def command(
@@ -49,6 +53,7 @@ def command(
     images: int,
     seed: int,
     threshold: float,
+    as_run: bool,
     workers: int,
     as_json: bool,
 ) -> None:
@@ -69,7 +74,7 @@ def command(
             with tempfile.TemporaryDirectory() as folder, bar(f"rendering {cell}") as progress:
                 generate(
                     {cell: config}, Path(folder), images=images, seed=seed, layout="coco", workers=workers,
-                    valid=1.0, progress=progress,
+                    valid=1.0, progress=progress, randomized=not as_run,
                 )  # fmt: skip
                 measured[cell] = evaluate_folder(model, names, Path(folder), threshold)
         if dataset is not None:

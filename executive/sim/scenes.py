@@ -21,9 +21,10 @@ from executive.errors import InputError
 from executive.geometry import Array, Pose
 from executive.messages import Box
 from executive.sim.arrangements import Arrangement, arrange, random_light, random_part, random_tint, reach
-from executive.sim.camera import Image, add_noise, camera_pose, render
+from executive.sim.camera import CELL_LIGHT, Image, add_noise, camera_pose, render
 from executive.sim.models import load_mesh
 from executive.sim.silhouette import outline_box, visible_share
+from executive.sim.spawn import spawn
 from executive.sim.world import World
 from executive.vision.camera_model import camera_matrix, on_plane, project
 from executive.vision.dataset import Entry, image_path, save_image, write_annotations
@@ -71,10 +72,15 @@ class Sample:
 
 
 class SceneRenderer:
-    """Makes samples of one camera of a cell, reusing one world for all of them."""
+    """Makes samples of one camera of a cell, reusing one world for all of them.
 
-    def __init__(self, config: CellConfig, camera: str) -> None:
+    With `randomized`, everything varies more than a run can: for training. Without, scenes are as a run
+    begins with: objects set down by `spawn`, the cell's own lamp, the arm at one of the scan poses.
+    """
+
+    def __init__(self, config: CellConfig, camera: str, *, randomized: bool = True) -> None:
         self._config = config
+        self._randomized = randomized
         self._camera = config.cameras[camera]
         self._meshes = {label: load_mesh(model) for label, model in config.objects.items()}
         self._world = World(config)
@@ -84,7 +90,8 @@ class SceneRenderer:
         """Return the sample of `seed`: the first of its random scenes with few half-hidden objects."""
         attempt = 0
         while True:
-            sample = self._draw(np.random.default_rng([seed, attempt]))
+            rng = np.random.default_rng([seed, attempt])
+            sample = self._draw(rng) if self._randomized else self._draw_as_run(rng)
             if sample is not None:
                 return sample
             attempt += 1
@@ -113,6 +120,22 @@ class SceneRenderer:
                 world.remove_object(body)
         image = add_noise(shot.image, self._camera.noise, rng)
         return self._label(image, shot.bodies, bodies, arrangement, X_WC, part)
+
+    def _draw_as_run(self, rng: np.random.Generator) -> Sample | None:
+        world, part = self._world, self._camera.table_view
+        pose = np.radians(self._config.arm.poses_deg[str(rng.choice(self._camera.scan_poses))])
+        world.set_arm(pose)
+        bodies = spawn(world, self._config, int(rng.integers(2**32)))
+        world.set_arm(pose)  # settling may have let it sag
+        try:
+            X_WC = camera_pose(world, self._camera)
+            items = [(world.bodies[body], world.object_pose(body), (0.0, 0.0, 0.0)) for body in bodies]
+            shot = render(world, self._matrix, X_WC, part, CELL_LIGHT)
+        finally:
+            for body in bodies:
+                world.remove_object(body)
+        image = add_noise(shot.image, self._camera.noise, rng)
+        return self._label(image, shot.bodies, list(bodies), Arrangement(tuple(items)), X_WC, part)
 
     def _label(
         self,
@@ -183,6 +206,7 @@ def generate(
     workers: int,
     valid: float,
     progress: Callable[[int, int], None],
+    randomized: bool = True,
 ) -> None:
     """Write a dataset of random scenes, the cells taking turns; the last share of it is for validation.
 
@@ -195,6 +219,7 @@ def generate(
         workers: Processes that render.
         valid: Share of the images that goes into the split `valid`, 0 to 1.
         progress: Told (images made, images in all) now and then.
+        randomized: Vary everything, for training; else scenes as a run begins with.
 
     Raises:
         InputError: The layout is unknown, the cells differ in their classes, or a file cannot be written.
@@ -212,7 +237,9 @@ def generate(
     entries: dict[int, Entry] = {}
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         blocks = [
-            pool.submit(_render_block, cells, out, layout, seed, first, splits[first : first + BLOCK])
+            pool.submit(
+                _render_block, cells, out, layout, seed, first, splits[first : first + BLOCK], randomized
+            )
             for first in range(0, images, BLOCK)
         ]
         for block in as_completed(blocks):
@@ -222,12 +249,21 @@ def generate(
 
 
 def _render_block(
-    cells: Sequence[CellConfig], out: Path, layout: str, seed: int, first: int, splits: Sequence[str]
+    cells: Sequence[CellConfig],
+    out: Path,
+    layout: str,
+    seed: int,
+    first: int,
+    splits: Sequence[str],
+    randomized: bool,
 ) -> dict[int, Entry]:
     """Render and save the images from number `first` on, one per split; runs in a process of its own."""
     cv2.setNumThreads(1)
     cameras = [next(iter(cell.cameras)) for cell in cells]
-    renderers = [SceneRenderer(cell, camera) for cell, camera in zip(cells, cameras, strict=True)]
+    renderers = [
+        SceneRenderer(cell, camera, randomized=randomized)
+        for cell, camera in zip(cells, cameras, strict=True)
+    ]
     entries = {}
     for number, split in enumerate(splits, first):
         turn = number % len(cells)
