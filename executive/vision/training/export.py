@@ -12,7 +12,7 @@ from executive.vision.training.compress import Storage, compress
 
 OPSET = 17
 STORAGE: Storage = "int8"
-"""How weights are stored: measured to move box centres by less than a hundredth of a pixel."""
+"""How weights are stored: moves 99 of 100 box centres by less than 0.03 pixel against float32, measured."""
 
 
 def export_onnx(checkpoint: Path, classes: int, out: Path, storage: Storage | None) -> None:
