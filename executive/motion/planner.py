@@ -33,8 +33,8 @@ UNLIKE = 0.25
 """Joint difference from which two joint paths are worth checking both [rad]."""
 WIDTH = 60
 """Best partial joint paths that are kept from stroke to stroke."""
-SAG = 0.01
-"""How far the tool may sink between two waypoints below the lower of them [m]."""
+SAG, SAG_LOADED = 0.05, 0.01
+"""How far the tool may sink between two waypoints below the lower of them, empty and with a load [m]."""
 ATTEMPTS = 16
 """Joint paths that are checked before a motion counts as blocked."""
 
@@ -100,7 +100,7 @@ class Planner:
             trajectory = Trajectory(path, self.limits, self._rates(path, speeds))
             trajectory.check(self.limits)
             try:
-                self._require_level(path)
+                self._require_level(path, SAG if carrying is None else SAG_LOADED)
                 if self._clearance is not None:
                     self._clearance(trajectory.path(SPACING), carrying)
             except Blocked as error:
@@ -110,8 +110,10 @@ class Planner:
         others = f"; of {len(blocked)} ways tried none is free" if len(blocked) > 1 else ""
         raise Blocked(f"{blocked[0]}{others}")
 
-    def _require_level(self, path: Array) -> None:
-        """Make sure that the tool sinks nowhere between two waypoints `(N, 7)` far below the lower one.
+    def _require_level(self, path: Array, allowed: float) -> None:
+        """Make sure that the tool sinks nowhere between two waypoints by more than `allowed` [m].
+
+        `path` is the joint positions `(N, 7)` [rad] of the waypoints; it counts from the lower of the two.
 
         A via's height is what keeps tool and load above walls and loose objects, and a straight line
         between two joint positions of equal height may sag by centimetres on the way.
@@ -123,9 +125,9 @@ class Planner:
         states = path[None, :-1] + along * np.diff(path, axis=0)
         heights = self.kinematics.positions(states.reshape(-1, 7))[:, 2].reshape(states.shape[:2])
         sag = float(np.max(np.minimum(heights[0], heights[-1]) - heights.min(axis=0)))
-        if sag > SAG:
+        if sag > allowed:
             raise Blocked(
-                f"the tool would sink {sag * 1000:.0f} mm below its way; {SAG * 1000:.0f} mm are allowed"
+                f"the tool would sink {sag * 1000:.0f} mm below its way; {allowed * 1000:.0f} mm are allowed"
             )
 
     def _rates(self, path: Array, speeds: Sequence[float | None]) -> list[float]:

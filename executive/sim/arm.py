@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Sequence
 
@@ -10,7 +11,7 @@ import pybullet
 
 from executive.cell import Motion, Via
 from executive.cell_config import ArmConfig
-from executive.errors import Fault, Unreachable
+from executive.errors import Blocked, Fault, Unreachable
 from executive.geometry import Array, Pose
 from executive.messages import ObjectClass
 from executive.motion.limits import JointLimits
@@ -24,6 +25,8 @@ TORQUES = (320.0, 320.0, 176.0, 176.0, 110.0, 40.0, 40.0)
 """Largest joint torques of the iiwa 14 [Nm], data sheet as in RobotLocomotion/models iiwa_description."""
 START_TOLERANCE = math.radians(0.2)
 """Largest joint difference between the arm and the start of a motion [rad]."""
+LIFTS = (0.0, 0.05, 0.10)
+"""Heights above travel height that are tried before leaving for a named pose, in order [m]."""
 TRACKING_TOLERANCE = math.radians(0.5)
 """Largest joint difference between command and arm [rad]; undisturbed it is under 0.001°."""
 
@@ -104,11 +107,11 @@ class SimArm:
         X_WT = self.planner.kinematics.forward(self._command)
         x, y, z = X_WT.position
         if z < self._travel_height and -X_WT.rotation[2, 2] > UPRIGHT:
-            above = Via(np.array([x, y, self._travel_height]))
-            try:
-                return self.planner.plan_joints(self._command, goal, first=[above])
-            except Unreachable:
-                pass  # no room to go up: the straight way may still be free
+            for higher in LIFTS:
+                above = Via(np.array([x, y, self._travel_height + higher]))
+                # No room to go up so far, or no free way from there: another height may have one.
+                with contextlib.suppress(Unreachable, Blocked):
+                    return self.planner.plan_joints(self._command, goal, first=[above])
         return self.planner.plan_joints(self._command, goal)
 
     def start(self, motion: Motion) -> None:
