@@ -39,7 +39,8 @@ def test_fresh_scenes_of_a_shipped_cell_are_read_almost_without_error(missions, 
     renderer.close()
     measured = evaluate(OnnxModel(MODEL, read_labels(LABELS)), samples, 0.5)
     assert measured.objects > 20
-    assert measured.precision >= 0.97
-    assert measured.recall >= 0.97
+    # Of about fifty objects: the card's figures, less two mistakes.
+    assert measured.precision >= 0.95
+    assert measured.recall >= 0.90
     assert measured.centre.median < 1.0
     assert measured.position.median < 3.0
