@@ -107,11 +107,13 @@ class SimArm:
         X_WT = self.planner.kinematics.forward(self._command)
         x, y, z = X_WT.position
         if z < self._travel_height and -X_WT.rotation[2, 2] > UPRIGHT:
-            for higher in LIFTS:
-                above = Via(np.array([x, y, self._travel_height + higher]))
-                # No room to go up so far, or no free way from there: another height may have one.
+            there = self.planner.kinematics.forward(goal).position
+            lifts = [Via(np.array([x, y, self._travel_height + higher])) for higher in LIFTS]
+            # Straight from above to the pose, or from a contorted posture first to where its tool is: there
+            # the planner may choose the posture.
+            for first in (*([lift] for lift in lifts), *([lift, Via(there)] for lift in lifts)):
                 with contextlib.suppress(Unreachable, Blocked):
-                    return self.planner.plan_joints(self._command, goal, first=[above])
+                    return self.planner.plan_joints(self._command, goal, first=first)
         return self.planner.plan_joints(self._command, goal)
 
     def start(self, motion: Motion) -> None:
