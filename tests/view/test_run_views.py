@@ -180,7 +180,7 @@ def test_the_summary_says_how_it_ended_how_long_it_took_and_how_to_repeat_it():
     repeat = repeat_command("sort", seed=7, overrides={"attempts": "5"}, requests=["cube"])
     assert summary(RESULT, items, repeat).splitlines() == [
         "FAILURE Transit.dropped at sort/0/3: lost at 1.2 m/s",
-        "34.2 s on the robot's clock, 6.8 s of waiting",
+        "34.2 s on the robot's clock, 6.8 s by the wall clock",
         "runs/latest  (repeat: executive run sort --seed 7 --set attempts=5 --request cube)",
         "  red_bin: cube-1, cube-2",
         "  rejected: duck-1 (three misses)",
