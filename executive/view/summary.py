@@ -35,7 +35,8 @@ def summary(result: Mapping[str, Any], items: ItemTable, repeat: str) -> str:
     """Return three lines, then one for each bin and for each other fate of an item."""
     lines = [
         verdict(result),
-        f"{result['robot_time_s']:.1f} s on the robot's clock, {result['wall_time_s']:.1f} s by the wall clock",
+        f"{result['robot_time_s']:.1f} s on the robot's clock, "
+        f"{result['wall_time_s']:.1f} s by the wall clock",
         f"{result['run']}  (repeat: {repeat})",
     ]
     lines += [f"  {fate}: {', '.join(names)}" for fate, names in sorted(items.by_fate().items())]
