@@ -32,7 +32,7 @@ def command(
     with stdout_kept_clean():
         from executive.cli.cells import load_cells
         from executive.cli.progress import bar
-        from executive.sim.scenes import generate
+        from executive.sim.datasets import generate
 
         configs = load_cells(cells)
         with bar("rendering") as progress:

@@ -63,7 +63,7 @@ def command(
     with stdout_kept_clean():
         from executive.cli.cells import load_cells
         from executive.cli.progress import bar
-        from executive.sim.scenes import generate
+        from executive.sim.datasets import generate
         from executive.vision.detectors.embedded import LABELS, MODEL
         from executive.vision.evaluate import evaluate_folder
 

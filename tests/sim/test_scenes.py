@@ -9,9 +9,10 @@ import pytest
 from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.geometry import Pose
+from executive.sim.datasets import generate
 from executive.sim.models import load_mesh
 from executive.sim.piles import settle
-from executive.sim.scenes import SIZE, SceneRenderer, generate, render_sample
+from executive.sim.scenes import SIZE, SceneRenderer, render_sample
 from executive.sim.silhouette import outline_area
 
 
@@ -77,7 +78,7 @@ def test_what_is_dropped_comes_to_lie_on_the_table_or_on_another(overhead: CellC
 def test_a_dataset_is_the_same_for_any_number_of_workers(
     overhead: CellConfig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("executive.sim.scenes.BLOCK", 2)
+    monkeypatch.setattr("executive.sim.datasets.BLOCK", 2)
     told: list[tuple[int, int]] = []
     for workers in (1, 2):
         generate(
