@@ -121,7 +121,7 @@ class Kinematics:
         # Frame 3: z along the upper arm, y normal to the triangle, x completes it.
         z3 = math.cos(lift) * n + math.sin(lift) * out
         y3 = np.cross(n, out)
-        x3 = np.cross(y3, z3)
+        x3 = np.asarray(np.cross(y3, z3), dtype=np.float64)
         x4 = math.cos(q4) * x3 + math.sin(q4) * z3
         z4 = -math.sin(q4) * x3 + math.cos(q4) * z3
         R_47 = np.stack([x4, y3, z4], axis=-2) @ X_WT.rotation
