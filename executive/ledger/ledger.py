@@ -169,7 +169,7 @@ class ItemLedger:
         """Decide what became of everything still open: the run is over.
 
         An item seen where it was left is rejected, one that is known to exist and was not found again is
-        lost, one that a single look believed in and another one did not is a phantom.
+        lost, given up or not, one that a single look believed in and another one did not is a phantom.
         """
         for record in self._records.values():
             if record.state is State.HELD:
@@ -179,7 +179,7 @@ class ItemLedger:
                 continue
             elif not record.exists and record.absent:
                 self._change(record.item, State.PHANTOM)
-            elif record.state is State.REJECTED:
+            elif record.state is State.REJECTED and record.absent < self._config.looks_to_believe:
                 continue
             elif record.state is State.DROPPED or record.absent:
                 record.why = "known to exist, not found again"

@@ -58,7 +58,7 @@ def read_samples(folder: Path) -> Iterator[LabelledImage]:
             return
     raise InputError(
         f"{folder} holds no labelled images: {ANNOTATIONS} (COCO) or images/ and labels/ (YOLO) were looked "
-        f"for there and in {', '.join(SPLITS)}; make some with `executive data`"
+        f"for there and in {', '.join(SPLITS)}; make some with `executive dataset`"
     )
 
 

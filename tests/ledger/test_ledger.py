@@ -227,3 +227,23 @@ def test_an_item_nobody_entered_is_a_fault(bench: Bench) -> None:
     bench.look(("cube", 0.5, 0.0))
     with pytest.raises(Fault, match='the ledger knows no item "cube-9"; it knows: cube-1'):
         bench.ledger.held("cube-9")
+
+
+def test_a_rejected_item_that_is_nowhere_to_be_found_is_lost(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0))
+    bench.ledger.held("cube-1")
+    bench.ledger.dropped("cube-1")
+    bench.ledger.rejected("cube-1", "could not be picked")
+    bench.look(view="full")
+    bench.look(view="full")
+    bench.ledger.close()
+    assert (bench.ledger.balance()["lost"], bench.ledger.balance()["rejected"]) == (1, 0)
+
+
+def test_a_rejected_item_that_one_look_misses_stays_rejected(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0))
+    bench.look(("cube", 0.50, 0.0))
+    bench.ledger.rejected("cube-1", "could not be picked")
+    bench.look(view="full")
+    bench.ledger.close()
+    assert (bench.ledger.balance()["lost"], bench.ledger.balance()["rejected"]) == (0, 1)

@@ -177,3 +177,23 @@ def test_a_box_that_stays_in_doubt_ends_in_an_empty_table_and_not_in_a_failure(m
     fake_of(run).world.objects.clear()
     assert run.execute().status == "SUCCESS"
     assert sum(e.data.get("reason") == "unsure" and e.data["node"].endswith("Detect") for e in events) >= 6
+
+
+def test_an_object_that_slips_out_of_the_cup_every_time_is_given_up_in_the_end(missions: Path) -> None:
+    run, _ = make(missions)
+    fake = fake_of(run)
+    slippery = fake.world.objects[0]
+    advance = fake.advance
+
+    def slipping() -> None:
+        advance()
+        if fake.world.held is slippery and fake.arm.tool_pose.position[2] > 0.12:
+            fake.tool.open()
+        assert fake.world.steps < 60_000, "the mission tries for ever"
+
+    fake.advance = slipping  # type: ignore[method-assign]
+    outcome, items, audit = run.execute(), run.items(), run.audit()
+    assert outcome.status == "SUCCESS", outcome
+    assert (items["rejected"], audit["left"]) == (1, 1)
+    assert items["placed"] == audit["right"] == items["seen"] - 1
+    assert next(row for row in items["rows"] if row["state"] == "rejected")["attempts"] == 8

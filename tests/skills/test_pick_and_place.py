@@ -158,3 +158,14 @@ def test_move_to_scan_goes_to_the_cameras_first_pose(fake: FakeCell) -> None:
     fake.camera.sees = lambda: False
     assert run_skill(MoveToScan(), fake).status == "SUCCESS"
     assert np.allclose(fake.arm.tool_pose.position, [0.3, -0.3, 0.3])
+
+
+def test_an_item_is_given_up_only_after_the_failures_the_mission_grants(
+    fake: FakeCell, target: Target
+) -> None:
+    fake.ledger.missed("cube-1")
+    run_skill(RejectTarget(item="cube-1", after=2), fake)
+    assert fake.ledger.is_open("cube-1")
+    fake.ledger.missed("cube-1")
+    run_skill(RejectTarget(item="cube-1", after=2), fake)
+    assert not fake.ledger.is_open("cube-1")
