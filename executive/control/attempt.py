@@ -35,6 +35,11 @@ class Try(ControlNode):
         self._body, self._finish = body, finish
         self._handlers = tuple(handlers)
 
+    def when(self, child: Behaviour) -> str:
+        """Return after which failures a catch runs: `on Grasp.missed`."""
+        names = next((names for names, behaviour in self._handlers if behaviour is child), ())
+        return f"on {', '.join('.'.join(name) for name in names)}" if names else ""
+
     def start(self) -> None:
         """Begin with the body."""
         self._current = self._body

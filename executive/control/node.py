@@ -7,7 +7,7 @@ node, not its descendants: the executive observes a tree through events, not thr
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from py_trees.behaviour import Behaviour
@@ -42,9 +42,11 @@ class ControlNode(Composite):
         word: What the node is called in a mission; the source of failures of its own.
         path: Unique path from the root of the tree.
         failure: Why it failed, while its status is FAILURE; else None.
+        subtrees: Names of the subtrees that begin with it, the outermost first.
     """
 
     word = "node"
+    subtrees: tuple[str, ...] = ()
 
     def __init__(self, site: Site, children: Sequence[Behaviour]) -> None:
         super().__init__(site.label or self.word, children)
@@ -57,12 +59,20 @@ class ControlNode(Composite):
         """What the mission says about it, in a few words, for outlines."""
         return ""
 
+    def when(self, child: Behaviour) -> str:
+        """Return after which failures a child runs, in a few words; "" for one that needs none."""
+        del child
+        return ""
+
     def start(self) -> None:
         """Begin anew; called before the first `step` of every activation."""
 
     def step(self) -> Status:
         """Go on by one tick and return RUNNING, SUCCESS or FAILURE; set `failure` before FAILURE."""
         raise NotImplementedError
+
+    def clean_up(self) -> None:
+        """Leave nothing behind; called once at the end of every activation, however it ends."""
 
     def tick_once(self) -> None:
         """Go on by one tick."""
@@ -87,12 +97,13 @@ class ControlNode(Composite):
             Fault: The clean-up of a node below failed; all the others were halted none the less.
         """
         was_running = self.status is Status.RUNNING
-        problems = [problem for child in self.children for problem in halt(child)]
-        self.status = new_status
-        if was_running:
-            self._emit("status", node=self.path, status=new_status.value)
-        if problems:
-            raise Fault("; ".join(problems), self.path)
+        try:
+            self.halt_children(self.children)
+        finally:
+            self.status = new_status
+            if was_running:
+                self.clean_up()
+                self._emit("status", node=self.path, status=new_status.value)
 
     def run_child(self, child: Behaviour) -> Status:
         """Tick a child and return its status."""
@@ -102,13 +113,13 @@ class ControlNode(Composite):
             raise Fault(f"{child.name} was ticked and has no status", self.path)
         return status
 
-    def halt_child(self, child: Behaviour) -> None:
-        """End a running child.
+    def halt_children(self, children: Iterable[Behaviour]) -> None:
+        """End whatever runs in and below these children, one after the other.
 
         Raises:
-            Fault: Its clean-up failed.
+            Fault: The clean-up of some of them failed; all the others were ended none the less.
         """
-        if problems := halt(child):
+        if problems := [problem for child in children for problem in halt(child)]:
             raise Fault("; ".join(problems), self.path)
 
     def failure_of(self, child: Behaviour) -> Failure:
@@ -127,12 +138,14 @@ class ControlNode(Composite):
         """Fail for a reason of this node's own, and return FAILURE."""
         return self.fail(Failure(reason, message, self.word, self.path))
 
-    def choose(self, choice: str, why: Failure) -> None:
-        """Tell the observers what the node does about a failure."""
-        self._emit("choice", node=self.path, choice=choice, reason=str(why), message=why.message)
+    def choose(self, choice: str, why: Failure | None = None) -> None:
+        """Tell the observers what the node does next, and about which failure, if it is about one."""
+        reason, message = (str(why), why.message) if why else ("", "")
+        self._emit("choice", node=self.path, choice=choice, reason=reason, message=message)
 
     def _end(self, status: Status) -> None:
         self.status = status
+        self.clean_up()
         if self.failure is not None and status is Status.FAILURE:
             failure = self.failure
             self._emit(

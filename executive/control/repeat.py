@@ -9,12 +9,17 @@ from py_trees.common import Status
 
 from executive.control.node import Site
 from executive.control.rounds import Rounds
+from executive.errors import InputError
 
 
 class Repeat(Rounds):
     """Runs its body again and again: `times` times, or `until` it fails in one of these ways.
 
-    Ending so is success; any other failure of the body is passed on.
+    Where both are given, whichever comes first ends it. Ending so is success; any other failure of
+    the body is passed on.
+
+    Raises:
+        InputError: `times` is negative.
     """
 
     word = "repeat"
@@ -26,15 +31,18 @@ class Repeat(Rounds):
         times: int | None = None,
         until: Sequence[tuple[str, str]] = (),
     ) -> None:
+        if times is not None and times < 0:
+            raise InputError(f"{site.path}: a body can be repeated 0 times or more, not {times} times")
         super().__init__(site, [body])
         self._body, self._times, self._until = body, times, tuple(until)
 
     @property
     def detail(self) -> str:
         """What ends it."""
-        if self._times is not None:
-            return f"{self._times} times"
-        return f"until {', '.join('.'.join(name) for name in self._until)}"
+        ends = [] if self._times is None else [f"{self._times} times"]
+        if self._until:
+            ends.append(f"until {', '.join('.'.join(name) for name in self._until)}")
+        return " or ".join(ends)
 
     def start(self) -> None:
         """Begin the first round."""
@@ -54,8 +62,6 @@ class Repeat(Rounds):
                 self.choose("done", failure)
                 return Status.SUCCESS
             self._done += 1
-            idle = not self.took_time
-            self.begin_round()
-            if idle and self._done != self._times:
+            if not self.next_round() and self._done != self._times:
                 return Status.RUNNING
         return Status.SUCCESS

@@ -14,14 +14,13 @@ class Rounds(ControlNode):
     A round that begins and ends within one tick has let no time pass, so the next one must wait for
     the next tick; otherwise a body that ends at once would hold the tick for ever. A round that took
     time is followed by the next within the same tick: a loop costs no idle ticks.
+
+    Attributes:
+        took_time: True once the current round has handed back a tick.
     """
 
     def start(self) -> None:
         """Begin the first round."""
-        self.begin_round()
-
-    def begin_round(self) -> None:
-        """Begin a round with the next call of `run_round`."""
         self.took_time = False
 
     def run_round(self, child: Behaviour) -> Status:
@@ -30,3 +29,8 @@ class Rounds(ControlNode):
         if status is Status.RUNNING:
             self.took_time = True
         return status
+
+    def next_round(self) -> bool:
+        """Begin the next round; tell whether it may run in this tick, because the last one took time."""
+        took_time, self.took_time = self.took_time, False
+        return took_time

@@ -28,3 +28,7 @@ class Scope(Mapping[str, Any]):
     def write(self, values: Mapping[str, Any]) -> None:
         """Set all these variables at once."""
         self._values.update(values)
+
+    def forget(self, name: str) -> None:
+        """Remove a variable; it need not be there."""
+        self._values.pop(name, None)

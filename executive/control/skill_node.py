@@ -17,9 +17,6 @@ from executive.errors import Fault
 from executive.messages import Target
 from executive.skill import Skill, SkillFailed
 
-ITEM_PORTS = ("item", "held", "placed")
-"""Ports that by convention carry the item a skill works on."""
-
 
 @dataclass(frozen=True)
 class Wiring:
@@ -42,7 +39,12 @@ class SkillNode(Behaviour):
     Attributes:
         path: Unique path from the root of the tree.
         failure: Why it failed, while its status is FAILURE; else None.
+        skill_type: What it runs.
+        wiring: What the mission connects to it.
+        subtrees: Names of the subtrees that begin with it, the outermost first.
     """
+
+    subtrees: tuple[str, ...] = ()
 
     def __init__(
         self, site: Site, name: str, skill: type[Skill], wiring: Wiring, cell: Cell, scope: Scope
@@ -51,16 +53,20 @@ class SkillNode(Behaviour):
         self.path, self.label, self.skill_name = site.path, site.label, name
         self.failure: Failure | None = None
         self._emit = site.emit
-        self._type, self._wiring, self._cell, self._scope = skill, wiring, cell, scope
+        self.skill_type, self.wiring, self._cell, self._scope = skill, wiring, cell, scope
         self._skill: Skill | None = None
         self._steps: Iterator[Any] = iter(())
         self._item = ""
+        # An item that may be left out narrows a choice; what the skill works on it always has.
+        self._item_ports = tuple(
+            name for name, port in skill.ports.items() if port.refers == "item" and port.default is ...
+        )
 
     @property
     def detail(self) -> str:
         """The constants and the renamed variables, for outlines."""
-        said = {name: _shown(value) for name, value in self._wiring.constants.items()}
-        wired = {**self._wiring.inputs, **self._wiring.outputs}
+        said = {name: _shown(value) for name, value in self.wiring.constants.items()}
+        wired = {**self.wiring.inputs, **self.wiring.outputs}
         said |= {port: f"${variable}" for port, variable in wired.items() if port != variable}
         if self.label:
             return ", ".join([self.skill_name, *(f"{key}: {value}" for key, value in said.items())])
@@ -124,38 +130,45 @@ class SkillNode(Behaviour):
         self.failure = None
         self.status = Status.RUNNING
         inputs = self._read()
-        self._item = _item_of(inputs)
+        self._item = self._item_of(inputs)
         self._tell("RUNNING")
-        self._skill = self._type(**self._wiring.constants, **inputs)
+        self._skill = self.skill_type(**self.wiring.constants, **inputs)
         # A `run` without any yield is a plain function: it has done its work already.
         self._steps = iter(self._skill.run(self._cell) or ())
 
     def _read(self) -> dict[str, Any]:
         inputs = {}
-        for port, variable in self._wiring.inputs.items():
+        for port, variable in self.wiring.inputs.items():
             if variable in self._scope:
                 inputs[port] = self._scope[variable]
-            elif self._type.ports[port].required:
+            elif self.skill_type.ports[port].required:
                 raise Fault(
                     f'the input "{port}" reads ${variable}, which nothing has written yet; '
                     f"written so far: {', '.join(self._scope) or 'nothing'}"
                 )
         return inputs
 
+    def _item_of(self, values: Mapping[str, Any]) -> str:
+        """Return the item that these port values are about, or ""."""
+        for value in values.values():
+            if isinstance(value, Target):
+                return value.item
+        return next((values[port] for port in self._item_ports if values.get(port)), "")
+
     def _succeed(self) -> None:
         skill = self._skill
-        unset = [port for port in self._wiring.outputs if not hasattr(skill, port)]
+        unset = [port for port in self.wiring.outputs if not hasattr(skill, port)]
         if unset:
             raise self._fault(f"it succeeded without setting its output {', '.join(unset)}")
-        outputs = {port: getattr(skill, port) for port in self._wiring.outputs}
-        self._scope.write({self._wiring.outputs[port]: value for port, value in outputs.items()})
-        self._item = _item_of(outputs) or self._item
+        outputs = {port: getattr(skill, port) for port in self.wiring.outputs}
+        self._scope.write({self.wiring.outputs[port]: value for port, value in outputs.items()})
+        self._item = self._item_of(outputs) or self._item
         self._close(Status.SUCCESS)
         self._tell("SUCCESS", outputs=outputs)
 
     def _fail(self, failed: SkillFailed) -> None:
-        if failed.reason not in self._type.reasons:
-            declared = ", ".join(self._type.reasons) or "none"
+        if failed.reason not in self.skill_type.reasons:
+            declared = ", ".join(self.skill_type.reasons) or "none"
             raise self._fault(
                 f'it failed with the undeclared reason "{failed.reason}"; it declares: {declared}'
             ) from failed
@@ -182,14 +195,6 @@ class SkillNode(Behaviour):
             item=self._item,
             **more,
         )
-
-
-def _item_of(values: Mapping[str, Any]) -> str:
-    """Return the item that these port values are about, or ""."""
-    for value in values.values():
-        if isinstance(value, Target):
-            return value.item
-    return next((values[port] for port in ITEM_PORTS if isinstance(values.get(port), str)), "")
 
 
 def _shown(value: Any) -> str:

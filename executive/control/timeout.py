@@ -37,6 +37,6 @@ class Timeout(ControlNode):
             return self.fail(self.failure_of(self._body))
         # A nanosecond of slack: a clock that adds up steps may miss the deadline by rounding.
         if status is Status.RUNNING and self._clock.now >= self._deadline - 1e-9:
-            self.halt_child(self._body)
+            self.halt_children([self._body])
             return self.fail_for("timeout", f"not done after {self._seconds:g} s")
         return status

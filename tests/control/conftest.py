@@ -1,4 +1,4 @@
-"""Scripted leaves, a clock that the test sets, and a record of what happened."""
+"""Scripted leaves, a clock, and a record of what happened."""
 
 from __future__ import annotations
 
@@ -6,21 +6,12 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from hand_set_clock import Clock
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from scripted_leaf import Leaf
 
 from executive.control.node import Site
-
-
-class Clock:
-    """A clock that the test sets."""
-
-    now = 0.0
-    step = 0.1
-
-    def sleep(self, duration: float) -> Any:
-        raise NotImplementedError
 
 
 @pytest.fixture

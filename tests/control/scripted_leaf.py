@@ -21,6 +21,10 @@ class Leaf(Behaviour):
         self.breaks = False
         self._scripts, self._log, self._runs, self._steps = scripts, log, 0, iter("")
 
+    def rewind(self) -> None:
+        """Begin with the first script again."""
+        self._runs = 0
+
     def initialise(self) -> None:
         script = self._scripts[min(self._runs, len(self._scripts) - 1)]
         self._runs += 1

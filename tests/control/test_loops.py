@@ -1,4 +1,4 @@
-"""Retry and repeat."""
+"""Retry, repeat and while."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from executive.control.node import Site
 from executive.control.repeat import Repeat
 from executive.control.retry import Retry
 from executive.control.sequence import Sequence
+from executive.control.while_loop import While
+from executive.errors import InputError
 
 
 def test_a_retry_tries_again_in_the_tick_of_the_failure(leaf: Any, site: Any, ticks: Any, log: Any) -> None:
@@ -85,6 +87,17 @@ def test_repeat_until_a_failure_is_a_success(leaf: Any, site: Any, ticks: Any, l
     assert node.failure is None
 
 
+@pytest.mark.parametrize(
+    ("scripts", "end", "rounds"),
+    [(("R S", "empty"), "RS", 2), (("R S",), "RRRS", 3), (("R S", "R S", "lost"), "RRF", 3)],
+)
+def test_of_times_and_until_the_first_to_come_ends_it(
+    scripts: tuple[str, ...], end: str, rounds: int, leaf: Any, site: Any, ticks: Any, log: Any
+) -> None:
+    assert ticks(Repeat(site(), leaf("A", *scripts), times=3, until=[("A", "empty")])) == end
+    assert log == ["A starts"] * rounds
+
+
 def test_other_failures_of_the_body_are_passed_on(leaf: Any, site: Any, ticks: Any) -> None:
     node = Repeat(site(), leaf("A", "R S", "lost"), until=[("A", "empty")])
     assert ticks(node) == "RF"
@@ -96,9 +109,53 @@ def test_a_body_that_takes_no_time_does_not_hold_the_tick(leaf: Any, site: Any, 
     assert ticks(Repeat(site(), leaf("A"), times=3)) == "RRS"
 
 
+def test_a_body_is_not_repeated_a_negative_number_of_times(leaf: Any, site: Any) -> None:
+    with pytest.raises(InputError, match="tree/x: a body can be repeated 0 times or more, not -1 times"):
+        Repeat(site("tree/x"), leaf("A"), times=-1)
+
+
+def test_while_checks_its_condition_before_every_round(leaf: Any, site: Any, ticks: Any, log: Any) -> None:
+    condition = leaf("more", "R S", "S", "R none")
+    assert ticks(While(site(), condition, leaf("A", "R S"))) == "RRRRS"
+    assert log == ["more starts", "A starts", "more starts", "A starts", "more starts"]
+
+
+def test_a_failed_condition_is_a_success_that_is_told(leaf: Any, site: Any, ticks: Any, events: Any) -> None:
+    node = While(site("here"), leaf("more", "none"), leaf("A"))
+    assert ticks(node) == "S"
+    assert node.failure is None
+    assert events[1] == {
+        "kind": "choice", "node": "here", "choice": "done", "reason": "more.none", "message": "none happened",
+    }  # fmt: skip
+
+
+def test_while_passes_on_a_failure_of_its_body(leaf: Any, site: Any, ticks: Any, log: Any) -> None:
+    node = While(site(), leaf("more"), leaf("A", "R S", "R lost"))
+    assert ticks(node) == "RRF"
+    assert str(node.failure) == "A.lost"
+
+
+def test_while_does_not_hold_the_tick(leaf: Any, site: Any, ticks: Any) -> None:
+    assert ticks(While(site(), leaf("more"), leaf("A")), most=20) == "R" * 20
+    assert ticks(While(site(), leaf("more", "R S", "none"), leaf("A"))) == "RS"
+
+
+def test_while_halted_in_its_body_begins_with_its_condition(leaf: Any, site: Any, log: Any) -> None:
+    node = While(site(), leaf("more"), leaf("A", "R S"))
+    node.tick_once()
+    node.stop(Status.INVALID)
+    node.tick_once()
+    assert log == ["more starts", "A starts", "A halted", "more starts", "A starts"]
+
+
 def test_nested_loops_do_not_hold_the_tick(leaf: Any, site: Any, ticks: Any) -> None:
     inner = Repeat(site("inner"), leaf("A"), times=2)
     assert ticks(Repeat(site(), inner, times=2)) == "RRS"
+
+
+def test_a_retry_makes_at_least_one_attempt(leaf: Any, site: Any) -> None:
+    with pytest.raises(InputError, match="tree/x: a retry makes 1 attempt or more, not 0"):
+        Retry(site("tree/x"), leaf("A"), 0)
 
 
 @given(attempts=st.integers(1, 6), failures=st.integers(0, 8), took=st.booleans())
@@ -125,3 +182,5 @@ def test_a_loop_of_many_rounds_needs_no_deep_stack(leaf: Any, site: Any) -> None
 def test_details_say_what_the_mission_says(leaf: Any, site: Any, attempts: int) -> None:
     assert Retry(site(), leaf("A"), attempts).detail == f"up to {attempts} attempts, on any failure"
     assert Repeat(site(), leaf("A"), until=[("A", "lost"), ("B", "x")]).detail == "until A.lost, B.x"
+    assert Repeat(site(), leaf("A"), times=3).detail == "3 times"
+    assert Repeat(site(), leaf("A"), 3, [("A", "lost")]).detail == "3 times or until A.lost"

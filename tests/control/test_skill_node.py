@@ -211,7 +211,40 @@ def test_events_say_what_happened_to_which_item(site: Any, events: Any) -> None:
     ]
 
 
+class Sort(Skill):
+    """Finds what goes into a box."""
+
+    colour: In[str]
+    box: In[str] = port(refers="item")
+    unlike: In[str | None] = port(default=None, refers="item")
+    found: Out[str] = port(refers="item")
+
+    def run(self, cell: Any) -> Iterator[None]:
+        yield
+        self.found = "cube-9" if self.colour == "red" else ""
+
+
+@pytest.mark.parametrize(("colour", "items"), [("red", ["box-1", "cube-9"]), ("blue", ["box-1", "box-1"])])
+def test_the_item_is_what_a_port_names_that_the_skill_always_has(
+    colour: str, items: list[str], site: Any, ticks: Any, events: Any
+) -> None:
+    scope = Scope()
+    scope.write({"box": "box-1", "unlike": "cube-2", "colour": colour})
+    inputs = {name: name for name in ("unlike", "colour", "box")}
+    wiring = Wiring({}, inputs, {"found": "found"})
+    assert ticks(SkillNode(site(), "Sort", Sort, wiring, None, scope)) == "RS"  # type: ignore[arg-type]
+    assert [event["item"] for event in events] == items
+
+
 def test_scopes_share_nothing() -> None:
     first, second = Scope(), Scope()
     first.write({"a": 1})
     assert (dict(first), dict(second)) == ({"a": 1}, {})
+
+
+def test_a_forgotten_variable_is_gone_and_need_not_have_been_there() -> None:
+    scope = Scope()
+    scope.write({"a": 1, "b": 2})
+    scope.forget("a")
+    scope.forget("a")
+    assert dict(scope) == {"b": 2}
