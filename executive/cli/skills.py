@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 import inspect
-from typing import TYPE_CHECKING, Any
+import json
+import textwrap
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
-from executive.cli.output import stdout_kept_clean
+from executive.cli.options import json_option
+from executive.cli.output import print_json, stdout_kept_clean
 
 if TYPE_CHECKING:
     from executive.skill import Param, Port, Skill
 
+_WIDTH = 100
+
+Facts = Mapping[str, Any]
+"""What a skill, a port or a param declares, as plain JSON values."""
+
 
 @click.command(name="skills")
 @click.argument("name", required=False)
-def command(name: str | None) -> None:
+@json_option
+def command(name: str | None, as_json: bool) -> None:
     """List the installed skills, or tell everything about the skill NAME."""
     with stdout_kept_clean():
         from executive.errors import InputError
@@ -25,61 +35,136 @@ def command(name: str | None) -> None:
         skills = discover()
         if name is not None and name not in skills:
             raise InputError(f'no skill "{name}" is installed. {alternatives(name, skills, "There are")}')
-    if name is not None:
-        click.echo(describe(name, skills[name]))
-        return
-    for known, skill in skills.items():
-        click.echo(f"{known:16}{(inspect.getdoc(skill) or '').splitlines()[0]}")
-        click.echo(f"{'':16}{_flow(skill)}")
+        known = {key: declared(key, skill) for key, skill in skills.items()}
+    if as_json:
+        print_json(list(known.values()) if name is None else known[name])
+    elif name is None:
+        click.echo("\n".join(_briefly(facts) for facts in known.values()))
+    else:
+        click.echo(_fully(known[name]))
 
 
-def describe(name: str, skill: type[Skill]) -> str:
-    """Return everything a mission's author needs to know about `skill`."""
-    from executive.skill import Direction
-
-    lines = [name, "", inspect.getdoc(skill) or "", ""]
-    for title, direction in (("reads", Direction.IN), ("writes", Direction.OUT)):
-        lines += [f"{title}:"]
-        lines += [
-            f"  {port.name}: {_type(port)}" for port in skill.ports.values() if port.direction is direction
-        ] or ["  nothing"]
-    lines += ["params:"]
-    lines += [f"  {_param(param)}" for param in skill.params.values()] or ["  none"]
-    lines += [f"may fail with: {', '.join(skill.reasons) or 'nothing'}"]
-    lines += [f"uses: {', '.join(skill.uses) or 'nothing'}"]
+def declared(name: str, skill: type[Skill]) -> Facts:
+    """Return everything that a skill declares, as plain JSON values."""
     before, after = skill.tool_state
-    lines += [f"tool: {before.value} before, {after.value} after"]
+    return {
+        "name": name,
+        "doc": inspect.getdoc(skill) or "",
+        "params": [_param(param) for param in skill.params.values()],
+        "ports": [_port(port) for port in skill.ports.values()],
+        "reasons": list(skill.reasons),
+        "uses": list(skill.uses),
+        "senses": skill.senses,
+        "moves": skill.moves,
+        "tool": {
+            "before": before.value,
+            "after": after.value,
+            "left": {ending: state.value for ending, state in skill.tool_left.items()},
+        },
+    }
+
+
+def _param(param: Param) -> Facts:
+    return {
+        "name": param.name,
+        "type": _type(param.type),
+        "unit": param.unit,
+        "required": param.required,
+        "default": _default(param),
+        "min": param.ge,
+        "max": param.le,
+        "choices": None if param.choices is None else list(param.choices),
+        "refers": param.refers,
+        "doc": param.doc,
+    }
+
+
+def _port(port: Port) -> Facts:
+    return {
+        "name": port.name,
+        "type": _type(port.type),
+        "direction": port.direction.value,
+        "required": port.required,
+        "default": _default(port),
+        "refers": port.refers,
+        "doc": port.doc,
+    }
+
+
+def _default(of: Param | Port) -> Any:
+    """Return a default as JSON can hold it, None where there is none."""
+    from pydantic_core import to_json
+
+    return (
+        None if of.default is ... else json.loads(to_json(of.default, inf_nan_mode="strings", fallback=str))
+    )
+
+
+def _type(declared: Any) -> str:
+    plain = isinstance(declared, type) and not get_args(declared)
+    name = declared.__name__ if plain else str(declared)
+    return name.replace("typing.", "").replace("executive.messages.", "")
+
+
+def _briefly(facts: Facts) -> str:
+    """Return a skill in two lines: what it does, and what flows through it."""
+    reads, writes = (", ".join(port["name"] for port in _ports(facts, way)) for way in ("in", "out"))
+    parts = [f"{reads or '-'} -> {writes or '-'}"]
+    if facts["params"]:
+        parts.append(f"params: {', '.join(param['name'] for param in facts['params'])}")
+    if facts["reasons"]:
+        parts.append(f"reasons: {', '.join(facts['reasons'])}")
+    summary, _, _ = facts["doc"].partition("\n")
+    return f"{facts['name']:15} {summary}\n{'':16}{' | '.join(parts)}"
+
+
+def _fully(facts: Facts) -> str:
+    """Return everything a mission's author needs to know about a skill."""
+    lines = [facts["name"], "", facts["doc"], ""]
+    for title, way in (("reads", "in"), ("writes", "out")):
+        lines += [f"{title}:", *([_entry(port) for port in _ports(facts, way)] or ["  nothing"])]
+    lines += ["params:", *([_entry(param) for param in facts["params"]] or ["  none"])]
+    lines.append(f"may fail with: {', '.join(facts['reasons']) or 'nothing'}")
+    lines.append("; ".join(_effects(facts)))
+    lines.append(_tool(facts["tool"]))
     return "\n".join(lines)
 
 
-def _flow(skill: type[Skill]) -> str:
-    from executive.skill import Direction
-
-    reads = [port.name for port in skill.ports.values() if port.direction is Direction.IN]
-    writes = [port.name for port in skill.ports.values() if port.direction is Direction.OUT]
-    parts = [f"{', '.join(reads) or '-'} -> {', '.join(writes) or '-'}"]
-    if skill.params:
-        parts.append(f"params: {', '.join(skill.params)}")
-    if skill.reasons:
-        parts.append(f"reasons: {', '.join(skill.reasons)}")
-    return " | ".join(parts)
+def _ports(facts: Facts, direction: str) -> list[Facts]:
+    return [port for port in facts["ports"] if port["direction"] == direction]
 
 
-def _param(param: Param) -> str:
-    facts = [_type(param) + (f" [{param.unit}]" if param.unit else "")]
-    facts.append("required" if param.required else f"default {param.default!r}")
-    if param.ge is not None:
-        facts.append(f"at least {param.ge:g}")
-    if param.le is not None:
-        facts.append(f"at most {param.le:g}")
-    if param.choices is not None:
-        facts.append(f"one of {', '.join(map(str, param.choices))}")
-    if param.refers:
-        facts.append(f"names a {param.refers}")
-    return f"{param.name}: {', '.join(facts)}" + (f". {param.doc}" if param.doc else "")
+def _entry(of: Facts) -> str:
+    """Return a param or port with everything about it."""
+    words = [of["type"] + (f" [{of['unit']}]" if of.get("unit") else "")]
+    if of["required"] or "direction" not in of:
+        words.append("required" if of["required"] else f"default {of['default']!r}")
+    elif of["direction"] == "in":
+        words.append("may be left out")
+    if of.get("min") is not None:
+        words.append(f"at least {of['min']:g}")
+    if of.get("max") is not None:
+        words.append(f"at most {of['max']:g}")
+    if of.get("choices"):
+        words.append(f"one of {', '.join(map(str, of['choices']))}")
+    if of["refers"]:
+        words.append(f"names {'an' if of['refers'][0] in 'aeiou' else 'a'} {of['refers']}")
+    text = f"{of['name']}: {', '.join(words)}" + (f". {of['doc']}" if of["doc"] else "")
+    return textwrap.fill(
+        text, _WIDTH, initial_indent="  ", subsequent_indent=" " * 6,
+        break_long_words=False, break_on_hyphens=False,
+    )  # fmt: skip
 
 
-def _type(declared: Port | Param) -> str:
-    kind: Any = declared.type
-    name = kind.__name__ if isinstance(kind, type) and not hasattr(kind, "__args__") else str(kind)
-    return name.replace("typing.", "").replace("executive.messages.", "")
+def _effects(facts: Facts) -> Iterator[str]:
+    """Yield what a skill uses and does."""
+    yield f"uses: {', '.join(facts['uses']) or 'nothing'}"
+    if facts["senses"]:
+        yield "senses"
+    if facts["moves"]:
+        yield "moves the arm"
+
+
+def _tool(tool: Facts) -> str:
+    left = "".join(f", {state} after {ending}" for ending, state in tool["left"].items())
+    return f"tool: {tool['before']} before, {tool['after']} after{left}"

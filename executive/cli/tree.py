@@ -2,35 +2,80 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
 
 import click
 
-from executive.cli.options import MISSION, overrides_option
-from executive.cli.output import stdout_kept_clean
+from executive.cli.options import MISSION, json_option, overrides_option
+from executive.cli.output import print_json, stdout_kept_clean
 
 if TYPE_CHECKING:
     from executive.cell import Cell
+    from executive.mission.outline import OutlineNode
 
 
 @click.command(name="tree")
 @MISSION
 @overrides_option
-def command(mission: str, overrides: dict[str, str]) -> None:
+@click.option(
+    "--ports", is_flag=True, help="Say below every skill what it reads (? where it may be unset) and writes."
+)
+@click.option("--reasons", is_flag=True, help="Say why every skill may fail, and what every catch is for.")
+@click.option("--fold", is_flag=True, help="Show every subtree once, then only its name.")
+@click.option("--svg", "as_svg", is_flag=True, help="Print the tree as a picture, as SVG on stdout.")
+@click.option("--dot", "as_dot", is_flag=True, help="Print the tree as Graphviz text on stdout.")
+@json_option
+def command(
+    mission: str,
+    overrides: dict[str, str],
+    ports: bool,
+    reasons: bool,
+    fold: bool,
+    as_svg: bool,
+    as_dot: bool,
+    as_json: bool,
+) -> None:
     """Print the tree of MISSION, subtrees in their places."""
+    forms = [name for name, wanted in (("--svg", as_svg), ("--dot", as_dot), ("--json", as_json)) if wanted]
+    extras = [name for name, wanted in (("--ports", ports), ("--reasons", reasons)) if wanted]
+    if len(forms) > 1:
+        raise click.UsageError(f"{' and '.join(forms)} exclude each other: standard output holds one of them")
+    if forms and extras:
+        raise click.UsageError(f"{forms[0]} holds ports and reasons anyway; leave out {' and '.join(extras)}")
     with stdout_kept_clean():
-        from executive.control.scope import Scope
-        from executive.events import ignore
-        from executive.mission.build import build
-        from executive.mission.load import load_mission
-        from executive.mission.outline import outline
-        from executive.skill import discover
-        from executive.view.outline import drawn
+        from pydantic_core import to_json
 
-        skills = discover()
-        loaded = load_mission(mission, skills, overrides)
-        # A tree that never runs needs no cell, only somewhere to take the clock from.
-        nowhere = cast("Cell", SimpleNamespace(clock=None))
-        text = drawn(outline(build(loaded, skills, nowhere, Scope(), ignore)))
-    click.echo(text)
+        from executive.view.outline import drawn, folded
+        from executive.view.tree_dot import dot
+        from executive.view.tree_svg import svg
+
+        name, nodes = _outline_of(mission, overrides)
+        nodes = folded(nodes) if fold else nodes
+        if as_svg:
+            shown = svg(nodes, name)
+        elif as_dot:
+            shown = dot(nodes, name)
+        elif as_json:
+            shown = json.loads(to_json(nodes, inf_nan_mode="strings", fallback=str))
+        else:
+            shown = drawn(nodes, ports=ports, reasons=reasons)
+    (print_json if as_json else click.echo)(shown)
+
+
+def _outline_of(mission: str, overrides: dict[str, str]) -> tuple[str, Sequence[OutlineNode]]:
+    """Return a mission's name and its tree's outline."""
+    from executive.control.scope import Scope
+    from executive.events import ignore
+    from executive.mission.build import build
+    from executive.mission.load import load_mission
+    from executive.mission.outline import outline
+    from executive.skill import discover
+
+    skills = discover()
+    loaded = load_mission(mission, skills, overrides)
+    # A tree that never runs needs no cell, only a clock, which stands still.
+    nowhere = cast("Cell", SimpleNamespace(clock=SimpleNamespace(now=0.0)))
+    return loaded.mission.name, outline(build(loaded, skills, nowhere, Scope(), ignore))

@@ -1,14 +1,32 @@
-"""The shape of a built tree as plain lines."""
+"""The shape of a built tree as plain data: what drawings, records and pages of it are made from."""
 
 from __future__ import annotations
 
+import inspect
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 from py_trees.behaviour import Behaviour
 
+from executive.control.attempt import Try
+from executive.control.skill_node import SkillNode
+
 _NUMBER = re.compile(r"[0-9]+:")
+
+
+@dataclass(frozen=True)
+class Connection:
+    """A port of a skill and the variable it is connected to.
+
+    Attributes:
+        required: False for an input that has a default for when nothing has written the variable.
+    """
+
+    port: str
+    variable: str
+    required: bool
 
 
 @dataclass(frozen=True)
@@ -20,29 +38,128 @@ class OutlineNode:
         name: What it is called, after what it is to its parent: `Grasp`, `recover: look`, `do`.
         depth: How many nodes are above it.
         detail: What the mission says about it, in a few words.
+        kind: `skill`, or the word of a control node.
+        title: What it is called without regard to its parent: label, skill or word.
+        slot: What it is to its parent: `do`, `recover`, `catch 1`; "" in a list.
+        when: After which failures it runs, for a catch: `on Grasp.missed`; else "".
+        subtrees: Names of the subtrees that begin with it, the outermost first.
+        skill: Name of the skill; "" for a control node, and so are the fields that follow.
+        doc: What the skill does, one sentence.
+        params: Its constants from the mission.
+        reads, writes: Its connected ports.
+        reasons: Why it may fail.
     """
 
     path: str
     name: str
     depth: int
     detail: str
+    kind: str
+    title: str
+    slot: str = ""
+    when: str = ""
+    subtrees: tuple[str, ...] = ()
+    skill: str = ""
+    doc: str = ""
+    params: Mapping[str, Any] = field(default_factory=dict)
+    reads: tuple[Connection, ...] = ()
+    writes: tuple[Connection, ...] = ()
+    reasons: tuple[str, ...] = ()
+
+    @property
+    def subtree(self) -> str:
+        """The names of its subtrees as one; "" where none begins with it."""
+        return " / ".join(self.subtrees)
 
 
 def outline(root: Behaviour) -> list[OutlineNode]:
     """Return every node of the tree in the order of the mission, parents before children."""
-    return list(_outline(root, "tree", 0))
+    return list(_outline(root, None))
 
 
-def _outline(node: Behaviour, parent: str, depth: int) -> Iterator[OutlineNode]:
-    path = getattr(node, "path", node.name)
-    slot, _, last = path.removeprefix(f"{parent}/").rpartition("/")
+def children(nodes: Sequence[OutlineNode]) -> list[list[int]]:
+    """Return for each node where its children stand in the outline."""
+    found: list[list[int]] = [[] for _ in nodes]
+    above: list[int] = []
+    for index, node in enumerate(nodes):
+        del above[node.depth :]
+        if above:
+            found[above[-1]].append(index)
+        above.append(index)
+    return found
+
+
+def _outline(node: Behaviour, parent: Behaviour | None, depth: int = 0) -> Iterator[OutlineNode]:
+    path = _path(node)
+    place = path.removeprefix(f"{_path(parent) if parent else 'tree'}/")
+    facts = _skill_facts(node) if isinstance(node, SkillNode) else {"kind": _word(node)}
+    label, detail = getattr(node, "label", ""), getattr(node, "detail", "")
+    if label and not isinstance(node, SkillNode):
+        detail = ", ".join(part for part in (_word(node), detail) if part)
+    title = label or facts.get("skill") or facts["kind"]
+    subtrees = tuple(getattr(node, "subtrees", ()))
+    yield OutlineNode(
+        path, _name(place), depth, detail, title=title, subtrees=subtrees,
+        slot=_slot(place, parent, title, subtrees) if parent else "", when=_when(node, parent), **facts,
+    )  # fmt: skip
+    for child in node.children:
+        yield from _outline(child, node, depth + 1)
+
+
+def _path(node: Behaviour) -> str:
+    return str(getattr(node, "path", node.name))
+
+
+def _word(node: Behaviour) -> str:
+    """Return the word of a control node; a stock py_trees behaviour goes by the name of its class."""
+    return str(getattr(node, "word", type(node).__name__.lower()))
+
+
+def _when(node: Behaviour, parent: Behaviour | None) -> str:
+    """Return when a node runs, where its parent makes it wait for certain failures."""
+    when = getattr(parent, "when", None)
+    return str(when(node)) if when else ""
+
+
+def _name(place: str) -> str:
+    """Return what a node is called below its parent."""
+    slot, _, last = place.rpartition("/")
     last = _NUMBER.sub("", last)
     slot = slot.replace("/", " ")
     # A list in the second catch is the catch itself.
-    name = f"{slot} {last}" if last.isdigit() else f"{slot}: {last}" if slot else last
-    detail = getattr(node, "detail", "")
-    if getattr(node, "label", "") and hasattr(node, "word"):
-        detail = ", ".join(part for part in (node.word, detail) if part)
-    yield OutlineNode(path, name, depth, detail)
-    for child in node.children:
-        yield from _outline(child, path, depth + 1)
+    return f"{slot} {last}" if last.isdigit() else f"{slot}: {last}" if slot else last
+
+
+def _slot(place: str, parent: Behaviour, title: str, subtrees: tuple[str, ...]) -> str:
+    """Return what is left of a node's place below its parent without its own name and its subtrees'.
+
+    A bare list has no name of its own: it is the slot. The body of a `try` has no slot in its path.
+    """
+    parts = [_NUMBER.sub("", part) for part in place.split("/")]
+    if parts[-1] == title:
+        del parts[-1]
+    for subtree in reversed(subtrees):
+        if parts and parts[-1] == subtree:
+            del parts[-1]
+    return " ".join(parts) or ("do" if isinstance(parent, Try) else "")
+
+
+def _skill_facts(node: SkillNode) -> dict[str, Any]:
+    """Return what an outline says of a skill only."""
+    skill, wiring = node.skill_type, node.wiring
+    ports = skill.ports
+
+    def connections(wires: Mapping[str, str]) -> tuple[Connection, ...]:
+        return tuple(
+            Connection(port, variable, ports[port].default is ...) for port, variable in wires.items()
+        )
+
+    return {
+        "kind": "skill",
+        "skill": node.skill_name,
+        "doc": (inspect.getdoc(skill) or "").partition("\n")[0],
+        "params": dict(wiring.constants),
+        "reads": connections(wiring.inputs),
+        "writes": connections(wiring.outputs),
+        "reasons": tuple(skill.reasons),
+    }

@@ -54,7 +54,8 @@ class Lines:
         if event.kind == "status":
             return self._transition(data)
         if event.kind == "choice":
-            return f"{self._names[data['node']]}: {data['choice']}, after {data['reason']}"
+            after = f", after {data['reason']}" if data["reason"] else ""
+            return f"{self._names[data['node']]}: {data['choice']}{after}"
         if event.kind == "request":
             return "request: " + ", ".join(f"{key} {value}" for key, value in data.items())
         if event.kind == "item":

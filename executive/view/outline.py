@@ -2,18 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+import textwrap
+from collections.abc import Collection, Iterator, Sequence
 
-from executive.mission.outline import OutlineNode
+from executive.mission.outline import Connection, OutlineNode, children
+
+WIDTH = 100
+"""Where long lines are wrapped [columns]."""
+
+_LEAST = 40
 
 
-def drawn(nodes: Sequence[OutlineNode]) -> str:
-    """Return an outline as text, one line per node."""
+def drawn(nodes: Sequence[OutlineNode], *, ports: bool = False, reasons: bool = False) -> str:
+    """Return an outline as text, one line per node where it is not too long.
+
+    Args:
+        nodes: The outline.
+        ports: Say below every skill which variables it reads and writes.
+        reasons: Say below every skill why it may fail, and below every catch which failures it is for.
+    """
     lines = []
-    for node, branch in zip(nodes, branches(nodes), strict=True):
+    for node, branch, below in zip(nodes, branches(nodes), children(nodes), strict=True):
+        margin = branch.replace("├─", "│ ").replace("└─", "  ") + ("│  " if below else "   ")
         detail = f"  ({node.detail})" if node.detail else ""
-        lines.append(f"{branch}{node.name}{detail}")
+        lines += _wrapped(f"{node.name}{detail}", branch, margin)
+        for sentence in _said_below(node, ports, reasons):
+            lines += _wrapped(sentence, margin, margin)
     return "\n".join(lines)
+
+
+def reads(node: OutlineNode) -> str:
+    """Return which variables a skill reads, with `?` where one may be unset; "" if none."""
+    return "reads " + ", ".join(_wire(wire, "<-") for wire in node.reads) if node.reads else ""
+
+
+def writes(node: OutlineNode) -> str:
+    """Return which variables a skill writes; "" if none."""
+    return "writes " + ", ".join(_wire(wire, "->") for wire in node.writes) if node.writes else ""
+
+
+def why(node: OutlineNode) -> str:
+    """Return why a skill may fail; "" if it cannot."""
+    return f"may fail: {', '.join(node.reasons)}" if node.reasons else ""
 
 
 def branches(nodes: Sequence[OutlineNode]) -> list[str]:
@@ -43,6 +73,26 @@ def skills(nodes: Sequence[OutlineNode]) -> dict[str, str]:
     }
 
 
+def folded(nodes: Sequence[OutlineNode]) -> list[OutlineNode]:
+    """Return an outline in which every subtree is shown once; where it is used again stands its name."""
+    shown: list[OutlineNode] = []
+    first: dict[str, list[tuple[int, str, str]]] = {}
+    ends = _ends(nodes)
+    index = 0
+    while index < len(nodes):
+        node, branch = nodes[index], nodes[index : ends[index]]
+        known = next((subtree for subtree in node.subtrees if subtree in first), None)
+        if known is None:
+            first |= {subtree: _content(branch) for subtree in node.subtrees}
+            shown.append(node)
+            index += 1
+        else:
+            same = first[known] == _content(branch)
+            shown.append(_use(node, known, "as above" if same else "as above, other params"))
+            index = ends[index]
+    return shown
+
+
 def opened(nodes: Sequence[OutlineNode], running: Collection[str]) -> list[OutlineNode]:
     """Return the root and what stands directly below a running node; what rests stays folded."""
     shown = []
@@ -54,3 +104,46 @@ def opened(nodes: Sequence[OutlineNode], running: Collection[str]) -> list[Outli
             shown.append(node)
         runs.append(node.path in running)
     return shown
+
+
+def _wrapped(text: str, first: str, other: str) -> list[str]:
+    """Return a text in lines that are not too long, after what stands before the first and the others."""
+    return textwrap.wrap(
+        text, max(WIDTH, len(other) + _LEAST), initial_indent=first, subsequent_indent=f"{other}  ",
+        break_long_words=False, break_on_hyphens=False,
+    )  # fmt: skip
+
+
+def _said_below(node: OutlineNode, ports: bool, reasons: bool) -> Iterator[str]:
+    """Yield what is said below a node."""
+    if reasons and node.when:
+        yield node.when
+    if ports and (flow := "; ".join(filter(None, (reads(node), writes(node))))):
+        yield flow
+    if reasons and node.reasons:
+        yield why(node)
+
+
+def _wire(wire: Connection, arrow: str) -> str:
+    variable = f"${wire.variable}" + ("" if wire.required else "?")
+    return variable if wire.port == wire.variable else f"{wire.port} {arrow} {variable}"
+
+
+def _ends(nodes: Sequence[OutlineNode]) -> list[int]:
+    """Return for each node where what hangs from it ends in the outline."""
+    ends = [index + 1 for index in range(len(nodes))]
+    for index, below in reversed([*enumerate(children(nodes))]):
+        if below:
+            ends[index] = ends[below[-1]]
+    return ends
+
+
+def _content(branch: Sequence[OutlineNode]) -> list[tuple[int, str, str]]:
+    """Return what tells two uses of a subtree from each other."""
+    return [(node.depth - branch[0].depth, node.title, node.detail) for node in branch]
+
+
+def _use(node: OutlineNode, subtree: str, detail: str) -> OutlineNode:
+    """Return what stands for a subtree that begins with this node; those around it stay what they are."""
+    around = node.subtrees[: node.subtrees.index(subtree)]
+    return OutlineNode(node.path, node.name, node.depth, detail, "use", subtree, node.slot, node.when, around)

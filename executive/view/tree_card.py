@@ -1,0 +1,73 @@
+"""What a picture of a tree says of one node."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from executive.mission.outline import OutlineNode
+from executive.view.outline import reads, why, writes
+from executive.view.tree_text import fitted
+
+SYMBOLS: Mapping[str, str] = {
+    "sequence": "→",
+    "fallback": "?",
+    "parallel": "⇉",
+    "retry": "↻",
+    "repeat": "↻",
+    "while": "↺",
+    "for_each": "∀",
+    "try": "↯",
+    "timeout": "◷",
+    "invert": "¬",
+    "succeed": "✓",
+    "use": "…",
+}
+"""What stands beside the word of a control node."""
+
+UNKNOWN = "◇"
+"""What stands beside a word that has no symbol of its own."""
+
+_COLUMNS = 28
+
+
+@dataclass(frozen=True)
+class Card:
+    """A node in a picture.
+
+    Attributes:
+        symbol: What stands before the title of a control node; "" for a skill.
+        title: Its name.
+        lines: What the mission says about it, shortened.
+        tooltip: Everything about it, one fact a line.
+    """
+
+    symbol: str
+    title: str
+    lines: tuple[str, ...]
+    tooltip: str
+
+
+def card(node: OutlineNode) -> Card:
+    """Return what a picture says of a node."""
+    symbol = "" if node.kind == "skill" else SYMBOLS.get(node.kind, UNKNOWN)
+    title = "".join(fitted(node.title, _COLUMNS))
+    lines = fitted(node.when, _COLUMNS, 2) + fitted(node.detail, _COLUMNS, 3 if symbol else 2)
+    return Card(symbol, title, lines, "\n".join(_facts(node)))
+
+
+def _facts(node: OutlineNode) -> list[str]:
+    """Return everything there is to say about a node, most important first."""
+    word = node.skill or node.kind
+    facts = (
+        node.title if node.title == word else f"{node.title}: {word}",
+        node.doc,
+        node.when,
+        node.detail,
+        reads(node),
+        writes(node),
+        why(node),
+        f"subtree {node.subtree}" if node.subtrees else "",
+        node.path,
+    )
+    return [fact for fact in facts if fact]

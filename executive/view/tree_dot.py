@@ -1,0 +1,72 @@
+"""A tree as Graphviz text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from executive.mission.outline import OutlineNode, children
+from executive.view.tree_card import card
+from executive.view.tree_text import writable
+
+SHAPES: Mapping[str, str] = {
+    "skill": "box",
+    "sequence": "box",
+    "fallback": "octagon",
+    "parallel": "parallelogram",
+    "retry": "hexagon",
+    "repeat": "hexagon",
+    "while": "hexagon",
+    "for_each": "hexagon",
+}
+"""Shapes by kind; others are ellipses."""
+
+
+def dot(nodes: Sequence[OutlineNode], name: str) -> str:
+    """Return a tree as a Graphviz digraph; a subtree is a cluster of its name."""
+    below = children(nodes)
+    lines = [
+        f"digraph {_quoted(name)} {{",
+        '  ordering=out; nodesep=0.15; fontname="sans-serif"; fontsize=11;',
+        '  node [fontname="sans-serif", fontsize=11]; edge [fontname="sans-serif", fontsize=9];',
+        *_indented(_branch(0, nodes, below)),
+        "}",
+    ]
+    return "\n".join(lines)
+
+
+def _branch(index: int, nodes: Sequence[OutlineNode], below: Sequence[Sequence[int]]) -> list[str]:
+    """Return the lines of a node and of all that hangs from it."""
+    node = nodes[index]
+    lines = [_node(node)]
+    for child in below[index]:
+        lines += [*_branch(child, nodes, below), _edge(node, nodes[child])]
+    if node.subtrees:
+        head = f"subgraph {_quoted(f'cluster {node.path}')} {{"
+        lines = [head, f"  label={_quoted(node.subtree)}; style=dashed; color=gray;", *_indented(lines), "}"]
+    return lines
+
+
+def _node(node: OutlineNode) -> str:
+    shown = card(node)
+    label = "\n".join([f"{shown.symbol} {shown.title}".strip(), *shown.lines])
+    shape = SHAPES.get(node.kind, "ellipse")
+    style = ', style="rounded"' if node.kind == "skill" else ""
+    tooltip = _quoted(shown.tooltip)
+    return f"{_quoted(node.path)} [label={_quoted(label)}, shape={shape}{style}, tooltip={tooltip}];"
+
+
+def _edge(parent: OutlineNode, node: OutlineNode) -> str:
+    label = f" [label={_quoted(node.slot)}]" if node.slot else ""
+    return f"{_quoted(parent.path)} -> {_quoted(node.path)}{label};"
+
+
+def _indented(lines: Sequence[str]) -> list[str]:
+    return [f"  {line}" for line in lines]
+
+
+def _quoted(text: str) -> str:
+    """Return a text as a quoted string, in which Graphviz knows backslashes and the entities of HTML."""
+    text = writable(text).replace("&", "&amp;")
+    for plain, escaped in (("\\", "\\\\"), ('"', '\\"'), ("\n", "\\n")):
+        text = text.replace(plain, escaped)
+    return f'"{text}"'

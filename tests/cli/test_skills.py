@@ -1,0 +1,155 @@
+"""`executive skills`: what the installed skills declare, as text and as JSON."""
+
+from __future__ import annotations
+
+import json
+from enum import Enum
+from typing import Any, ClassVar
+
+import pytest
+from click.testing import CliRunner, Result
+
+from executive.cli.main import main
+from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Out, Skill, discover, param, port
+
+
+class Speed(Enum):
+    """How fast."""
+
+    SLOW = "slow"
+
+
+class PlaceNeatly(Skill):
+    """Put the item down in line with the others.
+
+    Succeeds when the tool is empty.
+    """
+
+    held: In[str] = port(refers="item", doc="what to put down")
+    beside: In[list[str] | None] = port(default=None, doc="what it goes beside")
+    placed: Out[str] = port(doc="what was put down")
+    gap: Metres = param(0.01, ge=0, le=0.05, doc="between two items")
+    bin: str = param(refers="bin")
+    order: str = param("rows", choices=("rows", "columns"), doc="word " * 30)
+    speed: Speed = param(Speed.SLOW)
+    limit: float = param(float("inf"))
+    reasons: ClassVar = ("full", "stuck")
+    uses: ClassVar = ("arm", "tool")
+    senses: ClassVar = True
+    moves: ClassVar = True
+    tool_state: ClassVar = (HOLDING, EMPTY)
+    tool_left: ClassVar = {"halt": ANY}
+
+
+class Rest(Skill):
+    """Do nothing."""
+
+
+@pytest.fixture(autouse=True)
+def installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("executive.skill.discover", lambda: {"PlaceNeatly": PlaceNeatly, "Rest": Rest})
+
+
+def shown(*words: str) -> Result:
+    return CliRunner().invoke(main, ["skills", *words])
+
+
+def entry(entries: list[dict[str, Any]], name: str) -> dict[str, Any]:
+    return next(each for each in entries if each["name"] == name)
+
+
+def test_one_skill_as_json_is_one_object():
+    told = json.loads(shown("PlaceNeatly", "--json").stdout)
+    assert list(told) == [
+        "name", "doc", "params", "ports", "reasons", "uses", "senses", "moves", "tool",
+    ]  # fmt: skip
+    assert told["doc"].splitlines() == [
+        "Put the item down in line with the others.", "", "Succeeds when the tool is empty.",
+    ]  # fmt: skip
+    assert (told["reasons"], told["uses"]) == (["full", "stuck"], ["arm", "tool"])
+    assert (told["senses"], told["moves"]) == (True, True)
+    assert told["tool"] == {"before": "holding", "after": "empty", "left": {"halt": "any"}}
+
+
+def test_all_skills_as_json_are_one_array():
+    assert [told["name"] for told in json.loads(shown("--json").stdout)] == ["PlaceNeatly", "Rest"]
+
+
+def test_json_tells_everything_about_a_param():
+    params = json.loads(shown("PlaceNeatly", "--json").stdout)["params"]
+    assert entry(params, "gap") == {
+        "name": "gap", "type": "float", "unit": "m", "required": False, "default": 0.01, "min": 0,
+        "max": 0.05, "choices": None, "refers": "", "doc": "between two items",
+    }  # fmt: skip
+    assert entry(params, "bin")["required"] is True
+    assert entry(params, "bin")["refers"] == "bin"
+    assert entry(params, "order")["choices"] == ["rows", "columns"]
+
+
+def test_a_default_that_json_does_not_have_becomes_text():
+    params = json.loads(shown("PlaceNeatly", "--json").stdout)["params"]
+    assert entry(params, "speed")["default"] == "slow"
+    assert entry(params, "limit")["default"] == "Infinity"
+
+
+def test_json_tells_everything_about_a_port():
+    ports = json.loads(shown("PlaceNeatly", "--json").stdout)["ports"]
+    assert entry(ports, "held") == {
+        "name": "held", "type": "str", "direction": "in", "required": True, "default": None,
+        "refers": "item", "doc": "what to put down",
+    }  # fmt: skip
+    assert entry(ports, "beside")["type"] == "list[str] | None"
+    assert entry(ports, "beside")["required"] is False
+    assert entry(ports, "placed")["direction"] == "out"
+
+
+def test_the_text_tells_the_same():
+    text = shown("PlaceNeatly").stdout
+    for line in (
+        "  held: str, required, names an item. what to put down",
+        "  beside: list[str] | None, may be left out. what it goes beside",
+        "  placed: str. what was put down",
+        "  gap: float [m], default 0.01, at least 0, at most 0.05. between two items",
+        "  bin: str, required, names a bin",
+        "may fail with: full, stuck",
+        "uses: arm, tool; senses; moves the arm",
+        "tool: holding before, empty after, any after halt",
+    ):
+        assert line in text.splitlines()
+    assert max(map(len, text.splitlines())) <= 100
+
+
+def test_a_skill_that_needs_nothing_says_so():
+    assert shown("Rest").stdout.splitlines() == [
+        "Rest", "", "Do nothing.", "",
+        "reads:", "  nothing",
+        "writes:", "  nothing",
+        "params:", "  none",
+        "may fail with: nothing",
+        "uses: nothing",
+        "tool: any before, any after",
+    ]  # fmt: skip
+
+
+def test_the_list_has_two_lines_for_every_skill():
+    assert shown().stdout.splitlines() == [
+        "PlaceNeatly     Put the item down in line with the others.",
+        "                held, beside -> placed | params: gap, bin, order, speed, limit "
+        "| reasons: full, stuck",
+        "Rest            Do nothing.",
+        "                - -> -",
+    ]
+
+
+def test_an_unknown_skill_is_refused_in_either_form():
+    result = shown("Rets", "--json")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert 'no skill "Rets" is installed. Did you mean "Rest"?' in result.stderr
+
+
+def test_every_installed_skill_can_be_told(monkeypatch):
+    monkeypatch.undo()
+    told = json.loads(shown("--json").stdout)
+    assert [facts["name"] for facts in told] == list(discover())
+    for facts in told:
+        assert shown(facts["name"]).stdout.startswith(f"{facts['name']}\n")

@@ -1,0 +1,154 @@
+"""`executive tree`: the tree of a mission in every form."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from click.testing import CliRunner, Result
+
+from executive.cli.main import main
+from executive.mission.files import shipped_folder
+
+SHIPPED = sorted(path.stem for path in shipped_folder().glob("*.yaml"))
+
+EVERY_NODE = """
+mission: every_node
+cell: cells/overhead.yaml
+routes: {cube: red_bin, duck: yellow_bin}
+tree:
+  for_each:
+    each: kind
+    in: [cube, duck]
+    do:
+      repeat:
+        times: 5
+        until: [SelectTarget.unseen]
+        do:
+          - parallel:
+              wait_for: all
+              do: [{use: look}, {timeout: {seconds: 20, do: MoveToScan}}]
+          - SelectTarget: {wanted: $kind}
+          - while:
+              condition: {invert: {SelectTarget: {same: $item}}}
+              do: {fallback: [{use: look}, succeed]}
+          - try:
+              retry:
+                attempts: 3
+                on: [Grasp.missed]
+                recover: {use: look}
+                backoff: {first: 0.5, factor: 2, most: 8}
+                do: [Approach, Grasp, Transit, Release]
+              as: pick
+            catch:
+              - on: [Grasp.missed, Approach.no_contact]
+                do: {RejectTarget: {why: "<b>&\\"'\\x1b ü"}}
+            finally: {succeed: MoveToScan}
+trees:
+  look: {args: {view: table}, do: [{Detect: {view: $view}}, Localize]}
+"""
+
+
+def shown(*words: str) -> Result:
+    return CliRunner().invoke(main, ["tree", *words])
+
+
+@pytest.fixture
+def every_node(tmp_path: Path) -> str:
+    """Return a mission with every control node, and a param that means something in XML and Graphviz."""
+    shutil.copytree(shipped_folder() / "cells", tmp_path / "cells")
+    path = tmp_path / "every_node.yaml"
+    path.write_text(EVERY_NODE, encoding="utf-8")
+    return str(path)
+
+
+@pytest.mark.parametrize("mission", SHIPPED)
+def test_every_shipped_mission_is_shown_in_every_form(mission):
+    nodes = json.loads(shown(mission, "--json").stdout)
+    picture = ElementTree.fromstring(shown(mission, "--svg").stdout)
+    groups = [group for group in picture.iter() if "node" in group.attrib.get("class", "").split()]
+    assert [group.attrib["data-path"] for group in groups] == [node["path"] for node in nodes]
+    assert len({group.attrib["id"] for group in groups}) == len(nodes)
+    assert shown(mission).stdout.startswith(nodes[0]["name"])
+    text = shown(mission, "--dot").stdout
+    assert all(f'"{node["path"]}" [' in text for node in nodes)
+
+
+def test_every_control_node_is_known_by_its_word(every_node):
+    kinds = {node["kind"] for node in json.loads(shown(every_node, "--json").stdout)}
+    assert kinds == {
+        "for_each", "repeat", "sequence", "parallel", "timeout", "while", "invert", "fallback", "succeed",
+        "try", "retry", "skill",
+    }  # fmt: skip
+
+
+def test_what_a_mission_says_cannot_break_the_picture(every_node):
+    picture = shown(every_node, "--svg").stdout
+    elements = ElementTree.fromstring(picture).iter("{http://www.w3.org/2000/svg}title")
+    (reject,) = [title for title in (element.text or "" for element in elements) if "RejectTarget" in title]
+    assert "why: <b>&\"'\ufffd ü" in reject.splitlines()
+    assert "<b>" not in picture
+
+
+def test_ports_and_reasons_are_told_on_demand(every_node):
+    plain, full = shown(every_node).stdout, shown(every_node, "--ports", "--reasons").stdout
+    assert "reads" not in plain and "may fail" not in plain
+    assert "reads $targets, $same?, wanted <- $kind?; writes $target, $item, $bin" in full
+    assert "may fail: no_candidate, unseen" in full
+    assert max(map(len, full.splitlines())) <= 100
+
+
+def test_json_tells_what_a_skill_reads_writes_and_fails_with(every_node):
+    nodes = json.loads(shown(every_node, "--json").stdout)
+    (grasp,) = [node for node in nodes if node["skill"] == "Grasp"]
+    assert grasp["reads"] == [{"port": "target", "variable": "target", "required": True}]
+    assert grasp["writes"] == [{"port": "held", "variable": "held", "required": True}]
+    assert grasp["reasons"] == ["missed"]
+    (select,) = [node for node in nodes if "wanted: $kind" in node["detail"]]
+    assert {wire["port"]: wire["variable"] for wire in select["reads"]}["wanted"] == "kind"
+
+
+def test_params_given_on_the_command_line_are_in_the_tree():
+    assert "up to 9 attempts" in shown("sort_overhead", "--set", "attempts=9").stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--svg", "--dot"), "--svg and --dot exclude each other"),
+        (("--svg", "--json"), "--svg and --json exclude each other"),
+        (("--json", "--dot", "--svg"), "--svg and --dot and --json exclude each other"),
+        (("--svg", "--ports"), "--svg holds ports and reasons anyway; leave out --ports"),
+        (("--json", "--reasons"), "--json holds ports and reasons anyway; leave out --reasons"),
+    ],
+)
+def test_forms_that_exclude_each_other_are_refused(words, sentence):
+    result = shown("sort_overhead", *words)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert sentence in result.stderr
+
+
+def test_a_mission_with_mistakes_has_no_tree(tmp_path):
+    (tmp_path / "m.yaml").write_text("mission: m\ncell: cells/none.yaml\ntree: Grip\n")
+    result = shown(str(tmp_path / "m.yaml"), "--svg")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert "error" in result.stderr
+
+
+def test_a_folded_tree_shows_every_subtree_once():
+    text = shown("sort_overhead", "--fold").stdout
+    assert text.count("Localize") == 1
+    assert [line.strip("│├└─ ") for line in text.splitlines() if "as above" in line] == [
+        "look  (as above)", "look  (as above, other params)", "sort_one  (as above)",
+    ]  # fmt: skip
+    picture = ElementTree.fromstring(shown("sort_overhead", "--fold", "--svg").stdout)
+    assert [part.attrib["data-kind"] for part in picture if "use" in part.attrib.get("class", "")] == [
+        "use"
+    ] * 3
+
+
+def test_a_catch_tells_what_it_is_for():
+    assert "on Transit.unreachable, Transit.blocked" in shown("sort_overhead", "--reasons").stdout

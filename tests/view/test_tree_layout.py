@@ -1,0 +1,125 @@
+"""Where things stand in a picture, for trees of any shape."""
+
+from __future__ import annotations
+
+import itertools
+import random
+
+import pytest
+
+from executive.view.tree_layout import GAP, MARGIN, Layout, Rectangle, Size, layout
+
+LEAF = Size(60, 28)
+
+
+def drawn_by_chance(seed: int) -> tuple[list[int], list[Size]]:
+    """Return the depths of the nodes of a tree, parents before children, and their sizes."""
+    chance = random.Random(seed)
+    depths = [0]
+    for _ in range(chance.randrange(40)):
+        depths.append(chance.randint(1, depths[-1] + 1))
+
+    def size() -> Size:
+        slot, name = (chance.choice([0.0, chance.uniform(10, 200)]) for _ in range(2))
+        return Size(chance.uniform(10, 200), chance.uniform(20, 70), slot, name)
+
+    return depths, [size() for _ in depths]
+
+
+@pytest.fixture(params=range(12))
+def tree(request: pytest.FixtureRequest) -> tuple[list[int], list[Size]]:
+    return drawn_by_chance(request.param)
+
+
+def below(depths: list[int]) -> list[list[int]]:
+    children: list[list[int]] = [[] for _ in depths]
+    for index, depth in enumerate(depths):
+        if depth:
+            parent = max(other for other in range(index) if depths[other] == depth - 1)
+            children[parent].append(index)
+    return children
+
+
+def inside(index: int, depths: list[int]) -> set[int]:
+    """Return a node and all that hangs from it."""
+    rest = itertools.takewhile(lambda other: depths[other] > depths[index], range(index + 1, len(depths)))
+    return {index, *rest}
+
+
+def overlap(one: Rectangle, other: Rectangle) -> bool:
+    across = one.x < other.right and other.x < one.right
+    return across and one.y < other.y + other.height and other.y < one.y + one.height
+
+
+def contains(outer: Rectangle, inner: Rectangle) -> bool:
+    slack = 1e-6
+    return (
+        outer.x <= inner.x + slack
+        and outer.y <= inner.y + slack
+        and outer.right >= inner.right - slack
+        and outer.y + outer.height >= inner.y + inner.height - slack
+    )
+
+
+def laid_out(depths: list[int], nodes: list[Size]) -> Layout:
+    return layout(depths, below(depths), nodes)
+
+
+def test_nothing_overlaps(tree):
+    boxes = laid_out(*tree).boxes
+    assert not any(overlap(one, other) for one, other in itertools.combinations(boxes, 2))
+
+
+def test_a_node_stands_right_of_its_parent_and_of_what_leads_to_it(tree):
+    depths, nodes = tree
+    plan = laid_out(depths, nodes)
+    for parent, among in enumerate(below(depths)):
+        for child in among:
+            trunk = plan.trunks[depths[child]]
+            assert plan.boxes[parent].right < trunk < plan.boxes[child].x - nodes[child].slot
+
+
+def test_siblings_stand_in_their_order(tree):
+    depths, nodes = tree
+    plan = laid_out(depths, nodes)
+    for among in below(depths):
+        middles = [plan.boxes[child].middle for child in among]
+        assert middles == sorted(middles)
+
+
+def test_a_node_is_level_with_its_first_child(tree):
+    depths, nodes = tree
+    plan = laid_out(depths, nodes)
+    for parent, among in enumerate(below(depths)):
+        if among and not nodes[parent].name:
+            assert abs(plan.boxes[parent].middle - plan.boxes[among[0]].middle) < 1e-6
+
+
+def test_a_frame_holds_its_subtree_and_nothing_else(tree):
+    depths, nodes = tree
+    plan = laid_out(depths, nodes)
+    assert set(plan.frames) == {index for index, size in enumerate(nodes) if size.name}
+    for index, frame in plan.frames.items():
+        within = inside(index, depths)
+        assert frame.width >= nodes[index].name
+        for other, box in enumerate(plan.boxes):
+            assert contains(frame, box) if other in within else not overlap(frame, box)
+        for other, another in plan.frames.items():
+            assert overlap(frame, another) == (other in within or index in inside(other, depths))
+
+
+def test_everything_is_within_the_picture(tree):
+    plan = laid_out(*tree)
+    whole = Rectangle(0, 0, plan.width, plan.height)
+    assert all(contains(whole, part) for part in (*plan.boxes, *plan.frames.values()))
+
+
+def test_a_single_node_stands_in_the_corner():
+    plan = laid_out([0], [LEAF])
+    assert plan.boxes == (Rectangle(MARGIN, MARGIN, 60, 28),)
+    assert (plan.width, plan.height) == (60 + 2 * MARGIN, 28 + 2 * MARGIN)
+
+
+def test_leaves_stand_below_each_other_without_waste():
+    plan = laid_out([0, 1, 1], [LEAF, LEAF, LEAF])
+    assert plan.boxes[2].y - plan.boxes[1].y == 28 + GAP

@@ -1,0 +1,190 @@
+"""What is known about a tree's nodes, and the tree as text."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, ClassVar
+
+from py_trees.behaviour import Behaviour
+
+from executive.control.attempt import Try
+from executive.control.node import Site
+from executive.control.retry import Retry
+from executive.control.scope import Scope
+from executive.control.sequence import Sequence
+from executive.control.skill_node import SkillNode, Wiring
+from executive.mission.outline import Connection, OutlineNode, children, outline
+from executive.skill import In, Metres, Out, Skill, param, port
+from executive.view.outline import WIDTH, drawn, folded
+
+CELL: Any = SimpleNamespace()
+
+
+class Pick(Skill):
+    """Take something.
+
+    Succeeds when it is held.
+    """
+
+    seen: In[list[int]]
+    only: In[str | None] = port(default=None)
+    height: Metres = param(0.1)
+    held: Out[str]
+    reasons: ClassVar = ("missed", "blocked")
+
+
+def pick(path: str, label: str = "", wiring: Wiring | None = None) -> SkillNode:
+    wired = Wiring({"height": 0.2}, {"seen": "seen", "only": "item"}, {"held": "thing"})
+    return SkillNode(Site(path, label), "Pick", Pick, wiring or wired, CELL, Scope())
+
+
+def in_subtree(node: Behaviour, *subtrees: str) -> Behaviour:
+    node.subtrees = subtrees
+    return node
+
+
+def look(path: str, height: float = 0.2) -> Behaviour:
+    wiring = Wiring({"height": height})
+    return in_subtree(Sequence(Site(path), [pick(f"{path}/Pick", wiring=wiring)]), "look")
+
+
+def tree() -> Behaviour:
+    """Return a retry in a try, whose catch and recovery use the subtree `look`."""
+    retry = Retry(
+        Site("tree/try/retry"), pick("tree/try/retry/do/Pick"), 3, [("Pick", "missed")],
+        look("tree/try/retry/recover/look"),
+    )  # fmt: skip
+    handlers = [([("Pick", "missed")], look("tree/try/catch/1/look", 0.3))]
+    return Try(Site("tree/try"), retry, handlers, look("tree/try/finally/look"))
+
+
+def test_a_skill_tells_what_the_mission_connects_and_what_it_declares():
+    (node,) = outline(pick("tree/Pick"))
+    assert (node.kind, node.title, node.skill, node.doc) == ("skill", "Pick", "Pick", "Take something.")
+    assert node.params == {"height": 0.2}
+    assert node.reads == (Connection("seen", "seen", True), Connection("only", "item", False))
+    assert node.writes == (Connection("held", "thing", True),)
+    assert node.reasons == ("missed", "blocked")
+
+
+def test_a_label_is_the_title_and_leaves_the_kind_as_it_is():
+    nodes = outline(Sequence(Site("tree/pair", "pair"), [pick("tree/pair/first", "first")]))
+    assert [(node.title, node.kind, node.skill) for node in nodes] == [
+        ("pair", "sequence", ""), ("first", "skill", "Pick"),
+    ]  # fmt: skip
+    assert nodes[0].detail == "sequence"
+
+
+def test_every_node_knows_what_it_is_to_its_parent_and_which_subtree_begins_with_it():
+    assert [(node.slot, node.title, node.subtrees) for node in outline(tree())] == [
+        ("", "try", ()),
+        ("do", "retry", ()),
+        ("recover", "sequence", ("look",)),
+        ("", "Pick", ()),
+        ("do", "Pick", ()),
+        ("catch 1", "sequence", ("look",)),
+        ("", "Pick", ()),
+        ("finally", "sequence", ("look",)),
+        ("", "Pick", ()),
+    ]
+
+
+def test_a_node_knows_after_which_failures_it_runs():
+    class Says(Try):
+        def when(self, child: Behaviour) -> str:
+            return "on Pick.missed" if child.path.endswith("look") else ""
+
+    handlers = [([("Pick", "missed")], look("tree/try/catch/1/look"))]
+    root = Says(Site("tree/try"), pick("tree/try/Pick"), handlers)
+    assert [node.when for node in outline(root)] == ["", "", "on Pick.missed", ""]
+
+
+def test_a_subtree_that_is_one_node_is_told_from_the_node():
+    inner = in_subtree(pick("tree/repeat/do/look/close/Pick"), "look", "close")
+    (_, node) = outline(Retry(Site("tree/repeat"), inner, 2))
+    assert (node.slot, node.title, node.subtree) == ("do", "Pick", "look / close")
+    assert node.name == "do look close: Pick"
+
+
+def test_a_bare_list_is_its_slot():
+    body = Sequence(Site("tree/retry/do"), [pick("tree/retry/do/2:Pick")])
+    assert [node.slot for node in outline(Retry(Site("tree/retry"), body, 2))] == ["", "do", ""]
+
+
+def test_children_stand_below_their_parents():
+    assert children(outline(tree())) == [[1, 5, 7], [2, 4], [3], [], [], [6], [], [8], []]
+
+
+def test_ports_and_reasons_stand_below_the_skill():
+    nodes = outline(Sequence(Site("tree"), [pick("tree/Pick"), pick("tree/other", "other")]))
+    assert drawn(nodes, ports=True, reasons=True).splitlines() == [
+        "tree",
+        "├─ Pick  (height: 0.2, only: $item, held: $thing)",
+        "│     reads $seen, only <- $item?; writes held -> $thing",
+        "│     may fail: missed, blocked",
+        "└─ other  (Pick, height: 0.2, only: $item, held: $thing)",
+        "      reads $seen, only <- $item?; writes held -> $thing",
+        "      may fail: missed, blocked",
+    ]
+
+
+def test_what_is_not_asked_for_is_not_told():
+    nodes = outline(pick("tree/Pick"))
+    assert len(drawn(nodes).splitlines()) == 1
+    assert "may fail" not in drawn(nodes, ports=True)
+    assert "reads" not in drawn(nodes, reasons=True)
+
+
+def test_a_skill_without_ports_or_reasons_has_nothing_below_it():
+    nodes = [OutlineNode("tree/Wait", "Wait", 0, "", "skill", "Wait", skill="Wait")]
+    assert drawn(nodes, ports=True, reasons=True) == "Wait"
+
+
+def test_a_catch_tells_what_it_is_for_with_the_reasons():
+    nodes = [
+        OutlineNode("tree/try", "try", 0, "", "try", "try"),
+        OutlineNode("tree/try/catch/1", "catch 1", 1, "", "sequence", "sequence", when="on Pick.missed"),
+        OutlineNode("tree/try/catch/1/Wait", "Wait", 2, "", "skill", "Wait"),
+    ]
+    assert drawn(nodes, reasons=True).splitlines() == [
+        "try", "└─ catch 1", "   │  on Pick.missed", "   └─ Wait",
+    ]  # fmt: skip
+
+
+def test_long_lines_are_wrapped_under_their_node():
+    wiring = Wiring(inputs={"seen": "a_rather_long_name"}, outputs={"held": "b" * 60})
+    body = pick("tree/retry/do/Pick", wiring=wiring)
+    on = [("Pick", reason) for reason in ("missed", "blocked", "unreachable", "dropped", "slipped")]
+    lines = drawn(outline(Retry(Site("tree/retry"), body, 3, on)), ports=True).splitlines()
+    assert max(map(len, lines)) <= WIDTH
+    assert lines[1] == "│    Pick.slipped)"
+    assert lines[-1].startswith("        ") and lines[-1].endswith("b")
+
+
+def test_a_folded_tree_shows_every_subtree_once():
+    nodes = outline(tree())
+    shown = folded(nodes)
+    assert drawn(shown).splitlines() == [
+        "try",
+        "├─ retry  (up to 3 attempts, on Pick.missed)",
+        "│  ├─ recover: look",
+        "│  │  └─ Pick  (height: 0.2)",
+        "│  └─ do: Pick  (height: 0.2, only: $item, held: $thing)",
+        "├─ catch 1: look  (as above, other params)",
+        "└─ finally: look  (as above)",
+    ]
+    assert [(node.kind, node.title, node.slot) for node in shown if node.kind == "use"] == [
+        ("use", "look", "catch 1"), ("use", "look", "finally"),
+    ]  # fmt: skip
+    assert [node for node in shown if node.kind != "use"] == nodes[:5]
+
+
+def test_a_folded_subtree_stays_within_those_around_it():
+    first, second = look("tree/1:look"), look("tree/2:wide/look")
+    shown = folded(outline(Sequence(Site("tree"), [first, in_subtree(second, "wide", "look")])))
+    assert [(node.title, node.subtrees) for node in shown[2:]] == [("Pick", ()), ("look", ("wide",))]
+
+
+def test_a_tree_without_subtrees_is_not_folded():
+    nodes = outline(Sequence(Site("tree"), [pick("tree/1:Pick"), pick("tree/2:Pick")]))
+    assert folded(nodes) == nodes

@@ -1,0 +1,237 @@
+"""The tree as a picture: SVG and Graphviz text."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import pytest
+
+from executive.mission.outline import Connection, OutlineNode
+from executive.view.tree_card import SYMBOLS, UNKNOWN, card
+from executive.view.tree_dot import dot
+from executive.view.tree_svg import identifier, svg
+from executive.view.tree_text import extent, fitted, writable
+
+NASTY = """<b onload="x">&amp; 'quoted' "twice" \\ ]]> --> größer ≥ 日本 \x00\x1b \ud800"""
+RETRY = "up to 3 attempts, on Grasp.missed, Grasp.blocked"
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def control(path: str, depth: int, word: str, **more) -> OutlineNode:
+    return OutlineNode(path, word, depth, more.pop("detail", ""), word, more.pop("title", word), **more)
+
+
+def skill(path: str, depth: int, name: str, **more) -> OutlineNode:
+    detail, title = more.pop("detail", ""), more.pop("title", name)
+    return OutlineNode(path, name, depth, detail, "skill", title, skill=name, **more)
+
+
+NODES = [
+    control("tree/try", 0, "try"),
+    control("tree/try/retry", 1, "retry", slot="do", detail=RETRY),
+    skill(
+        "tree/try/retry/do/Grasp", 2, "Grasp", slot="do", doc="Close the tool.", detail="settle: 0.2",
+        reads=(Connection("target", "target", True), Connection("only", "item", False)),
+        writes=(Connection("held", "thing", True),), reasons=("missed", "blocked"),
+    ),
+    control(
+        "tree/try/catch/1/look", 1, "sequence", slot="catch 1", when="on Grasp.missed", subtrees=("look",)
+    ),
+    skill("tree/try/catch/1/look/2:Detect", 2, "Detect", title="again", detail="Detect, view: full"),
+]  # fmt: skip
+
+
+def parsed(nodes: list[OutlineNode], name: str = "sort") -> Element:
+    return ElementTree.fromstring(svg(nodes, name))
+
+
+def groups(picture: Element) -> dict[str, Element]:
+    """Return the groups of the nodes by path."""
+    return {
+        group.attrib["data-path"]: group
+        for group in picture.iter(f"{SVG}g")
+        if "node" in group.attrib["class"].split()
+    }
+
+
+def texts(group: Element, kind: str) -> list[str | None]:
+    return [text.text for text in group.iter(f"{SVG}text") if text.attrib["class"] == kind]
+
+
+def tooltip(group: Element) -> str:
+    return group.findtext(f"{SVG}title") or ""
+
+
+def test_every_node_is_a_group_that_a_page_can_find():
+    found = groups(parsed(NODES))
+    assert list(found) == [node.path for node in NODES]
+    assert [group.attrib["data-kind"] for group in found.values()] == [node.kind for node in NODES]
+    assert found["tree/try/retry/do/Grasp"].attrib["class"] == "node skill"
+    assert found["tree/try/retry"].attrib["class"] == "node control retry"
+    assert found["tree/try/catch/1/look/2:Detect"].attrib["id"] == "node-tree-try-catch-1-look-2--3a-Detect"
+
+
+def test_an_id_says_its_path_and_no_two_are_alike():
+    paths = ["a/b", "a-b", "a_b", "a:b", "a.b", "a b", "a/ü", "a/:b", 'a"b']
+    found = [identifier(path) for path in paths]
+    assert len(set(found)) == len(paths)
+    assert all(re.fullmatch(r"node-[A-Za-z0-9_-]+", each) for each in found)
+
+
+def test_a_node_shows_its_symbol_its_title_and_short_lines():
+    found = groups(parsed(NODES))
+    retry, again = found["tree/try/retry"], found["tree/try/catch/1/look/2:Detect"]
+    assert (texts(retry, "symbol"), texts(retry, "title")) == (["↻"], ["retry"])
+    assert texts(retry, "line") == ["up to 3 attempts,", "on Grasp.missed,", "Grasp.blocked"]
+    assert (texts(again, "symbol"), texts(again, "title")) == ([], ["again"])
+    assert texts(again, "line") == ["Detect, view: full"]
+
+
+def test_a_line_says_what_the_node_is_to_its_parent():
+    slots = {path: texts(group, "slot") for path, group in groups(parsed(NODES)).items()}
+    assert list(slots.values()) == [[], ["do"], ["do"], ["catch 1"], []]
+
+
+def test_the_title_of_a_node_says_everything():
+    found = groups(parsed(NODES))
+    assert tooltip(found["tree/try/retry/do/Grasp"]).splitlines() == [
+        "Grasp",
+        "Close the tool.",
+        "settle: 0.2",
+        "reads $target, only <- $item?",
+        "writes held -> $thing",
+        "may fail: missed, blocked",
+        "tree/try/retry/do/Grasp",
+    ]
+    assert tooltip(found["tree/try/catch/1/look"]).splitlines() == [
+        "sequence", "on Grasp.missed", "subtree look", "tree/try/catch/1/look",
+    ]  # fmt: skip
+    assert tooltip(found["tree/try/catch/1/look/2:Detect"]).startswith("again: Detect\n")
+
+
+def test_a_subtree_has_a_frame_with_its_name():
+    (frame,) = [group for group in parsed(NODES).iter(f"{SVG}g") if group.attrib["class"] == "subtree"]
+    assert frame.attrib["data-path"] == "tree/try/catch/1/look"
+    assert texts(frame, "name") == ["look"]
+
+
+@pytest.mark.parametrize("word", SYMBOLS)
+def test_every_control_node_has_its_symbol(word):
+    (group,) = groups(parsed([control(f"tree/{word}", 0, word)])).values()
+    assert texts(group, "symbol") == [SYMBOLS[word]]
+
+
+def test_a_word_that_nobody_knows_is_drawn_like_any_other():
+    node = control("tree/dance", 0, "dance")
+    (group,) = groups(parsed([node])).values()
+    assert (texts(group, "symbol"), texts(group, "title")) == ([UNKNOWN], ["dance"])
+    assert "shape=ellipse" in dot([node], "x")
+
+
+def test_the_picture_needs_nothing_else():
+    text = svg(NODES, "sort")
+    elements = {element.tag.removeprefix(SVG) for element in ElementTree.fromstring(text).iter()}
+    assert elements == {"svg", "title", "style", "g", "rect", "text", "path"}
+    assert not re.search(r"href|url\(|@import|http(?!://www\.w3\.org/2000/svg)", text)
+
+
+def test_colours_come_from_the_style_sheet_alone():
+    picture = parsed(NODES)
+    assert not any({"fill", "stroke", "style"} & set(element.attrib) for element in picture.iter())
+    style = picture.findtext(f"{SVG}style") or ""
+    for status in ("running", "success", "failure"):
+        assert f".{status} .box" in style
+    assert all(rule.lstrip().startswith(".behaviour-tree ") for rule in re.findall(r"[^{}]+(?={)", style))
+
+
+def test_the_same_tree_makes_the_same_picture():
+    assert svg(NODES, "sort") == svg(NODES, "sort")
+
+
+def test_text_from_a_mission_cannot_leave_its_place_in_the_svg():
+    node = skill(f"tree/{NASTY}", 0, "Grasp", title=NASTY, detail=NASTY, slot=NASTY, subtrees=(NASTY,))
+    picture = parsed([control("tree", 0, "sequence"), replace(node, depth=1)], NASTY)
+    group = groups(picture)[f"tree/{writable(NASTY)}"]
+    assert picture.findtext(f"{SVG}title") == writable(NASTY)
+    assert texts(group, "slot") == [writable(NASTY)]
+    assert NASTY[:24] in tooltip(group)
+    svg([node], NASTY).encode()
+
+
+def test_text_from_a_mission_cannot_leave_its_place_in_the_dot():
+    node = skill(f"tree/{NASTY}", 0, "Grasp", title=NASTY, detail=NASTY, subtrees=(NASTY,))
+    text = dot([node], NASTY)
+    text.encode()
+    outside = re.sub(r'"(?:[^"\\]|\\.)*"', "_", text)
+    assert outside.splitlines() == [
+        "digraph _ {",
+        "  ordering=out; nodesep=0.15; fontname=_; fontsize=11;",
+        "  node [fontname=_, fontsize=11]; edge [fontname=_, fontsize=9];",
+        "  subgraph _ {",
+        "    label=_; style=dashed; color=gray;",
+        "    _ [label=_, shape=box, style=_, tooltip=_];",
+        "  }",
+        "}",
+    ]
+    assert "&amp;amp;" in text
+
+
+def test_the_dot_has_every_node_and_every_line():
+    lines = [re.sub(r", tooltip=.*", "", line.strip()) for line in dot(NODES, "sort").splitlines()]
+    assert lines[0] == 'digraph "sort" {'
+    assert lines[3:] == [
+        '"tree/try" [label="↯ try", shape=ellipse',
+        r'"tree/try/retry" [label="↻ retry\nup to 3 attempts,\non Grasp.missed,\nGrasp.blocked", '
+        "shape=hexagon",
+        '"tree/try/retry/do/Grasp" [label="Grasp\\nsettle: 0.2", shape=box, style="rounded"',
+        '"tree/try/retry" -> "tree/try/retry/do/Grasp" [label="do"];',
+        '"tree/try" -> "tree/try/retry" [label="do"];',
+        'subgraph "cluster tree/try/catch/1/look" {',
+        'label="look"; style=dashed; color=gray;',
+        '"tree/try/catch/1/look" [label="→ sequence\\non Grasp.missed", shape=box',
+        '"tree/try/catch/1/look/2:Detect" [label="again\\nDetect, view: full", shape=box, style="rounded"',
+        '"tree/try/catch/1/look" -> "tree/try/catch/1/look/2:Detect";',
+        "}",
+        '"tree/try" -> "tree/try/catch/1/look" [label="catch 1"];',
+        "}",
+    ]
+
+
+def test_a_skill_has_two_lines_of_params_at_most():
+    detail = ", ".join(f"param_{number}: {number}" for number in range(9))
+    assert card(skill("tree/A", 0, "A", detail=detail)).lines == (
+        "param_0: 0, param_1: 1,",
+        "param_2: 2, param_3: 3, …",
+    )
+    assert card(skill("tree/A", 0, "A", detail="x" * 100)).lines == ("x" * 28, "x" * 27 + "…")
+
+
+@pytest.mark.parametrize(
+    ("text", "rows"),
+    [
+        ("", ()),
+        ("one two three", ("one two", "three")),
+        ("a: 1, b: 2", ("a: 1, b: 2",)),
+        ("alpha: 1, beta: 2", ("alpha: 1,", "beta: 2")),
+        ("a\n  b\tc", ("a b c",)),
+        ("alpha: 1, beta: 2, gamma: 3", ("alpha: 1,", "beta: 2, …")),
+    ],
+)
+def test_text_is_cut_behind_a_comma_where_it_can_be(text, rows):
+    assert fitted(text, 11, 2) == rows
+
+
+def test_long_text_gets_a_longer_box():
+    assert (
+        extent("SelectTarget", 13)
+        < extent("SelectTarget", 13, bold=True)
+        < extent("SelectTargets", 13, bold=True)
+    )
+    assert extent("日本", 10) > extent("ab", 10)
+
+
+def test_what_xml_cannot_hold_is_replaced():
+    assert writable("a\x00\x1b\ud800\ufffeb\tc\n€𝄞") == "a����b\tc\n€𝄞"
