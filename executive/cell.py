@@ -17,6 +17,9 @@ from executive.messages import Bin, Box, Detection, Detections, Frame, Item, Obj
 Steps = Iterator[None]
 """What a generator hands the tick loop: one None per control step."""
 
+Routes = Mapping[str, tuple[str, ...]]
+"""Class label to the bins it may go to, in the order the mission names them: any of them is right."""
+
 
 class Clock(Protocol):
     """The run's only clock; in simulation it advances by physics steps alone."""
@@ -223,8 +226,11 @@ class Ledger(Protocol):
     def attempts(self, item: Item) -> int:
         """Return how many grasps of the item have failed."""
 
-    def free_slot(self, bin: str) -> int:
-        """Return the number of the drop slot of `bin` to use next."""
+    def objects_in(self, bin: str) -> int:
+        """Return how many objects were let go in `bin` so far: the number of its next free slot."""
+
+    def in_tool(self) -> Item | None:
+        """Return the item that the tool is believed to hold, or None."""
 
 
 class Operator(Protocol):
@@ -246,7 +252,7 @@ class Cell:
         detectors: By name; the first is the default.
         bins: By name.
         classes: What is known of each class of objects, by label.
-        routes: Class label to bin name, as the mission says.
+        routes: Class label to the names of the bins that are right for it, as the mission says.
         localizer: How detections become positions in this cell.
         safe_place: Where something held may be put down `(3,)` [m].
         travel_height: Height of the tool centre point at which tool and load clear everything [m].
@@ -264,7 +270,7 @@ class Cell:
     operator: Operator
     bins: Mapping[str, Bin]
     classes: Mapping[str, ObjectClass]
-    routes: Mapping[str, str]
+    routes: Routes
     localizer: Localizer
     safe_place: Array
     travel_height: float

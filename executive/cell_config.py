@@ -235,6 +235,8 @@ class LedgerConfig(Section):
 class CellConfig(Section):
     """A whole cell file."""
 
+    base: str = Field("", exclude=True)
+    """Another cell file, which gives every key of the first level that this one does not; "" once it has."""
     cell: str
     """Name of the cell."""
     description: str = ""

@@ -18,6 +18,7 @@ from executive.errors import Fault, InputError
 
 if TYPE_CHECKING:
     from executive.cell import Cell
+    from executive.workcell import LeastTimes
 
 T = TypeVar("T")
 
@@ -91,6 +92,7 @@ class Port:
         type: Python type of the value.
         direction: IN or OUT.
         default: Value of an unwired input; `...` where it must be wired to a written variable.
+        refers: What a text names (`item`, `bin`, `class`), or "" for a plain value.
         doc: One sentence.
     """
 
@@ -98,6 +100,7 @@ class Port:
     type: Any
     direction: Direction
     default: Any
+    refers: str
     doc: str
 
     @property
@@ -131,9 +134,9 @@ def param(
     return _Declared(default, ge, le, choices, refers, doc)
 
 
-def port(*, default: Any = ..., doc: str = "") -> Any:
-    """Give an input port a default for when it is not wired, or a port its sentence."""
-    return _Declared(default, None, None, None, "", doc)
+def port(*, default: Any = ..., refers: str = "", doc: str = "") -> Any:
+    """Give an input port a default for when it is not wired, or a port what it names and its sentence."""
+    return _Declared(default, None, None, None, refers, doc)
 
 
 class SkillFailed(Exception):
@@ -153,9 +156,11 @@ class Skill:
         ports: The declared ports by name.
         reasons: Why it may fail; a closed list.
         uses: What no sibling may use at the same time: `arm`, `tool`, `camera`.
-        senses: True if it looks at the world anew.
+        senses: True if it takes in something new: an image, a person's wish.
         moves: True if it moves the arm.
-        tool_state: What the tool must hold before, and holds after success.
+        tool_state: What the tool must hold before (ANY: no matter), and holds after success (ANY: as before).
+        tool_left: What it holds after a failure, by reason, or after a `halt`, where that is not what it
+            held before; ANY where it may be either.
     """
 
     params: ClassVar[Mapping[str, Param]] = {}
@@ -165,6 +170,7 @@ class Skill:
     senses: ClassVar[bool] = False
     moves: ClassVar[bool] = False
     tool_state: ClassVar[tuple[ToolState, ToolState]] = (ANY, ANY)
+    tool_left: ClassVar[Mapping[str, ToolState]] = {}
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -179,8 +185,8 @@ class Skill:
             direction = next((mark for mark in marks if isinstance(mark, Direction)), None)
             if direction is not None:
                 default = declared.default if isinstance(declared, _Declared) else ...
-                doc = declared.doc if isinstance(declared, _Declared) else ""
-                ports[name] = Port(name, base, direction, default, doc)
+                refers, doc = (declared.refers, declared.doc) if isinstance(declared, _Declared) else ("", "")
+                ports[name] = Port(name, base, direction, default, refers, doc)
             elif isinstance(declared, _Declared):
                 unit = next((mark for mark in marks if isinstance(mark, str)), "")
                 params[name] = Param(
@@ -216,9 +222,12 @@ class Skill:
         raise NotImplementedError
 
     @classmethod
-    def shortest(cls, cell: Cell, inputs: Mapping[str, Any]) -> float:
-        """Return the least time this skill can take with these inputs [s]; 0 where nothing is known."""
-        del cell, inputs
+    def shortest(cls, least: LeastTimes, given: Mapping[str, Any]) -> float:
+        """Return the least time in which this skill can succeed [s]; 0 where nothing is known.
+
+        `given` are the params, and the inputs whose value stands in the mission.
+        """
+        del least, given
         return 0.0
 
     def failed(self, reason: str, message: str) -> SkillFailed:

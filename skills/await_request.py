@@ -11,8 +11,9 @@ from executive.skill import Out, Skill, port
 class AwaitRequest(Skill):
     """Know which class the operator wants next; the run's clock stands still until they say it."""
 
-    wanted: Out[str] = port(doc="the class asked for")
+    wanted: Out[str] = port(refers="class", doc="the class asked for")
     reasons: ClassVar = ("rescan", "quit")
+    senses: ClassVar = True
 
     def run(self, cell: Cell) -> Steps:
         """Ask once."""

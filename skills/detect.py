@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 from executive.cell import Cell, Steps
 from executive.errors import Unavailable
 from executive.messages import Detections
+from executive.moving import LeastTimes
 from executive.skill import Out, Skill, param, port
 
 
@@ -29,6 +31,11 @@ class Detect(Skill):
     reasons: ClassVar = ("unsure", "hidden", "unavailable")
     uses: ClassVar = ("camera",)
     senses: ClassVar = True
+
+    @classmethod
+    def shortest(cls, least: LeastTimes, given: Mapping[str, Any]) -> float:
+        """Return the time until the detector's answer [s]."""
+        return least.answer(given["detector"])
 
     def run(self, cell: Cell) -> Steps:
         """Take a frame, ask the detector, wait for its answer."""

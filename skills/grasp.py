@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 from executive.cell import Cell, Steps
 from executive.messages import Item, Target
+from executive.moving import LeastTimes
 from executive.skill import EMPTY, HOLDING, In, Out, Seconds, Skill, param, port
 
 
@@ -16,11 +18,17 @@ class Grasp(Skill):
     """
 
     target: In[Target] = port(doc="what the tool touches")
-    held: Out[Item] = port(doc="the item in the tool")
+    held: Out[Item] = port(refers="item", doc="the item in the tool")
     settle: Seconds = param(0.10, ge=0, le=2, doc="time given to the seal")
     reasons: ClassVar = ("missed",)
     uses: ClassVar = ("tool",)
     tool_state: ClassVar = (EMPTY, HOLDING)
+
+    @classmethod
+    def shortest(cls, least: LeastTimes, given: Mapping[str, Any]) -> float:
+        """Return `settle` [s]."""
+        del least
+        return float(given["settle"])
 
     def run(self, cell: Cell) -> Steps:
         """Switch the vacuum on and ask the sensor."""

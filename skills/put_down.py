@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 
 from executive.cell import Cell, Steps, Via
 from executive.messages import Item
-from executive.moving import follow, planned, settle, travel
-from executive.skill import EMPTY, HOLDING, In, Metres, Seconds, Skill, param, port
+from executive.moving import LeastTimes, follow, planned, settle, travel
+from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, param, port
 
 
 class PutDown(Skill):
     """Put the held item down on the cell's safe place, where the next look finds it."""
 
-    held: In[Item] = port(doc="the item in the tool")
+    held: In[Item] = port(refers="item", doc="the item in the tool")
     drop: Metres = param(0.005, ge=0, le=0.05, doc="height of the item's underside above the table")
     settle: Seconds = param(0.10, ge=0, le=2, doc="time given to the vacuum to vanish")
     reasons: ClassVar = ("unreachable", "blocked", "stuck")
     uses: ClassVar = ("arm", "tool")
     moves: ClassVar = True
     tool_state: ClassVar = (HOLDING, EMPTY)
+    tool_left: ClassVar = {"halt": ANY}
+
+    @classmethod
+    def shortest(cls, least: LeastTimes, given: Mapping[str, Any]) -> float:
+        """Return `settle` [s]; the item may hang over the safe place already."""
+        del least
+        return float(given["settle"])
 
     def run(self, cell: Cell) -> Steps:
         """Carry it there, come down, let go."""

@@ -15,7 +15,7 @@ class RejectTarget(Skill):
     With `after`, only once its grasps have failed that often; until then this does nothing and succeeds.
     """
 
-    item: In[Item] = port(doc="the item to give up")
+    item: In[Item] = port(refers="item", doc="the item to give up")
     why: str = param("could not be picked", doc="what the report says about it")
     after: int = param(0, ge=0, doc="failed attempts from which it is given up")
     reasons: ClassVar = ()

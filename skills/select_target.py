@@ -19,11 +19,11 @@ class SelectTarget(Skill):
     """
 
     targets: In[list[Target]] = port(doc="what the last look localized")
-    same: In[Item | None] = port(default=None, doc="only this item")
-    wanted: In[str | None] = port(default=None, doc="only this class")
+    same: In[Item | None] = port(default=None, refers="item", doc="only this item")
+    wanted: In[str | None] = port(default=None, refers="class", doc="only this class")
     target: Out[Target] = port(doc="the chosen target")
-    item: Out[Item] = port(doc="the item it is bound to")
-    bin: Out[str] = port(doc="the bin its class goes to")
+    item: Out[Item] = port(refers="item", doc="the item it is bound to")
+    bin: Out[str] = port(refers="bin", doc="the one of its class's bins with the fewest objects")
     prefer: str = param(
         "nearest", choices=("nearest", "surest"), doc="`nearest` to the tool, or the `surest` detection"
     )
@@ -43,7 +43,9 @@ class SelectTarget(Skill):
             best = min(candidates, key=lambda t: (float(np.linalg.norm(t.position[:2] - here)), t.item))
         else:
             best = min(candidates, key=lambda t: (-t.confidence, t.item))
-        self.target, self.item, self.bin = best, best.item, cell.routes[best.label]
+        self.target, self.item = best, best.item
+        # The number of a bin's next slot is the number of objects let go in it.
+        self.bin = min(cell.routes[best.label], key=cell.ledger.objects_in)
         cell.decided(best, self.bin)
 
     def _eligible(self, cell: Cell, target: Target) -> bool:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 
 from executive.cell import Cell, Steps, Via
 from executive.messages import Item
-from executive.moving import follow, planned, settle, travel
-from executive.skill import HOLDING, In, Metres, Skill, param, port
+from executive.moving import LeastTimes, follow, planned, settle, travel
+from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Skill, param, port
 
 
 class Transit(Skill):
@@ -19,20 +20,26 @@ class Transit(Skill):
     all the way.
     """
 
-    held: In[Item] = port(doc="the item in the tool")
-    bin: In[str] = port(doc="where to")
+    held: In[Item] = port(refers="item", doc="the item in the tool")
+    bin: In[str] = port(refers="bin", doc="where to")
     drop: Metres = param(0.015, ge=0.005, le=0.1, doc="height of the item's underside above the floor")
     reasons: ClassVar = ("unreachable", "blocked", "dropped")
     uses: ClassVar = ("arm", "tool")
     moves: ClassVar = True
     tool_state: ClassVar = (HOLDING, HOLDING)
+    tool_left: ClassVar = {"dropped": EMPTY, "halt": ANY}
+
+    @classmethod
+    def shortest(cls, least: LeastTimes, given: Mapping[str, Any]) -> float:
+        """Return the time of the shortest carry from the workspace to the bin, if it is known which [s]."""
+        return least.carry(given.get("bin"))
 
     def run(self, cell: Cell) -> Steps:
         """Plan the whole way, then follow it as long as the seal holds."""
         yield from settle(cell.arm)
         bin = cell.bins[self.bin]
         kind = cell.classes[cell.ledger.label(self.held)]
-        slot = cell.ledger.free_slot(self.bin)
+        slot = cell.ledger.objects_in(self.bin)
         layer, place = divmod(slot, len(bin.slots))
         over = bin.slots[place]
         low = float(bin.position[2]) + kind.height * (1 + layer) + self.drop

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from executive.cell import Routes
 from executive.cell_config import LedgerConfig
 from executive.errors import Fault
 from executive.events import Emit
@@ -24,9 +25,7 @@ class ItemLedger:
     Every change is emitted as an `item` event, so that the record can be rebuilt from the journal.
     """
 
-    def __init__(
-        self, config: LedgerConfig, bins: Mapping[str, Bin], routes: Mapping[str, str], emit: Emit
-    ) -> None:
+    def __init__(self, config: LedgerConfig, bins: Mapping[str, Bin], routes: Routes, emit: Emit) -> None:
         self._config = config
         self._bins = bins
         self._routes = routes
@@ -161,9 +160,13 @@ class ItemLedger:
         """Return how many grasps of the item have failed."""
         return self._record(item).attempts
 
-    def free_slot(self, bin: str) -> int:
-        """Return the number of the drop slot of `bin` to use next."""
+    def objects_in(self, bin: str) -> int:
+        """Return how many objects were let go in `bin` so far: the number of its next free slot."""
         return sum(record.bin == bin for record in self._records.values())
+
+    def in_tool(self) -> Item | None:
+        """Return the item that the tool is believed to hold, or None."""
+        return next((r.item for r in self._records.values() if r.state is State.HELD), None)
 
     def close(self) -> None:
         """Decide what became of everything still open: the run is over.
@@ -240,18 +243,20 @@ class ItemLedger:
         return next((name for name, bin in self._bins.items() if bin.contains(position)), None)
 
     def _recognize_in_bins(self, inside: Sequence[tuple[str, Array]]) -> None:
-        """Find dropped items again that fell into the very bin they were meant for.
+        """Find dropped items again that fell into a bin that is right for them.
 
-        More objects of a class in its bin than were let go there can only be ones that fell.
+        More objects of a class in one of its bins than were let go there can only be ones that fell.
         """
         shown = Counter((label, self._bin_at(position)) for label, position in inside)
         for record in self._records.values():
-            bin = self._routes.get(record.label, "")
-            if record.state is not State.DROPPED or not bin:
+            if record.state is not State.DROPPED:
                 continue
-            there = sum(r.bin == bin and r.label == record.label for r in self._records.values())
-            if shown[record.label, bin] > there:
-                self.placed(record.item, bin)
+            label = record.label
+            for bin in self._routes.get(label, ()):
+                there = sum(r.bin == bin and r.label == label for r in self._records.values())
+                if shown[label, bin] > there:
+                    self.placed(record.item, bin)
+                    break
 
     def _emit_look(self, detections: Detections, positions: Sequence[Array]) -> None:
         frame = detections.frame

@@ -1,18 +1,27 @@
-"""A cell file, read and checked."""
+"""A cell file, put together with the files it is based on, and checked."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
+from collections.abc import Mapping as Mapped
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from executive.cell_config import CellConfig
-from executive.mission.files import read_source
+from executive.errors import InputError
+from executive.mission.files import below, read_source
 from executive.mission.findings import Finding, MissionError, error, in_file_order
-from executive.mission.overrides import override_cell
+from executive.mission.overrides import CELL, override_cell, override_source
 from executive.mission.source import Source
-from executive.mission.text import Node, parse_yaml
+from executive.mission.text import Mapping, Node, Scalar, parse_yaml, plain
 from executive.mission.validate import KeyPath, mark_of, validate
+from executive.mission.words import describe
+
+BASE = "base"
+"""The key that names the file which gives every key of the first level that this one does not."""
+
+DEEPEST = 5
+"""How many files may stand below a cell file, each the base of the one before."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +30,8 @@ class CellFile:
 
     Attributes:
         config: Its content, or None where findings say why not.
-        root: Its nodes, for placing findings that come later; None where it is no YAML.
+        root: Its nodes and those of its bases, for placing findings that come later; None where it or a
+            base is no YAML.
     """
 
     config: CellConfig | None
@@ -35,7 +45,7 @@ class CellFile:
         return error(mark, code, message)
 
 
-def load_cell(path: Path, overrides: Mapping[str, str] | None = None) -> CellConfig:
+def load_cell(path: Path, overrides: Mapped[str, str] | None = None) -> CellConfig:
     """Return the content of the cell file at `path`; `overrides` name its keys as `cell.<key>.<key>`.
 
     Raises:
@@ -48,24 +58,88 @@ def load_cell(path: Path, overrides: Mapping[str, str] | None = None) -> CellCon
     return file.config
 
 
-def read_cell(path: Path, overrides: Mapping[str, str]) -> CellFile:
-    """Return what a cell file says and everything that is wrong with it.
+def read_cell(path: Path, overrides: Mapped[str, str]) -> CellFile:
+    """Return what a cell file and its bases say and everything that is wrong with them.
 
     Raises:
         InputError: There is no such file.
     """
     source = read_source(path)
-    root, findings = parse_yaml(source)
+    parts = _Parts()
+    root = parts.tree(path, source, ())
     if root is None:
-        return CellFile(None, source, None, tuple(findings))
+        return CellFile(None, source, None, tuple(parts.findings))
     root, wrong = override_cell(root, overrides)
+    wrong += _rebased(overrides)
     validated = validate(root, CellConfig)
-    file = CellFile(validated.model, source, root, (*findings, *wrong, *validated.findings))
+    file = CellFile(validated.model, source, root, (*parts.findings, *wrong, *validated.findings))
     if validated.model is None:
         return file
     later = (*_links(file, validated.model), *_assets(file, validated.model))
-    found = _models_found(validated.model, path.parent)
+    found = _models_found(file, validated.model, parts.folders)
     return CellFile(found, source, root, (*file.findings, *later))
+
+
+class _Parts:
+    """The files that a cell is put together from, gathered while they are read.
+
+    Attributes:
+        folders: Where each of them is.
+        findings: What is wrong with their form.
+    """
+
+    def __init__(self) -> None:
+        self.folders: dict[Source, Path] = {}
+        self.findings: list[Finding] = []
+
+    def tree(self, path: Path, source: Source, above: tuple[Path, ...]) -> Node | None:
+        """Return the nodes of a file with those of its base put in, or None where one is no YAML.
+
+        `above` are the files that are based on this one, the cell file itself first.
+        """
+        self.folders[source] = path.parent
+        root, wrong = parse_yaml(source)
+        self.findings += wrong
+        if not isinstance(root, Mapping):
+            return root
+        named = root.get(BASE)
+        # A base that is no text stays where it is, for validation to complain of.
+        if not isinstance(named, Scalar) or not isinstance(named.value, str):
+            return root
+        base = self._base(named, (*above, path))
+        if base is None:
+            return None
+        own = tuple(entry for entry in root.entries if entry.key.text != BASE)
+        inherited = tuple(entry for entry in base.entries if entry.key.text not in root.keys)
+        return replace(root, entries=(*own, *inherited))
+
+    def _base(self, named: Scalar, files: tuple[Path, ...]) -> Mapping | None:
+        """Return the nodes of the base that the last of `files` names, or None where there are none."""
+        try:
+            path = below(files[-1].parent, named.text)
+            if any(file.samefile(path) for file in files):
+                ring = " -> ".join(file.name for file in (*files, path))
+                raise InputError(f'"{named.text}" is itself based on this file: {ring}')
+            if len(files) > DEEPEST:
+                raise InputError(
+                    f"at most {DEEPEST} files may stand below {files[0].name}, one as base of another"
+                )
+            source = read_source(path)
+            root = self.tree(path, source, files)
+            if root is not None and not isinstance(root, Mapping):
+                raise InputError(f"{source.path} must be a mapping, not {describe(plain(root))}")
+        except InputError as problem:
+            self.findings.append(error(named.mark, "no-base", str(problem)))
+            return None
+        return root
+
+
+def _rebased(overrides: Mapped[str, str]) -> Iterator[Finding]:
+    """Yield a finding where an override names another base: that is for the file to say."""
+    key = f"{CELL}{BASE}"
+    if key in overrides:
+        mark = override_source(key, overrides[key]).mark(1, 1, len(key))
+        yield error(mark, "unknown-key", "a cell's base cannot be changed here; name it in the cell file")
 
 
 def _links(file: CellFile, config: CellConfig) -> Iterator[Finding]:
@@ -78,24 +152,33 @@ def _links(file: CellFile, config: CellConfig) -> Iterator[Finding]:
                 yield file.finding(("cameras", name, "scan_poses", index), "unknown-pose", message)
 
 
-def _models_found(config: CellConfig, folder: Path) -> CellConfig:
-    """Return the cell with the models that lie in `folder` by their full path; others stay as named."""
+def _models(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Yield the keys and the path, as written, of every model file that a cell names."""
+    yield ("arm", "urdf"), config.arm.urdf
+    for label, kind in config.objects.items():
+        yield ("objects", label, "urdf"), kind.urdf
 
-    def found(urdf: str) -> dict[str, str]:
+
+def _models_found(file: CellFile, config: CellConfig, folders: Mapped[Source, Path]) -> CellConfig:
+    """Return the cell with the models beside the file that names them by full path; others stay as named."""
+    assert file.root is not None
+    found = {}
+    for keys, urdf in _models(config):
+        folder = folders.get(mark_of(file.root, keys).source, folders[file.source])
         path = (folder / urdf).resolve()
-        return {"urdf": str(path) if path.is_file() else urdf}
-
-    objects = {label: kind.model_copy(update=found(kind.urdf)) for label, kind in config.objects.items()}
-    arm = config.arm.model_copy(update=found(config.arm.urdf))
+        found[keys] = str(path) if path.is_file() else urdf
+    objects = {
+        label: kind.model_copy(update={"urdf": found["objects", label, "urdf"]})
+        for label, kind in config.objects.items()
+    }
+    arm = config.arm.model_copy(update={"urdf": found["arm", "urdf"]})
     return config.model_copy(update={"arm": arm, "objects": objects})
 
 
 def _assets(file: CellFile, config: CellConfig) -> Iterator[Finding]:
     """Yield every model file that cannot lie below the cell's own folder or pybullet_data."""
-    named: list[tuple[KeyPath, str]] = [(("arm", "urdf"), config.arm.urdf)]
-    named += [(("objects", label, "urdf"), shape.urdf) for label, shape in config.objects.items()]
-    for path, urdf in named:
+    for keys, urdf in _models(config):
         written = PurePosixPath(urdf)
         if written.is_absolute() or ".." in written.parts:
             message = f'"{urdf}" must be a relative path without ".."'
-            yield file.finding(path, "outside", message)
+            yield file.finding(keys, "outside", message)

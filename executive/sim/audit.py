@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from executive.cell import Routes
 from executive.geometry import Array
 from executive.ledger.item import Record, State
 from executive.messages import Bin
@@ -20,7 +21,7 @@ def audit(
     initial: Mapping[int, Array],
     records: Sequence[Record],
     bins: Mapping[str, Bin],
-    routes: Mapping[str, str],
+    routes: Routes,
     reach: float,
     held: int | None = None,
 ) -> dict[str, int]:
@@ -34,7 +35,7 @@ def audit(
         initial: Where each body `(3,)` [m] lay when the run began, by body id.
         records: The ledger's items.
         bins: The cell's bins.
-        routes: Class to bin.
+        routes: Class label to the bins that are right for it.
         reach: How far from a body's first place an item may have been seen first [m].
         held: Body in the tool, or None.
     """
@@ -46,7 +47,7 @@ def audit(
         if position[2] < FLOOR:
             counts["elsewhere"] += 1
         elif inside is not None and body != held:
-            counts["right" if inside == routes.get(label) else "wrong_bin"] += 1
+            counts["right" if inside in routes.get(label, ()) else "wrong_bin"] += 1
         else:
             counts["left"] += 1
         near = [r for r in real if float(np.linalg.norm(r.first[:2] - initial[body][:2])) <= reach]

@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+import functools
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
-from executive.cell import Cell, Operator
-from executive.cell_config import CellConfig, LedgerConfig
+from executive.cell import Cell, Routes
+from executive.cell_config import CellConfig
+from executive.errors import InputError
 from executive.events import Emit, ignore
+from executive.geometry import Pose
+from executive.layout import as_bin, as_class, travel_height
 from executive.ledger.ledger import ItemLedger
-from executive.messages import Bin, ObjectClass, Target
-from executive.testing.fake_parts import FakeArm, FakeCamera, FakeClock, FakeDetector, FakeTool
-from executive.testing.fake_world import FakeWorld
+from executive.messages import Target
+from executive.mission.cell_file import load_cell
+from executive.mission.files import shipped_folder
+from executive.testing.fake_arm import FakeArm, FakeTool, named_poses, out_of_reach
+from executive.testing.fake_camera import FakeCamera, FakeDetector
+from executive.testing.fake_times import FakeTimes
+from executive.testing.fake_world import FakeClock, FakeWorld
 from executive.vision.localize import PlaneLocalizer
-from executive.workcell import CellOptions
+from executive.workcell import CellOptions, KeyPath, LeastTimes
 
-CLASSES = {
-    "cube": ObjectClass("cube", 0.05, 0.035),
-    "sphere": ObjectClass("sphere", 0.06, 0.03),
-    "duck": ObjectClass("duck", 0.05, 0.04),
-}
-ROUTES = {"cube": "red_bin", "sphere": "blue_bin", "duck": "yellow_bin"}
-PLACES = {"red_bin": (0.20, -0.44), "blue_bin": (0.20, 0.44), "yellow_bin": (0.52, 0.46)}
+ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
+"""Where the classes of the shipped cells go."""
 
 
 class SilentOperator:
@@ -39,32 +42,64 @@ class SilentOperator:
 
 
 class FakeCell:
-    """A fake work cell; implements `executive.workcell.Workcell`.
+    """A cell file brought to life without physics; implements `executive.workcell.Workcell`.
+
+    Bins, classes, table, poses, camera, detectors and ledger are as the cell file says. The arm goes in
+    straight lines, the tool seals always, and every detector sees everything, whatever its kind.
+
+    Args:
+        config: The cell file; by default `bare_table`.
+        seed: Decides which objects lie where.
+        routes: Class label to the bins that are right for it.
+        emit: Tells the run what happens.
+        options: How the run wants its cell; by default with an operator who wants nothing.
 
     Attributes:
-        world, arm, tool, camera, detector, ledger: The fake parts, for a test to arrange and inspect.
+        world, arm, tool, camera, detectors, ledger, routes: The parts, for a test to arrange and inspect.
+        detector: The first detector.
+        decisions: Every target that was decided for, in order.
+
+    Raises:
+        InputError: The workspace has no room for the objects, or a window was asked for.
     """
 
     def __init__(
         self,
+        config: CellConfig | None = None,
         *,
-        routes: Mapping[str, str] = ROUTES,
+        seed: int = 0,
+        routes: Routes = ROUTES,
         emit: Emit = ignore,
-        operator: Operator | None = None,
-        detectors: Sequence[str] = ("embedded",),
+        options: CellOptions | None = None,
     ) -> None:
+        config = config or bare_table()
+        options = options or CellOptions(SilentOperator(), base=Path())
+        if options.gui:
+            raise InputError(f'cell {config.cell} is of kind "fake" and has no window; run it without --gui')
         self._emit = emit
-        self._routes = dict(routes)
-        self.world = FakeWorld(dict(CLASSES))
+        self.routes = dict(routes)
+        classes = {label: as_class(label, kind) for label, kind in config.objects.items()}
+        self.world = FakeWorld(classes)
+        scatter(self.world, config, seed)
         clock = FakeClock(self.world)
-        self.arm = FakeArm(
-            self.world, {"home": np.array([0.3, -0.3, 0.3]), "scan": np.array([0.5, 0.0, 0.4])}
-        )
+        self.arm = FakeArm(self.world, named_poses(config))
         self.tool = FakeTool(self.world, lambda: self.arm.tool_pose.position)
-        bins = {name: _bin(name, *place) for name, place in PLACES.items()}
-        self.ledger = ItemLedger(LedgerConfig(), bins, self._routes, emit)
-        self.camera = FakeCamera(self.world, lambda: self.ledger.epoch)
-        self.detectors = {name: FakeDetector(self.world, clock) for name in detectors}
+        bins = {name: as_bin(name, bin) for name, bin in config.bins.items()}
+        self.ledger = ItemLedger(config.ledger, bins, self.routes, emit)
+        name, camera = next(iter(config.cameras.items()))
+        X_TF = Pose.of((0.0, 0.0, -config.tool.length))
+        self.camera = FakeCamera(
+            name,
+            camera,
+            config.table,
+            self.world,
+            flange=lambda: self.arm.tool_pose @ X_TF,
+            epoch=lambda: self.ledger.epoch,
+        )
+        self.detectors = {
+            name: FakeDetector(detector, self.world, clock, self.camera.area)
+            for name, detector in config.detectors.items()
+        }
         self.detector = next(iter(self.detectors.values()))
         self.decisions: list[Target] = []
         self._cell = Cell(
@@ -74,30 +109,34 @@ class FakeCell:
             camera=self.camera,
             detectors=self.detectors,
             ledger=self.ledger,
-            operator=operator or SilentOperator(),
+            operator=options.operator,
             bins=bins,
-            classes=CLASSES,
-            routes=self._routes,
-            localizer=PlaneLocalizer(CLASSES),
-            safe_place=np.array([0.45, -0.30, 0.0]),
-            travel_height=0.16,
-            descent=0.02,
-            descent_speed=0.1,
+            classes=classes,
+            routes=self.routes,
+            localizer=PlaneLocalizer(classes),
+            safe_place=np.array(config.safe_place),
+            travel_height=travel_height(config),
+            descent=config.motion.descent,
+            descent_speed=config.motion.descent_speed,
             decided=self._decided,
         )
 
-    @classmethod
-    def from_config(
-        cls, config: CellConfig, *, seed: int, routes: Mapping[str, str], emit: Emit, options: CellOptions
-    ) -> FakeCell:
-        """Return a fake cell with a seeded handful of objects, whatever the cell file says of the world."""
-        made = cls(routes=routes, emit=emit, operator=options.operator, detectors=tuple(config.detectors))
-        random = np.random.default_rng(seed)
-        places = [(x, y) for x in (0.45, 0.55) for y in (-0.15, 0.0, 0.15)]
-        random.shuffle(places)
-        for x, y in places[: int(random.integers(3, 6))]:
-            made.world.put(str(random.choice(sorted(CLASSES))), x, y)
-        return made
+    @staticmethod
+    def check(config: CellConfig, base: Path) -> Iterable[tuple[KeyPath, str]]:
+        """Return what this kind of cell cannot do of a cell file: places out of the fake arm's reach."""
+        del base
+        return tuple(out_of_reach(config))
+
+    @staticmethod
+    def labels(config: CellConfig, base: Path) -> Mapping[str, tuple[str, ...] | None]:
+        """Return None for every detector: a fake one knows whatever lies there."""
+        del base
+        return dict.fromkeys(config.detectors)
+
+    @staticmethod
+    def least_times(config: CellConfig) -> LeastTimes:
+        """Return what things take at the very least in a cell like this."""
+        return FakeTimes(config)
 
     @property
     def cell(self) -> Cell:
@@ -119,10 +158,10 @@ class FakeCell:
         counts = {"right": 0, "wrong_bin": 0, "left": 0, "elsewhere": 0, "unseen": 0}
         for thing in self.world.objects:
             inside = next((n for n, bin in self._cell.bins.items() if bin.contains(thing.position)), None)
-            if inside is None:
+            if inside is None or thing is self.world.held:
                 counts["left"] += 1
             else:
-                counts["right" if inside == self._routes.get(thing.label) else "wrong_bin"] += 1
+                counts["right" if inside in self.routes.get(thing.label, ()) else "wrong_bin"] += 1
         return counts
 
     def close(self) -> None:
@@ -130,10 +169,32 @@ class FakeCell:
 
     def _decided(self, target: Target, bin: str) -> None:
         self.decisions.append(target)
-        data: dict[str, Any] = {"item": target.item, "label": target.label, "frame": target.frame, "bin": bin}
-        self._emit("decision", **data)
+        self._emit("decision", item=target.item, label=target.label, frame=target.frame, bin=bin)
 
 
-def _bin(name: str, x: float, y: float) -> Bin:
-    slots = np.array([[x + dx, y + dy] for dx in (-0.05, 0.05) for dy in (-0.07, 0.0, 0.07)])
-    return Bin(name, np.array([x, y, 0.0]), np.array([0.22, 0.24, 0.06]), slots)
+@functools.cache
+def bare_table() -> CellConfig:
+    """Return the shipped overhead cell with nothing on its table: where a skill is tried out."""
+    path = shipped_folder() / "cells" / "overhead.yaml"
+    return load_cell(path, {"cell.kind": "fake", "cell.table.objects": "[0, 0]"})
+
+
+def scatter(world: FakeWorld, config: CellConfig, seed: int) -> None:
+    """Put as many objects as the cell file says on the table, of random classes on a grid of places.
+
+    Raises:
+        InputError: The workspace has no room for so many.
+    """
+    random = np.random.default_rng(seed)
+    table = config.table
+    pitch = 2 * max(kind.radius for kind in config.objects.values()) + table.gap
+    xs, ys = (np.linspace(*side, 1 + int((side[1] - side[0]) / pitch)) for side in (table.x, table.y))
+    places = [(float(x), float(y)) for x in xs for y in ys]
+    count = int(random.integers(*table.objects, endpoint=True))
+    if count > len(places):
+        raise InputError(
+            f"{count} objects find no room on the workspace of cell {config.cell}, which has "
+            f"{len(places)} places {pitch:.3f} m apart; ask for fewer or widen table.x and table.y"
+        )
+    for index in random.permutation(len(places))[:count]:
+        world.put(str(random.choice(list(config.objects))), *places[index])

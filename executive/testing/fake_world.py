@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from executive.cell import Steps
 from executive.geometry import Array
 from executive.messages import ObjectClass
 
@@ -14,6 +16,9 @@ STEP = 1 / 240
 
 CUP = 0.012
 """How far beside an object's centre the fake cup still seals [m]."""
+
+TOUCH = 0.002
+"""How far above or below an object's upper side the fake cup is on it [m]."""
 
 
 @dataclass(eq=False)
@@ -35,7 +40,7 @@ class FakeWorld:
         steps: Control steps since the run began.
     """
 
-    classes: dict[str, ObjectClass]
+    classes: Mapping[str, ObjectClass]
     objects: list[FakeObject] = field(default_factory=list)
     held: FakeObject | None = None
     steps: int = 0
@@ -59,6 +64,29 @@ class FakeWorld:
         """Return the object whose upper side the cup at `tip` `(3,)` [m] is on, if any."""
         for thing in self.objects:
             beside = float(np.linalg.norm(thing.position[:2] - tip[:2]))
-            if thing is not self.held and beside <= CUP and abs(self.top(thing) - tip[2]) <= 0.002:
+            if thing is not self.held and beside <= CUP and abs(self.top(thing) - tip[2]) <= TOUCH:
                 return thing
         return None
+
+
+class FakeClock:
+    """A clock that only the test moves."""
+
+    def __init__(self, world: FakeWorld) -> None:
+        self._world = world
+
+    @property
+    def now(self) -> float:
+        """Time since the run began [s]."""
+        return self._world.now
+
+    @property
+    def step(self) -> float:
+        """Length of one control step [s]."""
+        return STEP
+
+    def sleep(self, duration: float) -> Steps:
+        """Yield until `duration` [s] has passed."""
+        end = self.now + duration
+        while self.now < end - STEP / 2:
+            yield

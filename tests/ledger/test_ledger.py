@@ -19,13 +19,17 @@ class Bench:
 
     def __init__(self) -> None:
         self.events: list[tuple[str, dict]] = []
+        size, slots = np.array([0.22, 0.24, 0.06]), np.zeros((6, 2))
         bins = {
-            "red_bin": Bin(
-                "red_bin", np.array([0.2, -0.44, 0]), np.array([0.22, 0.24, 0.06]), np.zeros((6, 2))
-            )
+            "red_bin": Bin("red_bin", np.array([0.2, -0.44, 0]), size, slots),
+            "pink_bin": Bin("pink_bin", np.array([0.2, 0.44, 0]), size, slots),
+            "grey_bin": Bin("grey_bin", np.array([-0.2, 0.44, 0]), size, slots),
         }
         self.ledger = ItemLedger(
-            LedgerConfig(), bins, {"cube": "red_bin"}, lambda kind, **data: self.events.append((kind, data))
+            LedgerConfig(),
+            bins,
+            {"cube": ("red_bin", "pink_bin")},
+            lambda kind, **data: self.events.append((kind, data)),
         )
         self.frames = 0
 
@@ -118,6 +122,35 @@ def test_a_dropped_item_that_fell_into_its_bin_is_placed(bench: Bench) -> None:
     bench.ledger.dropped("cube-1")
     assert bench.look(("cube", 0.2, -0.44), view="full") == []
     assert bench.ledger.balance()["placed"] == 1
+
+
+def test_a_dropped_item_that_fell_into_any_bin_of_its_class_is_placed_there(bench: Bench) -> None:
+    for number, x in enumerate((0.45, 0.60), start=1):
+        bench.look(("cube", x, 0.0))
+        bench.ledger.held(f"cube-{number}")
+    bench.ledger.placed("cube-1", "red_bin")
+    bench.ledger.dropped("cube-2")
+    bench.look(("cube", 0.2, -0.44), view="full")
+    assert bench.ledger.balance()["placed"] == 1, "the cube in the red bin is the one that was let go there"
+    bench.look(("cube", 0.2, -0.44), ("cube", 0.2, 0.44), view="full")
+    assert bench.ledger.rows()[1]["bin"] == "pink_bin"
+
+
+def test_a_dropped_item_is_placed_once_though_two_of_its_bins_show_one_too_many(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0))
+    bench.ledger.held("cube-1")
+    bench.ledger.dropped("cube-1")
+    bench.look(("cube", 0.2, 0.44), ("cube", 0.2, -0.44), view="full")
+    placed = [data["bin"] for kind, data in bench.events if kind == "item" and data["state"] == "placed"]
+    assert placed == ["red_bin"]
+
+
+def test_a_dropped_item_that_fell_into_a_bin_of_another_class_is_not_placed(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0))
+    bench.ledger.held("cube-1")
+    bench.ledger.dropped("cube-1")
+    bench.look(("cube", -0.2, 0.44), view="full")
+    assert bench.ledger.balance()["placed"] == 0
 
 
 def test_what_lies_in_a_bin_is_no_target(bench: Bench) -> None:

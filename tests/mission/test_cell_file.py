@@ -120,3 +120,112 @@ def test_findings_about_overrides_show_the_override(
     key: str, value: str, expected: str, small_cell: str
 ) -> None:
     assert expected in complaint(small_cell + "kind: sim\n", {key: value})
+
+
+def test_a_cell_takes_from_its_base_every_key_that_it_has_not_itself(small_cell: str) -> None:
+    Path("base.yaml").write_text(small_cell)
+    Path("c.yaml").write_text(
+        "base: base.yaml\ncell: smaller\nobjects: {duck: {urdf: duck_vhacd.urdf, height: 0.05, radius: 0.03}}\n"
+    )
+    base, cell = load_cell(Path("base.yaml")), load_cell(Path("c.yaml"))
+    assert (base.cell, cell.cell) == ("small", "smaller")
+    assert list(cell.objects) == ["duck"], "a key is replaced as a whole"
+    replaced = {"cell", "objects"}
+    assert cell.model_dump(exclude=replaced) == base.model_dump(exclude=replaced)
+    assert cell.base == ""
+    assert "base" not in cell.model_dump(), "what is recorded of a cell stands by itself"
+
+
+def test_a_base_may_have_a_base_and_the_nearest_file_counts(small_cell: str) -> None:
+    Path("one.yaml").write_text(small_cell + "description: one\nkind: sim\n")
+    Path("two.yaml").write_text("base: one.yaml\ndescription: two\ntable: {objects: [1, 1]}\n")
+    Path("c.yaml").write_text("base: two.yaml\ntable: {objects: [2, 2]}\n")
+    cell = load_cell(Path("c.yaml"))
+    assert (cell.cell, cell.description, cell.table.objects) == ("small", "two", (2, 2))
+
+
+def test_a_shipped_cell_is_a_base_from_anywhere() -> None:
+    Path("c.yaml").write_text("base: cells/overhead.yaml\ncell: mine\n")
+    assert list(load_cell(Path("c.yaml")).bins) == ["red_bin", "blue_bin", "yellow_bin"]
+
+
+def test_a_finding_about_a_value_of_the_base_stands_in_the_base(small_cell: str) -> None:
+    Path("parts").mkdir()
+    Path("parts/base.yaml").write_text(small_cell.replace("force: 12.0", "force: 0", 1))
+    text = complaint("base: parts/base.yaml\ntable: {x: [0.4]}\n")
+    assert text == (
+        "c.yaml:2:9: error[wrong-length]: table.x has 1 of the 2 values it needs\n"
+        "   2 | table: {x: [0.4]}\n"
+        "     |         ^\n"
+        "parts/base.yaml:12:34: error[out-of-range]: tool.force must be more than 0, not 0\n"
+        "  12 | tool: {cup_radius: 0.006, force: 0, gap: 0.008, tilt_deg: 30, least_force: 3.0, source: a test}\n"
+        "     |                                  ^"
+    )
+
+
+def test_a_key_that_no_file_has_is_missing_in_the_file_itself(small_cell: str) -> None:
+    Path("base.yaml").write_text(small_cell.replace("cell: small\n", "").replace("safe_place: [", "table: ["))
+    text = complaint("base: base.yaml\nkind: sim\n")
+    assert 'c.yaml:1:1: error[missing-key]: the file needs the key "cell"\n' in text
+    assert (
+        'base.yaml:30:1: error[duplicate-key]: the key "table" stands here twice; the first is in line 12\n'
+        in text
+    )
+
+
+@pytest.mark.parametrize(
+    ("base", "files", "expected"),
+    [
+        ("bse.yaml", {"base.yaml": ""}, 'c.yaml:1:7: error[no-base]: there is no file "bse.yaml" beside this one, and none is shipped. Did you mean "base.yaml"?'),
+        ("../b.yaml", {}, 'c.yaml:1:7: error[no-base]: "../b.yaml" is not below the folder of the file that names it'),
+        ("5", {}, "c.yaml:1:7: error[wrong-type]: base must be a text, not 5\n"),
+        ("[a.yaml]", {}, "c.yaml:1:1: error[wrong-type]: base must be a text, not a list of 1\n"),
+        ("c.yaml", {}, 'c.yaml:1:7: error[no-base]: "c.yaml" is itself based on this file: c.yaml -> c.yaml\n'),
+        ("b.yaml", {"b.yaml": "cell: b\nbase: a.yaml", "a.yaml": "base: b.yaml"}, 'a.yaml:1:7: error[no-base]: "b.yaml" is itself based on this file: c.yaml -> b.yaml -> a.yaml -> b.yaml\n'),
+        ("b.yaml", {"b.yaml": "- cell"}, "c.yaml:1:7: error[no-base]: b.yaml must be a mapping, not a list of 1\n"),
+        ("b.yaml", {"b.yaml": "cell: [b\n"}, "b.yaml:1:8: error[yaml]: not valid YAML"),
+        ("1.yaml", {f"{n}.yaml": f"base: {n + 1}.yaml" for n in range(1, 7)}, "5.yaml:1:7: error[no-base]: at most 5 files may stand below c.yaml, one as base of another\n"),
+    ],
+)  # fmt: skip
+def test_a_base_that_cannot_be_one_is_refused_where_it_is_named(
+    base: str, files: dict[str, str], expected: str
+) -> None:
+    for name, text in files.items():
+        Path(name).write_text(text)
+    assert expected in complaint(f"base: {base}\ncell: c\n") + "\n"
+
+
+def test_five_files_may_stand_below_a_cell_file(small_cell: str) -> None:
+    for number in range(1, 5):
+        Path(f"{number}.yaml").write_text(f"base: {number + 1}.yaml\n")
+    Path("5.yaml").write_text(small_cell)
+    Path("c.yaml").write_text("base: 1.yaml\n")
+    assert load_cell(Path("c.yaml")).cell == "small"
+
+
+def test_overrides_change_what_comes_from_the_base(small_cell: str) -> None:
+    Path("base.yaml").write_text(small_cell)
+    Path("c.yaml").write_text("base: base.yaml\n")
+    assert load_cell(Path("c.yaml"), {"cell.tool.force": "9.5"}).tool.force == 9.5
+
+
+def test_the_base_itself_cannot_be_overridden(small_cell: str) -> None:
+    text = complaint(small_cell, {"cell.base": "other.yaml"})
+    assert text == (
+        "--set:1:1: error[unknown-key]: a cell's base cannot be changed here; name it in the cell file\n"
+        "   1 | cell.base=other.yaml\n"
+        "     | ^^^^^^^^^"
+    )
+
+
+def test_models_are_looked_for_beside_the_file_that_names_them(small_cell: str) -> None:
+    for folder in (Path(), Path("parts")):
+        (folder / "models").mkdir(parents=True)
+        (folder / "models/cup.urdf").write_text("<robot/>")
+    Path("parts/base.yaml").write_text(small_cell.replace("  limits", "  urdf: models/cup.urdf\n  limits", 1))
+    Path("c.yaml").write_text(
+        "base: parts/base.yaml\nobjects: {cup: {urdf: models/cup.urdf, height: 0.05, radius: 0.03}}\n"
+    )
+    cell = load_cell(Path("c.yaml"))
+    assert cell.arm.urdf == str(Path("parts/models/cup.urdf").resolve())
+    assert cell.objects["cup"].urdf == str(Path("models/cup.urdf").resolve())

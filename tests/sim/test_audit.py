@@ -19,12 +19,18 @@ class OneBody:
         return Pose.of((0.2, -0.44, 0.12))
 
 
-def test_what_hangs_in_the_tool_over_its_bin_is_left_and_not_placed() -> None:
+def counted(bins_of_cube: tuple[str, ...], held: int | None = None) -> dict[str, int]:
     bins = {"red_bin": Bin("red_bin", np.array([0.2, -0.44, 0]), np.array([0.2, 0.2, 0.1]), np.zeros((1, 2)))}
     initial = {7: np.array([0.5, 0.0, 0.025])}
-    ended = {
-        held: audit(OneBody(), initial, [], bins, {"cube": "red_bin"}, 0.025, held=held)  # type: ignore[arg-type]
-        for held in (None, 7)
-    }
+    return audit(OneBody(), initial, [], bins, {"cube": bins_of_cube}, 0.025, held=held)  # type: ignore[arg-type]
+
+
+def test_what_hangs_in_the_tool_over_its_bin_is_left_and_not_placed() -> None:
+    ended = {held: counted(("red_bin",), held=held) for held in (None, 7)}
     assert (ended[None]["right"], ended[None]["left"]) == (1, 0)
     assert (ended[7]["right"], ended[7]["left"]) == (0, 1)
+
+
+def test_any_bin_of_its_class_is_right_and_no_other() -> None:
+    assert counted(("blue_bin", "red_bin"))["right"] == 1
+    assert counted(("blue_bin", "grey_bin"))["wrong_bin"] == 1

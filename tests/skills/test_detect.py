@@ -36,7 +36,7 @@ def test_an_arm_in_the_way_is_hidden_and_nothing_is_photographed(fake: FakeCell)
     fake.camera.sees = lambda: False
     result = run_skill(Detect(), fake)
     assert result.reason == "hidden"
-    assert result.message == "the arm hides part of the workspace from camera fake"
+    assert result.message == "the arm hides part of the workspace from camera overhead"
 
 
 def test_a_detector_without_an_answer_is_unavailable_with_its_sentence(fake: FakeCell) -> None:

@@ -10,11 +10,25 @@ def select(fake: FakeCell, targets, **values) -> SkillResult:
 
 
 def test_the_nearest_target_comes_first_with_its_bin(fake: FakeCell, look) -> None:
-    fake.world.put("cube", 0.6, 0.2)
-    fake.world.put("duck", 0.45, -0.2)
+    fake.world.put("cube", 0.6, -0.2)
+    fake.world.put("duck", 0.45, 0.2)
     result = select(fake, look())
     assert (result.outputs["item"], result.outputs["bin"]) == ("duck-1", "yellow_bin")
     assert [decision.item for decision in fake.decisions] == ["duck-1"]
+
+
+def test_of_several_bins_the_one_with_the_fewest_objects_is_next_the_first_among_equals(
+    fake: FakeCell, look
+) -> None:
+    fake.routes["cube"] = ("blue_bin", "red_bin")
+    for x in (0.45, 0.55, 0.65):
+        fake.world.put("cube", x, 0.0)
+    chosen = []
+    for target in look():
+        bin = select(fake, [target]).outputs["bin"]
+        chosen.append(bin)
+        fake.ledger.placed(target.item, bin)
+    assert chosen == ["blue_bin", "red_bin", "blue_bin"]
 
 
 def test_a_rejected_item_is_passed_over(fake: FakeCell, look) -> None:

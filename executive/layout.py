@@ -1,11 +1,11 @@
-"""Where things go in a cell: drop slots, and the height at which loads travel."""
+"""What a cell file means in space: bins with their drop slots, classes of objects, the height of travel."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from executive.cell_config import BinConfig, CellConfig
-from executive.messages import Bin
+from executive.cell_config import BinConfig, CellConfig, ObjectConfig
+from executive.messages import Bin, ObjectClass
 
 
 def as_bin(name: str, config: BinConfig) -> Bin:
@@ -16,6 +16,11 @@ def as_bin(name: str, config: BinConfig) -> Bin:
     y = position[1] + size[1] * ((np.arange(rows) + 0.5) / rows - 0.5)
     slots = np.array([[column, row] for column in x for row in y])
     return Bin(name, position, size, slots)
+
+
+def as_class(label: str, config: ObjectConfig) -> ObjectClass:
+    """Return what skills know of a class of objects of a cell file."""
+    return ObjectClass(label, config.height, config.radius)
 
 
 def travel_height(config: CellConfig) -> float:

@@ -1,0 +1,166 @@
+"""The fake cell's camera and detectors: blank images, and detectors that know what they would show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from executive.cell import Request
+from executive.cell_config import CameraConfig, DetectorConfig, TableConfig
+from executive.errors import Unavailable
+from executive.geometry import Pose
+from executive.messages import Box, Detection, Frame
+from executive.testing.fake_world import FakeClock, FakeWorld
+from executive.vision.camera_model import camera_matrix, looking_at
+
+CONFIDENCE = 0.9
+"""What a fake detector says of what it sees, or its threshold where that is more."""
+
+
+class FakeCamera:
+    """A camera where the cell file says, whose images are blank.
+
+    Attributes:
+        name: Its name in the cell file.
+        sees: Tells whether the whole workspace is in view; the fake arm hides nothing.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        config: CameraConfig,
+        table: TableConfig,
+        world: FakeWorld,
+        *,
+        flange: Callable[[], Pose],
+        epoch: Callable[[], int],
+    ) -> None:
+        self.name = name
+        self.sees: Callable[[], bool] = self._whole_table
+        self._config = config
+        self._corners = np.array([(x, y, 0.0) for x in table.x for y in table.y])
+        self._matrix = camera_matrix(config.width, config.height, config.fov_deg)
+        self._world = world
+        self._flange = flange
+        self._epoch = epoch
+        self._count = 0
+        self._turn = 0
+
+    @property
+    def scan_poses(self) -> Sequence[str]:
+        """Names of the arm poses from which it sees the table."""
+        return self._config.scan_poses
+
+    def next_pose(self) -> str:
+        """Return the scan pose after the one this returned last."""
+        self._turn += 1
+        return self.scan_poses[self._turn % len(self.scan_poses)]
+
+    def area(self, view: str) -> Box:
+        """Return the part of the image [pixel] that `view` means."""
+        if view == "table":
+            return self._config.table_view
+        return 0, 0, self._config.width, self._config.height
+
+    def sees_table(self) -> bool:
+        """Tell what `sees` says."""
+        return self.sees()
+
+    def capture(self) -> Frame:
+        """Return a blank frame with a true pose."""
+        self._count += 1
+        size = self._config.height, self._config.width
+        return Frame(
+            id=self._count,
+            camera=self.name,
+            image=np.zeros((*size, 3), dtype=np.uint8),
+            depth=None,
+            matrix=self._matrix,
+            X_WC=self._pose(),
+            stamp=self._world.now,
+            visible=np.ones(size, dtype=bool),
+            epoch=self._epoch(),
+        )
+
+    def _pose(self) -> Pose:
+        X_MC = looking_at(self._config.position, self._config.look_at, self._config.up)
+        return X_MC if self._config.mount == "fixed" else self._flange() @ X_MC
+
+    def _whole_table(self) -> bool:
+        corners = self._pose().inverse().apply(self._corners) @ self._matrix.T
+        pixels = corners[:, :2] / corners[:, 2:]
+        inside = (pixels >= 0) & (pixels < (self._config.width, self._config.height))
+        return bool(np.all(corners[:, 2] > 0) and np.all(inside))
+
+
+@dataclass(frozen=True)
+class FakeRequest:
+    """An answer that is due at a time."""
+
+    due: float
+    clock: FakeClock
+    answer: Sequence[Detection] | str
+
+    @property
+    def ready(self) -> bool:
+        """True once the time has come."""
+        return self.clock.now >= self.due
+
+    def result(self) -> Sequence[Detection]:
+        """Return the detections, or raise Unavailable with the sentence scripted."""
+        if isinstance(self.answer, str):
+            raise Unavailable(self.answer)
+        return self.answer
+
+
+class FakeDetector:
+    """A detector that sees every object before the lens, unless `answers` says otherwise for a look.
+
+    `answers` gets the number of the look (from 1) and the true detections, and returns detections, or a
+    sentence to be unavailable with.
+    """
+
+    def __init__(
+        self, config: DetectorConfig, world: FakeWorld, clock: FakeClock, area: Callable[[str], Box]
+    ) -> None:
+        self._config = config
+        self._world = world
+        self._clock = clock
+        self._area = area
+        self._looks = 0
+        self.answers: Callable[[int, Sequence[Detection]], Sequence[Detection] | str] = _truthful
+
+    @property
+    def threshold(self) -> float:
+        """Confidence from which a detection counts."""
+        return self._config.threshold
+
+    def request(self, frame: Frame, view: str) -> Request:
+        """Answer with what the searched part of the frame would show, as late as the cell file says."""
+        self._looks += 1
+        left, top, right, bottom = self._area(view)
+        true = []
+        for thing in self._world.objects:
+            x, y, depth = frame.matrix @ frame.X_WC.inverse().apply(thing.position)
+            if depth <= 0 or thing is self._world.held:
+                continue
+            column, row = x / depth, y / depth
+            if left <= column < right and top <= row < bottom:
+                true.append(self._detection(thing.label, column, row, frame.matrix[0, 0] / depth))
+        return FakeRequest(frame.stamp + self._config.latency, self._clock, self.answers(self._looks, true))
+
+    def close(self) -> None:
+        """Have nothing to give back."""
+
+    def _detection(self, label: str, column: float, row: float, scale: float) -> Detection:
+        """Return the box around an object whose centre is at a pixel, at a `scale` [pixel/m]."""
+        size = scale * self._world.classes[label].radius
+        box = (column - size, row - size, column + size, row + size)
+        return Detection(label, max(CONFIDENCE, self.threshold), box)
+
+
+def _truthful(look: int, true: Sequence[Detection]) -> Sequence[Detection]:
+    del look
+    return true

@@ -1,0 +1,45 @@
+"""Every cell that is shipped can be worked in, and says what it stands for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from executive.cell_config import CellConfig
+from executive.mission.cell_file import load_cell
+from executive.runtime.cells import cell_kind
+from executive.testing.fake_cell import FakeCell
+
+CELLS = sorted((Path(__file__).parents[2] / "missions" / "cells").glob("*.yaml"))
+
+
+@pytest.fixture(params=CELLS, ids=lambda path: path.stem)
+def path(request: pytest.FixtureRequest) -> Path:
+    return request.param
+
+
+@pytest.fixture
+def config(path: Path) -> CellConfig:
+    return load_cell(path)
+
+
+def test_there_are_cells() -> None:
+    expected = {"overhead", "wrist", "cascade", "kitting", "recycling", "fruit", "instruments"}
+    assert {path.stem for path in CELLS} >= expected
+
+
+def test_it_has_the_name_of_its_file_and_says_what_it_stands_for(path: Path, config: CellConfig) -> None:
+    assert config.cell == path.stem
+    assert config.description
+    assert path.read_text().startswith("# ")
+
+
+def test_its_kind_finds_nothing_wrong_with_it(path: Path, config: CellConfig) -> None:
+    assert list(cell_kind(config.kind).check(config, path.parent)) == []
+
+
+def test_the_most_objects_that_it_asks_for_find_room(config: CellConfig) -> None:
+    most = config.table.objects[1]
+    crowded = config.model_copy(update={"table": config.table.model_copy(update={"objects": (most, most)})})
+    assert len(FakeCell(crowded).world.objects) == most

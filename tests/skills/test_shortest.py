@@ -1,0 +1,91 @@
+"""The least time in which each skill can succeed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import pytest
+
+from executive.messages import Target
+from executive.skill import Skill, discover
+from executive.testing.fake_cell import FakeCell, bare_table
+from executive.testing.run_skill import run_skill
+from skills.approach import Approach
+from skills.await_request import AwaitRequest
+from skills.detect import Detect
+from skills.grasp import Grasp
+from skills.localize import Localize
+from skills.move_to_scan import MoveToScan
+from skills.put_down import PutDown
+from skills.reject_target import RejectTarget
+from skills.release import Release
+from skills.select_target import SelectTarget
+from skills.transit import Transit
+from skills.wait import Wait
+
+
+class Least:
+    """A cell in which everything takes another time."""
+
+    descent = 0.3
+
+    def carry(self, bin: str | None) -> float:
+        return {None: 0.5, "red_bin": 0.7}[bin]
+
+    def answer(self, detector: str) -> float:
+        return {"": 0.05, "slow": 2.0}[detector]
+
+
+SHORTEST: list[tuple[type[Skill], Mapping[str, Any], float]] = [
+    (Approach, {}, 0.3),
+    (AwaitRequest, {}, 0.0),
+    (Detect, {}, 0.05),
+    (Detect, {"detector": "slow"}, 2.0),
+    (Grasp, {"settle": 0.2}, 0.2),
+    (Localize, {}, 0.0),
+    (MoveToScan, {"pose": "home"}, 0.0),
+    (PutDown, {"settle": 0.3}, 0.3),
+    (RejectTarget, {}, 0.0),
+    (Release, {"settle": 0.4}, 0.4),
+    (SelectTarget, {}, 0.0),
+    (Transit, {}, 0.5),
+    (Transit, {"bin": "red_bin"}, 0.7),
+    (Wait, {"seconds": 3}, 3.0),
+    (Wait, {}, 0.0),
+]
+
+
+@pytest.mark.parametrize(("skill", "given", "seconds"), SHORTEST)
+def test_the_least_time_follows_from_cell_and_params(
+    skill: type[Skill], given: Mapping[str, Any], seconds: float
+) -> None:
+    defaults = {name: param.default for name, param in skill.params.items() if not param.required}
+    assert skill.shortest(Least(), {**defaults, **given}) == seconds
+
+
+def test_no_shipped_skill_was_forgotten() -> None:
+    assert {skill for skill, _, _ in SHORTEST} == set(discover().values())
+
+
+def test_no_skill_succeeds_sooner(fake: FakeCell, look: Callable[..., list[Target]]) -> None:
+    least = FakeCell.least_times(bare_table())
+
+    def run(skill: Skill, **given: Any) -> Mapping[str, Any]:
+        defaults = {name: getattr(skill, name) for name in skill.params}
+        before = fake.cell.clock.now
+        result = run_skill(skill, fake)
+        assert result.status == "SUCCESS"
+        taken = fake.cell.clock.now - before
+        shortest = skill.shortest(least, {**defaults, **given})
+        assert 0 < shortest <= taken + 1e-9, type(skill).__name__
+        return result.outputs
+
+    fake.world.put("cube", 0.5, 0.0)
+    run(Detect())
+    (target,) = look()
+    run(Approach(target=target))
+    held = run(Grasp(target=target))["held"]
+    run(Transit(held=held, bin="red_bin"), bin="red_bin")
+    run(Release(held=held, bin="red_bin"))
+    run(Wait(seconds=0.5))
