@@ -3,40 +3,50 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from typing import Any
 
 import click
 
-from executive.cli.options import json_option
+from executive.cli.options import json_option, overrides_option
 from executive.cli.output import print_json, stdout_kept_clean
 
 
 @click.command(name="check")
 @click.argument("missions", metavar="MISSION...", nargs=-1, required=True)
+@overrides_option
 @json_option
 @click.pass_context
-def command(ctx: click.Context, missions: tuple[str, ...], as_json: bool) -> None:
-    """Load each MISSION and print what is wrong with it; exit code 2 if any cannot be run."""
+def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, str], as_json: bool) -> None:
+    """Print everything that is wrong with each MISSION, and which failures can still end it.
+
+    Exit code 2 if any cannot be run.
+    """
     with stdout_kept_clean():
         from executive.errors import InputError
         from executive.mission.findings import MissionError
         from executive.mission.load import load_mission
-        from executive.runtime.cells import robot_check
+        from executive.runtime.cells import cell_kind
         from executive.skill import discover
+        from executive.view.verdict import verdict
 
         skills = discover()
-        reports, texts = [], []
+        reports: list[dict[str, Any]] = []
+        texts = []
         for mission in missions:
-            ok = False
+            report: dict[str, Any] = {"mission": mission, "ok": False, "findings": [], "endings": []}
             try:
-                found = load_mission(mission, skills, robot_check=robot_check).warnings
-                findings, text = [asdict(finding) for finding in found], "\n".join(map(str, found))
-                ok = True
+                loaded = load_mission(mission, skills, overrides, cell_kind)
+                report["findings"] = [asdict(finding) for finding in loaded.warnings]
+                report["endings"] = [asdict(ending) for ending in loaded.endings]
+                report["ok"] = True
+                texts.append(verdict(mission, loaded.warnings, loaded.endings))
             except MissionError as error:
-                findings, text = [asdict(finding) for finding in error.findings], str(error)
+                report["findings"] = [asdict(finding) for finding in error.findings]
+                texts.append(str(error))
             except InputError as error:
-                findings, text = [{"path": mission, "severity": "error", "message": str(error)}], str(error)
-            reports.append({"mission": mission, "ok": ok, "findings": findings})
-            texts.append(text or f"{mission}: ok")
+                report["findings"] = [{"path": mission, "severity": "error", "message": str(error)}]
+                texts.append(str(error))
+            reports.append(report)
     if as_json:
         print_json(reports)
     else:

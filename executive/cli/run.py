@@ -46,12 +46,12 @@ def command(
         from executive.mission.load import load_mission
         from executive.record.recorded_run import recorded_run
         from executive.record.result import EXIT_CODES
-        from executive.runtime.cells import robot_check
+        from executive.runtime.cells import cell_kind
         from executive.skill import discover
         from executive.view.summary import repeat_command, summary
 
         skills = discover()
-        loaded = load_mission(mission, skills, overrides, robot_check)
+        loaded = load_mission(mission, skills, overrides, cell_kind)
         view = None if quiet else _view()
         if view is not None:
             for warning in loaded.warnings:

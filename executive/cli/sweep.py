@@ -54,11 +54,11 @@ def command(
         from executive.campaign.sweep import summarize, sweep
         from executive.cli.progress import bar
         from executive.mission.load import load_mission
-        from executive.runtime.cells import robot_check
+        from executive.runtime.cells import cell_kind
         from executive.skill import discover
 
         # What is wrong with the mission is told once, not for every seed.
-        load_mission(mission, discover(), overrides, robot_check)
+        load_mission(mission, discover(), overrides, cell_kind)
         with bar(mission) as progress:
             results = sweep(
                 mission, seeds, overrides=overrides, runs=runs, workers=workers, frames=frames,

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 from executive.cell import Cell
 from executive.control.attempt import Try
+from executive.control.backoff import Backoff
 from executive.control.fallback import Fallback
+from executive.control.for_each import ForEach
 from executive.control.invert import Invert
 from executive.control.node import ControlNode, Site
+from executive.control.parallel import Parallel
 from executive.control.repeat import Repeat
 from executive.control.retry import Retry
 from executive.control.scope import Scope
@@ -19,10 +22,12 @@ from executive.control.sequence import Sequence as SequenceOf
 from executive.control.skill_node import SkillNode, Wiring
 from executive.control.succeed import Succeed
 from executive.control.timeout import Timeout
+from executive.control.while_loop import While
 from executive.events import Emit
-from executive.mission import model
+from executive.mission import nodes
 from executive.mission.load import LoadedMission
 from executive.mission.typed import convert
+from executive.mission.values import Match
 from executive.mission.wiring import literals, wires
 from executive.skill import Direction, Param, Port, Skill
 
@@ -33,12 +38,8 @@ TreeNode = ControlNode | SkillNode
 def build(
     loaded: LoadedMission, skills: Mapping[str, type[Skill]], cell: Cell, scope: Scope, emit: Emit
 ) -> TreeNode:
-    """Return the root of a fresh tree of py_trees behaviours; every node has a unique, readable `path`.
-
-    A path names what is on the way: `tree/repeat/do/2:try/retry/do/Grasp`. A skill goes by its name or
-    label; in a list, control nodes and whatever stands there twice carry their number.
-    """
-    return Builder(skills, cell, scope, emit).node(loaded.tree, "", "tree")
+    """Return the root of a fresh tree of py_trees behaviours; every node has a unique, readable `path`."""
+    return Builder(skills, cell, scope, emit).node(loaded.tree)
 
 
 @dataclass(frozen=True)
@@ -50,80 +51,66 @@ class Builder:
     scope: Scope
     emit: Emit
 
-    def node(self, node: model.Node, parent: str, slot: str, name: str | None = None) -> TreeNode:
-        """Return the behaviour for a node that stands in `slot` of `parent`.
+    def node(self, node: nodes.Node) -> TreeNode:
+        """Return the behaviour for a node."""
+        return _BUILDERS[type(node)](self, node)
 
-        A bare list is the slot itself; any other node adds its own name to the path.
-        """
-        place = "/".join(part for part in (parent, slot) if part)
-        if isinstance(node, model.SequenceNode) and node.listed and name is None:
-            return self._sequence(node, place)
-        path = "/".join(part for part in (place, name or name_of(node)) if part)
-        return _BUILDERS[type(node)](self, node, path)
+    def _site(self, node: nodes.Node) -> Site:
+        return Site(node.path, node.label, self.emit)
 
-    def site(self, node: model.Node, path: str) -> Site:
-        """Return where a behaviour stands."""
-        return Site(path, node.label, self.emit)
+    def _all(self, children: Sequence[nodes.Node]) -> list[TreeNode]:
+        return [self.node(child) for child in children]
 
-    def list(self, nodes: Sequence[model.Node], parent: str) -> list[TreeNode]:
-        """Return the behaviours of a list, named so that no two have the same path."""
-        names = [name_of(node) for node in nodes]
-        count = Counter(names)
-        children = []
-        for index, (node, name) in enumerate(zip(nodes, names, strict=True), 1):
-            named = bool(node.label) or isinstance(node, model.SkillNode | model.UseNode)
-            children.append(
-                self.node(node, parent, "", name if named and count[name] == 1 else f"{index}:{name}")
-            )
-        return children
+    def _sequence(self, node: Any) -> TreeNode:
+        return SequenceOf(self._site(node), self._all(node.steps))
 
-    def _sequence(self, node: Any, path: str) -> TreeNode:
-        return SequenceOf(self.site(node, path), self.list(node.steps, path))
+    def _fallback(self, node: Any) -> TreeNode:
+        return Fallback(self._site(node), self._all(node.choices))
 
-    def _fallback(self, node: Any, path: str) -> TreeNode:
-        return Fallback(self.site(node, path), self.list(node.choices, path))
+    def _parallel(self, node: Any) -> TreeNode:
+        count = {"all": None, "any": 1}.get(node.wait_for.value, node.wait_for.value)
+        return Parallel(self._site(node), self._all(node.branches), count, convert(node.halt.value, bool))
 
-    def _retry(self, node: Any, path: str) -> TreeNode:
-        recover = None if node.recover is None else self.node(node.recover, path, "recover")
-        body = self.node(node.do, path, "do")
-        attempts = convert(node.attempts.value, int)
-        return Retry(self.site(node, path), body, attempts, _names(node.on), recover)
+    def _retry(self, node: Any) -> TreeNode:
+        recover = None if node.recover is None else self.node(node.recover)
+        attempts, backoff = convert(node.attempts.value, int), _backoff(node.backoff)
+        return Retry(
+            self._site(node), self.node(node.do), attempts, _names(node.on), recover, backoff, self.cell.clock
+        )
 
-    def _repeat(self, node: Any, path: str) -> TreeNode:
-        body = self.node(node.do, path, "do")
+    def _repeat(self, node: Any) -> TreeNode:
         times = None if node.times is None else convert(node.times.value, int)
-        return Repeat(self.site(node, path), body, times, _names(node.until))
+        return Repeat(self._site(node), self.node(node.do), times, _names(node.until))
 
-    def _try(self, node: Any, path: str) -> TreeNode:
-        listed = isinstance(node.do, model.SequenceNode) and node.do.listed
-        body = self.node(node.do, path, "do" if listed else "")
-        handlers = [
-            (_names(catch.on), self.node(catch.do, path, f"catch/{index}"))
-            for index, catch in enumerate(node.catches, 1)
-        ]
-        finish = None if node.finish is None else self.node(node.finish, path, "finally")
-        return Try(self.site(node, path), body, handlers, finish)
+    def _while(self, node: Any) -> TreeNode:
+        return While(self._site(node), self.node(node.condition), self.node(node.do))
 
-    def _timeout(self, node: Any, path: str) -> TreeNode:
-        body = self.node(node.do, path, "do")
-        return Timeout(self.site(node, path), body, convert(node.seconds.value, float), self.cell.clock)
+    def _for_each(self, node: Any) -> TreeNode:
+        source = node.source.value if hasattr(node.source, "value") else node.source.name
+        return ForEach(self._site(node), self.node(node.do), self.scope, node.each.name, source)
 
-    def _invert(self, node: Any, path: str) -> TreeNode:
-        return Invert(self.site(node, path), self.node(node.do, path, "do"))
+    def _try(self, node: Any) -> TreeNode:
+        handlers = [(_names(catch.on), self.node(catch.do)) for catch in node.catches]
+        finish = None if node.finish is None else self.node(node.finish)
+        return Try(self._site(node), self.node(node.do), handlers, finish)
 
-    def _succeed(self, node: Any, path: str) -> TreeNode:
-        return Succeed(self.site(node, path), None if node.do is None else self.node(node.do, path, "do"))
+    def _timeout(self, node: Any) -> TreeNode:
+        seconds = convert(node.seconds.value, float)
+        return Timeout(self._site(node), self.node(node.do), seconds, self.cell.clock)
 
-    def _use(self, node: Any, path: str) -> TreeNode:
-        parent, _, name = path.rpartition("/")
-        body = node.body
-        if node.label:
-            return SequenceOf(self.site(node, path), [self.node(body, path, "do")])
-        if isinstance(body, model.SequenceNode) and body.listed:
-            return self._sequence(body, path)
-        return self.node(body, parent, name)
+    def _invert(self, node: Any) -> TreeNode:
+        return Invert(self._site(node), self.node(node.do))
 
-    def _skill(self, node: Any, path: str) -> TreeNode:
+    def _succeed(self, node: Any) -> TreeNode:
+        return Succeed(self._site(node), None if node.do is None else self.node(node.do))
+
+    def _use(self, node: Any) -> TreeNode:
+        body = self.node(node.body)
+        root = SequenceOf(self._site(node), [body]) if node.label else body
+        root.subtrees = (node.name, *root.subtrees)
+        return root
+
+    def _skill(self, node: Any) -> TreeNode:
         skill = self.skills[node.skill]
         declared: dict[str, Param | Port] = {**skill.params, **skill.ports}
         wiring = Wiring(
@@ -131,42 +118,36 @@ class Builder:
             inputs={wire.port.name: wire.variable for wire in wires(node, skill, Direction.IN)},
             outputs={wire.port.name: wire.variable for wire in wires(node, skill, Direction.OUT)},
         )
-        return SkillNode(self.site(node, path), node.skill, skill, wiring, self.cell, self.scope)
+        return SkillNode(self._site(node), node.skill, skill, wiring, self.cell, self.scope)
 
 
-def name_of(node: model.Node) -> str:
-    """Return what a node is called in a path."""
-    if node.label:
-        return node.label
-    if isinstance(node, model.SkillNode):
-        return node.skill
-    return node.name if isinstance(node, model.UseNode) else _WORDS[type(node)]
-
-
-def _names(matches: Sequence[model.Match]) -> list[tuple[str, str]]:
+def _names(matches: Sequence[Match]) -> list[tuple[str, str]]:
     return [(match.source, match.reason) for match in matches]
 
 
-_WORDS: Mapping[type, str] = {
-    model.SequenceNode: "sequence",
-    model.FallbackNode: "fallback",
-    model.RetryNode: "retry",
-    model.RepeatNode: "repeat",
-    model.TryNode: "try",
-    model.TimeoutNode: "timeout",
-    model.InvertNode: "invert",
-    model.SucceedNode: "succeed",
-}
+def _backoff(node: Any) -> Backoff | None:
+    if node is None:
+        return None
 
-_BUILDERS: Mapping[type, Callable[[Builder, Any, str], TreeNode]] = {
-    model.SkillNode: Builder._skill,
-    model.SequenceNode: Builder._sequence,
-    model.FallbackNode: Builder._fallback,
-    model.RetryNode: Builder._retry,
-    model.RepeatNode: Builder._repeat,
-    model.TryNode: Builder._try,
-    model.TimeoutNode: Builder._timeout,
-    model.InvertNode: Builder._invert,
-    model.SucceedNode: Builder._succeed,
-    model.UseNode: Builder._use,
+    first, factor, most = (
+        inf if value is None else convert(value.value, float)
+        for value in (node.first, node.factor, node.most)
+    )
+    return Backoff(first, factor, most)
+
+
+_BUILDERS: Mapping[type[nodes.Node], Callable[[Builder, Any], TreeNode]] = {
+    nodes.SkillNode: Builder._skill,
+    nodes.SequenceNode: Builder._sequence,
+    nodes.FallbackNode: Builder._fallback,
+    nodes.ParallelNode: Builder._parallel,
+    nodes.RetryNode: Builder._retry,
+    nodes.RepeatNode: Builder._repeat,
+    nodes.WhileNode: Builder._while,
+    nodes.ForEachNode: Builder._for_each,
+    nodes.TryNode: Builder._try,
+    nodes.TimeoutNode: Builder._timeout,
+    nodes.InvertNode: Builder._invert,
+    nodes.SucceedNode: Builder._succeed,
+    nodes.UseNode: Builder._use,
 }

@@ -4,10 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 from executive.cell_config import CellConfig
-from executive.mission.model import Mission, Node, SkillNode
-from executive.skill import Skill
+from executive.mission.findings import alternatives
+from executive.mission.flow import Analysis
+from executive.mission.model import Mission
+from executive.mission.nodes import Node, SkillNode
+from executive.mission.values import Reference
+from executive.mission.wiring import Wire, wires
+from executive.skill import Direction, Skill
+from executive.workcell import LeastTimes
 
 
 @dataclass(frozen=True)
@@ -16,10 +23,12 @@ class Case:
 
     Attributes:
         mission: As written.
-        tree: The tree that runs, expanded.
+        tree: The tree that runs, expanded, with paths; None where it could not be read.
         unused: Expanded subtrees that nothing uses.
         skills: Installed skills by name.
         cell: The cell, or None where its file has findings of its own.
+        labels: For every detector of the cell the classes its model knows, None where it cannot be known.
+        least: Lower bounds of what things take in the cell, or None where they are not known.
     """
 
     mission: Mission
@@ -27,6 +36,13 @@ class Case:
     unused: tuple[Node, ...]
     skills: Mapping[str, type[Skill]]
     cell: CellConfig | None
+    labels: Mapping[str, tuple[str, ...] | None]
+    least: LeastTimes | None
+
+    @cached_property
+    def flow(self) -> Analysis | None:
+        """What can happen in the tree that runs, or None where there is none."""
+        return None if self.tree is None else Analysis(self.tree, self.skills)
 
     def nodes(self) -> Iterator[Node]:
         """Yield every node, also of the subtrees that nothing uses."""
@@ -39,3 +55,15 @@ class Case:
         for node in self.nodes():
             if isinstance(node, SkillNode) and node.skill in self.skills:
                 yield node, self.skills[node.skill]
+
+    def constant_hint(self, reference: Reference) -> str:
+        """Return what to write where a variable stands in the place of a constant."""
+        params = self.mission.params
+        if reference.name in params:
+            return "A library sees its own arguments only: declare it under args and give it with `with`."
+        return alternatives(f"${reference.name}", [f"${name}" for name in params], "The mission's params")
+
+    def wires(self, node: Node, direction: Direction) -> Iterator[Wire]:
+        """Yield the variables that a node reads or writes through the ports of its skill, if it is one."""
+        if isinstance(node, SkillNode) and node.skill in self.skills:
+            yield from wires(node, self.skills[node.skill], direction)

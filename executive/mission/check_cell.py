@@ -8,6 +8,7 @@ from executive.cell_config import CellConfig
 from executive.mission.case import Case
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.wiring import literals
+from executive.skill import Param
 
 
 def routes(case: Case) -> Iterator[Finding]:
@@ -18,27 +19,42 @@ def routes(case: Case) -> Iterator[Finding]:
         if route.label not in case.cell.objects:
             hint = alternatives(route.label, case.cell.objects, "Its classes")
             yield error(route.key, "unknown-class", f'the cell knows no class "{route.label}"', hint)
-        if route.bin not in case.cell.bins:
-            hint = alternatives(route.bin, case.cell.bins, "Its bins")
-            yield error(route.mark, "unknown-bin", f'the cell has no bin "{route.bin}"', hint)
+        for bin in route.bins:
+            if bin.name not in case.cell.bins:
+                hint = alternatives(bin.name, case.cell.bins, "Its bins")
+                yield error(bin.mark, "unknown-bin", f'the cell has no bin "{bin.name}"', hint)
 
 
 def names(case: Case) -> Iterator[Finding]:
-    """Find every param that names something the cell does not have."""
+    """Find every param and input that names something the cell does not have."""
     if case.cell is None:
         return
     known = _known(case.cell)
     for node, skill in case.known_skills():
         for name, value in literals(node):
-            param = skill.params.get(name)
-            if param is None or param.refers not in known or value.value == param.default:
+            declared = skill.params.get(name) or skill.ports.get(name)
+            if declared is None or declared.refers not in known or value.value == declared.default:
                 continue
-            words = [*known[param.refers], *(param.choices or ())]
+            choices = declared.choices if isinstance(declared, Param) else None
+            words = [*known[declared.refers], *(choices or ())]
             for word in value.value if isinstance(value.value, list) else [value.value]:
                 if isinstance(word, str) and word not in words:
-                    message = f'the cell has no {param.refers} "{word}" for {node.skill}.{name}'
+                    message = f'the cell has no {declared.refers} "{word}" for {node.skill}.{name}'
                     hint = alternatives(word, words, f"{node.skill}.{name} takes")
-                    yield error(value.mark, f"unknown-{param.refers}", message, hint)
+                    yield error(value.mark, f"unknown-{declared.refers}", message, hint)
+
+
+def known_classes(case: Case) -> Iterator[Finding]:
+    """Find every routed class that no detector's model knows."""
+    models = {name: labels for name, labels in case.labels.items() if labels is not None}
+    if len(models) < len(case.labels) or not models or case.cell is None:
+        # A detector whose classes are not known may know any.
+        return
+    for route in case.mission.routes:
+        if route.label in case.cell.objects and not any(route.label in labels for labels in models.values()):
+            said = "; ".join(f"{name}: {', '.join(labels)}" for name, labels in models.items())
+            message = f'no detector of the cell can see the class "{route.label}"'
+            yield error(route.key, "unseen-class", message, f"Their models know {said}.")
 
 
 def _known(cell: CellConfig) -> Mapping[str, list[str]]:

@@ -1,89 +1,94 @@
-"""Checks of `on`, `catch` and `until`: could what they name ever happen there?"""
+"""Checks of `on`, `catch` and `until`: what they name can happen there, and means one node."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
+from executive.mission import nodes
 from executive.mission.case import Case
 from executive.mission.findings import Finding, alternatives, error
-from executive.mission.model import (
-    InvertNode,
-    Match,
-    Node,
-    RepeatNode,
-    RetryNode,
-    SkillNode,
-    TimeoutNode,
-    TryNode,
-    UseNode,
-)
-from executive.skill import Skill
+from executive.mission.flow import Analysis
+from executive.mission.flow_state import Raise
+from executive.mission.nodes import Node
+from executive.mission.values import Match
 
-_OWN = {TimeoutNode: ("timeout", "timeout"), InvertNode: ("invert", "inverted")}
+_OWN = {nodes.TimeoutNode: ("timeout", "timeout"), nodes.InvertNode: ("invert", "inverted")}
 """Control nodes that fail for a reason of their own: their word, and the reason."""
 
 
 def matches(case: Case) -> Iterator[Finding]:
-    """Find every failure that is waited for and cannot come."""
-    for node in case.nodes():
+    """Find every failure that is waited for and cannot come, or that more than one node could mean."""
+    if case.flow is None:
+        return
+    for node in case.flow.nodes.values():
         for match, where, body in _expectations(node):
-            yield from _impossible(match, where, body, case.skills)
+            flow = case.flow.flows.get(body.path)
+            if flow is None:
+                continue
+            coming = [failure for failure in flow.failures if failure.may_match([match])]
+            if not coming:
+                yield _impossible(case, case.flow, match, where, body)
+            elif len(meant := _meant(case.flow, match, coming)) > 1:
+                yield _ambiguous(match, meant)
 
 
 def _expectations(node: Node) -> Iterator[tuple[Match, str, Node]]:
     """Yield every failure a node waits for, the key it stands under, and the body it should come from."""
-    if isinstance(node, RetryNode):
+    if isinstance(node, nodes.RetryNode):
         yield from ((match, "retry", node.do) for match in node.on)
-    elif isinstance(node, RepeatNode):
+    elif isinstance(node, nodes.RepeatNode):
         yield from ((match, "repeat", node.do) for match in node.until)
-    elif isinstance(node, TryNode):
+    elif isinstance(node, nodes.TryNode):
         yield from ((match, "try", node.do) for catch in node.catches for match in catch.on)
 
 
-def _impossible(match: Match, where: str, body: Node, skills: Mapping[str, type[Skill]]) -> Iterator[Finding]:
-    raised = _raised(body, skills)
-    if raised is None:
-        return
-    if match.source in raised:
-        reasons = raised[match.source]
+def _impossible(case: Case, flow: Analysis, match: Match, where: str, body: Node) -> Finding:
+    inside = _reasons(flow, body)
+    if match.source in inside:
+        reasons = inside[match.source]
         if match.reason not in reasons:
             hint = alternatives(match.reason, reasons, f"{match.source} may fail with")
             message = f'{match.source} never fails with "{match.reason}"'
-            yield error(match.mark, "unknown-reason", message, hint)
-    elif match.source in skills:
+            return error(match.mark, "unknown-reason", message, hint)
+        message = f"{match} never comes out of the body of this {where}: it is dealt with inside"
+        leaving = ", ".join(sorted({str(failure) for failure in flow.flows[body.path].failures}))
+        return error(match.mark, "impossible-reason", message, f"What comes out: {leaving or 'nothing'}.")
+    if match.source in case.skills:
         message = f"{match.source} is not in the body of this {where}, so {match} cannot come from it"
-        yield error(match.mark, "impossible-reason", message, f"In the body: {', '.join(raised) or 'none'}.")
-    else:
-        hint = alternatives(match.source, raised, "In the body")
-        message = f'there is no skill or label "{match.source}"'
-        yield error(match.mark, "unknown-skill", message, hint)
+        return error(match.mark, "impossible-reason", message, f"In the body: {', '.join(inside) or 'none'}.")
+    hint = alternatives(match.source, inside, "In the body")
+    return error(match.mark, "unknown-skill", f'there is no skill or label "{match.source}"', hint)
 
 
-def _raised(body: Node, skills: Mapping[str, type[Skill]]) -> dict[str, list[str]] | None:
-    """Return the reasons that may come out of `body` by skill or label; None if a part of it is unknown.
-
-    What a `catch` inside would keep back is counted too: the answer errs on the side of silence.
-    """
-    raised: dict[str, list[str]] = {}
+def _reasons(flow: Analysis, body: Node) -> dict[str, list[str]]:
+    """Return the reasons of everything in `body` by skill, control word or label, caught inside or not."""
+    reasons: dict[str, list[str]] = {}
     for node in body.walk():
-        if isinstance(node, UseNode) and node.body is None:
-            return None
-        if isinstance(node, SkillNode):
-            if node.skill not in skills:
-                return None
-            raised.setdefault(node.skill, list(skills[node.skill].reasons))
+        own: list[str] = []
+        if isinstance(node, nodes.SkillNode):
+            skill = flow.skill(node.skill)
+            reasons.setdefault(node.skill, []).extend(skill.reasons if skill else ())
         elif type(node) in _OWN:
             word, reason = _OWN[type(node)]
-            raised.setdefault(word, [reason])
-        if node.label:
-            inside = [reason for reasons in _below(node, skills) for reason in reasons]
-            raised[node.label] = [*raised.get(node.label, []), *inside]
-    return {source: list(dict.fromkeys(reasons)) for source, reasons in raised.items()}
+            own = reasons.setdefault(word, [])
+            own.append(reason)
+        if node.label and node.path in flow.flows:
+            passed = flow.flows[node.path].failures
+            reasons.setdefault(node.label, []).extend(failure.reason for failure in passed)
+    return {source: list(dict.fromkeys(found)) for source, found in reasons.items()}
 
 
-def _below(node: Node, skills: Mapping[str, type[Skill]]) -> Iterator[tuple[str, ...]]:
-    for inner in node.walk():
-        if isinstance(inner, SkillNode) and inner.skill in skills:
-            yield tuple(skills[inner.skill].reasons)
-        elif type(inner) in _OWN:
-            yield (_OWN[type(inner)][1],)
+def _meant(flow: Analysis, match: Match, coming: list[Raise]) -> list[Node]:
+    """Return the nodes that a name means; a label means whatever fails under it, and so one thing."""
+    if any(match.source in failure.labels for failure in coming):
+        return []
+    # The same place twice is one node of a subtree that is used twice.
+    places = {flow.nodes[failure.origin].mark: flow.nodes[failure.origin] for failure in coming}
+    return sorted(places.values(), key=lambda node: (node.mark.line, node.mark.col))
+
+
+def _ambiguous(match: Match, meant: list[Node]) -> Finding:
+    lines = " and ".join(str(node.mark.line) for node in meant)
+    message = f"{match} may come from more than one node here, in lines {lines}"
+    hint = f"Label them with as: and name the one that is meant, as label.{match.reason}."
+    return error(match.mark, "ambiguous", message, hint)

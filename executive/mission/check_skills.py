@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 from executive.mission.case import Case
 from executive.mission.findings import Finding, alternatives, error, suggest
-from executive.mission.model import Literal, Reference, SkillNode
+from executive.mission.nodes import SkillNode
 from executive.mission.typed import WrongType, convert, is_plain
+from executive.mission.values import Literal, Reference
 from executive.mission.wiring import literals
 from executive.mission.words import describe
 from executive.skill import Direction, Param
@@ -114,11 +115,8 @@ def _wrong(node: SkillNode, name: str, value: Literal, code: str, sentence: str,
 
 
 def _variable_for_param(case: Case, node: SkillNode, name: str, reference: Reference) -> Finding:
-    meant = suggest(reference.name, case.mission.params)
     message = f"{node.skill}.{name} is a constant, and ${reference.name} is neither param nor argument here"
-    hint = f'Did you mean "${meant}"? ' if meant else ""
-    listed = ", ".join(case.mission.params) or "none"
-    return error(reference.mark, "unknown-param", message, f"{hint}The mission's params: {listed}.")
+    return error(reference.mark, "unknown-param", message, case.constant_hint(reference))
 
 
 def _meant_variable(case: Case, value: object) -> str:

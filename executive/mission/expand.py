@@ -6,15 +6,23 @@ expanded tree, so an argument is checked with the value it has at each place of 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from executive.mission.findings import Finding, alternatives, error, warning
-from executive.mission.model import Catch, Literal, Mission, Node, Reference, Setting, Subtree, UseNode, Value
+from executive.mission.closure import renamed
+from executive.mission.findings import Finding, alternatives, error, suggest, warning
+from executive.mission.model import Mission, Subtree
+from executive.mission.nodes import Backoff, Catch, ForEachNode, Node, SkillNode, UseNode
+from executive.mission.values import Literal, Reference, Setting, Value
+from executive.mission.wiring import written_below
+from executive.skill import Direction, Skill
 
 _DEEPEST = 40
 _MOST_NODES = 5000
+_OUTSIDE = "^"
+"""Stands before the variables of the place of use while those of the subtree are renamed."""
 
 Names = Mapping[str, Value]
 """What `$name` stands for where it is not a variable."""
@@ -34,13 +42,13 @@ class Expanded:
     findings: tuple[Finding, ...]
 
 
-def expand(mission: Mission) -> Expanded:
+def expand(mission: Mission, skills: Mapping[str, type[Skill]]) -> Expanded:
     """Return the mission's tree with nothing left to look up but variables."""
-    expander = _Expander(mission)
-    tree = None if mission.tree is None else expander.whole(mission.tree, mission.params)
+    expander = _Expander(mission, skills)
+    tree = None if mission.tree is None else expander.whole(mission.tree, expander.params)
     unused = []
     for subtree in mission.trees.values():
-        if subtree.name in expander.used:
+        if subtree.name in expander.used or subtree.library:
             continue
         expander.findings.append(
             warning(subtree.mark, "unused-tree", f'nothing uses the subtree "{subtree.name}"')
@@ -48,8 +56,9 @@ def expand(mission: Mission) -> Expanded:
         defaults = {name: argument.default for name, argument in subtree.args.items()}
         given = {name: default for name, default in defaults.items() if default is not None}
         if len(given) == len(defaults):
-            body = expander.whole(subtree.do, {**mission.params, **given})
+            body = expander.whole(subtree.do, {**expander.params, **given})
             unused += [body] if body else []
+    expander.findings += expander.unused_names()
     return Expanded(tree, tuple(unused), tuple(expander.findings))
 
 
@@ -58,17 +67,32 @@ class _TooLargeError(Exception):
 
 
 class _Expander:
-    def __init__(self, mission: Mission) -> None:
-        self.mission = mission
+    def __init__(self, mission: Mission, skills: Mapping[str, type[Skill]]) -> None:
+        self.mission, self.skills = mission, skills
+        self.params: Names = {name: param.value for name, param in mission.params.items()}
         self.findings: list[Finding] = []
         self.used: set[str] = set()
+        self._looked_up: set[tuple[str, str]] = set()
         self._count = 0
+        self._uses: Counter[str] = Counter()
 
     def whole(self, tree: Node, names: Names) -> Node | None:
         try:
             return self._node(tree, names, (), 0)
         except _TooLargeError:
             return None
+
+    def unused_names(self) -> Iterator[Finding]:
+        """Find every param and argument that no `$name` of a tree that was put in refers to."""
+        for name, param in self.mission.params.items() if self.mission.tree else ():
+            if ("", name) not in self._looked_up:
+                yield warning(param.mark, "unused-param", f'nothing uses the param "{name}"')
+        for subtree in self.mission.trees.values():
+            for name, argument in subtree.args.items():
+                put_in = self._uses[subtree.name] > 0 and not subtree.library
+                if put_in and (subtree.name, name) not in self._looked_up:
+                    message = f'nothing in the subtree "{subtree.name}" uses its argument "{name}"'
+                    yield warning(argument.mark, "unused-argument", message)
 
     def _node(self, node: Node, names: Names, inside: tuple[str, ...], depth: int) -> Node:
         self._count += 1
@@ -83,8 +107,8 @@ class _Expander:
             if isinstance(part, Node):
                 return self._node(part, names, inside, depth + 1)
             if isinstance(part, Reference):
-                return _resolved(part, names)
-            if isinstance(part, Setting | Catch):
+                return self._resolved(part, names, inside)
+            if isinstance(part, Setting | Catch | Backoff):
                 return _rebuilt(part)
             if isinstance(part, tuple):
                 return tuple([filled(item) for item in part])
@@ -95,8 +119,38 @@ class _Expander:
         def _rebuilt(part: Any) -> Any:
             return replace(part, **{field.name: filled(getattr(part, field.name)) for field in fields(part)})
 
+        self.findings += self._shadowed(node, names)
         rebuilt: Node = _rebuilt(node)
         return self._use(rebuilt, inside, depth) if isinstance(rebuilt, UseNode) else rebuilt
+
+    def _shadowed(self, node: Node, names: Names) -> Iterator[Finding]:
+        """Find every variable that a node would write under the name of a param or argument."""
+        if isinstance(node, ForEachNode) and node.each.name in names:
+            message = f"for_each would write ${node.each.name}, but that is {self._sort(node.each.name)}"
+            yield error(node.each.mark, "shadowed-param", message, "Call one of them otherwise.")
+        if not isinstance(node, SkillNode) or node.skill not in self.skills:
+            return
+        for name, port in self.skills[node.skill].ports.items():
+            if port.direction is Direction.OUT and name in names and name not in node.settings:
+                message = f"{node.skill}.{name} would write ${name}, but that is {self._sort(name)}"
+                hint = f"Rename that, or write {name}: $other."
+                yield error(node.mark, "shadowed-param", message, hint)
+
+    def _sort(self, name: str) -> str:
+        return "a param of the mission" if name in self.params else "an argument here"
+
+    def _resolved(self, reference: Reference, names: Names, inside: tuple[str, ...]) -> Value:
+        value = names.get(reference.name)
+        # Who writes a name a little wrong has not forgotten it.
+        meant = reference.name if value is not None else suggest(reference.name, names)
+        own = bool(inside) and meant in self.mission.trees[inside[-1]].args
+        self._looked_up.add((inside[-1] if own else "", meant or ""))
+        if value is None:
+            return reference
+        if isinstance(value, Reference):
+            return Reference(value.name, reference.mark)
+        # The place of the value is the one to correct; the place of its use is named beside it.
+        return Literal(value.value, value.mark, f"${reference.name} in line {reference.mark.line}")
 
     def _use(self, use: UseNode, inside: tuple[str, ...], depth: int) -> Node:
         self.used.add(use.name)
@@ -111,11 +165,49 @@ class _Expander:
             self.findings.append(error(use.mark, "recursive-use", message))
             return use
         arguments = self._arguments(use, subtree)
+        returns = self._returns(use, subtree)
         if arguments is None:
             return use
-        names = {**self.mission.params, **arguments}
-        body = self._node(subtree.do, names, (*inside, use.name), depth + 1)
-        return replace(use, body=body)
+        self._uses[use.name] += 1
+        # A library knows its own arguments only: it must mean the same in every mission.
+        around: Names = {} if subtree.library else self.params
+        if subtree.returns is None:
+            body = self._node(subtree.do, {**around, **arguments}, (*inside, use.name), depth + 1)
+            return replace(use, body=body)
+        arguments = {name: _from_outside(value) for name, value in arguments.items()}
+        body = self._node(subtree.do, {**around, **arguments}, (*inside, use.name), depth + 1)
+        return replace(use, body=self._closed(use, body, returns))
+
+    def _closed(self, use: UseNode, body: Node, returns: Mapping[str, str]) -> Node:
+        """Return the body with the variables that it keeps to itself under names of their own."""
+        number = self._uses[use.name]
+        own = f"{use.name}." if number == 1 else f"{use.name}-{number}."
+        kept = written_below(body, self.skills)
+
+        def rename(name: str) -> str:
+            if name.startswith(_OUTSIDE):
+                return name.removeprefix(_OUTSIDE)
+            if name in returns:
+                return returns[name]
+            return own + name if name in kept else name
+
+        return renamed(body, rename, self.skills)
+
+    def _returns(self, use: UseNode, subtree: Subtree) -> dict[str, str]:
+        """Return what each variable that the subtree returns is called at the place of use."""
+        known = subtree.returns or {}
+        names = {name: name for name in known}
+        for name, setting in use.returns.items():
+            if name not in known:
+                hint = alternatives(name, known, "It returns")
+                message = f'the subtree "{subtree.name}" does not return "{name}"'
+                self.findings.append(error(setting.key, "unknown-return", message, hint))
+            elif isinstance(setting.value, Reference):
+                names[name] = setting.value.name
+            else:
+                message = f'returns.{name} takes the variable to write, as "$mine"'
+                self.findings.append(error(setting.value.mark, "wrong-type", message))
+        return names
 
     def _arguments(self, use: UseNode, subtree: Subtree) -> dict[str, Value] | None:
         """Return the value of every argument of the subtree, or None if one is missing."""
@@ -137,11 +229,5 @@ class _Expander:
         return values if len(values) == len(subtree.args) else None
 
 
-def _resolved(reference: Reference, names: Names) -> Value:
-    value = names.get(reference.name)
-    if value is None:
-        return reference
-    if isinstance(value, Reference):
-        return Reference(value.name, reference.mark)
-    # The place of the value is the one to correct; the place of its use is named beside it.
-    return Literal(value.value, value.mark, f"${reference.name} in line {reference.mark.line}")
+def _from_outside(value: Value) -> Value:
+    return replace(value, name=_OUTSIDE + value.name) if isinstance(value, Reference) else value

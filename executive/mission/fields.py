@@ -6,9 +6,9 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 
 from executive.mission.findings import Finding, alternatives, error
-from executive.mission.model import Literal, Match, Reference, Setting, Value
 from executive.mission.source import Mark
 from executive.mission.text import Mapping, Node, Scalar, Sequence, plain, scalars
+from executive.mission.values import Literal, Match, Reference, Setting, Value
 from executive.mission.words import describe
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -53,6 +53,11 @@ class Fields:
         entry = self._node.entry(key) if self._node else None
         return entry.key.mark if entry else self.mark
 
+    def value_mark(self, key: str) -> Mark:
+        """Return where the value of `key` stands, or the owner where it is missing."""
+        node = self.get(key)
+        return node.mark if node else self.mark
+
     def required(self, key: str) -> Node | None:
         """Return the value of `key`; its absence is a finding."""
         node = self.get(key)
@@ -85,6 +90,9 @@ class Fields:
         if node is None:
             return ()
         found = []
+        if isinstance(node, Sequence) and not node.items:
+            hint = f'For every failure leave out "{key}".'
+            self._refuse(node.mark, "empty-list", f"{self.owner}.{key} names no failure", hint)
         for item in self.items(key):
             written = item.text if isinstance(item, Scalar) else ""
             if form := _MATCH.fullmatch(written):

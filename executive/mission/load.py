@@ -10,19 +10,20 @@ from typing import Any
 from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.mission.case import Case
-from executive.mission.cell_file import CellFile, read_cell
 from executive.mission.check import check
+from executive.mission.endings import Ending, endings
 from executive.mission.expand import expand
-from executive.mission.files import below, find_mission, read_source
-from executive.mission.findings import Finding, MissionError, error, in_file_order
-from executive.mission.model import Mission, Node
-from executive.mission.parse import parse_mission
-from executive.mission.text import parse_yaml
-from executive.mission.validate import KeyPath
+from executive.mission.files import find_mission
+from executive.mission.findings import Finding, MissionError, in_file_order
+from executive.mission.model import Mission
+from executive.mission.nodes import Node
+from executive.mission.paths import with_paths
+from executive.mission.read_mission import MissionFiles, read_mission
 from executive.skill import Skill
+from executive.workcell import CellKind
 
-RobotCheck = Callable[[CellConfig], Iterable[tuple[KeyPath, str]]]
-"""Says what the robot cannot do in a cell: the keys of the value in the cell file, and a sentence."""
+Kinds = Callable[[str], CellKind]
+"""Finds the installed kind of cells of a name; raises InputError where there is none."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,8 @@ class LoadedMission:
         text: The mission file.
         path: Where it was found.
         cell_path: Where the cell file was found.
+        libraries: The text of every library file by its path as the mission writes it.
+        endings: Failures that can still end it.
         warnings: Findings that are no reason not to run.
     """
 
@@ -45,24 +48,26 @@ class LoadedMission:
     text: str
     path: Path
     cell_path: Path
+    libraries: Mapping[str, str]
+    endings: tuple[Ending, ...] = ()
     warnings: tuple[Finding, ...] = ()
 
     @property
     def params(self) -> dict[str, Any]:
         """The mission's params as plain values, overrides applied."""
-        return {name: literal.value for name, literal in self.mission.params.items()}
+        return {name: param.value.value for name, param in self.mission.params.items()}
 
     @property
-    def routes(self) -> dict[str, str]:
-        """Class label to bin name."""
-        return {route.label: route.bin for route in self.mission.routes}
+    def routes(self) -> dict[str, tuple[str, ...]]:
+        """For every class label the bins it may go to."""
+        return {route.label: tuple(bin.name for bin in route.bins) for route in self.mission.routes}
 
 
 def load_mission(
     path: str | Path,
     skills: Mapping[str, type[Skill]],
     overrides: Mapping[str, str] | None = None,
-    robot_check: RobotCheck | None = None,
+    kinds: Kinds | None = None,
 ) -> LoadedMission:
     """Return the mission in a file, or of a shipped name.
 
@@ -70,49 +75,46 @@ def load_mission(
         path: A mission file, or the name of a shipped mission.
         skills: Installed skills by name.
         overrides: Other values for params by name, and for the cell as `cell.<key>.<key>`.
-        robot_check: Asked about the cell once it is known to be well formed.
+        kinds: Finds the kind of the cell, which is asked what it cannot do; None: nobody is asked.
 
     Raises:
         MissionError: Something is wrong with mission or cell; every finding is in it.
         InputError: There is no such mission.
     """
-    overrides = overrides or {}
     file = find_mission(path)
-    source = read_source(file)
-    root, findings = parse_yaml(source)
-    if root is None:
-        raise MissionError(in_file_order(findings, source.path))
-    mission, malformed = parse_mission(root, overrides)
-    findings += malformed
-    cell_path, cell = _cell(mission, file.parent, overrides, findings)
-    config = cell.config if cell else None
-    if cell and config and robot_check:
-        findings += [cell.finding(keys, "robot", sentence) for keys, sentence in robot_check(config)]
-    expanded = expand(mission)
-    findings += expanded.findings
-    case = Case(mission, expanded.tree, expanded.unused, skills, config)
-    findings += check(case, sound=not _errors(findings))
-    if config is None or cell_path is None or expanded.tree is None or _errors(findings):
-        raise MissionError(in_file_order(findings, source.path))
+    files = read_mission(file, overrides or {})
+    mission, config = files.mission, files.cell.config if files.cell else None
+    findings = list(files.findings)
+    kind = _kind(files, kinds, findings)
+    labels, least = {}, None
+    if kind is not None and files.cell is not None and files.cell_path is not None:
+        base = files.cell_path.parent
+        wrong = [files.cell.finding(keys, "robot", text) for keys, text in kind.check(config, base)]
+        findings += wrong
+        labels = dict(kind.labels(config, base))
+        least = None if wrong else kind.least_times(config)
+    expanded = expand(mission, skills)
+    tree = expanded.tree and with_paths(expanded.tree)
+    case = Case(mission, tree, expanded.unused, skills, config, labels, least)
+    findings += (*expanded.findings, *check(case))
+    ordered = in_file_order(findings, files.source.path)
+    if config is None or files.cell_path is None or tree is None or case.flow is None or _errors(findings):
+        raise MissionError(ordered)
     return LoadedMission(
-        mission, expanded.tree, config, source.text, file, cell_path, in_file_order(findings, source.path)
-    )
+        mission, tree, config, files.source.text, file, files.cell_path, files.libraries,
+        endings(case.flow), ordered,
+    )  # fmt: skip
 
 
-def _cell(
-    mission: Mission, folder: Path, overrides: Mapping[str, str], findings: list[Finding]
-) -> tuple[Path | None, CellFile | None]:
-    """Return the mission's cell file; what is wrong with it is added to the findings."""
-    if not mission.cell:
-        return None, None
+def _kind(files: MissionFiles, kinds: Kinds | None, findings: list[Finding]) -> CellKind | None:
+    """Return the kind of the mission's cell, or None where there is none to ask."""
+    if files.cell is None or files.cell.config is None or kinds is None:
+        return None
     try:
-        path = below(folder, mission.cell)
-        cell = read_cell(path, overrides)
+        return kinds(files.cell.config.kind)
     except InputError as problem:
-        findings.append(error(mission.cell_mark, "no-cell", str(problem)))
-        return None, None
-    findings += cell.findings
-    return path, cell
+        findings.append(files.cell.finding(("kind",), "unknown-kind", str(problem)))
+        return None
 
 
 def _errors(findings: Iterable[Finding]) -> bool:

@@ -5,16 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from executive.mission import model
-from executive.mission.fields import Fields, settings_of
+from executive.mission import grammar
+from executive.mission import nodes as model
+from executive.mission.fields import NAME, Fields, settings_of
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.source import Mark
 from executive.mission.text import Mapping, Node, Scalar, Sequence, plain
+from executive.mission.values import Literal, Named, Value
 from executive.mission.words import describe
 
-_LABEL = re.compile(r"[a-z_][a-z0-9_]*")
+_LABEL = re.compile(grammar.LABEL)
 _SKILL = re.compile(r"[A-Z][A-Za-z0-9]*")
-_PARTNERS = {"use": ("with",), "try": ("catch", "finally")}
 
 
 class NodeParser:
@@ -83,14 +84,15 @@ class NodeParser:
             message = f'"{head.key.text}" and "{entry.key.text}" stand in one node; a node has one name'
             self.refuse(entry.key.mark, "two-nodes", message, "Write a list to run one after the other.")
         name = head.key.text
-        allowed = (name, "as", *_PARTNERS.get(name, ()))
+        partners = grammar.CONTROL[name].partners if name in grammar.CONTROL else ()
+        allowed = (name, "as", *partners)
         for entry in words:
             if entry not in heads and entry.key.text not in allowed:
                 hint = alternatives(entry.key.text, allowed[1:], f"Beside {name} may stand")
                 message = f'"{entry.key.text}" may not stand beside "{name}"'
                 self.refuse(entry.key.mark, "unknown-key", message, hint)
         if name in CONTROL:
-            return CONTROL[name](self, Head(node, head.key.mark, label, head.value))
+            return CONTROL[name](self, Head(node, name, head.key.mark, label, head.value))
         settings = settings_of(head.value, name, self.findings)
         return model.SkillNode(head.key.mark, label, name, settings)
 
@@ -113,16 +115,16 @@ class NodeParser:
 class Head:
     """One control node in the file: the mapping it stands in, its word, its label, its value."""
 
-    def __init__(self, node: Mapping, mark: Mark, label: str, value: Node) -> None:
-        self.node, self.mark, self.label, self.value = node, mark, label, value
+    def __init__(self, node: Mapping, word: str, mark: Mark, label: str, value: Node) -> None:
+        self.node, self.word, self.mark, self.label, self.value = node, word, mark, label, value
 
 
 def _nothing(mark: Mark) -> model.Node:
     return model.SucceedNode(mark, "", None)
 
 
-def _fields(parser: NodeParser, head: Head, owner: str, *known: str) -> Fields:
-    return Fields(owner, head.mark, head.value, known, parser.findings)
+def _fields(parser: NodeParser, head: Head) -> Fields:
+    return Fields(head.word, head.mark, head.value, grammar.CONTROL[head.word].keys, parser.findings)
 
 
 def _sequence(parser: NodeParser, head: Head) -> model.Node:
@@ -133,10 +135,22 @@ def _fallback(parser: NodeParser, head: Head) -> model.Node:
     return model.FallbackNode(head.mark, head.label, parser.nodes(head.value, "fallback"))
 
 
+def _parallel(parser: NodeParser, head: Head) -> model.Node:
+    wait_for: Value = Literal("all", head.mark)
+    halt: Value = Literal(False, head.mark)
+    body: Node | None = head.value
+    if not isinstance(head.value, Sequence):
+        fields = _fields(parser, head)
+        wait_for, halt = fields.value("wait_for") or wait_for, fields.value("halt") or halt
+        body = fields.required("do")
+    branches = () if body is None else parser.nodes(body, "parallel")
+    return model.ParallelNode(head.mark, head.label, branches, wait_for, halt)
+
+
 def _retry(parser: NodeParser, head: Head) -> model.Node:
-    fields = _fields(parser, head, "retry", "attempts", "on", "recover", "do")
+    fields = _fields(parser, head)
     fields.required("attempts")
-    attempts = fields.value("attempts") or model.Literal(1, head.mark)
+    attempts = fields.value("attempts") or Literal(1, head.mark)
     recover = fields.get("recover")
     return model.RetryNode(
         head.mark,
@@ -144,18 +158,53 @@ def _retry(parser: NodeParser, head: Head) -> model.Node:
         attempts,
         fields.matches("on"),
         None if recover is None else parser.node(recover, fields.key_mark("recover")),
+        _backoff(parser, fields),
         parser.node(fields.required("do"), fields.key_mark("do")),
     )
 
 
+def _backoff(parser: NodeParser, fields: Fields) -> model.Backoff | None:
+    node = fields.get("backoff")
+    same: Value = Literal(1.0, fields.key_mark("backoff"))
+    if not isinstance(node, Mapping):
+        first = fields.value("backoff")
+        return None if first is None else model.Backoff(first, same, None)
+    inner = Fields("backoff", fields.key_mark("backoff"), node, grammar.BACKOFF, parser.findings)
+    inner.required("first")
+    first = inner.value("first")
+    if first is None:
+        return None
+    return model.Backoff(first, inner.value("factor") or same, inner.value("most"))
+
+
 def _repeat(parser: NodeParser, head: Head) -> model.Node:
-    fields = _fields(parser, head, "repeat", "until", "times", "do")
+    fields = _fields(parser, head)
     times, until = fields.value("times"), fields.matches("until")
-    if fields.sound and (times is None) == (fields.get("until") is None):
+    if fields.sound and fields.get("times") is None and fields.get("until") is None:
         message = 'repeat needs one of "until" and "times", to know when it is done'
         parser.refuse(head.mark, "missing-key", message)
     body = parser.node(fields.required("do"), fields.key_mark("do"))
     return model.RepeatNode(head.mark, head.label, times, until, body)
+
+
+def _while(parser: NodeParser, head: Head) -> model.Node:
+    fields = _fields(parser, head)
+    condition = parser.node(fields.required("condition"), fields.key_mark("condition"))
+    body = parser.node(fields.required("do"), fields.key_mark("do"))
+    return model.WhileNode(head.mark, head.label, condition, body)
+
+
+def _for_each(parser: NodeParser, head: Head) -> model.Node:
+    fields = _fields(parser, head)
+    for key in ("each", "in"):
+        fields.required(key)
+    each = Named(fields.text("each"), fields.value_mark("each"))
+    if each.name and not NAME.fullmatch(each.name):
+        hint = "Write the bare name, for instance each: target; its value is $target."
+        parser.refuse(each.mark, "bad-name", f'"{each.name}" cannot name a variable', hint)
+    source = fields.value("in") or Literal([], head.mark)
+    body = parser.node(fields.required("do"), fields.key_mark("do"))
+    return model.ForEachNode(head.mark, head.label, each, source, body)
 
 
 def _try(parser: NodeParser, head: Head) -> model.Node:
@@ -167,7 +216,7 @@ def _try(parser: NodeParser, head: Head) -> model.Node:
         message = f'catch takes a list of "on" and "do", not {describe(plain(caught))}'
         parser.refuse(caught.mark, "wrong-type", message)
     for item in caught.items if isinstance(caught, Sequence) else ():
-        fields = Fields("catch", item.mark, item, ("on", "do"), parser.findings)
+        fields = Fields("catch", item.mark, item, grammar.CATCH, parser.findings)
         fields.required("on")
         body = parser.node(fields.required("do"), fields.key_mark("do"))
         catches.append(model.Catch(fields.matches("on"), body))
@@ -181,9 +230,9 @@ def _try(parser: NodeParser, head: Head) -> model.Node:
 
 
 def _timeout(parser: NodeParser, head: Head) -> model.Node:
-    fields = _fields(parser, head, "timeout", "seconds", "do")
+    fields = _fields(parser, head)
     fields.required("seconds")
-    seconds = fields.value("seconds") or model.Literal(1.0, head.mark)
+    seconds = fields.value("seconds") or Literal(1.0, head.mark)
     body = parser.node(fields.required("do"), fields.key_mark("do"))
     return model.TimeoutNode(head.mark, head.label, seconds, body)
 
@@ -199,20 +248,25 @@ def _succeed(parser: NodeParser, head: Head) -> model.Node:
 
 
 def _use(parser: NodeParser, head: Head) -> model.Node:
-    arguments = head.node.get("with")
-    settings = {} if arguments is None else settings_of(arguments, "with", parser.findings)
+    given = {key: head.node.get(key) for key in ("with", "returns")}
+    arguments, returns = (
+        {} if node is None else settings_of(node, key, parser.findings) for key, node in given.items()
+    )
     if not (isinstance(head.value, Scalar) and isinstance(head.value.value, str)):
         message = f"use takes the name of a subtree, not {describe(plain(head.value))}"
         parser.refuse(head.value.mark, "wrong-type", message)
         return _nothing(head.mark)
-    return model.UseNode(head.value.mark, head.label, head.value.text, settings)
+    return model.UseNode(head.value.mark, head.label, head.value.text, arguments, returns)
 
 
 CONTROL: dict[str, Callable[[NodeParser, Head], model.Node]] = {
     "sequence": _sequence,
     "fallback": _fallback,
+    "parallel": _parallel,
     "retry": _retry,
     "repeat": _repeat,
+    "while": _while,
+    "for_each": _for_each,
     "try": _try,
     "timeout": _timeout,
     "invert": _invert,

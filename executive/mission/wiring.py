@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from executive.mission.model import Literal, Reference, SkillNode
+from executive.mission.nodes import ForEachNode, Node, SkillNode
 from executive.mission.source import Mark
+from executive.mission.values import Literal, Reference
 from executive.skill import Direction, Port, Skill
 
 
@@ -15,16 +16,21 @@ class Wire:
     """A port and the variable it is connected to.
 
     Attributes:
-        port: The skill's port.
+        skill: Name of the skill.
+        port: Its port.
         variable: Name of the variable.
         mark: Where the mission says so, or the skill itself where the port goes by its own name.
         explicit: True where the mission names the variable.
     """
 
+    skill: str
     port: Port
     variable: str
     mark: Mark
     explicit: bool
+
+    def __str__(self) -> str:
+        return f"{self.skill}.{self.port.name}"
 
 
 def wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Iterator[Wire]:
@@ -34,9 +40,9 @@ def wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Iterator
             continue
         setting = node.settings.get(port.name)
         if setting is None:
-            yield Wire(port, port.name, node.mark, explicit=False)
+            yield Wire(node.skill, port, node.names.get(port.name, port.name), node.mark, explicit=False)
         elif isinstance(setting.value, Reference):
-            yield Wire(port, setting.value.name, setting.value.mark, explicit=True)
+            yield Wire(node.skill, port, setting.value.name, setting.value.mark, explicit=True)
 
 
 def literals(node: SkillNode) -> Iterator[tuple[str, Literal]]:
@@ -44,3 +50,14 @@ def literals(node: SkillNode) -> Iterator[tuple[str, Literal]]:
     for name, setting in node.settings.items():
         if isinstance(setting.value, Literal):
             yield name, setting.value
+
+
+def written_below(root: Node, skills: Mapping[str, type[Skill]]) -> set[str]:
+    """Return the variables that something in the tree may write."""
+    written = set()
+    for node in root.walk():
+        if isinstance(node, ForEachNode):
+            written.add(node.each.name)
+        elif isinstance(node, SkillNode) and node.skill in skills:
+            written |= {wire.variable for wire in wires(node, skills[node.skill], Direction.OUT)}
+    return written

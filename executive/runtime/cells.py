@@ -1,13 +1,11 @@
-"""Finding the installed kinds of work cells, and asking one what is wrong with a cell file."""
+"""Finding the installed kinds of work cells."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from importlib.metadata import entry_points
 
-from executive.cell_config import CellConfig
 from executive.errors import InputError
-from executive.workcell import CellKind, KeyPath
+from executive.workcell import CellKind
 
 GROUP = "executive.cells"
 
@@ -26,12 +24,3 @@ def cell_kind(name: str) -> CellKind:
         )
     kind: CellKind = entries[name].load()
     return kind
-
-
-def robot_check(config: CellConfig) -> Iterable[tuple[KeyPath, str]]:
-    """Return what the robot of a cell file cannot do, each with the key it is about and a sentence.
-
-    Raises:
-        InputError: No installed package offers this kind of cell.
-    """
-    return cell_kind(config.kind).check(config)

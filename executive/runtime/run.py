@@ -100,16 +100,15 @@ class Run:
         self._interrupted = False
         self._workcell: Workcell | None = None
         kind = kind or cell_kind(loaded.cell_config.kind)
-        routes = {route.label: route.bin for route in loaded.mission.routes}
         operator: Operator
         if requests is None:
             operator = TerminalOperator(self._emit, interrupted=lambda: self._interrupted)
         else:
-            operator = ScriptedOperator(requests, tuple(routes), self._emit)
+            operator = ScriptedOperator(requests, tuple(loaded.routes), self._emit)
         self._workcell = kind(
             loaded.cell_config,
             seed=seed,
-            routes=routes,
+            routes=loaded.routes,
             emit=self._emit,
             options=CellOptions(operator, base=loaded.cell_path.parent, gui=gui),
         )

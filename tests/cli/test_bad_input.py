@@ -86,7 +86,7 @@ CASES = {
         m.yaml:10:5: error[unknown-skill]: there is no skill "Localise"
           10 |   - Localise
              |     ^^^^^^^^
-          Did you mean "Localize"? Installed skills: Approach, AwaitRequest, Detect, Grasp, Localize, MoveToScan, PutDown, RejectTarget, Release, SelectTarget, Transit.
+          Did you mean "Localize"? Installed skills: Approach, AwaitRequest, Detect, Grasp, IsHolding, Localize, MoveToScan, PutDown, RejectTarget, Release, SelectTarget, Transit, Wait.
         """,
         mission=("- Localize", "- Localise"),
     ),
@@ -133,7 +133,7 @@ CASES = {
     ),
     "a cell file that is not there": Case(
         """
-        m.yaml:3:7: error[no-cell]: there is no file "cells/overhed.yaml" beside this one, and none is shipped. Did you mean "cells/overhead.yaml"? There are: cells/overhead.yaml, cells/wrist.yaml.
+        m.yaml:3:7: error[no-cell]: there is no file "cells/overhed.yaml" beside this one, and none is shipped. Did you mean "cells/overhead.yaml"? There are: cells/cascade.yaml, cells/fruit.yaml, cells/instruments.yaml, cells/kitting.yaml, cells/overhead.yaml, cells/recycling.yaml, cells/wrist.yaml.
            3 | cell: cells/overhed.yaml
              |       ^^^^^^^^^^^^^^^^^^
         """,
@@ -144,7 +144,7 @@ CASES = {
         cells/overhead.yaml:LINE:1: error[unknown-key]: the file has no key "ledgre"
         LINE | ledgre: {gate: 0.03}
              | ^^^^^^
-          Did you mean "ledger"? the file takes: cell, description, kind, arm, tool, motion, table, bins, cameras, detectors, localization, objects, ledger, safe_place.
+          Did you mean "ledger"? the file takes: base, cell, description, kind, arm, tool, motion, table, bins, cameras, detectors, localization, objects, ledger, safe_place.
         """,
         cell=("safe_place:", "ledgre: {gate: 0.03}\nsafe_place:"),
     ),
@@ -185,7 +185,7 @@ def invoke(*words: str) -> Result:
 
 def test_the_mission_that_all_cases_change_is_sound(write: Callable[..., int]) -> None:
     write()
-    assert invoke("check", "m.yaml").stdout == "m.yaml: ok\n"
+    assert invoke("check", "m.yaml").stdout.startswith("m.yaml: ok\n")
 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
@@ -204,8 +204,8 @@ def test_a_mistake_in_a_file_is_told_once_and_nothing_moves(write: Callable[...,
 @pytest.mark.parametrize(
     ("name", "expected"),
     [
-        ("sort_overhed", 'there is no mission file "sort_overhed", and no shipped mission of that name. Did you mean "sort_overhead"? Shipped missions: pick_on_request, sort_overhead, sort_wrist.\n'),
-        ("nowhere.yaml", 'there is no mission file "nowhere.yaml", and no shipped mission of that name. Shipped missions: pick_on_request, sort_overhead, sort_wrist.\n'),
+        ("sort_overhed", 'there is no mission file "sort_overhed", and no shipped mission of that name. Did you mean "sort_overhead"? Shipped missions: detector_cascade, inspect_then_sort, kit_fasteners, pick_on_request, recycle, sort_by_priority, sort_fruit, sort_overhead, sort_wrist, tray_instruments.\n'),
+        ("nowhere.yaml", 'there is no mission file "nowhere.yaml", and no shipped mission of that name. Shipped missions: detector_cascade, inspect_then_sort, kit_fasteners, pick_on_request, recycle, sort_by_priority, sort_fruit, sort_overhead, sort_wrist, tray_instruments.\n'),
         ("cells", '"cells" is a folder; name one of its files\n'),
     ],
 )  # fmt: skip
@@ -234,7 +234,7 @@ def test_a_mission_that_is_not_there_is_told_with_those_that_are(
         (
             "attempts=many",
             """
-            --set:1:10: error[wrong-type]: attempts must be of the kind of its default, 4, not the text "many"
+            --set:1:10: error[wrong-type]: attempts must be a whole number, not the text "many"
                1 | attempts=many
                  |          ^^^^
             """,

@@ -13,6 +13,7 @@ from click.testing import CliRunner
 
 from executive.cli.main import COMMANDS, main
 from executive.errors import Fault, InputError
+from executive.mission.endings import Ending
 from executive.mission.findings import Finding, MissionError
 from executive.skill import In, Metres, Skill, param
 
@@ -49,14 +50,15 @@ RESULT = {
 def project(monkeypatch):
     """Stands for everything below the commands; tests say what it answers and read what it was asked."""
     asked = SimpleNamespace(
-        load=[], run=[], load_error=None, warnings=(), run_error=None, result=dict(RESULT)
+        load=[], run=[], load_error=None, warnings=(), endings=(), run_error=None, result=dict(RESULT)
     )
 
     def load_mission(mission, skills, overrides=None, robot_check=None):
         asked.load.append((mission, overrides))
         if asked.load_error is not None:
             raise asked.load_error
-        return SimpleNamespace(mission=SimpleNamespace(name=mission), warnings=asked.warnings)
+        named = SimpleNamespace(name=mission)
+        return SimpleNamespace(mission=named, warnings=asked.warnings, endings=asked.endings)
 
     def recorded_run(loaded, skills, **options):
         asked.run.append(options)
@@ -233,6 +235,26 @@ def test_check_as_json_is_one_array(project):
 def test_check_says_that_all_is_well(project):
     shown = invoke("check", "sort")
     assert (shown.exit_code, shown.stdout) == (0, "sort: ok\n")
+
+
+def test_check_tells_what_can_still_end_the_mission(project):
+    project.endings = (
+        Ending("Detect.hidden", "tree/look/Detect", "sort.yaml", 9),
+        Ending("Detect.hidden", "tree/again/look/Detect", "sort.yaml", 9),
+        Ending("Release.stuck", "tree/Release", "sort.yaml", 12),
+    )
+    shown = invoke("check", "sort.yaml")
+    assert shown.exit_code == 0
+    assert shown.stdout.splitlines() == [
+        "sort.yaml: ok",
+        "  nothing deals with these failures; each would end the mission:",
+        "    Detect.hidden  sort.yaml:9  tree/look/Detect and 1 more of its uses",
+        "    Release.stuck  sort.yaml:12  tree/Release",
+    ]
+    (report,) = json.loads(invoke("check", "sort.yaml", "--json").stdout)
+    assert report["endings"][2] == {
+        "reason": "Release.stuck", "node": "tree/Release", "path": "sort.yaml", "line": 12,
+    }  # fmt: skip
 
 
 def test_a_warning_is_told_and_stops_nothing(project):

@@ -21,6 +21,7 @@ class Look(Skill):
     classes: tuple[str, ...] = param((), refers="class")
     seen: Out[list[int]]
     reasons: ClassVar = ("unsure", "hidden")
+    senses: ClassVar = True
 
     def run(self, cell: Any) -> Any:
         yield

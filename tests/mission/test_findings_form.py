@@ -34,7 +34,7 @@ CASES = {
         m.yaml:3:1: error[unknown-key]: the mission has no key "tre"
            3 | tre: Look
              | ^^^
-          Did you mean "tree"? It takes: mission, description, cell, params, routes, tree, trees.
+          Did you mean "tree"? It takes: mission, description, cell, library, params, routes, tree, trees.
         """,
     ),
     "missing keys": (
@@ -86,7 +86,7 @@ CASES = {
         m.yaml:1:1: error[wrong-type]: the mission takes a mapping, not a list of 1
            1 | - Look
              | ^
-          It takes: mission, description, cell, params, routes, tree, trees.
+          It takes: mission, description, cell, library, params, routes, tree, trees.
         """,
     ),
     "unknown control": (
@@ -100,7 +100,7 @@ CASES = {
         m.yaml:4:3: error[unknown-node]: there is no control node "rety"
            4 |   rety: {attempts: 2, do: Look}
              |   ^^^^
-          Did you mean "retry"? Skills begin with a capital letter; control nodes are: sequence, fallback, retry, repeat, try, timeout, invert, succeed, use.
+          Did you mean "retry"? Skills begin with a capital letter; control nodes are: sequence, fallback, parallel, retry, repeat, while, for_each, try, timeout, invert, succeed, use.
         """,
     ),
     "unknown control key": (
@@ -117,7 +117,7 @@ CASES = {
         m.yaml:4:11: error[unknown-key]: retry has no key "attemps"
            4 |   retry: {attemps: 2, do: Look}
              |           ^^^^^^^
-          Did you mean "attempts"? It takes: attempts, on, recover, do.
+          Did you mean "attempts"? It takes: attempts, on, recover, backoff, do.
         """,
     ),
     "bare control": (
@@ -270,20 +270,20 @@ CASES = {
         m.yaml:4:10: error[wrong-type]: retry takes a mapping, not 3
            4 |   retry: 3
              |          ^
-          It takes: attempts, on, recover, do.
+          It takes: attempts, on, recover, backoff, do.
         """,
     ),
     "route type": (
         """
         mission: m
         cell: cells/small.yaml
-        routes: {cube: [red_bin]}
+        routes: {cube: [red_bin, 3]}
         tree: Look
         """,
         """
-        m.yaml:3:16: error[wrong-type]: a route names a bin, not a list of 1
-           3 | routes: {cube: [red_bin]}
-             |                ^
+        m.yaml:3:26: error[wrong-type]: a route names a bin or a list of bins, not 3
+           3 | routes: {cube: [red_bin, 3]}
+             |                          ^
         """,
     ),
     "match form": (

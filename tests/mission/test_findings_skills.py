@@ -75,6 +75,7 @@ CASES = {
         m.yaml:3:26: error[unknown-param]: retry.attempts is a constant, and $seen is neither param nor argument here
            3 | tree: {retry: {attempts: $seen, do: Look}}
              |                          ^^^^^
+          The mission's params: none.
         """,
     ),
     "timeout zero": (
@@ -162,7 +163,7 @@ CASES = {
         m.yaml:4:30: error[unknown-param]: Pick.height is a constant, and $higt is neither param nor argument here
            4 | tree: [Look, {Pick: {height: $higt}}]
              |                              ^^^^^
-          Did you mean "$hight"? The mission's params: hight.
+          Did you mean "$hight"? The mission's params: $hight.
         """,
     ),
     "input literal": (
@@ -223,13 +224,17 @@ CASES = {
         mission: m
         cell: cells/small.yaml
         params: {seen: 1}
-        tree: Look
+        tree: [Look, {repeat: {times: $seen, do: Look}}]
         """,
         """
-        m.yaml:4:7: error[shadowed-param]: Look.seen would write $seen, but that is a param of the mission
-           4 | tree: Look
-             |       ^^^^
-          Rename the param, or write seen: $other.
+        m.yaml:4:8: error[shadowed-param]: Look.seen would write $seen, but that is a param of the mission
+           4 | tree: [Look, {repeat: {times: $seen, do: Look}}]
+             |        ^^^^
+          Rename that, or write seen: $other.
+        m.yaml:4:42: error[shadowed-param]: Look.seen would write $seen, but that is a param of the mission
+           4 | tree: [Look, {repeat: {times: $seen, do: Look}}]
+             |                                          ^^^^
+          Rename that, or write seen: $other.
         """,
     ),
 }

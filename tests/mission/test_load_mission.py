@@ -11,11 +11,12 @@ import pytest
 
 from executive.cell_config import CellConfig
 from executive.errors import InputError
-from executive.mission import model
+from executive.mission import nodes
 from executive.mission.files import find_mission, shipped_folder
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission, load_mission
 from executive.skill import Skill
+from executive.testing.fake_cell import FakeCell
 
 Load = Callable[..., LoadedMission]
 
@@ -23,9 +24,9 @@ HEAD = "mission: m\ncell: cells/small.yaml\n"
 PARAMS = HEAD + "params: {tries: 2, high: 0.2, name: a, wide: true, kinds: [cube]}\ntree: Look\n"
 
 
-def skill(loaded: LoadedMission, name: str) -> model.SkillNode:
-    nodes = loaded.tree.walk()
-    return next(node for node in nodes if isinstance(node, model.SkillNode) and node.skill == name)
+def skill(loaded: LoadedMission, name: str) -> nodes.SkillNode:
+    walked = loaded.tree.walk()
+    return next(node for node in walked if isinstance(node, nodes.SkillNode) and node.skill == name)
 
 
 def test_a_mission_knows_its_files(load: Load) -> None:
@@ -34,7 +35,7 @@ def test_a_mission_knows_its_files(load: Load) -> None:
     assert (loaded.mission.name, loaded.mission.description) == ("m", "A test.")
     assert loaded.text == text
     assert (loaded.path, loaded.cell_path) == (Path("m.yaml"), Path("cells/small.yaml"))
-    assert loaded.routes == {"cube": "red_bin"}
+    assert loaded.routes == {"cube": ("red_bin",)}
 
 
 def test_overrides_take_the_type_of_the_default(load: Load) -> None:
@@ -49,9 +50,9 @@ def test_overrides_take_the_type_of_the_default(load: Load) -> None:
 @pytest.mark.parametrize(
     ("key", "value", "expected"),
     [
-        ("tries", "many", "--set:1:7: error[wrong-type]: tries must be of the kind of its default, 2, not the text \"many\""),
-        ("tries", "1.5", "tries must be of the kind of its default, 2, not 1.5"),
-        ("wide", "yes", 'wide must be of the kind of its default, true, not the text "yes"'),
+        ("tries", "many", "--set:1:7: error[wrong-type]: tries must be a whole number, not the text \"many\""),
+        ("tries", "1.5", "tries must be a whole number, not 1.5"),
+        ("wide", "yes", 'wide must be true or false, not the text "yes"'),
         ("trys", "1", '--set:1:1: error[unknown-param]: the mission has no param "trys"\n   1 | trys=1\n     | ^^^^\n  Did you mean "tries"?'),
     ],
 )  # fmt: skip
@@ -90,11 +91,13 @@ def test_all_findings_come_at_once_and_in_order(load: Load, small_cell: str) -> 
 
 
 def test_findings_of_the_robot_stand_in_the_cell_file(load: Load) -> None:
-    def unreachable(cell: CellConfig) -> Iterable[tuple[tuple[str | int, ...], str]]:
-        yield ("bins", "blue_bin", "position"), "0.3 m out of reach"
+    class Short(FakeCell):
+        @staticmethod
+        def check(config: CellConfig, base: Path) -> Iterable[tuple[tuple[str | int, ...], str]]:
+            yield ("bins", "blue_bin", "position"), "0.3 m out of reach"
 
     with pytest.raises(MissionError) as caught:
-        load(HEAD + "tree: Look\n", robot_check=unreachable)
+        load(HEAD + "tree: Look\n", kinds=lambda name: Short)
     assert str(caught.value).startswith("cells/small.yaml:16:14: error[robot]: 0.3 m out of reach\n")
 
 

@@ -7,10 +7,13 @@ import os
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from executive.errors import Fault, InputError
 from executive.events import Event
-from executive.record.journal import Journal, read_journal
+from executive.record.journal import TRANSIENT, Journal, line_of, read_journal
+from executive.record.plain import plain
 
 
 @pytest.fixture
@@ -27,6 +30,31 @@ def test_writes_an_object_per_line_with_its_stamp_first(tmp_path):
     text = (tmp_path / "journal.jsonl").read_text()
     journal.close()
     assert text == '{"tick": 3, "clock": 0.0125, "kind": "status", "node": "a/Grasp", "at": [0.333333]}\n'
+
+
+VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text() | st.just(np.array([1 / 3, np.nan])),
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.tuples(inner)
+        | st.dictionaries(st.text(max_size=3), inner, max_size=3)
+    ),
+    max_leaves=6,
+)
+KEYS = st.sampled_from(["node", "status", "outputs", "größe", 'a "key"', "tick", "clock", "kind", *TRANSIENT])
+
+
+@given(
+    st.builds(
+        Event, st.sampled_from(["status", "item", "end"]), st.integers(0), st.floats(0),
+        st.dictionaries(KEYS, VALUES),
+    )
+)  # fmt: skip
+def test_every_line_is_the_json_of_the_stamp_and_of_the_data_made_plain(event):
+    stamp = {"tick": event.tick, "clock": plain(event.clock), "kind": event.kind}
+    data = {key: value for key, value in event.data.items() if key not in (*TRANSIENT, *stamp)}
+    line = json.dumps({**stamp, **plain(data)}, ensure_ascii=False, allow_nan=False) + "\n"
+    assert line_of(event) == line.encode()
 
 
 def test_leaves_the_pixels_out(tmp_path):

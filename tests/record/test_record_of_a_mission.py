@@ -15,7 +15,7 @@ from executive.testing.fake_cell import FakeCell
 @pytest.fixture
 def run(missions, tmp_path, monkeypatch):
     """Run the shipped mission once and return its result."""
-    monkeypatch.setattr("executive.runtime.run.cell_kind", lambda name: FakeCell.from_config)
+    monkeypatch.setattr("executive.runtime.run.cell_kind", lambda name: FakeCell)
     skills = discover()
 
     def once(seed: int, frames: bool = False) -> dict:

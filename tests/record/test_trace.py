@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from executive.events import Event
+from executive.record.plain import plain
 from executive.record.trace import Trace
 
 STATUS = {
@@ -46,6 +52,36 @@ def test_equal_events_give_equal_traces():
 )
 def test_every_decision_counts(change):
     assert digest(Event("status", 3, 0.1, STATUS)) != digest(Event("status", 3, 0.1, {**STATUS, **change}))
+
+
+HASHED = {
+    "status": ("node", "status", "reason", "item", "outputs"),
+    "item": ("item", "state", "label", "position", "bin"),
+    "decision": ("item", "label", "frame"),
+}
+KEYS = sorted({"message", *(key for keys in HASHED.values() for key in keys)})
+DATA = st.dictionaries(
+    st.sampled_from(KEYS),
+    st.none()
+    | st.integers()
+    | st.text()
+    | st.dictionaries(st.text(max_size=3), st.floats() | st.just(np.array([0.1, np.inf])), max_size=4),
+)
+
+
+@given(st.lists(st.builds(Event, st.sampled_from([*HASHED, "end"]), st.integers(0), st.floats(0), DATA)))
+def test_hashes_one_line_of_compact_json_per_decision(events):
+    lines = [
+        json.dumps(
+            [event.tick, event.kind, *(plain(event.data.get(key)) for key in HASHED[event.kind])],
+            sort_keys=True,
+            separators=(",", ":"),
+        )
+        for event in events
+        if event.kind in HASHED
+    ]
+    text = "".join(f"{line}\n" for line in lines)
+    assert digest(*events) == hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def test_the_tick_and_the_order_count():

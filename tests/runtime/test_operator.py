@@ -134,6 +134,6 @@ def test_ctrl_c_at_the_question_halts_the_run_instead_of_ending_it_well(missions
 
     type_in("")
     loaded = load_mission(missions / "pick_on_request.yaml", discover())
-    run = Run(loaded, discover(), seed=1, kind=FakeCell.from_config, observers=[interrupt])
+    run = Run(loaded, discover(), seed=1, kind=FakeCell, observers=[interrupt])
     outcome = run.execute()
     assert (outcome.status, outcome.message) == ("HALTED", "halted by the user")

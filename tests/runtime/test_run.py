@@ -24,7 +24,7 @@ def make(
     loaded = load_mission(missions / f"{name}.yaml", discover())
     observers = [events.append, *options.pop("observers", [])]
     return Run(
-        loaded, discover(), seed=seed, observers=observers, kind=FakeCell.from_config, **options
+        loaded, discover(), seed=seed, observers=observers, kind=FakeCell, **options
     ), events
 
 
@@ -165,7 +165,7 @@ def test_a_request_for_nothing_known_says_what_there_is(missions: Path) -> None:
 def test_an_unknown_kind_of_cell_names_the_installed_ones(missions: Path) -> None:
     loaded = load_mission(missions / "sort_overhead.yaml", discover(), {"cell.kind": "hardware"})
     with pytest.raises(
-        InputError, match='no installed package offers cells of kind "hardware"; installed: sim'
+        InputError, match='no installed package offers cells of kind "hardware"; installed: fake, sim'
     ):
         Run(loaded, discover(), seed=1)
 

@@ -1,0 +1,129 @@
+"""Checks of what the variables hold: does what one writes fit what the other reads?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from executive.mission.case import Case
+from executive.mission.findings import Finding, error
+from executive.mission.nodes import ForEachNode
+from executive.mission.source import Mark
+from executive.mission.typed import WrongType, convert
+from executive.mission.types import called, element_of, fits
+from executive.mission.values import Literal, Reference
+from executive.skill import Direction, Port
+
+
+@dataclass(frozen=True)
+class Writer:
+    """Something that writes a variable.
+
+    Attributes:
+        name: What it is called in a sentence, for instance `Localize.targets in line 9`.
+        type: Type of what it writes.
+        refers: What a text names, or "".
+        values: The values themselves where they stand in the file, else None.
+    """
+
+    name: str
+    type: Any
+    refers: str
+    values: tuple[Any, ...] | None = None
+
+
+def port_types(case: Case) -> Iterator[Finding]:
+    """Find every input wired to a variable that may hold something else than it takes."""
+    if case.tree is None:
+        return
+    writers = _writers(case)
+    for node in case.tree.walk():
+        if isinstance(node, ForEachNode) and isinstance(node.source, Reference):
+            for writer in writers.get(node.source.name, ()):
+                if element_of(writer.type) is None:
+                    message = f"for_each.in takes a list, but ${node.source.name} holds {called(writer.type)}"
+                    yield error(node.source.mark, "port-type", message, f"It is written by {writer.name}.")
+        for wire in case.wires(node, Direction.IN):
+            for writer in writers.get(wire.variable, ()):
+                if sentence := _misfit(wire.port, writer):
+                    message = f"{wire} takes {_wanted(wire.port)}, but {sentence}"
+                    message = message.replace("$?", f"${wire.variable}")
+                    yield error(wire.mark, "port-type", message, f"It is written by {writer.name}.")
+
+
+def element_names(case: Case) -> Iterator[Finding]:
+    """Find every element of a list in the file that names something the cell does not have."""
+    if case.tree is None or case.cell is None:
+        return
+    known = {"bin": list(case.cell.bins), "class": list(case.cell.objects)}
+    readers = _readers(case)
+    for node in case.tree.walk():
+        if not isinstance(node, ForEachNode) or not isinstance(node.source, Literal):
+            continue
+        for port, reader, _ in readers.get(node.each.name, ()):
+            for value in node.source.value if isinstance(node.source.value, list) else ():
+                names = known.get(port.refers)
+                if names is not None and isinstance(value, str) and value not in names:
+                    message = f'the cell has no {port.refers} "{value}" for {reader}'
+                    hint = f"{reader} takes: {', '.join(names)}."
+                    yield error(node.source.mark, f"unknown-{port.refers}", message, hint)
+
+
+def _misfit(port: Port, writer: Writer) -> str:
+    """Return what is wrong with wiring an input to what a writer writes, or ""."""
+    if writer.values is not None:
+        for value in writer.values:
+            try:
+                convert(value, port.type)
+            except WrongType as problem:
+                return f"an element of the list $? stands for {problem}"
+        return ""
+    if not fits(writer.type, port.type):
+        return f"$? holds {called(writer.type)}"
+    if port.refers and writer.refers != port.refers:
+        return f"$? holds the name of {_a(writer.refers)}" if writer.refers else "$? holds any text"
+    return ""
+
+
+def _wanted(port: Port) -> str:
+    return f"the name of {_a(port.refers)}" if port.refers else called(port.type)
+
+
+def _a(noun: str) -> str:
+    return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"
+
+
+def _writers(case: Case) -> dict[str, list[Writer]]:
+    writers: dict[str, list[Writer]] = {}
+    loops = []
+    for node in case.tree.walk() if case.tree else ():
+        if isinstance(node, ForEachNode):
+            loops.append(node)
+        for wire in case.wires(node, Direction.OUT):
+            name = f"{wire} in line {node.mark.line}"
+            writers.setdefault(wire.variable, []).append(Writer(name, wire.port.type, wire.port.refers))
+    for loop in loops:
+        writers.setdefault(loop.each.name, []).extend(_elements(loop, writers))
+    return writers
+
+
+def _elements(loop: ForEachNode, writers: dict[str, list[Writer]]) -> list[Writer]:
+    """Return what a loop writes to its variable."""
+    name = f"for_each in line {loop.mark.line}"
+    if isinstance(loop.source, Literal):
+        values = loop.source.value
+        return [Writer(name, Any, "", tuple(values))] if isinstance(values, list) else []
+    return [
+        Writer(name, element_of(writer.type), writer.refers)
+        for writer in writers.get(loop.source.name, ())
+        if element_of(writer.type) is not None
+    ]
+
+
+def _readers(case: Case) -> dict[str, list[tuple[Port, str, Mark]]]:
+    readers: dict[str, list[tuple[Port, str, Mark]]] = {}
+    for node in case.tree.walk() if case.tree else ():
+        for wire in case.wires(node, Direction.IN):
+            readers.setdefault(wire.variable, []).append((wire.port, str(wire), wire.mark))
+    return readers

@@ -1,0 +1,62 @@
+"""The smallest pieces of a mission: values, references and words, each with its place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from executive.mission.source import Mark
+
+
+@dataclass(frozen=True)
+class Literal:
+    """A value written in the file.
+
+    Attributes:
+        value: Plain value: nothing, truth value, number, text, list or mapping.
+        mark: Where it stands.
+        origin: How the reader sees it where that is not the value itself, for instance `$attempts`.
+    """
+
+    value: Any
+    mark: Mark
+    origin: str = ""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """`$name`: a param of the mission, an argument of the subtree, or a variable of the run."""
+
+    name: str
+    mark: Mark
+
+
+Value = Literal | Reference
+
+
+@dataclass(frozen=True)
+class Named:
+    """A word at its place: a bin in a route, a library's file, a loop's variable."""
+
+    name: str
+    mark: Mark
+
+
+@dataclass(frozen=True)
+class Setting:
+    """`key: value` inside a skill: a param, an input or an output."""
+
+    key: Mark
+    value: Value
+
+
+@dataclass(frozen=True)
+class Match:
+    """`Skill.reason` or `label.reason` in an `on`, `catch` or `until`."""
+
+    source: str
+    reason: str
+    mark: Mark
+
+    def __str__(self) -> str:
+        return f"{self.source}.{self.reason}"

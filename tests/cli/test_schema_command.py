@@ -1,0 +1,27 @@
+"""`executive schema`: one JSON Schema on standard output."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from executive.cli.main import main
+from executive.mission.schema import library_schema, mission_schema
+from executive.mission.schema_types import cell_schema
+from executive.skill import discover
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ([], mission_schema(discover())),
+        (["--library"], library_schema(discover())),
+        (["--cell"], cell_schema()),
+    ],
+)
+def test_the_schema_asked_for_is_printed(options: list[str], expected: object) -> None:
+    result = CliRunner().invoke(main, ["schema", *options])
+    assert result.exit_code == 0
+    assert json.loads(result.stdout) == expected

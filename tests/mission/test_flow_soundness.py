@@ -1,0 +1,253 @@
+"""Whatever a mission does when it runs, the checker has foreseen: random trees, random outcomes."""
+
+from __future__ import annotations
+
+import json
+import random
+from typing import Any, ClassVar, cast
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from py_trees.common import Status
+
+from executive.cell import Cell, Steps
+from executive.control.halting import halt
+from executive.control.scope import Scope
+from executive.events import ignore
+from executive.mission.build import Builder
+from executive.mission.case import Case
+from executive.mission.check import check
+from executive.mission.endings import endings
+from executive.mission.expand import expand
+from executive.mission.parse import parse_mission
+from executive.mission.paths import with_paths
+from executive.mission.source import Source
+from executive.mission.text import parse_yaml
+from executive.skill import ANY, EMPTY, HOLDING, In, Out, Skill, port
+
+MOST_TICKS = 400
+
+Tree = Any
+
+
+class World:
+    """What the skills act on: a die, a clock and a tool."""
+
+    def __init__(self, seed: int) -> None:
+        self.dice = random.Random(seed)
+        self.ticks = 0
+        self.holding = False
+        self.clock = self
+
+    @property
+    def now(self) -> float:
+        """The time: every tick takes a second."""
+        return float(self.ticks)
+
+    def sleep(self, duration: float) -> Steps:
+        """Wait."""
+        end = self.now + duration
+        while self.now < end:
+            yield
+
+
+class Chance(Skill):
+    """Take some ticks, then do what the dice say."""
+
+    def end(self, world: World) -> None:
+        """Do what success does."""
+
+    def run(self, cell: Any) -> Any:
+        for _ in range(cell.dice.randrange(3)):
+            yield
+        if self.reasons and cell.dice.random() < 0.4:
+            raise self.failed(cell.dice.choice(self.reasons), "the dice say so")
+        self.end(cell)
+
+
+class Look(Chance):
+    """See."""
+
+    seen: Out[int]
+    senses: ClassVar = True
+    reasons: ClassVar = ("dark", "lost")
+
+    def end(self, world: World) -> None:
+        self.seen = 1
+
+
+class Choose(Chance):
+    """Think."""
+
+    seen: In[int]
+    other: In[int | None] = port(default=None)
+    chosen: Out[int]
+    reasons: ClassVar = ("none",)
+
+    def end(self, world: World) -> None:
+        self.chosen = 2
+
+
+class Take(Chance):
+    """Grip."""
+
+    chosen: In[int]
+    reasons: ClassVar = ("missed",)
+    tool_state: ClassVar = (EMPTY, HOLDING)
+
+    def end(self, world: World) -> None:
+        assert not world.holding, "the checker lets a full tool be filled"
+        world.holding = True
+
+
+class Carry(Chance):
+    """Move what is held."""
+
+    reasons: ClassVar = ("blocked", "dropped")
+    tool_state: ClassVar = (HOLDING, HOLDING)
+    tool_left: ClassVar = {"dropped": EMPTY, "halt": ANY}
+    moves: ClassVar = True
+
+    def run(self, cell: Any) -> Any:
+        assert cell.holding, "the checker lets an empty tool be carried"
+        for _ in range(cell.dice.randrange(3)):
+            yield
+        chance = cell.dice.random()
+        if chance < 0.2:
+            cell.holding = False
+            raise self.failed("dropped", "the dice say so")
+        if chance < 0.4:
+            raise self.failed("blocked", "the dice say so")
+
+
+class Put(Chance):
+    """Let go."""
+
+    reasons: ClassVar = ("stuck",)
+    tool_state: ClassVar = (HOLDING, EMPTY)
+
+    def end(self, world: World) -> None:
+        assert world.holding, "the checker lets an empty tool be emptied"
+        world.holding = False
+
+
+class Pause(Chance):
+    """Do nothing for a while; it cannot fail."""
+
+
+SKILLS: dict[str, type[Skill]] = {skill.__name__: skill for skill in (Look, Choose, Take, Carry, Put, Pause)}
+REASONS = [f"{name}.{reason}" for name, skill in SKILLS.items() for reason in skill.reasons]
+REASONS += ["timeout.timeout", "invert.inverted"]
+
+reasons = st.lists(st.sampled_from(REASONS), min_size=1, max_size=3, unique=True)
+leaves = st.sampled_from(
+    [*SKILLS, "succeed", {"Choose": {"other": "$element"}}, {"Choose": {"seen": "$chosen"}}]
+)
+routine = st.just(
+    ["Look", "Choose", "Take", {"try": ["Carry", "Put"], "catch": [{"on": ["Carry.blocked"], "do": "Put"}]}]
+)
+
+
+def bodies(node: st.SearchStrategy[Tree]) -> st.SearchStrategy[Tree]:
+    lists = st.lists(node, min_size=1, max_size=4)
+    catches = st.lists(st.fixed_dictionaries({"on": reasons, "do": node}), min_size=1, max_size=2)
+    return st.one_of(
+        lists,
+        st.builds(lambda nodes: {"sequence": nodes}, lists),
+        st.builds(lambda nodes: {"fallback": nodes}, lists),
+        st.builds(
+            lambda nodes, wait, halts: {"parallel": {"do": nodes, "wait_for": wait, "halt": halts}},
+            lists, st.sampled_from(["all", "any"]), st.booleans(),
+        ),
+        st.builds(
+            lambda n, on, recover, do: {"retry": {"attempts": n, **on, **recover, "do": do}},
+            st.integers(1, 3),
+            st.one_of(st.just({}), st.builds(lambda on: {"on": on}, reasons)),
+            st.one_of(st.just({}), st.builds(lambda node: {"recover": node}, node)),
+            node,
+        ),
+        st.builds(
+            lambda n, until, do: {"repeat": {"times": n, "until": until, "do": do}},
+            st.integers(0, 3), reasons, node,
+        ),
+        st.builds(lambda n, do: {"repeat": {"times": n, "do": do}}, st.integers(0, 3), node),
+        st.builds(lambda until, do: {"repeat": {"until": until, "do": do}}, reasons, node),
+        st.builds(lambda condition, do: {"while": {"condition": condition, "do": do}}, node, node),
+        st.builds(
+            lambda n, do: {"for_each": {"each": "element", "in": list(range(n)), "do": do}},
+            st.integers(0, 3), node,
+        ),
+        st.builds(lambda do, catch: {"try": do, "catch": catch}, node, catches),
+        st.builds(lambda do, catch, end: {"try": do, "catch": catch, "finally": end}, node, catches, node),
+        st.builds(lambda do, end: {"try": do, "finally": end}, node, node),
+        st.builds(lambda s, do: {"timeout": {"seconds": s, "do": do}}, st.integers(1, 5), node),
+        st.builds(lambda do: {"invert": do}, node),
+        st.builds(lambda do: {"succeed": do}, node),
+    )  # fmt: skip
+
+
+trees = st.recursive(st.one_of(leaves, routine), bodies, max_leaves=14)
+
+
+def sound(tree: Tree) -> Case | None:
+    """Return the mission of this tree if the checker finds no error in it."""
+    source = Source("m.yaml", json.dumps({"mission": "m", "cell": "none", "tree": tree}))
+    root, wrong = parse_yaml(source)
+    assert root is not None
+    mission, malformed = parse_mission(root, {})
+    expanded = expand(mission, SKILLS)
+    placed = expanded.tree and with_paths(expanded.tree)
+    case = Case(mission, placed, (), SKILLS, None, {}, None)
+    findings = [*wrong, *malformed, *expanded.findings, *check(case)]
+    return None if any(finding.severity == "error" for finding in findings) else case
+
+
+def run(case: Case, seed: int) -> tuple[World, Any]:
+    """Run a mission until it ends or for long enough; return its world and its root."""
+    world = World(seed)
+    assert case.tree is not None
+    root = Builder(SKILLS, cast("Cell", world), Scope(), ignore).node(case.tree)
+    while world.ticks < MOST_TICKS:
+        root.tick_once()
+        if root.status is not Status.RUNNING:
+            break
+        world.ticks += 1
+    return world, root
+
+
+@settings(max_examples=1000, deadline=None)
+@given(tree=trees, seed=st.integers(0, 2**31))
+def test_what_happens_was_foreseen(tree: Tree, seed: int) -> None:
+    case = sound(tree)
+    flow = case.flow if case else None
+    if case is None or flow is None:
+        return
+    for number in range(8):
+        world, root = run(case, seed + number)
+        if root.status is Status.RUNNING:
+            assert halt(root) == []
+            continue
+        if root.status is Status.SUCCESS:
+            state = flow.result.success
+            assert state is not None, "the checker says that this cannot succeed"
+        else:
+            failure = root.failure
+            ends = {(f.source, f.reason, f.origin): after for f, after in flow.result.failures.items()}
+            key = failure.source, failure.reason, failure.path
+            assert key in ends, f"the checker has not foreseen {key}"
+            assert str(failure) in [ending.reason for ending in endings(flow)]
+            state = ends[key]
+        assert state.may_be(HOLDING if world.holding else EMPTY), "the checker thinks the tool otherwise"
+
+
+def test_a_good_part_of_the_random_trees_can_run() -> None:
+    found = 0
+
+    @settings(max_examples=200, deadline=None, database=None, derandomize=True)
+    @given(tree=trees)
+    def count(tree: Tree) -> None:
+        nonlocal found
+        found += sound(tree) is not None
+
+    count()
+    assert found >= 20

@@ -1,0 +1,78 @@
+"""Params of a mission: types, bounds, choices, and values given beside the file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from executive.mission.findings import MissionError
+from executive.mission.load import LoadedMission
+
+Load = Callable[..., LoadedMission]
+
+TREE = "tree: {repeat: {times: $n, do: Look}}\n"
+
+
+def mission(param: str) -> str:
+    return f"mission: m\ncell: cells/small.yaml\nparams: {{n: {param}}}\n{TREE}"
+
+
+@pytest.mark.parametrize(
+    ("param", "given", "value"),
+    [
+        ("3", None, 3),
+        ("3", "5", 5),
+        ("{default: 3}", None, 3),
+        ("{default: 3, min: 1, max: 5, doc: how often}", "5", 5),
+        ("{type: integer}", "4", 4),
+        ("{default: 3, choices: [3, 6]}", "6", 6),
+    ],
+)
+def test_a_param_has_its_default_or_what_is_given(
+    load: Load, param: str, given: str | None, value: Any
+) -> None:
+    assert load(mission(param), {"n": given} if given else None).params == {"n": value}
+
+
+def test_a_number_may_be_given_as_a_whole_one(load: Load) -> None:
+    text = "mission: m\ncell: cells/small.yaml\nparams: {s: {default: 2.5}}\n"
+    loaded = load(text + "tree: {timeout: {seconds: $s, do: Look}}\n", {"s": "4"})
+    assert loaded.params == {"s": 4.0}
+    assert isinstance(loaded.params["s"], float)
+
+
+def test_a_list_may_be_looped_over(load: Load) -> None:
+    text = "mission: m\ncell: cells/small.yaml\nparams: {kinds: [cube, sphere]}\n"
+    tree = "tree: [Look, {for_each: {each: kind, in: $kinds, do: {Pick: {only: $kind}}}}]\n"
+    assert load(text + tree, {"kinds": "[sphere]"}).params == {"kinds": ["sphere"]}
+
+
+@pytest.mark.parametrize(
+    ("param", "given", "finding"),
+    [
+        ("{default: 0, min: 1}", None, "m.yaml:3:23: error[out-of-range]: n must be at least 1, not 0"),
+        ("{default: 3, max: 5}", "6", "--set:1:3: error[out-of-range]: n must be at most 5, not 6"),
+        (
+            "{default: 3, choices: [3, 6]}",
+            "4",
+            "--set:1:3: error[out-of-range]: n must be one of 3, 6",
+        ),
+        ("{type: integer}", None, 'm.yaml:3:10: error[missing-param]: the param "n" has no default'),
+        ("{type: integer}", "x", '--set:1:3: error[wrong-type]: n must be a whole number, not the text "x"'),
+        ("{default: x, type: integer}", None, "m.yaml:3:23: error[wrong-type]: n must be a whole number"),
+        ("{default: 3, type: int}", None, 'm.yaml:3:32: error[wrong-value]: there is no type "int"'),
+        (
+            "{default: 3, min: low}",
+            None,
+            'm.yaml:3:31: error[wrong-type]: the param "n".min must be a',
+        ),
+        ("{default: 3, least: 1}", None, 'm.yaml:3:26: error[unknown-key]: the param "n" has no key'),
+        ("3", "2.5", "--set:1:3: error[wrong-type]: n must be a whole number, not 2.5"),
+    ],
+)
+def test_a_wrong_param_is_a_finding(load: Load, param: str, given: str | None, finding: str) -> None:
+    with pytest.raises(MissionError) as caught:
+        load(mission(param), {"n": given} if given else None)
+    assert str(caught.value).startswith(finding)

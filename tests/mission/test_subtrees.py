@@ -1,0 +1,219 @@
+"""Subtrees: arguments, variables of their own, what they return, and libraries of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from executive.mission.findings import MissionError
+from executive.mission.load import LoadedMission
+from executive.mission.nodes import SkillNode
+from executive.mission.wiring import wires
+from executive.skill import Direction, Skill
+
+Load = Callable[..., LoadedMission]
+
+HEAD = "mission: m\ncell: cells/small.yaml\n"
+
+
+def wiring(loaded: LoadedMission, skills: dict[str, type[Skill]]) -> list[str]:
+    """Return what every skill reads and writes, as `Pick seen<-$a held->$b`."""
+    lines = []
+    for node in loaded.tree.walk():
+        if isinstance(node, SkillNode):
+            skill = skills[node.skill]
+            reads = [f"{w.port.name}<-${w.variable}" for w in wires(node, skill, Direction.IN)]
+            writes = [f"{w.port.name}->${w.variable}" for w in wires(node, skill, Direction.OUT)]
+            lines.append(" ".join([node.skill, *reads, *writes]))
+    return lines
+
+
+def test_a_subtree_without_returns_shares_its_variables(load: Load, skills: dict[str, type[Skill]]) -> None:
+    loaded = load(HEAD + "tree: [use: look, Pick]\ntrees: {look: {do: Look}}\n")
+    assert wiring(loaded, skills) == ["Look seen->$seen", "Pick seen<-$seen only<-$only held->$held"]
+
+
+def test_a_subtree_with_returns_keeps_the_rest_to_itself(load: Load, skills: dict[str, type[Skill]]) -> None:
+    loaded = load(
+        HEAD
+        + "tree: [use: get, {Drop: {bin: red_bin}}]\n"
+        "trees: {get: {returns: [held], do: [Look, {Pick: {only: $who}}]}}\n".replace("{only: $who}", "{}")
+    )
+    assert wiring(loaded, skills) == [
+        "Look seen->$get.seen",
+        "Pick seen<-$get.seen only<-$only held->$held",
+        "Drop held<-$held",
+    ]
+
+
+def test_every_use_has_variables_of_its_own(load: Load, skills: dict[str, type[Skill]]) -> None:
+    loaded = load(
+        HEAD + "tree: [use: get, {Drop: {bin: red_bin}}, use: get, {Drop: {bin: red_bin}}]\n"
+        "trees: {get: {returns: [held], do: [Look, Pick]}}\n"
+    )
+    assert [line for line in wiring(loaded, skills) if line.startswith("Look")] == [
+        "Look seen->$get.seen",
+        "Look seen->$get-2.seen",
+    ]
+
+
+def test_what_is_returned_may_be_called_otherwise(load: Load, skills: dict[str, type[Skill]]) -> None:
+    loaded = load(
+        HEAD + "tree: [{use: get, returns: {held: $mine}}, {Drop: {held: $mine, bin: red_bin}}]\n"
+        "trees: {get: {returns: [held], do: [Look, Pick]}}\n"
+    )
+    assert wiring(loaded, skills)[1:] == ["Pick seen<-$get.seen only<-$only held->$mine", "Drop held<-$mine"]
+
+
+def test_an_argument_means_the_variable_of_the_place_of_use(
+    load: Load, skills: dict[str, type[Skill]]
+) -> None:
+    # Inside, `held` is a variable of the subtree's own; the argument is the one around it.
+    loaded = load(
+        HEAD + "tree: [Look, Pick, {use: again, with: {which: $held}}]\n"
+        "trees:\n"
+        "  again:\n"
+        "    args: [which]\n"
+        "    returns: [seen]\n"
+        "    do: [Look, Pick, {Drop: {held: $which, bin: red_bin}}]\n"
+    )
+    assert wiring(loaded, skills)[2:] == [
+        "Look seen->$seen",
+        "Pick seen<-$seen only<-$only held->$again.held",
+        "Drop held<-$held",
+    ]
+
+
+def test_closed_subtrees_nest(load: Load, skills: dict[str, type[Skill]]) -> None:
+    loaded = load(
+        HEAD + "tree: [Look, Pick, {use: outer, with: {which: $held}}]\n"
+        "trees:\n"
+        "  outer: {args: [which], returns: [seen], do: {use: inner, with: {what: $which}}}\n"
+        "  inner:\n"
+        "    args: [what]\n"
+        "    returns: [seen]\n"
+        "    do: [Look, Pick, {Drop: {held: $what, bin: red_bin}}, {Drop: {bin: red_bin}}]\n"
+    )
+    assert wiring(loaded, skills)[2:] == [
+        "Look seen->$seen",
+        "Pick seen<-$seen only<-$only held->$outer.inner.held",
+        "Drop held<-$held",
+        "Drop held<-$outer.inner.held",
+    ]
+
+
+def test_an_argument_may_stand_for_a_variable_by_default(load: Load, skills: dict[str, type[Skill]]) -> None:
+    loaded = load(
+        HEAD + "tree: [Look, Pick, use: drop]\n"
+        "trees: {drop: {args: {which: $held}, do: {Drop: {held: $which, bin: red_bin}}}}\n"
+    )
+    assert wiring(loaded, skills)[2:] == ["Drop held<-$held"]
+
+
+def test_what_a_subtree_does_not_return_cannot_be_read(load: Load) -> None:
+    with pytest.raises(MissionError) as caught:
+        load(
+            HEAD + "tree: [use: get, {Pick: {seen: $seen}}, {Drop: {bin: red_bin}}]\n"
+            "trees: {get: {returns: [held], do: [Look, Pick]}}\n"
+        )
+    assert "3:32: error[unwritten]: Pick.seen reads $seen, which nothing writes" in str(caught.value)
+
+
+def test_a_loop_in_a_closed_subtree_has_a_variable_of_its_own(load: Load) -> None:
+    loaded = load(
+        HEAD + "tree: [use: get, {Drop: {bin: red_bin}}]\n"
+        "trees:\n"
+        "  get:\n"
+        "    returns: [held]\n"
+        "    do: [Look, {for_each: {each: kind, in: [cube], do: {Pick: {only: $kind}}}}]\n"
+    )
+    loops = [node for node in loaded.tree.walk() if hasattr(node, "each")]
+    assert [loop.each.name for loop in loops] == ["get.kind"]
+
+
+def library(name: str, text: str) -> None:
+    Path("library").mkdir(exist_ok=True)
+    Path(f"library/{name}.yaml").write_text(text)
+
+
+def test_a_library_lends_its_subtrees(load: Load, skills: dict[str, type[Skill]]) -> None:
+    library("eyes", "library: eyes\ntrees: {look: {args: {view: full}, do: {Look: {view: $view}}}}\n")
+    loaded = load(HEAD + "library: library/eyes.yaml\ntree: [{use: look, with: {view: table}}, Pick]\n")
+    assert wiring(loaded, skills)[0] == "Look seen->$seen"
+    assert loaded.libraries == {"library/eyes.yaml": Path("library/eyes.yaml").read_text()}
+
+
+def test_subtrees_of_several_libraries_use_each_other(load: Load, skills: dict[str, type[Skill]]) -> None:
+    library("eyes", "library: eyes\ntrees: {look: Look}\n")
+    library("hands", "library: hands\ntrees: {get: [use: look, Pick]}\n")
+    loaded = load(HEAD + "library: [library/eyes.yaml, library/hands.yaml]\ntree: {use: get}\n")
+    assert [line.split()[0] for line in wiring(loaded, skills)] == ["Look", "Pick"]
+
+
+def test_a_library_does_not_see_the_params_of_the_mission(load: Load) -> None:
+    library("hands", "library: hands\ntrees: {get: [Look, {Pick: {height: $high}}]}\n")
+    with pytest.raises(MissionError) as caught:
+        load(HEAD + "params: {high: 0.2}\nlibrary: library/hands.yaml\ntree: {use: get}\n")
+    text = str(caught.value)
+    assert "library/hands.yaml:2:37: error[unknown-param]: Pick.height is a constant" in text
+    assert "A library sees its own arguments only: declare it under args and give it with `with`." in text
+
+
+def test_mistakes_in_a_library_are_found_in_its_own_file(load: Load) -> None:
+    library("hands", "library: hands\ntres: {}\ntrees: {get: [Look, Pik]}\n")
+    with pytest.raises(MissionError) as caught:
+        load(HEAD + "library: library/hands.yaml\ntree: {use: get}\n")
+    places = [(f.path, f.line, f.col, f.code) for f in caught.value.findings]
+    assert places == [
+        ("library/hands.yaml", 2, 1, "unknown-key"),
+        ("library/hands.yaml", 3, 21, "unknown-skill"),
+    ]
+
+
+def test_two_subtrees_of_one_name_are_an_error(load: Load) -> None:
+    library("eyes", "library: eyes\ntrees: {look: Look}\n")
+    with pytest.raises(MissionError) as caught:
+        load(HEAD + "library: library/eyes.yaml\ntree: {use: look}\ntrees: {look: Look}\n")
+    assert 'there are two subtrees "look"; the other is in m.yaml, line 5' in str(caught.value)
+
+
+def test_what_a_library_has_and_nobody_uses_is_no_mistake(load: Load) -> None:
+    library("eyes", "library: eyes\ntrees: {look: Look, unused: {args: [x], do: Look}}\n")
+    assert load(HEAD + "library: library/eyes.yaml\ntree: {use: look}\n").warnings == ()
+
+
+def test_a_missing_library_is_a_finding_at_its_name(load: Load) -> None:
+    with pytest.raises(MissionError) as caught:
+        load(HEAD + "library: library/nothing.yaml\ntree: Look\n")
+    assert str(caught.value).startswith(
+        'm.yaml:3:10: error[no-library]: there is no file "library/nothing.yaml"'
+    )
+
+
+def test_a_loop_cannot_take_the_name_of_a_param_or_an_argument(load: Load) -> None:
+    with pytest.raises(MissionError) as caught:
+        load(
+            HEAD + "params: {kind: cube}\n"
+            "tree: [Look, {for_each: {each: kind, in: [cube], do: {Pick: {only: $kind}}}}, "
+            "{use: get, with: {it: 1}}]\n"
+            "trees: {get: {args: [it], do: {for_each: {each: it, in: [1], do: {Look: {view: $it}}}}}}\n"
+        )
+    text = str(caught.value)
+    assert (
+        "m.yaml:4:32: error[shadowed-param]: for_each would write $kind, but that is a param of the mission"
+        in text
+    )
+    assert (
+        "m.yaml:5:49: error[shadowed-param]: for_each would write $it, but that is an argument here" in text
+    )
+
+
+def test_an_output_cannot_take_the_name_of_an_argument(load: Load) -> None:
+    with pytest.raises(MissionError) as caught:
+        load(
+            HEAD + "tree: {use: get, with: {seen: 0.1}}\n"
+            "trees: {get: {args: [seen], do: [Look, {Pick: {height: $seen}}]}}\n"
+        )
+    assert "Look.seen would write $seen, but that is an argument here" in str(caught.value)

@@ -1,0 +1,76 @@
+"""Which types of ports fit each other, and what they are called."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Optional
+
+import pytest
+
+from executive.messages import Detection, Target
+from executive.mission.types import called, element_of, fits
+
+
+class Special(Target):
+    """A kind of target."""
+
+
+@pytest.mark.parametrize(
+    ("given", "wanted"),
+    [
+        (int, int),
+        (int, float),
+        (Special, Target),
+        (str, str | None),
+        (None | str, Optional[str]),  # noqa: UP045 - both ways of writing it
+        (list[int], list[float]),
+        (list[Special], Sequence[Target]),
+        (tuple[int, ...], Sequence[float]),
+        (list[int], list),
+        (Any, Target),
+        (Target, Any),
+    ],
+)
+def test_these_fit(given: Any, wanted: Any) -> None:
+    assert fits(given, wanted)
+
+
+@pytest.mark.parametrize(
+    ("given", "wanted"),
+    [
+        (float, int),
+        (Target, Special),
+        (str | None, str),
+        (list[Target], Target),
+        (Target, list[Target]),
+        (list[Target], list[Detection]),
+        (str, list[str]),
+        (Target, str),
+    ],
+)
+def test_these_do_not_fit(given: Any, wanted: Any) -> None:
+    assert not fits(given, wanted)
+
+
+def test_a_list_has_elements_and_a_text_has_none() -> None:
+    assert element_of(list[Target]) is Target
+    assert element_of(Sequence[int]) is int
+    assert element_of(tuple[int, ...]) is int
+    assert element_of(list) is Any
+    assert element_of(str) is None
+    assert element_of(Target) is None
+
+
+@pytest.mark.parametrize(
+    ("declared", "word"),
+    [
+        (str, "a text"),
+        (Target, "a Target"),
+        (list[Target], "a list of Target"),
+        (list[str], "a list of text"),
+        (str | None, "a text or nothing"),
+        (list, "a list"),
+    ],
+)
+def test_types_have_words(declared: Any, word: str) -> None:
+    assert called(declared) == word
