@@ -18,7 +18,7 @@ BAD_INPUT, BROKEN, INTERRUPTED = 2, 3, 130
 """Exit codes of what ends a command early."""
 
 COMMANDS = (
-    "run", "check", "tree", "skills", "dataset", "train", "evaluate", "bench", "sweep", "doctor",
+    "run", "check", "tree", "skills", "schema", "dataset", "train", "evaluate", "bench", "sweep", "doctor",
 )  # fmt: skip
 """Every command, each in the module of its name, in the order in which `--help` lists them."""
 
