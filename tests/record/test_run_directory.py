@@ -43,6 +43,14 @@ def test_keeps_the_mission_verbatim_and_the_rest_as_yaml(tmp_path):
     assert yaml.safe_load((directory.path / "cell.yaml").read_text()) == {"size": [1, 2]}
 
 
+def test_libraries_lie_where_the_mission_looks_for_them(tmp_path):
+    directory = create(tmp_path)
+    libraries = {"library/sorting.yaml": "library: sorting\n", "own.yaml": "library: own\n"}
+    directory.save_inputs(mission="", params={}, cell={}, libraries=libraries)
+    assert (directory.path / "library" / "sorting.yaml").read_text() == "library: sorting\n"
+    assert (directory.path / "own.yaml").read_text() == "library: own\n"
+
+
 def test_a_place_that_cannot_be_written_to_is_a_sentence(tmp_path):
     (tmp_path / "runs").write_text("a file, no folder")
     with pytest.raises(InputError) as raised:
