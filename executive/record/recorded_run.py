@@ -61,7 +61,10 @@ def recorded_run(
     with closing(Run(loaded, skills, seed=seed, gui=gui, realtime=realtime, requests=requests)) as run:
         directory = RunDirectory.create(runs, mission=loaded.mission.name, seed=seed, started=datetime.now())
         directory.save_inputs(
-            mission=loaded.text, params=loaded.params, cell=loaded.cell_config.model_dump(mode="json")
+            mission=loaded.text,
+            params=loaded.params,
+            cell=loaded.cell_config.model_dump(mode="json"),
+            libraries=loaded.libraries,
         )
         recorder = Recorder(directory, frames=frames)
         run.observe(recorder)

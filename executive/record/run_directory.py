@@ -63,14 +63,27 @@ class RunDirectory:
         _point_latest(runs, path)
         return RunDirectory(path)
 
-    def save_inputs(self, *, mission: str, params: Mapping[str, Any], cell: Mapping[str, Any]) -> None:
+    def save_inputs(
+        self,
+        *,
+        mission: str,
+        params: Mapping[str, Any],
+        cell: Mapping[str, Any],
+        libraries: Mapping[str, str] | None = None,
+    ) -> None:
         """Write the mission's text as it was read, the params as they were resolved, and the cell.
+
+        The text of every library goes where the mission looks for it, beside the mission.
 
         Raises:
             InputError: The directory cannot be written to.
         """
         try:
             (self.path / "mission.yaml").write_text(mission, encoding="utf-8")
+            for reference, text in (libraries or {}).items():
+                library = self.path / reference
+                library.parent.mkdir(parents=True, exist_ok=True)
+                library.write_text(text, encoding="utf-8")
             for name, content in (("params.yaml", params), ("cell.yaml", cell)):
                 text = yaml.safe_dump(plain(content), sort_keys=False, allow_unicode=True)
                 (self.path / name).write_text(text, encoding="utf-8")
