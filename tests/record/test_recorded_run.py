@@ -87,6 +87,7 @@ def runtime(monkeypatch):
 LOADED = SimpleNamespace(
     text="mission: sort\n",
     params={"attempts": 3},
+    libraries={"library/own.yaml": "library: own\n"},
     mission=SimpleNamespace(name="sort"),
     cell_config=SimpleNamespace(model_dump=lambda mode: {"cell": "overhead"}),
 )
