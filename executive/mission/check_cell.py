@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from executive.cell_config import CellConfig
 from executive.mission.case import Case
 from executive.mission.findings import Finding, alternatives, error
+from executive.mission.source import Mark
 from executive.mission.wiring import literals
 from executive.skill import Param
 
@@ -37,24 +38,35 @@ def names(case: Case) -> Iterator[Finding]:
                 continue
             choices = declared.choices if isinstance(declared, Param) else None
             words = [*known[declared.refers], *(choices or ())]
-            for word in value.value if isinstance(value.value, list) else [value.value]:
+            for index, word in enumerate(value.value if isinstance(value.value, list) else [value.value]):
                 if isinstance(word, str) and word not in words:
                     message = f'the cell has no {declared.refers} "{word}" for {node.skill}.{name}'
                     hint = alternatives(word, words, f"{node.skill}.{name} takes")
-                    yield error(value.mark, f"unknown-{declared.refers}", message, hint)
+                    mark = value.element_mark(index) if isinstance(value.value, list) else value.mark
+                    yield error(mark, f"unknown-{declared.refers}", message, hint)
 
 
 def known_classes(case: Case) -> Iterator[Finding]:
-    """Find every routed class that no detector's model knows."""
+    """Find every class that the mission names and no detector's model knows."""
     models = {name: labels for name, labels in case.labels.items() if labels is not None}
     if len(models) < len(case.labels) or not models or case.cell is None:
         # A detector whose classes are not known may know any.
         return
-    for route in case.mission.routes:
-        if route.label in case.cell.objects and not any(route.label in labels for labels in models.values()):
+    for label, mark in _named_classes(case):
+        if label in case.cell.objects and not any(label in labels for labels in models.values()):
             said = "; ".join(f"{name}: {', '.join(labels)}" for name, labels in models.items())
-            message = f'no detector of the cell can see the class "{route.label}"'
-            yield error(route.key, "unseen-class", message, f"Their models know {said}.")
+            message = f'no detector of the cell can see the class "{label}"'
+            yield error(mark, "unseen-class", message, f"Their models know {said}.")
+
+
+def _named_classes(case: Case) -> Iterator[tuple[str, Mark]]:
+    """Yield every class in the routes and in the settings of skills, with its place."""
+    yield from ((route.label, route.key) for route in case.mission.routes)
+    for node, skill in case.known_skills():
+        for name, value in literals(node):
+            declared = skill.params.get(name) or skill.ports.get(name)
+            if declared is not None and declared.refers == "class" and isinstance(value.value, str):
+                yield value.value, value.mark
 
 
 def _known(cell: CellConfig) -> Mapping[str, list[str]]:

@@ -31,7 +31,7 @@ def constants(case: Case) -> Iterator[Finding]:
 def _constants(node: Node) -> Iterator[tuple[str, Key, Value | None]]:
     """Yield every constant of a node: its name in the file, what is declared of it, its value."""
     word = WORDS.get(type(node), "")
-    keys = grammar.CONTROL[word].keys if word else {}
+    keys = grammar.CONTROL[word].keys if word in grammar.CONTROL else {}
     for name, key in keys.items():
         if key.kind in _KINDS or key.kind == "count":
             yield f"{word}.{name}", key, getattr(node, name)

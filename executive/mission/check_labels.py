@@ -16,11 +16,12 @@ def labels(case: Case) -> Iterator[Finding]:
     for node in case.nodes():
         if not node.label:
             continue
+        mark = node.label_mark or node.mark
         if node.label in grammar.CONTROL:
             message = f'"{node.label}" is a word of the language and cannot be a label'
-            yield error(node.mark, "bad-label", message)
+            yield error(mark, "bad-label", message)
         # The same place twice is one node of a subtree that is used twice.
-        other = first.setdefault(node.label, node.mark)
-        if other != node.mark:
+        other = first.setdefault(node.label, mark)
+        if other != mark:
             message = f'the label "{node.label}" stands for two nodes; the first is in line {other.line}'
-            yield error(node.mark, "duplicate-label", message)
+            yield error(mark, "duplicate-label", message)

@@ -8,7 +8,7 @@ from itertools import combinations
 from executive.mission.case import Case
 from executive.mission.findings import Finding, error
 from executive.mission.nodes import ForEachNode, Node, ParallelNode, SkillNode
-from executive.mission.paths import name_of
+from executive.mission.source import Mark
 from executive.skill import Direction
 
 
@@ -35,15 +35,14 @@ def shared_variables(case: Case) -> Iterator[Finding]:
         if not isinstance(node, ParallelNode):
             continue
         for first, second in combinations([_writes(case, branch) for branch in node.branches], 2):
-            for variable in second:
+            for variable, (other, mark, hint) in second.items():
                 if variable in first:
-                    one, other = first[variable], second[variable]
+                    one, place, _ = first[variable]
                     message = (
-                        f"{name_of(other)} writes ${variable}, and so does {name_of(one)} "
-                        f"in line {one.mark.line}, in another branch of the same parallel"
+                        f"{other} writes ${variable}, and so does {one} in line {place.line}, "
+                        "in another branch of the same parallel"
                     )
-                    hint = f"Give one of them another variable, as {variable}: $other."
-                    yield error(other.mark, "shared-variable", message, hint)
+                    yield error(mark, "shared-variable", message, hint)
 
 
 def _uses(case: Case, branch: Node) -> dict[str, SkillNode]:
@@ -60,12 +59,14 @@ def _uses(case: Case, branch: Node) -> dict[str, SkillNode]:
     return users
 
 
-def _writes(case: Case, branch: Node) -> dict[str, Node]:
-    """Return the first writer of every variable below `branch`."""
-    writers: dict[str, Node] = {}
+def _writes(case: Case, branch: Node) -> dict[str, tuple[str, Mark, str]]:
+    """Return the first writer of every variable below `branch`, its place, and how to call it otherwise."""
+    writers: dict[str, tuple[str, Mark, str]] = {}
     for node in branch.walk():
         if isinstance(node, ForEachNode):
-            writers.setdefault(node.each.name, node)
+            hint = "Give one of them another variable, as each: other."
+            writers.setdefault(node.each.name, ("for_each", node.each.mark, hint))
         for wire in case.wires(node, Direction.OUT):
-            writers.setdefault(wire.variable, node)
+            hint = f"Give one of them another variable, as {wire.port.name}: $other."
+            writers.setdefault(wire.variable, (wire.skill, wire.mark, hint))
     return writers

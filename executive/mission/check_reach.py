@@ -20,18 +20,20 @@ def unreachable(case: Case) -> Iterator[Finding]:
 
 
 def shadowed_catches(case: Case) -> Iterator[Finding]:
-    """Find every failure named in a `catch` that an earlier one takes already."""
+    """Find every failure named in a `catch` that earlier ones take already, by this name or another."""
     for node in case.nodes():
-        if not isinstance(node, nodes.TryNode):
+        body = case.flow.flows.get(node.do.path) if case.flow and isinstance(node, nodes.TryNode) else None
+        if body is None or not isinstance(node, nodes.TryNode):
             continue
-        earlier: dict[tuple[str, str], Match] = {}
+        earlier: list[Match] = []
         for catch in node.catches:
             for match in catch.on:
-                name = match.source, match.reason
-                if name in earlier:
-                    message = f"{match} is caught already in line {earlier[name].mark.line}"
+                meant = [failure for failure in body.failures if failure.may_match([match])]
+                if meant and all(failure.must_match(earlier) for failure in meant):
+                    taker = next(e for e in earlier if meant[0].must_match([e]))
+                    message = f"{match} is caught already, as {taker} in line {taker.mark.line}"
                     yield warning(match.mark, "unreachable", message)
-                earlier.setdefault(name, match)
+                earlier.append(match)
 
 
 def endless_loops(case: Case) -> Iterator[Finding]:
@@ -47,14 +49,14 @@ def endless_loops(case: Case) -> Iterator[Finding]:
 
 
 def unchanging_retries(case: Case) -> Iterator[Finding]:
-    """Find every retry that would meet the same again: nothing in it looks, moves or waits."""
+    """Find every retry that would meet the same again: nothing in it looks or moves."""
     for node in case.nodes():
-        if not isinstance(node, nodes.RetryNode) or node.backoff is not None:
+        if not isinstance(node, nodes.RetryNode):
             continue
         skills = [case.skills.get(inner.skill) for inner in node.walk() if isinstance(inner, nodes.SkillNode)]
         if skills and not any(skill is None or skill.senses or skill.moves for skill in skills):
-            message = "this retry changes nothing between its attempts: nothing in it looks, moves or waits"
-            hint = "Put a look or a motion into do or recover, or wait with backoff."
+            message = "this retry changes nothing between its attempts: nothing in it looks or moves"
+            hint = "Put a look or a motion into do or recover."
             yield warning(node.mark, "unchanging-retry", message, hint)
 
 
@@ -74,9 +76,14 @@ def _unreachable(node: Node, flow: Analysis) -> Iterator[Finding]:
         if child.path in flow.entry:
             yield from _unreachable(child, flow)
         elif why := _why(node, child):
-            yield warning(child.mark, "unreachable", f"{name_of(child)} can never run: {why}")
+            yield warning(child.mark, "unreachable", f"{_called(child)} can never run: {why}")
             if isinstance(node, nodes.SequenceNode | nodes.FallbackNode):
                 return
+
+
+def _called(node: Node) -> str:
+    bare = isinstance(node, nodes.SequenceNode) and node.listed
+    return "this list" if bare and not node.label else name_of(node)
 
 
 def _why(parent: Node, child: Node) -> str:

@@ -8,7 +8,7 @@ from executive.mission import nodes
 from executive.mission.case import Case
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.flow import Analysis
-from executive.mission.flow_state import Raise
+from executive.mission.flow_state import ANYTHING, Raise
 from executive.mission.nodes import Node
 from executive.mission.values import Match
 
@@ -26,7 +26,9 @@ def matches(case: Case) -> Iterator[Finding]:
             if flow is None:
                 continue
             coming = [failure for failure in flow.failures if failure.may_match([match])]
-            if not coming:
+            if unknown := _unknown(case, case.flow, match, body):
+                yield unknown
+            elif not coming:
                 yield _impossible(case, case.flow, match, where, body)
             elif len(meant := _meant(case.flow, match, coming)) > 1:
                 yield _ambiguous(match, meant)
@@ -45,19 +47,31 @@ def _expectations(node: Node) -> Iterator[tuple[Match, str, Node]]:
 def _impossible(case: Case, flow: Analysis, match: Match, where: str, body: Node) -> Finding:
     inside = _reasons(flow, body)
     if match.source in inside:
-        reasons = inside[match.source]
-        if match.reason not in reasons:
-            hint = alternatives(match.reason, reasons, f"{match.source} may fail with")
-            message = f'{match.source} never fails with "{match.reason}"'
-            return error(match.mark, "unknown-reason", message, hint)
-        message = f"{match} never comes out of the body of this {where}: it is dealt with inside"
         leaving = ", ".join(sorted({str(failure) for failure in flow.flows[body.path].failures}))
-        return error(match.mark, "impossible-reason", message, f"What comes out: {leaving or 'nothing'}.")
-    if match.source in case.skills:
+        message = f"{match} never leaves the body of this {where}"
+        rule = "A retry fails as its body does, a fallback as its last choice."
+        hint = f"What leaves it: {leaving or 'nothing'}. {rule}"
+        return error(match.mark, "impossible-reason", message, hint)
+    if match.source in (*case.skills, *_words(case)):
         message = f"{match.source} is not in the body of this {where}, so {match} cannot come from it"
         return error(match.mark, "impossible-reason", message, f"In the body: {', '.join(inside) or 'none'}.")
     hint = alternatives(match.source, inside, "In the body")
     return error(match.mark, "unknown-skill", f'there is no skill or label "{match.source}"', hint)
+
+
+def _unknown(case: Case, flow: Analysis, match: Match, body: Node) -> Finding | None:
+    """Return a finding where what a name means has no such reason, wherever it stands."""
+    skill = case.skills.get(match.source)
+    reasons = skill.reasons if skill else _reasons(flow, body).get(match.source)
+    if reasons is None or match.reason in reasons or ANYTHING in reasons:
+        return None
+    hint = alternatives(match.reason, reasons, f"{match.source} may fail with")
+    return error(match.mark, "unknown-reason", f'{match.source} never fails with "{match.reason}"', hint)
+
+
+def _words(case: Case) -> set[str]:
+    """Return every label of the mission, and every control node that fails for a reason of its own."""
+    return {node.label for node in case.nodes() if node.label} | {word for word, _ in _OWN.values()}
 
 
 def _reasons(flow: Analysis, body: Node) -> dict[str, list[str]]:
@@ -83,12 +97,13 @@ def _meant(flow: Analysis, match: Match, coming: list[Raise]) -> list[Node]:
     if any(match.source in failure.labels for failure in coming):
         return []
     # The same place twice is one node of a subtree that is used twice.
-    places = {flow.nodes[failure.origin].mark: flow.nodes[failure.origin] for failure in coming}
+    sure = [flow.nodes[failure.origin] for failure in coming if failure.must_match([match])]
+    places = {node.mark: node for node in sure}
     return sorted(places.values(), key=lambda node: (node.mark.line, node.mark.col))
 
 
 def _ambiguous(match: Match, meant: list[Node]) -> Finding:
-    lines = " and ".join(str(node.mark.line) for node in meant)
-    message = f"{match} may come from more than one node here, in lines {lines}"
+    places = " and ".join(f"{node.mark.line}:{node.mark.col}" for node in meant)
+    message = f"{match} may come from more than one node here, at {places}"
     hint = f"Label them with as: and name the one that is meant, as label.{match.reason}."
     return error(match.mark, "ambiguous", message, hint)

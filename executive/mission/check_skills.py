@@ -80,11 +80,12 @@ def output_wiring(case: Case) -> Iterator[Finding]:
     for node, skill in case.known_skills():
         for name, value in literals(node):
             port = skill.ports.get(name)
-            if port is not None and port.direction is Direction.OUT:
-                sentence = f"is an output: it takes the variable to write, as ${name}"
-                if value.origin:
-                    sentence = f"is an output and cannot write the constant {value.origin.split()[0]}"
-                yield _wrong(node, name, value, "wrong-type", sentence)
+            if port is None or port.direction is not Direction.OUT:
+                continue
+            sentence = f"is an output: it takes the variable to write, as ${name}"
+            if value.origin:
+                sentence = f"is an output and cannot write the constant {value.origin.split()[0]}"
+            yield error(value.used or value.mark, "wrong-type", f"{node.skill}.{name} {sentence}")
 
 
 def _param_fault(param: Param, value: object) -> tuple[str, str] | None:

@@ -13,6 +13,8 @@ from executive.mission.source import Mark
 from executive.mission.typed import WrongType, convert
 from executive.mission.types import called, element_of, fits
 from executive.mission.values import Literal, Reference
+from executive.mission.wiring import Wire
+from executive.mission.words import describe
 from executive.skill import Direction, Port
 
 
@@ -24,13 +26,13 @@ class Writer:
         name: What it is called in a sentence, for instance `Localize.targets in line 9`.
         type: Type of what it writes.
         refers: What a text names, or "".
-        values: The values themselves where they stand in the file, else None.
+        values: The values themselves, each with its place, where they stand in the file; else None.
     """
 
     name: str
     type: Any
     refers: str
-    values: tuple[Any, ...] | None = None
+    values: tuple[tuple[Any, Mark], ...] | None = None
 
 
 def port_types(case: Case) -> Iterator[Finding]:
@@ -46,10 +48,7 @@ def port_types(case: Case) -> Iterator[Finding]:
                     yield error(node.source.mark, "port-type", message, f"It is written by {writer.name}.")
         for wire in case.wires(node, Direction.IN):
             for writer in writers.get(wire.variable, ()):
-                if sentence := _misfit(wire.port, writer):
-                    message = f"{wire} takes {_wanted(wire.port)}, but {sentence}"
-                    message = message.replace("$?", f"${wire.variable}")
-                    yield error(wire.mark, "port-type", message, f"It is written by {writer.name}.")
+                yield from _misfits(wire, writer)
 
 
 def element_names(case: Case) -> Iterator[Finding]:
@@ -62,28 +61,33 @@ def element_names(case: Case) -> Iterator[Finding]:
         if not isinstance(node, ForEachNode) or not isinstance(node.source, Literal):
             continue
         for port, reader, _ in readers.get(node.each.name, ()):
-            for value in node.source.value if isinstance(node.source.value, list) else ():
+            for index, value in enumerate(node.source.value if isinstance(node.source.value, list) else ()):
                 names = known.get(port.refers)
                 if names is not None and isinstance(value, str) and value not in names:
                     message = f'the cell has no {port.refers} "{value}" for {reader}'
                     hint = f"{reader} takes: {', '.join(names)}."
-                    yield error(node.source.mark, f"unknown-{port.refers}", message, hint)
+                    yield error(node.source.element_mark(index), f"unknown-{port.refers}", message, hint)
 
 
-def _misfit(port: Port, writer: Writer) -> str:
-    """Return what is wrong with wiring an input to what a writer writes, or ""."""
+def _misfits(wire: Wire, writer: Writer) -> Iterator[Finding]:
+    """Find what is wrong with wiring an input to what a writer writes."""
+    port, wanted = wire.port, f"{wire} takes {_wanted(wire.port)}"
+    for value, mark in writer.values or ():
+        try:
+            convert(value, port.type)
+        except WrongType:
+            message = f"{wanted}, but for ${wire.variable} stands {describe(value)} here"
+            yield error(mark, "port-type", message, f"It is read in line {wire.mark.line}.")
     if writer.values is not None:
-        for value in writer.values:
-            try:
-                convert(value, port.type)
-            except WrongType as problem:
-                return f"an element of the list $? stands for {problem}"
-        return ""
+        return
+    holds = ""
     if not fits(writer.type, port.type):
-        return f"$? holds {called(writer.type)}"
-    if port.refers and writer.refers != port.refers:
-        return f"$? holds the name of {_a(writer.refers)}" if writer.refers else "$? holds any text"
-    return ""
+        holds = called(writer.type)
+    elif port.refers and writer.refers != port.refers:
+        holds = f"the name of {_a(writer.refers)}" if writer.refers else "any text"
+    if holds:
+        message = f"{wanted}, but ${wire.variable} holds {holds}"
+        yield error(wire.mark, "port-type", message, f"It is written by {writer.name}.")
 
 
 def _wanted(port: Port) -> str:
@@ -113,7 +117,10 @@ def _elements(loop: ForEachNode, writers: dict[str, list[Writer]]) -> list[Write
     name = f"for_each in line {loop.mark.line}"
     if isinstance(loop.source, Literal):
         values = loop.source.value
-        return [Writer(name, Any, "", tuple(values))] if isinstance(values, list) else []
+        if not isinstance(values, list):
+            return []
+        marked = [(value, loop.source.element_mark(index)) for index, value in enumerate(values)]
+        return [Writer(name, Any, "", tuple(marked))]
     return [
         Writer(name, element_of(writer.type), writer.refers)
         for writer in writers.get(loop.source.name, ())

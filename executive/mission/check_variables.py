@@ -39,13 +39,30 @@ def unread_variables(case: Case) -> Iterator[Finding]:
         return
     read = {variable for _, _, variable, _ in _reads(case, case.tree, all_inputs=True)}
     for node in case.tree.walk():
-        if isinstance(node, ForEachNode) and node.each.name not in read:
+        if isinstance(node, ForEachNode) and node.each.name not in read | set(case.mission.params):
             message = f"nothing in this for_each reads ${node.each.name}"
             yield warning(node.each.mark, "unread", message, f"Write {node.each.name} where it is meant.")
         for wire in case.wires(node, Direction.OUT):
             if wire.explicit and wire.variable not in read:
                 message = f"{wire} writes ${wire.variable}, which nothing reads"
                 yield warning(wire.mark, "unread", message)
+        for setting in node.returns.values() if isinstance(node, UseNode) else ():
+            value = setting.value
+            if (
+                isinstance(node, UseNode)
+                and isinstance(value, Reference)
+                and value.name in set(node.promised) - read
+            ):
+                message = f"nothing reads ${value.name}, which the subtree returns here"
+                yield warning(value.mark, "unread", message)
+
+
+def _unread_returns(use: UseNode, read: set[str]) -> Iterator[Finding]:
+    for setting in use.returns.values():
+        value = setting.value
+        if isinstance(value, Reference) and value.name in use.promised and value.name not in read:
+            message = f"nothing reads ${value.name}, which the subtree returns here"
+            yield warning(value.mark, "unread", message)
 
 
 def broken_promises(case: Case) -> Iterator[Finding]:
@@ -56,8 +73,7 @@ def broken_promises(case: Case) -> Iterator[Finding]:
         if not isinstance(use, UseNode) or use.body is None:
             continue
         subtree = case.mission.trees[use.name]
-        flow = case.flow.flows.get(use.path)
-        after = flow.success if flow else None
+        after = case.flow.bodies.get(use.path)
         if after is None or after.written is None:
             continue
         written = written_below(use.body, case.skills)

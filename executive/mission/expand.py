@@ -14,8 +14,9 @@ from typing import Any
 from executive.mission.closure import renamed
 from executive.mission.findings import Finding, alternatives, error, suggest, warning
 from executive.mission.model import Mission, Subtree
-from executive.mission.nodes import Backoff, Catch, ForEachNode, Node, SkillNode, UseNode
-from executive.mission.values import Literal, Reference, Setting, Value
+from executive.mission.nodes import Backoff, Catch, ForEachNode, Node, SkillNode, UnknownNode, UseNode
+from executive.mission.source import Mark
+from executive.mission.values import Reference, Setting, Value
 from executive.mission.wiring import written_below
 from executive.skill import Direction, Skill
 
@@ -48,7 +49,7 @@ def expand(mission: Mission, skills: Mapping[str, type[Skill]]) -> Expanded:
     tree = None if mission.tree is None else expander.whole(mission.tree, expander.params)
     unused = []
     for subtree in mission.trees.values():
-        if subtree.name in expander.used or subtree.library:
+        if subtree.name in expander.used or subtree.library or isinstance(subtree.do, UnknownNode):
             continue
         expander.findings.append(
             warning(subtree.mark, "unused-tree", f'nothing uses the subtree "{subtree.name}"')
@@ -74,6 +75,7 @@ class _Expander:
         self.used: set[str] = set()
         self._looked_up: set[tuple[str, str]] = set()
         self._count = 0
+        self._outermost: Mark | None = None
         self._uses: Counter[str] = Counter()
 
     def whole(self, tree: Node, names: Names) -> Node | None:
@@ -85,21 +87,29 @@ class _Expander:
     def unused_names(self) -> Iterator[Finding]:
         """Find every param and argument that no `$name` of a tree that was put in refers to."""
         for name, param in self.mission.params.items() if self.mission.tree else ():
-            if ("", name) not in self._looked_up:
+            if ("", name) not in self._looked_up and f"${name}" not in param.mark.source.text:
                 yield warning(param.mark, "unused-param", f'nothing uses the param "{name}"')
         for subtree in self.mission.trees.values():
             for name, argument in subtree.args.items():
                 put_in = self._uses[subtree.name] > 0 and not subtree.library
-                if put_in and (subtree.name, name) not in self._looked_up:
+                if (
+                    put_in
+                    and not isinstance(subtree.do, UnknownNode)
+                    and (subtree.name, name) not in self._looked_up
+                ):
                     message = f'nothing in the subtree "{subtree.name}" uses its argument "{name}"'
                     yield warning(argument.mark, "unused-argument", message)
 
     def _node(self, node: Node, names: Names, inside: tuple[str, ...], depth: int) -> Node:
         self._count += 1
         if depth > _DEEPEST or self._count > _MOST_NODES:
-            limit = f"{_DEEPEST} levels deep" if depth > _DEEPEST else f"to {_MOST_NODES} nodes"
-            message = f"with its subtrees put in, the tree grows more than {limit}"
-            self.findings.append(error(node.mark, "too-large", message))
+            size = (
+                f"is more than {_DEEPEST} levels deep"
+                if depth > _DEEPEST
+                else f"has more than {_MOST_NODES} nodes"
+            )
+            message = f"with its subtrees put in, the tree {size}"
+            self.findings.append(error(self._outermost or node.mark, "too-large", message))
             raise _TooLargeError
 
         def filled(part: Any) -> Any:
@@ -148,14 +158,18 @@ class _Expander:
         if value is None:
             return reference
         if isinstance(value, Reference):
-            return Reference(value.name, reference.mark)
+            return value
         # The place of the value is the one to correct; the place of its use is named beside it.
-        return Literal(value.value, value.mark, f"${reference.name} in line {reference.mark.line}")
+        origin = f"${reference.name} in line {reference.mark.line}"
+        return replace(value, origin=origin, used=reference.mark)
 
     def _use(self, use: UseNode, inside: tuple[str, ...], depth: int) -> Node:
         self.used.add(use.name)
         subtree = self.mission.trees.get(use.name)
+        if subtree is None and not self.mission.whole:
+            return use
         if subtree is None:
+            self.used.add(suggest(use.name, self.mission.trees) or "")
             hint = alternatives(use.name, self.mission.trees, "The mission's subtrees")
             self.findings.append(error(use.mark, "unknown-tree", f'there is no subtree "{use.name}"', hint))
             return use
@@ -169,6 +183,7 @@ class _Expander:
         if arguments is None:
             return use
         self._uses[use.name] += 1
+        self._outermost = self._outermost if inside else use.mark
         # A library knows its own arguments only: it must mean the same in every mission.
         around: Names = {} if subtree.library else self.params
         if subtree.returns is None:
@@ -176,7 +191,7 @@ class _Expander:
             return replace(use, body=body)
         arguments = {name: _from_outside(value) for name, value in arguments.items()}
         body = self._node(subtree.do, {**around, **arguments}, (*inside, use.name), depth + 1)
-        return replace(use, body=self._closed(use, body, returns))
+        return replace(use, body=self._closed(use, body, returns), promised=tuple(returns.values()))
 
     def _closed(self, use: UseNode, body: Node, returns: Mapping[str, str]) -> Node:
         """Return the body with the variables that it keeps to itself under names of their own."""

@@ -149,7 +149,13 @@ def value_of(node: Node, findings: list[Finding]) -> Value | None:
             return Reference(name, node.mark)
     misplaced = list(_misplaced_dollars(node))
     findings += misplaced
-    return None if misplaced else Literal(plain(node), node.mark)
+    return None if misplaced else literal_of(node)
+
+
+def literal_of(node: Node) -> Literal:
+    """Return a node as a value that knows where it and its elements stand."""
+    elements = tuple(item.mark for item in node.items) if isinstance(node, Sequence) else ()
+    return Literal(plain(node), node.mark, elements=elements)
 
 
 def _misplaced_dollars(node: Node) -> Iterator[Finding]:

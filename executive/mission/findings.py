@@ -10,6 +10,12 @@ from executive.errors import InputError
 from executive.mission.source import Mark
 
 _WINDOW = 140
+_MOST_LISTED = 24
+_OF_A_VALUE = frozenset({
+    "wrong-type", "wrong-value", "out-of-range", "port-type", "unwritten",
+    "unknown-bin", "unknown-class", "unknown-detector", "unknown-pose", "unseen-class",
+})  # fmt: skip
+"""Codes of findings about one value; of those at the same place one is enough."""
 
 
 @dataclass(frozen=True)
@@ -85,9 +91,15 @@ def _finding(severity: str, mark: Mark, code: str, message: str, hint: str) -> F
 
 
 def in_file_order(findings: Iterable[Finding], first: str) -> tuple[Finding, ...]:
-    """Return the findings without repetitions, those of the file `first` first, each file top to bottom."""
-    unique = dict.fromkeys(findings)
-    return tuple(sorted(unique, key=lambda f: (f.path != first, f.path, f.line, f.col)))
+    """Return the findings, those of the file `first` first, each file top to bottom.
+
+    One mistake is told once: where several look at the same value, the first that minds it is heard.
+    """
+    unique: dict[tuple[str, int, int, str], Finding] = {}
+    for finding in findings:
+        sort = finding.code if finding.code in _OF_A_VALUE else str(finding)
+        unique.setdefault((finding.path, finding.line, finding.col, sort), finding)
+    return tuple(sorted(unique.values(), key=lambda f: (f.path != first, f.path, f.line, f.col)))
 
 
 def suggest(word: str, known: Iterable[str]) -> str | None:
@@ -101,5 +113,6 @@ def alternatives(word: str, known: Iterable[str], lead: str) -> str:
     """Return a hint: the likely meaning of `word`, then `lead` and every known word."""
     known = list(known)
     meant = suggest(word, known)
-    listed = f"{lead}: {', '.join(known) or 'none'}."
+    more = f" and {len(known) - _MOST_LISTED} more" if len(known) > _MOST_LISTED else ""
+    listed = f"{lead}: {', '.join(known[:_MOST_LISTED]) or 'none'}{more}."
     return f'Did you mean "{meant}"? {listed}' if meant else listed

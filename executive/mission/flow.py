@@ -7,6 +7,7 @@ Loops go round until nothing new turns up: variables can only become fewer and g
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from executive.mission import nodes
@@ -33,6 +34,7 @@ class Analysis:
         nodes: Every node by its path.
         entry: What is true where a node begins, by its path; a node that cannot be reached is not there.
         flows: How a node may end, by its path; the failures are those of every entry.
+        bodies: What is true after the body of a `use` succeeded, by the path of the use.
         result: How the whole tree may end.
     """
 
@@ -40,6 +42,7 @@ class Analysis:
         self.nodes = {node.path: node for node in tree.walk()}
         self.entry: dict[str, State] = {}
         self.flows: dict[str, Flow] = {}
+        self.bodies: dict[str, State | None] = {}
         self._skills = skills
         self._known: dict[tuple[str, State], Flow] = {}
         self.result = self._run(tree, BEGINNING)
@@ -100,7 +103,7 @@ class Analysis:
         flows = [self._run(branch, state) for branch in node.branches]
         total = len(flows)
         needed = {"all": total, "any": 1}.get(_constant(node.wait_for), _constant(node.wait_for))
-        needed = needed if isinstance(needed, int) else total
+        needed = min(max(needed, 1), total) if isinstance(needed, int) else total
         halts = needed < total or _constant(node.halt) is True
         ends = [grips_at_end(flow, state, halts) for flow in flows]
         succeeding = [flow.success for flow in flows if flow.success is not None]
@@ -237,10 +240,20 @@ class Analysis:
         body = self._run(node.do, state)
         return Flow(joined((body.success, *body.failures.values())), {}, body.halted)
 
+    def _unknown(self, node: Any, state: State) -> Flow:
+        del state  # Whatever stands around the parts, it is not what the author meant.
+        for part in node.parts:
+            self._run(part, UNKNOWN)
+        return _anything(node)
+
     def _use(self, node: Any, state: State) -> Flow:
         if node.body is None:
-            return Flow(UNKNOWN, {Raise(ANYTHING, ANYTHING, node.path): UNKNOWN}, UNKNOWN)
-        return self._run(node.body, state)
+            return _anything(node)
+        flow = self._run(node.body, state)
+        self.bodies[node.path] = flow.success
+        # A promise that is not kept is told there, not wherever somebody relies on it.
+        promised = flow.success and flow.success.writing(node.promised)
+        return replace(flow, success=promised)
 
     def _round(self, node: Node, state: State, again: Callable[[Flow], State | None]) -> tuple[Flow, State]:
         """Return the flow of a node that is entered anew in the state `again` tells, and what it is then."""
@@ -251,6 +264,10 @@ class Analysis:
             if widened == entry:
                 return flow, entry
             entry = widened
+
+
+def _anything(node: Node) -> Flow:
+    return Flow(UNKNOWN, {Raise(ANYTHING, ANYTHING, node.path): UNKNOWN}, UNKNOWN)
 
 
 def _tried_again(node: nodes.RetryNode, failure: Raise) -> bool:
@@ -280,4 +297,5 @@ _TRANSFER: Mapping[type[Node], Callable[[Analysis, Any, State], Flow]] = {
     nodes.InvertNode: Analysis._invert,
     nodes.SucceedNode: Analysis._succeed,
     nodes.UseNode: Analysis._use,
+    nodes.UnknownNode: Analysis._unknown,
 }

@@ -16,11 +16,13 @@ class Node:
     Attributes:
         mark: The word that names the node in the file.
         label: What `as:` calls it, or "".
+        label_mark: Where that stands.
         path: Unique path from the root of the tree that runs, given once that is known; else "".
     """
 
     mark: Mark
     label: str
+    label_mark: Mark | None = field(default=None, kw_only=True)
     path: str = field(default="", kw_only=True)
 
     @property
@@ -46,6 +48,22 @@ class SkillNode(Node):
     skill: str
     settings: Mapping[str, Setting]
     names: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class UnknownNode(Node):
+    """A node that could not be read; a finding says why. Anything may come of it.
+
+    Attributes:
+        parts: What could be read of it.
+    """
+
+    parts: tuple[Node, ...] = ()
+
+    @property
+    def children(self) -> tuple[Node, ...]:
+        """What could be read of it."""
+        return self.parts
 
 
 @dataclass(frozen=True)
@@ -229,12 +247,14 @@ class UseNode(Node):
     Attributes:
         arguments: Values of its arguments.
         returns: Other names for the variables it returns.
+        promised: The variables it returns, as they are called here.
         body: The subtree with the arguments put in; None until the mission is expanded.
     """
 
     name: str
     arguments: Mapping[str, Setting]
     returns: Mapping[str, Setting] = field(default_factory=dict)
+    promised: tuple[str, ...] = ()
     body: Node | None = None
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping as Mapped
+from dataclasses import replace
 
 from executive.mission import grammar, model
 from executive.mission.fields import Fields
@@ -22,7 +23,7 @@ _MISSION_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 def parse_mission(root: Node, overrides: Mapped[str, str]) -> tuple[model.Mission, list[Finding]]:
     """Return what the file says, as far as it can be read, and what is wrong with its form."""
     findings: list[Finding] = []
-    start = Mark(root.mark.source, 1, 1, 1)
+    start = replace(root.mark, length=1)
     fields = Fields("the mission", start, root, grammar.MISSION, findings)
     for key in ("mission", "cell", "tree"):
         fields.required(key)

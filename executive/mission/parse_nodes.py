@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 
 from executive.mission import grammar
 from executive.mission import nodes as model
 from executive.mission.fields import NAME, Fields, settings_of
-from executive.mission.findings import Finding, alternatives, error
+from executive.mission.findings import Finding, alternatives, error, suggest
 from executive.mission.source import Mark
-from executive.mission.text import Mapping, Node, Scalar, Sequence, plain
+from executive.mission.text import Entry, Mapping, Node, Scalar, Sequence, plain
 from executive.mission.values import Literal, Named, Value
 from executive.mission.words import describe
 
@@ -21,14 +22,14 @@ _SKILL = re.compile(r"[A-Z][A-Za-z0-9]*")
 class NodeParser:
     """Reads the nodes of one mission file; what is wrong goes to `findings`.
 
-    A node that cannot be read becomes one that does nothing, so that reading goes on.
+    A node that cannot be read becomes an unknown one, so that reading goes on.
     """
 
     def __init__(self, findings: list[Finding]) -> None:
         self.findings = findings
 
     def node(self, node: Node | None, mark: Mark) -> model.Node:
-        """Return the node that stands in the file, or one that does nothing where there is none."""
+        """Return the node that stands in the file, or an unknown one where there is none."""
         if node is None or (isinstance(node, Scalar) and node.value is None):
             if node is not None:
                 self.refuse(mark, "missing-node", "a node is missing here")
@@ -55,7 +56,8 @@ class NodeParser:
         self.findings.append(error(mark, code, message, hint))
 
     def _list(self, node: Sequence) -> model.Node:
-        return model.SequenceNode(node.mark, "", self.nodes(node, "a list of steps"))
+        steps = self.nodes(node, "a list of steps")
+        return model.SequenceNode(node.mark, "", steps) if steps else _nothing(node.mark)
 
     def _word(self, node: Scalar) -> model.Node:
         word = node.text
@@ -83,6 +85,10 @@ class NodeParser:
         for entry in others:
             message = f'"{head.key.text}" and "{entry.key.text}" stand in one node; a node has one name'
             self.refuse(entry.key.mark, "two-nodes", message, "Write a list to run one after the other.")
+        if others:
+            # What the others lack is not worth telling as long as they stand in the wrong place.
+            parts = [NodeParser([])._head(node, other, "") for other in others]
+            return model.UnknownNode(head.key.mark, label, (self._head(node, head, ""), *parts))
         name = head.key.text
         partners = grammar.CONTROL[name].partners if name in grammar.CONTROL else ()
         allowed = (name, "as", *partners)
@@ -91,6 +97,12 @@ class NodeParser:
                 hint = alternatives(entry.key.text, allowed[1:], f"Beside {name} may stand")
                 message = f'"{entry.key.text}" may not stand beside "{name}"'
                 self.refuse(entry.key.mark, "unknown-key", message, hint)
+        read = self._head(node, head, label)
+        return replace(read, label_mark=written.mark) if (written := node.get("as")) else read
+
+    def _head(self, node: Mapping, head: Entry, label: str) -> model.Node:
+        """Return the node of one word in a mapping, with the partners that stand beside it."""
+        name = head.key.text
         if name in CONTROL:
             return CONTROL[name](self, Head(node, name, head.key.mark, label, head.value))
         settings = settings_of(head.value, name, self.findings)
@@ -108,7 +120,10 @@ class NodeParser:
         return ""
 
     def _unknown(self, mark: Mark, word: str) -> None:
-        hint = alternatives(word, CONTROL, "Skills begin with a capital letter; control nodes are")
+        hint = alternatives(word, CONTROL, "Control nodes are")
+        if suggest(word, CONTROL) is None and NAME.fullmatch(word):
+            skill = "".join(part[:1].upper() + part[1:] for part in word.split("_"))
+            hint = f'If a skill is meant, write it as "{skill}". {hint}'
         self.refuse(mark, "unknown-node", f'there is no control node "{word}"', hint)
 
 
@@ -120,7 +135,7 @@ class Head:
 
 
 def _nothing(mark: Mark) -> model.Node:
-    return model.SucceedNode(mark, "", None)
+    return model.UnknownNode(mark, "")
 
 
 def _fields(parser: NodeParser, head: Head) -> Fields:
@@ -128,11 +143,13 @@ def _fields(parser: NodeParser, head: Head) -> Fields:
 
 
 def _sequence(parser: NodeParser, head: Head) -> model.Node:
-    return model.SequenceNode(head.mark, head.label, parser.nodes(head.value, "sequence"), listed=False)
+    steps = parser.nodes(head.value, "sequence")
+    return model.SequenceNode(head.mark, head.label, steps, listed=False) if steps else _nothing(head.mark)
 
 
 def _fallback(parser: NodeParser, head: Head) -> model.Node:
-    return model.FallbackNode(head.mark, head.label, parser.nodes(head.value, "fallback"))
+    choices = parser.nodes(head.value, "fallback")
+    return model.FallbackNode(head.mark, head.label, choices) if choices else _nothing(head.mark)
 
 
 def _parallel(parser: NodeParser, head: Head) -> model.Node:
@@ -144,6 +161,8 @@ def _parallel(parser: NodeParser, head: Head) -> model.Node:
         wait_for, halt = fields.value("wait_for") or wait_for, fields.value("halt") or halt
         body = fields.required("do")
     branches = () if body is None else parser.nodes(body, "parallel")
+    if not branches:
+        return _nothing(head.mark)
     return model.ParallelNode(head.mark, head.label, branches, wait_for, halt)
 
 
@@ -202,8 +221,11 @@ def _for_each(parser: NodeParser, head: Head) -> model.Node:
     if each.name and not NAME.fullmatch(each.name):
         hint = "Write the bare name, for instance each: target; its value is $target."
         parser.refuse(each.mark, "bad-name", f'"{each.name}" cannot name a variable', hint)
-    source = fields.value("in") or Literal([], head.mark)
+        each = Named(each.name.removeprefix("$"), each.mark)
+    source = fields.value("in")
     body = parser.node(fields.required("do"), fields.key_mark("do"))
+    if source is None or not NAME.fullmatch(each.name):
+        return model.UnknownNode(head.mark, head.label, (body,))
     return model.ForEachNode(head.mark, head.label, each, source, body)
 
 

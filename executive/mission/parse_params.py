@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping as Mapped
 from dataclasses import replace
 from typing import Any
 
 from executive.mission import grammar
-from executive.mission.fields import NAME, Fields
+from executive.mission.fields import NAME, Fields, literal_of
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.model import Param
 from executive.mission.overrides import CELL, override_node, override_source
@@ -53,14 +54,14 @@ def parse_params(fields: Fields, overrides: Mapped[str, str]) -> dict[str, Param
 def _param(name: str, mark: Mark, node: Node, given: bool, findings: list[Finding]) -> Param:
     """Return a param as it is declared: by its default alone, or by a mapping."""
     if not isinstance(node, Mapping):
-        return Param(mark, Literal(plain(node), node.mark), _type_of(plain(node)))
+        return Param(mark, literal_of(node), _type_of(plain(node)))
     fields = Fields(f'the param "{name}"', mark, node, grammar.PARAM, findings)
     default = fields.get("default")
     kind = _declared_type(fields, findings) or _type_of(None if default is None else plain(default))
     choices = fields.get("choices")
     param = Param(
         mark,
-        Literal(None, mark) if default is None else Literal(plain(default), default.mark),
+        Literal(None, mark) if default is None else literal_of(default),
         kind,
         _bound(fields, "min", findings),
         _bound(fields, "max", findings),
@@ -72,7 +73,9 @@ def _param(name: str, mark: Mark, node: Node, given: bool, findings: list[Findin
             message = f'the param "{name}" has no default and was not given'
             findings.append(error(mark, "missing-param", message, f"Give it with --set {name}=..."))
         return replace(param, value=Literal(_any_value(param), mark))
-    return _checked(name, param, param.value, findings) or param
+    # What is wrong with the default is told here, not again wherever it is used.
+    fallback = replace(param, value=Literal(_any_value(param), mark))
+    return _checked(name, param, param.value, findings) or fallback
 
 
 def _any_value(param: Param) -> Any:
@@ -103,7 +106,7 @@ def _bound(fields: Fields, key: str, findings: list[Finding]) -> float | None:
     if node is None:
         return None
     value = plain(node)
-    if isinstance(value, int | float) and not isinstance(value, bool):
+    if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
         return value
     findings.append(
         error(node.mark, "wrong-type", f"{fields.owner}.{key} must be a number, not {describe(value)}")
@@ -117,7 +120,7 @@ def _given(name: str, text: str, param: Param, findings: list[Finding]) -> Param
     findings += wrong
     if node is None:
         return param
-    return _checked(name, param, Literal(plain(node), node.mark), findings) or param
+    return _checked(name, param, literal_of(node), findings) or param
 
 
 def _checked(name: str, param: Param, value: Literal, findings: list[Finding]) -> Param | None:
@@ -132,7 +135,7 @@ def _checked(name: str, param: Param, value: Literal, findings: list[Finding]) -
     if sentence := _out_of_bounds(param, fitting):
         findings.append(error(value.mark, "out-of-range", f"{name} {sentence}, not {describe(fitting)}"))
         return None
-    return replace(param, value=Literal(fitting, value.mark))
+    return replace(param, value=replace(value, value=fitting))
 
 
 def _out_of_bounds(param: Param, value: Any) -> str:

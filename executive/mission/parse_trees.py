@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from executive.mission import grammar
 from executive.mission.fields import NAME, Fields, value_of
 from executive.mission.findings import Finding
@@ -14,7 +16,7 @@ from executive.mission.text import Mapping, Node, Scalar, Sequence
 def parse_library(root: Node) -> tuple[Library, list[Finding]]:
     """Return what a library file says, as far as it can be read, and what is wrong with its form."""
     findings: list[Finding] = []
-    start = Mark(root.mark.source, 1, 1, 1)
+    start = replace(root.mark, length=1)
     fields = Fields("the library", start, root, grammar.LIBRARY, findings)
     for key in ("library", "trees"):
         fields.required(key)
@@ -29,10 +31,11 @@ def parse_trees(fields: Fields, parser: NodeParser, library: str = "") -> dict[s
     def read(name: str, mark: Mark, node: Node) -> None:
         if not NAME.fullmatch(name):
             parser.refuse(mark, "bad-name", f'a subtree is named by letters, digits and "_", not "{name}"')
-        if isinstance(node, Mapping) and node.get("do") is not None:
-            trees[name] = _subtree(name, mark, node, parser, library)
-        elif isinstance(node, Mapping) and {"doc", "args", "returns"} & set(node.keys):
-            parser.refuse(mark, "missing-key", f'the subtree "{name}" needs the key "do"')
+        if isinstance(node, Mapping) and set(grammar.SUBTREE) & set(node.keys):
+            whole = node.get("do") is not None
+            if not whole:
+                parser.refuse(mark, "missing-key", f'the subtree "{name}" needs the key "do"')
+            trees[name] = _subtree(name, mark, node, parser if whole else NodeParser([]), library)
         else:
             trees[name] = Subtree(name, mark, "", {}, None, parser.node(node, mark), library)
 
@@ -46,7 +49,9 @@ def _subtree(name: str, mark: Mark, node: Mapping, parser: NodeParser, library: 
 
     def read(argument: str, where: Mark, value: Node) -> None:
         if not NAME.fullmatch(argument):
-            parser.refuse(where, "bad-name", f'"{argument}" cannot be written as ${argument}')
+            hint = "Write the bare name; inside, its value is $name."
+            parser.refuse(where, "bad-name", f'"{argument}" cannot name an argument', hint)
+            argument = argument.removeprefix("$")
         required = isinstance(value, Scalar) and value.value is None
         args[argument] = Argument(where, None if required else value_of(value, parser.findings))
 

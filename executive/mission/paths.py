@@ -26,10 +26,16 @@ WORDS: Mapping[type[Node], str] = {
     nodes.TimeoutNode: "timeout",
     nodes.InvertNode: "invert",
     nodes.SucceedNode: "succeed",
+    nodes.UnknownNode: "unknown",
 }
 """What each control node is called in a mission."""
 
-_LISTS = {nodes.SequenceNode: "steps", nodes.FallbackNode: "choices", nodes.ParallelNode: "branches"}
+_LISTS = {
+    nodes.SequenceNode: "steps",
+    nodes.FallbackNode: "choices",
+    nodes.ParallelNode: "branches",
+    nodes.UnknownNode: "parts",
+}
 
 
 def with_paths(root: Node) -> Node:

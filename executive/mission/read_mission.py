@@ -53,13 +53,13 @@ def read_mission(file: Path, overrides: Mapping[str, str]) -> MissionFiles:
     mission, malformed = parse_mission(root, overrides)
     findings += malformed
     trees: dict[str, Subtree] = dict(mission.trees)
-    texts = {}
-    for named in mission.libraries:
-        text = _add_library(named, file.parent, trees, findings)
-        if text is not None:
-            texts[named.name] = text
+    read = {named.name: _add_library(named, file.parent, trees, findings) for named in mission.libraries}
+    texts = {name: text for name, text in read.items() if text is not None}
+    whole = len(texts) == len(read)
     cell_path, cell = _cell(mission.cell, file.parent, overrides, findings)
-    return MissionFiles(source, replace(mission, trees=trees), texts, cell, cell_path, tuple(findings))
+    return MissionFiles(
+        source, replace(mission, trees=trees, whole=whole), texts, cell, cell_path, tuple(findings)
+    )
 
 
 def _add_library(

@@ -50,7 +50,7 @@ def called(declared: Any) -> str:
     element = element_of(declared)
     if element is not None and declared is not Any:
         return "a list" if element is Any else f"a list of {called(element).removeprefix('a ')}"
-    return f"a {getattr(declared, '__name__', str(declared))}"
+    return getattr(declared, "__name__", str(declared))
 
 
 def _is_union(declared: Any) -> bool:

@@ -17,6 +17,14 @@ from executive.mission.words import violation
 
 M = TypeVar("M", bound=BaseModel)
 
+_CODES = {
+    "value_error": "wrong-value",
+    "literal_error": "wrong-value",
+    "too_long": "wrong-length",
+    "too_short": "wrong-length",
+}
+"""Codes of findings by pydantic's kinds of errors; the others are wrong types."""
+
 KeyPath = tuple[str | int, ...]
 """Keys and list indices from the root of a file to one value in it."""
 
@@ -81,7 +89,7 @@ def _finding(root: Node, model: type[BaseModel], problem: Any) -> Finding:
     if kind == "missing":
         owner = dotted(inside) or "the file"
         return error(mark_of(root, inside), "missing-key", f'{owner} needs the key "{last}"')
-    code = "out-of-range" if "than" in kind else "wrong-value" if kind == "value_error" else "wrong-type"
+    code = "out-of-range" if "than" in kind else _CODES.get(kind, "wrong-type")
     name = dotted(path) or "the file"
     return error(mark_of(root, path), code, f"{name} {violation(problem)}")
 

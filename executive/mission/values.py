@@ -16,11 +16,19 @@ class Literal:
         value: Plain value: nothing, truth value, number, text, list or mapping.
         mark: Where it stands.
         origin: How the reader sees it where that is not the value itself, for instance `$attempts`.
+        used: Where `$attempts` stands, if it stands for this value; else None.
+        elements: Where the elements stand, if it is a list written in the file.
     """
 
     value: Any
     mark: Mark
     origin: str = ""
+    used: Mark | None = None
+    elements: tuple[Mark, ...] = ()
+
+    def element_mark(self, index: int) -> Mark:
+        """Return where an element of the list stands, or the list where that is not known."""
+        return self.elements[index] if index < len(self.elements) else self.mark
 
 
 @dataclass(frozen=True)

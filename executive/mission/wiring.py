@@ -39,7 +39,8 @@ def wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Iterator
         if port.direction is not direction:
             continue
         setting = node.settings.get(port.name)
-        if setting is None:
+        if setting is None or (direction is Direction.OUT and isinstance(setting.value, Literal)):
+            # A constant for an output is a mistake that is told elsewhere.
             yield Wire(node.skill, port, node.names.get(port.name, port.name), node.mark, explicit=False)
         elif isinstance(setting.value, Reference):
             yield Wire(node.skill, port, setting.value.name, setting.value.mark, explicit=True)

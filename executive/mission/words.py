@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -22,6 +23,8 @@ _WANTED = {
     "dataclass_type": "a mapping",
     "none_required": "left empty",
 }
+_TRUTHS = {"yes": "true", "on": "true", "no": "false", "off": "false"}
+_WITH_UNIT = re.compile(r"[-+]?[0-9.]+ *[A-Za-z]+")
 _BOUNDS = {
     "greater_than": ("more than", "gt"),
     "greater_than_equal": ("at least", "ge"),
@@ -48,7 +51,7 @@ def violation(problem: Mapping[str, Any]) -> str:
     kind, given = problem["type"], problem["input"]
     context = problem.get("ctx", {})
     if kind in _WANTED:
-        return f"must be {_WANTED[kind]}, not {describe(given)}"
+        return f"must be {_WANTED[kind]}, not {describe(given)}{_meant(kind, given)}"
     if kind in _BOUNDS:
         words, key = _BOUNDS[kind]
         return f"must be {words} {context[key]:g}, not {describe(given)}"
@@ -63,6 +66,15 @@ def violation(problem: Mapping[str, Any]) -> str:
     if kind == "value_error":
         return str(context["error"])
     return f"is not allowed here: {problem['msg'][:1].lower()}{problem['msg'][1:]}"
+
+
+def _meant(kind: str, given: Any) -> str:
+    """Return what was probably meant, in brackets, or ""."""
+    if kind == "bool_type" and isinstance(given, str) and given.lower() in _TRUTHS:
+        return f" (write {_TRUTHS[given.lower()]})"
+    if kind in ("float_type", "int_type") and isinstance(given, str) and _WITH_UNIT.fullmatch(given):
+        return " (write the number without its unit)"
+    return ""
 
 
 def _quoted(expected: str) -> list[str]:

@@ -100,7 +100,7 @@ CASES = {
         m.yaml:4:3: error[unknown-node]: there is no control node "rety"
            4 |   rety: {attempts: 2, do: Look}
              |   ^^^^
-          Did you mean "retry"? Skills begin with a capital letter; control nodes are: sequence, fallback, parallel, retry, repeat, while, for_each, try, timeout, invert, succeed, use.
+          Did you mean "retry"? Control nodes are: sequence, fallback, parallel, retry, repeat, while, for_each, try, timeout, invert, succeed, use.
         """,
     ),
     "unknown control key": (

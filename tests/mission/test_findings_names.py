@@ -61,9 +61,9 @@ CASES = {
           - Look: {classes: [cube, goose]}
         """,
         """
-        m.yaml:4:21: error[unknown-class]: the cell has no class "goose" for Look.classes
+        m.yaml:4:28: error[unknown-class]: the cell has no class "goose" for Look.classes
            4 |   - Look: {classes: [cube, goose]}
-             |                     ^
+             |                            ^^^^^
           Look.classes takes: cube, sphere.
         """,
     ),
@@ -149,9 +149,6 @@ CASES = {
            3 | tree: {use: lok}
              |             ^^^
           Did you mean "look"? The mission's subtrees: look.
-        m.yaml:4:9: warning[unused-tree]: nothing uses the subtree "look"
-           4 | trees: {look: Look}
-             |         ^^^^
         """,
     ),
     "unknown argument": (

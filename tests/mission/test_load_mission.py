@@ -144,12 +144,12 @@ def test_a_doubled_dollar_is_a_dollar(load: Load) -> None:
 
 def test_subtrees_cannot_blow_up_the_tree(load: Load) -> None:
     trees = "".join(f"  t{i}: [{', '.join([f'{{use: t{i + 1}}}'] * 10)}]\n" for i in range(8))
-    with pytest.raises(MissionError, match=r"error\[too-large\].*grows more than to 5000 nodes"):
+    with pytest.raises(MissionError, match=r"error\[too-large\].*the tree has more than 5000 nodes"):
         load(HEAD + "tree: {use: t0}\ntrees:\n" + trees + "  t8: Look\n")
 
 
 def test_a_deep_tree_is_refused_without_a_traceback(load: Load) -> None:
-    with pytest.raises(MissionError, match="grows more than 40 levels deep"):
+    with pytest.raises(MissionError, match="the tree is more than 40 levels deep"):
         load(HEAD + "tree: " + "{invert: " * 45 + "Look" + "}" * 45 + "\n")
 
 

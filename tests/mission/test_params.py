@@ -68,6 +68,7 @@ def test_a_list_may_be_looped_over(load: Load) -> None:
             None,
             'm.yaml:3:31: error[wrong-type]: the param "n".min must be a',
         ),
+        ("{default: 3, max: .inf}", None, 'm.yaml:3:31: error[wrong-type]: the param "n".max must be a'),
         ("{default: 3, least: 1}", None, 'm.yaml:3:26: error[unknown-key]: the param "n" has no key'),
         ("3", "2.5", "--set:1:3: error[wrong-type]: n must be a whole number, not 2.5"),
     ],

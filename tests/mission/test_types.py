@@ -65,7 +65,7 @@ def test_a_list_has_elements_and_a_text_has_none() -> None:
     ("declared", "word"),
     [
         (str, "a text"),
-        (Target, "a Target"),
+        (Target, "Target"),
         (list[Target], "a list of Target"),
         (list[str], "a list of text"),
         (str | None, "a text or nothing"),

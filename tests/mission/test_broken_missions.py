@@ -1,0 +1,141 @@
+"""Missions with a mistake, each with the findings that its author has to be told, and no others.
+
+Every file in `broken` begins with its findings: `# finds: LINE:COL error[code]`, or
+`# finds: FILE:LINE:COL error[code]` where the mistake is in its cell or library. Line 0 is the whole file.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from click.testing import CliRunner
+
+import executive.mission
+from executive.cli.main import main
+from executive.mission.findings import Finding, MissionError
+from executive.mission.load import load_mission
+from executive.runtime.cells import cell_kind
+from executive.skill import discover
+
+FOLDER = Path(__file__).parent / "broken"
+BROKEN = sorted(FOLDER.glob("*.yaml"))
+SHIPPED = sorted((Path(__file__).parents[2] / "missions").glob("*.yaml"))
+EXPECTED = re.compile(
+    r"# finds: (?:(?P<path>.+):)?(?P<line>\d+):(?P<col>\d+) (?P<severity>\w+)\[(?P<code>.+)\]"
+)
+HYPHENED, WORD = re.compile(r"[a-z]+(-[a-z]+)+"), re.compile(r"[a-z]+")
+TELLERS = {"error", "warning", "refuse", "_refuse", "finding"}
+"""Functions of `executive/mission` that make findings of a code."""
+
+Look = Callable[[Path], tuple[Finding, ...]]
+
+
+class Place(NamedTuple):
+    """What a finding is checked by."""
+
+    path: str
+    line: int
+    col: int
+    severity: str
+    code: str
+
+
+@pytest.fixture(autouse=True)
+def there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Work in the folder of the broken missions, so that paths are as short as their author's."""
+    monkeypatch.chdir(FOLDER)
+
+
+@pytest.fixture(scope="module")
+def look() -> Look:
+    """What is wrong with a mission; each is loaded once."""
+    skills, known = discover(), {}
+
+    def look(path: Path) -> tuple[Finding, ...]:
+        if path not in known:
+            try:
+                known[path] = load_mission(path, skills, kinds=cell_kind).warnings
+            except MissionError as error:
+                known[path] = error.findings
+        return known[path]
+
+    return look
+
+
+def expected(path: Path) -> Iterator[Place]:
+    """Yield the findings that the head of a file asks for."""
+    for line in path.read_text().splitlines():
+        if not (found := EXPECTED.fullmatch(line)):
+            return
+        file = found["path"] or path.name
+        yield Place(file, int(found["line"]), int(found["col"]), found["severity"], found["code"])
+
+
+def codes_in(module: Path) -> Iterator[str]:
+    """Yield the codes of the findings that a module of `executive.mission` may make."""
+    for node in ast.walk(ast.parse(module.read_text())):
+        if isinstance(node, ast.Constant) and HYPHENED.fullmatch(str(node.value)):
+            yield str(node.value)
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).split(".")[-1] in TELLERS:
+            for argument in node.args:
+                if isinstance(argument, ast.Constant) and WORD.fullmatch(str(argument.value)):
+                    yield str(argument.value)
+
+
+@pytest.mark.parametrize("path", BROKEN, ids=lambda path: path.stem)
+def test_exactly_the_expected_findings_are_found(path: Path, look: Look) -> None:
+    found = [Place(f.path, f.line, f.col, f.severity, f.code) for f in look(path)]
+    assert found == list(expected(path)), "\n".join(map(str, look(path)))
+
+
+@pytest.mark.parametrize("path", BROKEN, ids=lambda path: path.stem)
+def test_the_caret_stands_under_the_very_place(path: Path, look: Look) -> None:
+    for finding in look(path):
+        head, *shown = str(finding).splitlines()
+        if finding.line == 0:
+            assert head.startswith(f"{finding.path}: ")
+            continue
+        line = Path(finding.path).read_text().split("\n")[finding.line - 1]
+        number, excerpt = shown[0].split(" | ", 1)
+        blank, carets = re.fullmatch(r" +\| (\s*)(\^+)", shown[1]).groups()
+        assert head.startswith(f"{finding.path}:{finding.line}:{finding.col}: ")
+        assert int(number) == finding.line
+        assert excerpt in line
+        assert line.index(excerpt) + len(blank) == finding.col - 1
+        assert len(blank + carets) <= max(len(excerpt), len(blank) + 1)
+
+
+def test_the_command_prints_what_is_found_and_refuses_to_go_on(look: Look) -> None:
+    mistakes = FOLDER / "many-in-three-files.yaml"
+    result = CliRunner().invoke(main, ["check", mistakes.name])
+    assert result.exit_code == 2
+    assert result.output.splitlines() == "\n".join(map(str, look(mistakes))).splitlines()
+
+
+def test_five_mistakes_in_one_file_are_five_findings_in_one_call(look: Look) -> None:
+    found = look(FOLDER / "many-five-mistakes.yaml")
+    assert len(found) == len({finding.code for finding in found}) == 5
+
+
+def test_every_kind_of_finding_has_a_broken_mission() -> None:
+    checker = Path(executive.mission.__file__).parent
+    possible = {code for module in checker.glob("*.py") for code in codes_in(module)}
+    # Their codes are put together from what a param or port names.
+    possible |= {f"unknown-{named}" for named in ("bin", "class", "detector", "pose")}
+    assert {place.code for path in BROKEN for place in expected(path)} == possible
+
+
+def test_every_broken_mission_is_named_after_its_mistake() -> None:
+    for path in BROKEN:
+        codes = {place.code for place in expected(path)}
+        assert path.stem.startswith(("many-", *codes)), path.name
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_nothing_is_found_in_a_shipped_mission_and_its_cell(path: Path, look: Look) -> None:
+    assert look(path) == ()
