@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Any
 
 from executive.errors import Fault, InputError
 from executive.events import Event
-from executive.record.plain import plain
+from executive.record.entry import Entry, entry_of
 
-TRANSIENT = ("frame_object",)
-"""Event data that only observers in this process can use."""
+_ENCODER = json.JSONEncoder(ensure_ascii=False, allow_nan=False, check_circular=False)
 
 
 class Journal:
@@ -30,7 +28,11 @@ class Journal:
             raise InputError(f'cannot open the journal "{path}": {(error.strerror or "").lower()}') from error
 
     def __call__(self, event: Event) -> None:
-        """Append `event`.
+        """Append the entry for `event`; see `append`."""
+        self.append(entry_of(event))
+
+    def append(self, entry: Entry) -> None:
+        """Append `entry`.
 
         Raises:
             Fault: The disk does not take it; the run must not go on unrecorded. Later events are
@@ -40,8 +42,8 @@ class Journal:
             return
         try:
             # One unbuffered write per line: what was said before a crash is in the file.
-            _write_all(self._file, line_of(event))
-            if _must_last(event):
+            _write_all(self._file, _line_of(entry))
+            if _must_last(entry):
                 os.fsync(self._file)
         except OSError as error:
             os.close(self._file)
@@ -62,14 +64,7 @@ class Journal:
             os.close(file)
 
 
-def line_of(event: Event) -> bytes:
-    """Return the journal's line for `event`, line end included."""
-    stamp = {"tick": event.tick, "clock": plain(event.clock), "kind": event.kind}
-    data = {key: value for key, value in event.data.items() if key not in TRANSIENT and key not in stamp}
-    return (json.dumps({**stamp, **plain(data)}, ensure_ascii=False, allow_nan=False) + "\n").encode()
-
-
-def read_journal(path: Path) -> list[dict[str, Any]]:
+def read_journal(path: Path) -> list[Entry]:
     """Return the journal's entries; a last line torn by a power cut is left out.
 
     Raises:
@@ -99,8 +94,12 @@ def read_journal(path: Path) -> list[dict[str, Any]]:
     return entries
 
 
-def _must_last(event: Event) -> bool:
-    return event.kind == "intent" or (event.kind == "item" and event.data.get("state") == "placed")
+def _line_of(entry: Entry) -> bytes:
+    return (_ENCODER.encode(entry) + "\n").encode()
+
+
+def _must_last(entry: Entry) -> bool:
+    return entry["kind"] == "intent" or (entry["kind"] == "item" and entry.get("state") == "placed")
 
 
 def _write_all(file: int, line: bytes) -> None:

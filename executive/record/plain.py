@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from enum import Enum
 from pathlib import PurePath
 from typing import Any
@@ -23,36 +24,44 @@ def plain(value: Any) -> Any:
 
     Numbers that JSON does not have (infinities, NaN) become text, so a record stays readable by any parser.
     """
-    if value is None or isinstance(value, (str, bool, int)):
-        return value.value if isinstance(value, Enum) else value
-    if isinstance(value, (float, np.floating)):
-        return _number(float(value))
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, Frame):
-        return {"frame": value.id, "camera": value.camera, "stamp": _number(value.stamp)}
-    if isinstance(value, Pose):
-        return value.rounded(DIGITS)
-    if isinstance(value, Mapping):
-        return {str(key): plain(entry) for key, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(entry) for entry in value]
-    if isinstance(value, (set, frozenset)):
-        return sorted((plain(entry) for entry in value), key=repr)
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
-    if isinstance(value, Enum):
-        return plain(value.value)
-    if isinstance(value, PurePath):
-        return str(value)
+    return _rule(value.__class__)(value)
+
+
+@functools.cache
+def _rule(kind: type) -> Callable[[Any], Any]:
+    """Return what makes values of this type plain; found once per type, for events are told within a tick."""
+    if issubclass(kind, Enum):
+        return lambda value: plain(value.value)
+    if issubclass(kind, (str, int, type(None))):
+        return lambda value: value
+    if issubclass(kind, (float, np.floating)):
+        return _number
+    if issubclass(kind, np.generic):
+        return lambda value: plain(value.item())
+    if issubclass(kind, np.ndarray):
+        return lambda value: plain(value.tolist())
+    if issubclass(kind, Frame):
+        return lambda frame: {"frame": frame.id, "camera": frame.camera, "stamp": _number(frame.stamp)}
+    if issubclass(kind, Pose):
+        return lambda pose: pose.rounded(DIGITS)
+    if issubclass(kind, Mapping):
+        return lambda mapping: {str(key): plain(value) for key, value in mapping.items()}
+    if issubclass(kind, (list, tuple)):
+        return lambda values: [plain(value) for value in values]
+    if issubclass(kind, (set, frozenset)):
+        return lambda values: sorted((plain(value) for value in values), key=repr)
+    if dataclasses.is_dataclass(kind):
+        names = [field.name for field in dataclasses.fields(kind)]
+        return lambda value: {name: plain(getattr(value, name)) for name in names}
+    if issubclass(kind, PurePath):
+        return str
     # A default repr holds a memory address, which would make equal runs look different.
-    return type(value).__name__
+    return lambda _: kind.__name__
 
 
-def _number(value: float) -> float | str:
-    if not math.isfinite(value):
-        return str(value)
+def _number(value: Any) -> float | str:
+    number = float(value)
+    if not math.isfinite(number):
+        return str(number)
     # Adding zero turns -0.0 into 0.0, which compare equal but print differently.
-    return round(value, DIGITS) + 0.0
+    return round(number, DIGITS) + 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from executive.events import Event
+from executive.record.entry import entry_of
 from executive.record.frames import Frames
 from executive.record.journal import Journal
 from executive.record.run_directory import RunDirectory
@@ -19,8 +20,9 @@ class Recorder:
 
     def __call__(self, event: Event) -> None:
         """Record `event`; the trace first, for it cannot fail."""
-        self._trace(event)
-        self._journal(event)
+        entry = entry_of(event)
+        self._trace.take(entry)
+        self._journal.append(entry)
         if self._frames is not None:
             self._frames(event)
 

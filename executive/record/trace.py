@@ -6,7 +6,7 @@ import hashlib
 import json
 
 from executive.events import Event
-from executive.record.plain import plain
+from executive.record.entry import Entry, entry_of
 
 _DECIDING = {
     "status": ("node", "status", "reason", "item", "outputs"),
@@ -14,6 +14,8 @@ _DECIDING = {
     "decision": ("item", "label", "frame"),
 }
 """What counts, by kind of event. Sentences do not: they may be reworded without changing what is done."""
+
+_ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"), check_circular=False)
 
 
 class Trace:
@@ -27,12 +29,15 @@ class Trace:
         self._hash = hashlib.sha256()
 
     def __call__(self, event: Event) -> None:
-        """Take `event` into the hash if it decides anything."""
-        keys = _DECIDING.get(event.kind)
-        if keys is None:
-            return
-        entry = [event.tick, event.kind, *(plain(event.data.get(key)) for key in keys)]
-        self._hash.update(json.dumps(entry, sort_keys=True, separators=(",", ":")).encode() + b"\n")
+        """Take the entry for `event` into the hash; see `take`."""
+        self.take(entry_of(event))
+
+    def take(self, entry: Entry) -> None:
+        """Take `entry` into the hash if it decides anything."""
+        keys = _DECIDING.get(entry["kind"])
+        if keys is not None:
+            decision = [entry["tick"], entry["kind"], *map(entry.get, keys)]
+            self._hash.update(_ENCODER.encode(decision).encode() + b"\n")
 
     def hexdigest(self) -> str:
         """Return the first 16 hexadecimal digits of the SHA-256 so far."""

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import json
 import os
+from contextlib import closing
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from executive.errors import Fault, InputError
 from executive.events import Event
-from executive.record.journal import TRANSIENT, Journal, line_of, read_journal
+from executive.record.entry import TRANSIENT
+from executive.record.journal import Journal, read_journal
 from executive.record.plain import plain
 
 
@@ -44,6 +48,7 @@ VALUES = st.recursive(
 KEYS = st.sampled_from(["node", "status", "outputs", "größe", 'a "key"', "tick", "clock", "kind", *TRANSIENT])
 
 
+@settings(deadline=None)
 @given(
     st.builds(
         Event, st.sampled_from(["status", "item", "end"]), st.integers(0), st.floats(0),
@@ -54,7 +59,11 @@ def test_every_line_is_the_json_of_the_stamp_and_of_the_data_made_plain(event):
     stamp = {"tick": event.tick, "clock": plain(event.clock), "kind": event.kind}
     data = {key: value for key, value in event.data.items() if key not in (*TRANSIENT, *stamp)}
     line = json.dumps({**stamp, **plain(data)}, ensure_ascii=False, allow_nan=False) + "\n"
-    assert line_of(event) == line.encode()
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "journal.jsonl"
+        with closing(Journal(path)) as journal:
+            journal(event)
+        assert path.read_bytes() == line.encode()
 
 
 def test_leaves_the_pixels_out(tmp_path):

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from executive.geometry import Pose
@@ -149,6 +149,7 @@ def test_says_of_odd_values_what_the_straightforward_way_says(value):
     assert repr(plain(value)) == repr(straightforward(value))
 
 
+@settings(deadline=None)
 @given(VALUES)
 def test_says_what_the_straightforward_way_says(value):
     assert repr(plain(value)) == repr(straightforward(value))

@@ -97,7 +97,7 @@ def test_leaves_a_directory_that_explains_the_run(tmp_path, runtime):
     result = recorded_run(LOADED, {}, seed=7, runs=tmp_path)
     left = tmp_path / "latest"
     names = {path.name for path in left.iterdir()}
-    assert names == {"mission.yaml", "params.yaml", "cell.yaml", "journal.jsonl", "result.json"}
+    assert names == {"mission.yaml", "library", "params.yaml", "cell.yaml", "journal.jsonl", "result.json"}
     assert json.loads((left / "result.json").read_text()) == result
     assert [entry["kind"] for entry in read_journal(left / "journal.jsonl")] == ["run", "decision"]
     assert result["items"] == {"seen": 1, "placed": 1, "rejected": 0, "lost": 0, "phantom": 0}

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import json
+from contextlib import closing
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from executive.events import Event
+from executive.record.journal import Journal, read_journal
 from executive.record.plain import plain
 from executive.record.trace import Trace
 
@@ -59,7 +61,7 @@ HASHED = {
     "item": ("item", "state", "label", "position", "bin"),
     "decision": ("item", "label", "frame"),
 }
-KEYS = sorted({"message", *(key for keys in HASHED.values() for key in keys)})
+KEYS = sorted({"message", "tick", "kind", *(key for keys in HASHED.values() for key in keys)})
 DATA = st.dictionaries(
     st.sampled_from(KEYS),
     st.none()
@@ -69,6 +71,7 @@ DATA = st.dictionaries(
 )
 
 
+@settings(deadline=None)
 @given(st.lists(st.builds(Event, st.sampled_from([*HASHED, "end"]), st.integers(0), st.floats(0), DATA)))
 def test_hashes_one_line_of_compact_json_per_decision(events):
     lines = [
@@ -82,6 +85,24 @@ def test_hashes_one_line_of_compact_json_per_decision(events):
     ]
     text = "".join(f"{line}\n" for line in lines)
     assert digest(*events) == hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def test_can_be_told_from_the_journal(tmp_path):
+    events = [
+        Event("status", 3, 0.1, STATUS),
+        Event("look", 4, 0.2, {"frame": 1}),
+        Event("decision", 5, 0.3, {"item": "größe-1", "label": "cube", "frame": 1}),
+        Event(
+            "item", 6, 0.4, {"item": "cube-1", "state": "held", "position": np.array([1 / 3, -0.0, np.nan])}
+        ),
+    ]
+    with closing(Journal(tmp_path / "journal.jsonl")) as journal:
+        for event in events:
+            journal(event)
+    told = Trace()
+    for entry in read_journal(tmp_path / "journal.jsonl"):
+        told.take(entry)
+    assert told.hexdigest() == digest(*events)
 
 
 def test_the_tick_and_the_order_count():
