@@ -243,6 +243,26 @@ class Operator(Protocol):
         """
 
 
+class LeastTimes(Protocol):
+    """What things take in a cell at the very least [s]: nothing that succeeds there is done sooner.
+
+    Bounds, not estimates: whoever is given less time than this must fail, by whichever way the arm goes.
+    """
+
+    @property
+    def descent(self) -> float:
+        """The guarded last part of an approach, down to an object that lies on the table."""
+
+    def carry(self, bin: str | None) -> float:
+        """From where objects lie to above the floor of a bin, at rest at both ends; None: the nearest bin.
+
+        0 for a bin that the cell lacks.
+        """
+
+    def answer(self, detector: str) -> float:
+        """From a frame to the answer of a detector; "": the first one. 0 for one that the cell lacks."""
+
+
 @dataclass(frozen=True)
 class Cell:
     """A work cell: everything a skill may use.

@@ -26,6 +26,7 @@ Natural = Annotated[int, Field(ge=0)]
 Range = Annotated[tuple[float, float], AfterValidator(_rising)]
 Vector = Annotated[tuple[float, float, float], Field(description="x, y, z [m]")]
 Joints = tuple[float, float, float, float, float, float, float]
+Limits = tuple[Length, Length, Length, Length, Length, Length, Length]
 Colour = tuple[float, float, float]
 
 
@@ -156,17 +157,17 @@ class LimitsConfig(Section):
 
     source: str
     """Where the figures were taken from."""
-    position_deg: Joints
+    position_deg: Limits
     """Largest joint angle to either side [degree]."""
-    velocity_deg: Joints
+    velocity_deg: Limits
     """[degree/s]"""
-    acceleration: Joints
+    acceleration: Limits
     """[rad/s²]"""
-    jerk: Joints
+    jerk: Limits
     """[rad/s³]"""
-    stop_acceleration: Joints
+    stop_acceleration: Limits
     """Largest acceleration while braking [rad/s²]."""
-    stop_jerk: Joints
+    stop_jerk: Limits
     """Largest jerk while braking [rad/s³]."""
 
 

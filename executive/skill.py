@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, get_args, g
 from executive.errors import Fault, InputError
 
 if TYPE_CHECKING:
-    from executive.cell import Cell
-    from executive.workcell import LeastTimes
+    from executive.cell import Cell, LeastTimes
 
 T = TypeVar("T")
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from executive.cell import Cell, Operator
+from executive.cell import Cell, LeastTimes, Operator, Routes
 from executive.events import Emit
 
 
@@ -68,9 +68,21 @@ class CellKind(Protocol):
     """A class that makes work cells; found by its name in the entry-point group `executive.cells`."""
 
     def __call__(
-        self, config: Any, *, seed: int, routes: Mapping[str, str], emit: Emit, options: CellOptions
+        self, config: Any, *, seed: int, routes: Routes, emit: Emit, options: CellOptions
     ) -> Workcell:
         """Return a cell made from a cell file (`executive.cell_config.CellConfig`)."""
 
-    def check(self, config: Any) -> Iterable[tuple[KeyPath, str]]:
-        """Return what is wrong with a cell file beyond its form: the key it is about, and a sentence."""
+    def check(self, config: Any, base: Path) -> Iterable[tuple[KeyPath, str]]:
+        """Return what is wrong with a cell file beyond its form: the key it is about, and a sentence.
+
+        `base` is the folder that paths in it start from.
+        """
+
+    def labels(self, config: Any, base: Path) -> Mapping[str, tuple[str, ...] | None]:
+        """Return the classes that each detector of a cell file knows, by the cell's names for them.
+
+        None where nobody can know without asking it. Never raises: what is wrong is found by `check`.
+        """
+
+    def least_times(self, config: Any) -> LeastTimes:
+        """Return what things take at the very least in a cell that `check` finds nothing wrong with."""

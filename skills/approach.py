@@ -8,10 +8,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from executive.cell import Cell, Steps, Via
+from executive.cell import Cell, LeastTimes, Steps, Via
 from executive.geometry import Array
 from executive.messages import Target
-from executive.moving import LeastTimes, follow, planned, settle, travel
+from executive.moving import follow, planned, settle, travel
 from executive.skill import EMPTY, In, Metres, Skill, param, port
 
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from executive.cell import Cell, Steps
+from executive.cell import Cell, LeastTimes, Steps
 from executive.errors import Unavailable
 from executive.messages import Detections
-from executive.moving import LeastTimes
 from executive.skill import Out, Skill, param, port
 
 

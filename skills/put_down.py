@@ -7,9 +7,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from executive.cell import Cell, Steps, Via
+from executive.cell import Cell, LeastTimes, Steps, Via
 from executive.messages import Item
-from executive.moving import LeastTimes, follow, planned, settle, travel
+from executive.moving import follow, planned, settle, travel
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, param, port
 
 

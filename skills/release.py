@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from executive.cell import Cell, Steps
+from executive.cell import Cell, LeastTimes, Steps
 from executive.messages import Item
-from executive.moving import LeastTimes
 from executive.skill import ANY, EMPTY, HOLDING, In, Out, Seconds, Skill, param, port
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from executive.cell import Cell, Steps
-from executive.moving import LeastTimes
+from executive.cell import Cell, LeastTimes, Steps
 from executive.skill import Seconds, Skill, param
 
 

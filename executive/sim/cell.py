@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
 
 import numpy as np
 
-from executive.cell import Cell
+from executive.cell import Cell, Routes
 from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.events import Emit
+from executive.layout import as_bin, as_class, travel_height
 from executive.ledger.ledger import ItemLedger
-from executive.messages import ObjectClass, Target
+from executive.messages import Target
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
@@ -20,14 +22,20 @@ from executive.sim.audit import audit
 from executive.sim.camera import SimCamera
 from executive.sim.clearance import PathClearance
 from executive.sim.clock import SimClock
-from executive.sim.layout import as_bin, travel_height
+from executive.sim.least_times import SimLeastTimes
 from executive.sim.models import missing_models
+from executive.sim.poses import unfit_poses
 from executive.sim.reach import out_of_reach
 from executive.sim.spawn import spawn
 from executive.sim.tool import SuctionTool
 from executive.sim.view import ArmShadow
 from executive.sim.world import STEP, World
-from executive.vision.detectors.registry import ClosableDetector, build_detectors
+from executive.vision.detectors.registry import (
+    ClosableDetector,
+    build_detectors,
+    known_labels,
+    wrong_detectors,
+)
 from executive.vision.localize import PlaneLocalizer
 from executive.workcell import Accounts, CellOptions, KeyPath
 
@@ -38,7 +46,7 @@ class SimCell:
     Args:
         config: The cell file.
         seed: Decides which objects lie where, and the camera's noise.
-        routes: Class label to bin name.
+        routes: Class label to the bins that are right for it.
         emit: Tells the run what happens.
         options: How the run wants its cell.
         camera: Makes the camera.
@@ -53,16 +61,14 @@ class SimCell:
         config: CellConfig,
         *,
         seed: int,
-        routes: Mapping[str, str],
+        routes: Routes,
         emit: Emit,
         options: CellOptions,
         camera: Callable[..., SimCamera] = SimCamera,
         detectors: Callable[..., Mapping[str, ClosableDetector]] = build_detectors,
     ) -> None:
-        if config.localization != "plane":
-            raise InputError(
-                f'cell {config.cell}: localization "{config.localization}" is not available; use "plane"'
-            )
+        for _, sentence in _unknown_localization(config):
+            raise InputError(f"cell {config.cell}: {sentence}")
         spawn_seed, camera_seed = (int(s.generate_state(1)[0]) for s in np.random.SeedSequence(seed).spawn(2))
         self._config = config
         self._routes = dict(routes)
@@ -90,9 +96,7 @@ class SimCell:
             epoch=lambda: self._ledger.epoch,
         )
         self._detectors = detectors(config.detectors, camera=camera_config, clock=clock, base=options.base)
-        classes = {
-            label: ObjectClass(label, kind.height, kind.radius) for label, kind in config.objects.items()
-        }
+        classes = {label: as_class(label, kind) for label, kind in config.objects.items()}
 
         def decided(target: Target, bin: str) -> None:
             emit("decision", item=target.item, label=target.label, frame=target.frame, bin=bin)
@@ -117,9 +121,30 @@ class SimCell:
         )
 
     @staticmethod
-    def check(config: CellConfig) -> Iterable[tuple[KeyPath, str]]:
-        """Return what this kind of cell cannot do of a cell file: models it lacks, places out of reach."""
-        return (*missing_models(config), *out_of_reach(config))
+    def check(config: CellConfig, base: Path) -> Iterable[tuple[KeyPath, str]]:
+        """Return what this kind of cell cannot do of a cell file, with the key it is about.
+
+        Models and detectors it lacks, places out of reach, poses in collision or without a view.
+        """
+        missing = tuple(missing_models(config))
+        return (
+            *missing,
+            *_unknown_localization(config),
+            *wrong_detectors(config.detectors, base),
+            *out_of_reach(config),
+            # A world cannot be made without its models.
+            *(() if missing else unfit_poses(config)),
+        )
+
+    @staticmethod
+    def labels(config: CellConfig, base: Path) -> Mapping[str, tuple[str, ...] | None]:
+        """Return the classes that each detector knows, None where it does not say; loads no model."""
+        return known_labels(config.detectors, base)
+
+    @staticmethod
+    def least_times(config: CellConfig) -> SimLeastTimes:
+        """Return what things take at the very least."""
+        return SimLeastTimes(config)
 
     @property
     def cell(self) -> Cell:
@@ -155,3 +180,9 @@ class SimCell:
             detector.close()
         self._clearance.close()
         self._world.close()
+
+
+def _unknown_localization(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Yield its key and a sentence if a cell file wants objects localized in a way that is not there yet."""
+    if config.localization != "plane":
+        yield ("localization",), f'localization "{config.localization}" is not available; use "plane"'

@@ -33,6 +33,10 @@ class Approach(NamedTuple):
     distance: float
     allowed: float
 
+    def __str__(self) -> str:
+        how = f"{self.distance:.3f} m from" if self.distance >= 0 else f"{-self.distance:.3f} m into"
+        return f"{self.part} {how} {self.body}"
+
 
 class PathClearance:
     """Checks paths of the arm against table, bins and the arm itself.
@@ -40,10 +44,13 @@ class PathClearance:
     A motion may begin closer than the margin to something (the arm may have been stopped there, a held
     object lies on the table), but nowhere may it come closer than that. A held object, taken as an
     upright cylinder under the tool, may touch the table and a bin's floor, where it is picked and put.
+
+    Attributes:
+        world: Where it looks; the arm in it stands wherever it was asked about last.
     """
 
     def __init__(self, config: CellConfig) -> None:
-        self._world = World(config)
+        self.world = World(config, visuals=False)
         self._margin = config.motion.margin
         self._held: dict[ObjectClass, int] = {}
 
@@ -67,23 +74,27 @@ class PathClearance:
         """Return, at `q` `(7,)` [rad], every distance [m] shorter than the margin, by what is near what."""
         return {f"{near.part} - {near.body}": near.distance for near in self._near(q, carrying)}
 
+    def too_near(self, q: Array) -> Approach | None:
+        """Return what an empty arm at `q` `(7,)` [rad] brings nearest, if nearer than the margin, or None."""
+        nearest = min(self._near(q, None), key=lambda near: near.distance, default=None)
+        return nearest if nearest and nearest.distance < nearest.allowed - SLACK else None
+
     def close(self) -> None:
         """Give the planning world back."""
-        self._world.close()
+        self.world.close()
 
     def _text(self, near: Approach) -> str:
-        x, y, z = self._world.tool_pose().position
-        how = f"{near.distance:.3f} m from" if near.distance >= 0 else f"{-near.distance:.3f} m into"
+        x, y, z = self.world.tool_pose().position
         return (
-            f"the motion would bring {near.part} {how} {near.body}, with the tool at "
-            f"({x:.3f}, {y:.3f}, {z:.3f}) m; {self._margin:.3f} m must stay free"
+            f"the motion would bring {near}, with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m; "
+            f"{self._margin:.3f} m must stay free"
         )
 
     def _near(self, q: Array, carrying: ObjectClass | None) -> Iterator[Approach]:
         """Yield what is nearer than its margin at `q`."""
-        client, arm = self._world.client, self._world.arm
+        client, arm = self.world.client, self.world.arm
         client.resetJointStatesMultiDof(arm, range(7), [[angle] for angle in q])
-        bodies = {"the table": (self._world.table,), **self._world.bins}
+        bodies = {"the table": (self.world.table,), **self.world.bins}
         for name, parts in bodies.items():
             for body in parts:
                 for point in client.getClosestPoints(arm, body, self._margin):
@@ -98,24 +109,24 @@ class PathClearance:
 
     def _near_held(self, carrying: ObjectClass, bodies: Mapping[str, tuple[int, ...]]) -> Iterator[Approach]:
         held = self._body(carrying)
-        X_WH = self._world.tool_pose() @ Pose.of([0, 0, carrying.height / 2])
-        self._world.client.resetBasePositionAndOrientation(held, X_WH.position, X_WH.quaternion)
+        X_WH = self.world.tool_pose() @ Pose.of([0, 0, carrying.height / 2])
+        self.world.client.resetBasePositionAndOrientation(held, X_WH.position, X_WH.quaternion)
         part = f"the held {carrying.label}"
         for name, parts in bodies.items():
             for body in parts:
-                for point in self._world.client.getClosestPoints(held, body, self._margin):
+                for point in self.world.client.getClosestPoints(held, body, self._margin):
                     floor = self._floor(name) + BIN_THICKNESS
                     touchable = point[6][2] <= floor + 0.001
                     yield Approach(part, name, point[8], -self._margin if touchable else self._margin)
-        self._world.client.resetBasePositionAndOrientation(held, FAR_AWAY, [0, 0, 0, 1])
+        self.world.client.resetBasePositionAndOrientation(held, FAR_AWAY, [0, 0, 0, 1])
 
     def _floor(self, body: str) -> float:
-        bin = self._world.config.bins.get(body)
+        bin = self.world.config.bins.get(body)
         return bin.position[2] if bin else 0.0
 
     def _body(self, carrying: ObjectClass) -> int:
         if carrying not in self._held:
-            client = self._world.client
+            client = self.world.client
             shape = client.createCollisionShape(
                 pybullet.GEOM_CYLINDER, radius=carrying.radius, height=carrying.height
             )
@@ -123,4 +134,4 @@ class PathClearance:
         return self._held[carrying]
 
     def _part(self, link: int) -> str:
-        return "the tool" if link == self._world.tool else f"link {link + 1}"
+        return "the tool" if link == self.world.tool else f"link {link + 1}"

@@ -10,18 +10,18 @@ from executive.cell import Via
 from executive.cell_config import CellConfig
 from executive.errors import Unreachable
 from executive.geometry import Array
+from executive.layout import as_bin, travel_height
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
-from executive.sim.layout import as_bin, travel_height
 from executive.workcell import KeyPath
 
 
 def out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield a key of the cell file and a sentence for every place the tool has to go to and cannot.
 
-    Asked for are every drop slot of every bin and the safe place, at travel height and where a load is
-    let go, and every named pose within the joint limits.
+    Asked for are every drop slot of every bin and the safe place, from travel height down to where a load is
+    let go in one posture, and every named pose within the joint limits.
     """
     limits = JointLimits.of(config.arm.limits)
     planner = Planner(Kinematics(config.tool.length, limits.position), limits)
@@ -29,8 +29,7 @@ def out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
 
     def problem(place: Array, floor: float) -> str | None:
         try:
-            for height in (high, floor + load):
-                planner.require_reachable([Via(np.array([*place, height]))])
+            planner.require_reachable([Via(np.array([*place, height])) for height in (high, floor + load)])
         except Unreachable as error:
             return str(error)
         return None

@@ -40,6 +40,11 @@ BIN_THICKNESS = 0.005
 class World:
     """A PyBullet world with everything a cell file describes, arm at `home`, no objects yet.
 
+    Args:
+        config: The cell file.
+        gui: Show it in a window.
+        visuals: Load what is to be seen; without it a world is made in half the time, and no camera sees it.
+
     Attributes:
         client: The connection to the physics server.
         arm: Body of the arm, fixed at the origin.
@@ -54,20 +59,22 @@ class World:
     flange = 6
     tool = 7
 
-    def __init__(self, config: CellConfig, *, gui: bool = False) -> None:
+    def __init__(self, config: CellConfig, *, gui: bool = False, visuals: bool = True) -> None:
         self.config = config
         self.client = BulletClient(pybullet.GUI if gui else pybullet.DIRECT)
         self.client.setGravity(0, 0, -9.81)
         self.client.setTimeStep(STEP)
         self.client.setPhysicsEngineParameter(deterministicOverlappingPairs=1)
-        self.plane = self.client.loadURDF(str(find_model("plane.urdf")), [0, 0, -TABLE_HEIGHT])
+        flags = 0 if visuals else pybullet.URDF_IGNORE_VISUAL_SHAPES
+        self.plane = self.client.loadURDF(str(find_model("plane.urdf")), [0, 0, -TABLE_HEIGHT], flags=flags)
         self.table = self.client.loadURDF(
             str(find_model("table/table.urdf")),
             [*TABLE_CENTRE, -TABLE_HEIGHT],
             self.client.getQuaternionFromEuler([0, 0, np.pi / 2]),
             useFixedBase=True,
+            flags=flags,
         )
-        self.arm = self._load_arm()
+        self.arm = self._load_arm(flags)
         self.bins = {name: (add_bin(self.client, bin),) for name, bin in config.bins.items()}
         self.bodies: dict[int, str] = {}
         self.steps = 0
@@ -126,7 +133,7 @@ class World:
         """Give the physics server back; the world cannot be used afterwards."""
         self.client.disconnect()
 
-    def _load_arm(self) -> int:
+    def _load_arm(self, flags: int) -> int:
         """Load the arm with the tool as one more fixed link: no constraint whose error could drift.
 
         Bodies do not collide with themselves (PyBullet's default), so the tool never fights the wrist.
@@ -137,7 +144,7 @@ class World:
         with tempfile.TemporaryDirectory() as folder:
             generated = Path(folder) / "arm_with_tool.urdf"
             generated.write_text(text)
-            return int(self.client.loadURDF(str(generated), useFixedBase=True))
+            return int(self.client.loadURDF(str(generated), useFixedBase=True, flags=flags))
 
 
 def add_bin(client: BulletClient, bin: BinConfig) -> int:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from executive.cell import Cell, Routes
+from executive.cell import Cell, LeastTimes, Routes
 from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.events import Emit, ignore
@@ -16,14 +16,14 @@ from executive.geometry import Pose
 from executive.layout import as_bin, as_class, travel_height
 from executive.ledger.ledger import ItemLedger
 from executive.messages import Target
-from executive.mission.cell_file import load_cell
-from executive.mission.files import shipped_folder
+from executive.mission.parse.cell_file import load_cell
+from executive.mission.text.files import shipped_folder
 from executive.testing.fake_arm import FakeArm, FakeTool, named_poses, out_of_reach
 from executive.testing.fake_camera import FakeCamera, FakeDetector
 from executive.testing.fake_times import FakeTimes
 from executive.testing.fake_world import FakeClock, FakeWorld
 from executive.vision.localize import PlaneLocalizer
-from executive.workcell import CellOptions, KeyPath, LeastTimes
+from executive.workcell import CellOptions, KeyPath
 
 ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
 """Where the classes of the shipped cells go."""

@@ -12,7 +12,7 @@ from executive.testing.fake_world import TOUCH
 
 
 class FakeTimes:
-    """The fake arm's straight ways at its one speed; implements `executive.workcell.LeastTimes`."""
+    """The fake arm's straight ways at its one speed; implements `executive.cell.LeastTimes`."""
 
     def __init__(self, config: CellConfig) -> None:
         self._config = config

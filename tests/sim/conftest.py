@@ -6,16 +6,16 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-import yaml
 
 from executive.cell_config import CellConfig
+from executive.mission.parse.cell_file import load_cell
 from executive.sim.world import World
 
 
 def shipped_cell(name: str) -> CellConfig:
     """Return the shipped cell file of that name."""
     path = Path(__file__).parents[2] / "missions" / "cells" / f"{name}.yaml"
-    return CellConfig.model_validate(yaml.safe_load(path.read_text()))
+    return load_cell(path)
 
 
 @pytest.fixture(scope="session")

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pybullet
 import pytest
-import yaml
 
 from executive.cell import Via
 from executive.cell_config import CellConfig
 from executive.errors import Blocked
 from executive.geometry import tool_down
 from executive.messages import ObjectClass
+from executive.mission.parse.cell_file import load_cell
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
@@ -24,7 +24,7 @@ DUCK = ObjectClass("duck", 0.05, 0.04)
 
 @pytest.fixture(scope="module")
 def config(missions: Path) -> CellConfig:
-    return CellConfig(**yaml.safe_load((missions / "cells" / "overhead.yaml").read_text(encoding="utf-8")))
+    return load_cell(missions / "cells" / "overhead.yaml")
 
 
 @pytest.fixture(scope="module")
@@ -132,8 +132,8 @@ def test_the_arm_at_home_hides_nothing_of_the_workspace_from_the_fixed_camera(co
 
 @pytest.mark.parametrize("cell", ["overhead", "wrist"])
 def test_home_is_three_centimetres_clear_of_everything(missions: Path, cell: str) -> None:
-    text = (missions / "cells" / f"{cell}.yaml").read_text(encoding="utf-8")
-    config = CellConfig(**{**yaml.safe_load(text), "motion": {"margin": 0.03}})
+    config = load_cell(missions / "cells" / f"{cell}.yaml")
+    config = config.model_copy(update={"motion": config.motion.model_copy(update={"margin": 0.03})})
     clearance = PathClearance(config)
     near = clearance.distances(np.radians(config.arm.poses_deg["home"]))
     assert set(near) <= {"link 5 - link 7"}, near  # their usual distance is 29 mm

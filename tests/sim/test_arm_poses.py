@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from executive.cell import Via
-from executive.mission.cell_file import load_cell
+from executive.layout import as_bin, travel_height
+from executive.mission.parse.cell_file import load_cell
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
 from executive.sim.arm import SimArm
 from executive.sim.clearance import PathClearance
-from executive.sim.layout import as_bin, travel_height
 from executive.sim.world import World
 
 

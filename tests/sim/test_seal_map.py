@@ -4,16 +4,16 @@ import math
 from pathlib import Path
 
 import pytest
-import yaml
 
 from executive.cell_config import CellConfig
+from executive.mission.parse.cell_file import load_cell
 from executive.sim.seal_map import Row, measure_map, read_map, write_map
 
 CELLS = Path(__file__).parents[2] / "missions" / "cells"
 
 
 def cell(name: str = "overhead") -> CellConfig:
-    return CellConfig(**yaml.safe_load((CELLS / f"{name}.yaml").read_text(encoding="utf-8")))
+    return load_cell(CELLS / f"{name}.yaml")
 
 
 def rows_by_key(rows: list[Row]) -> dict[tuple[str, float, float], Row]:

@@ -14,7 +14,7 @@ from executive.errors import InputError
 from executive.events import ignore
 from executive.geometry import Pose
 from executive.messages import Detections
-from executive.mission.cell_file import load_cell
+from executive.mission.parse.cell_file import load_cell
 from executive.sim.cell import SimCell
 from executive.testing.fake_cell import ROUTES, SilentOperator
 from executive.testing.oracle import oracle_cell
@@ -86,11 +86,11 @@ def test_the_audit_counts_every_body_once_by_where_it_really_is(build_cell: Buil
     assert made.audit() == {"right": 0, "wrong_bin": 0, "left": 4, "elsewhere": 0, "unseen": 0}
 
     one, two, three, _ = made._world.bodies
-    home = made.cell.bins[ROUTES[made._world.bodies[one]]].position
+    home = made.cell.bins[ROUTES[made._world.bodies[one]][0]].position
     put(made, one, (home[0] + 0.05, home[1] - 0.05, 0.04))
     assert made.audit() == {"right": 1, "wrong_bin": 0, "left": 3, "elsewhere": 0, "unseen": 0}
 
-    strange = next(b for n, b in made.cell.bins.items() if n != ROUTES[made._world.bodies[two]]).position
+    strange = next(b for n, b in made.cell.bins.items() if n not in ROUTES[made._world.bodies[two]]).position
     put(made, two, (strange[0], strange[1] + 0.03, 0.04))
     assert made.audit() == {"right": 1, "wrong_bin": 1, "left": 2, "elsewhere": 0, "unseen": 0}
 

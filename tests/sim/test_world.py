@@ -9,7 +9,7 @@ import pytest
 from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.geometry import Pose, about_z, tool_down
-from executive.mission.cell_file import load_cell
+from executive.mission.parse.cell_file import load_cell
 from executive.sim.cell import SimCell
 from executive.sim.models import find_model, load_mesh
 from executive.sim.spawn import spawn
@@ -97,7 +97,7 @@ def test_a_model_that_is_nowhere_is_named() -> None:
 def test_a_missing_model_is_found_before_anything_is_loaded(missions: Path) -> None:
     overrides = {"cell.objects.duck.urdf": "unicorn.urdf"}
     config = load_cell(missions / "cells" / "overhead.yaml", overrides)
-    assert list(SimCell.check(config)) == [
+    assert list(SimCell.check(config, missions / "cells")) == [
         (
             ("objects", "duck", "urdf"),
             "there is no model unicorn.urdf, neither beside the cell file nor in pybullet_data",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from executive.mission.cell_file import load_cell
+from executive.mission.parse.cell_file import load_cell
 from executive.sim.scenes import SceneRenderer
 from executive.vision.detectors.embedded import LABELS, MODEL, WEIGHTS
 from executive.vision.detectors.onnx_model import OnnxModel, read_labels

@@ -13,6 +13,7 @@ from executive.vision.detectors.embedded import LABELS, MODEL, EmbeddedDetector
 from executive.vision.detectors.rfdetr import RfdetrDetector
 
 TABLE = (192, 100, 448, 356)
+ONNX = str(MODEL)
 
 
 class Clock:
@@ -86,7 +87,6 @@ def test_the_full_view_finds_an_object_anywhere_exactly_once(left, top):
 
 def test_the_class_map_renames_what_the_model_says():
     detector = detector_around(BrightSpots(256), {"spot": "cube"})
-    assert detector.labels == ("cube",)
     (found,) = search(detector, frame_with_spot(300, 200), "table")
     assert found.label == "cube"
 
@@ -98,43 +98,72 @@ def camera():
     )  # fmt: skip
 
 
+def configured(kind, **options):
+    return DetectorConfig(kind=kind.__name__, **options)
+
+
 def build(kind, base, **options):
-    config = DetectorConfig(kind=kind.__name__, **options)
-    return kind.from_config(config, camera=camera(), clock=Clock(), base=base)
+    return kind.from_config(configured(kind, **options), camera=camera(), clock=Clock(), base=base)
 
 
 def test_any_exported_model_can_be_used_by_path(tmp_path):
     (tmp_path / "model.onnx").symlink_to(MODEL)
     (tmp_path / "names.txt").write_text("one\ntwo\nthree\n")
-    detector = build(
-        RfdetrDetector, tmp_path, model_path="model.onnx", labels="names.txt", class_map={"one": "cube"}
-    )
+    detector = build(RfdetrDetector, tmp_path, model_path="model.onnx", labels="names.txt", threshold=0.6)
     detector.close()
-    assert detector.labels == ("cube", "two", "three")
+    assert detector.threshold == 0.6
 
 
-def test_the_embedded_detector_needs_no_options_and_knows_its_labels(tmp_path):
+def test_the_embedded_detector_needs_no_options(tmp_path):
     detector = build(EmbeddedDetector, tmp_path, threshold=0.6)
     detector.close()
     assert detector.threshold == 0.6
-    assert detector.labels == tuple(LABELS.read_text().split())
 
 
-@pytest.mark.parametrize(
-    ("kind", "options", "text"),
-    [
-        (RfdetrDetector, {"labels": ["a"]}, 'option "model_path".*field required'),
-        (RfdetrDetector, {"model_path": "m", "labels": ["a"], "colour": 1}, 'option "colour".*not permitted'),
-        (RfdetrDetector, {"model_path": "m.onnx", "labels": ["a"]}, "no model file .*m.onnx"),
-        (RfdetrDetector, {"model_path": "m.onnx", "labels": "no.txt"}, "no label file .*no.txt"),
-        (
-            RfdetrDetector,
-            {"model_path": "m.onnx", "labels": ["a"], "class_map": {"b": "cube"}},
-            "class_map .* names b, which the model does not know; it knows a",
-        ),
-        (EmbeddedDetector, {"model_path": "m.onnx"}, 'option "model_path".*its options: none'),
-    ],
-)
-def test_wrong_options_are_said_in_a_sentence(tmp_path, kind, options, text):
-    with pytest.raises(InputError, match=text):
+WRONG = [
+    (RfdetrDetector, {"labels": ["a"]}, "model_path", 'option "model_path".*field required'),
+    (RfdetrDetector, {"model_path": ONNX, "labels": 3}, "labels", 'option "labels.*" .* valid'),
+    (RfdetrDetector, {"model_path": ONNX, "labels": ["a"], "c": 1}, "c", 'option "c".*not permitted'),
+    (RfdetrDetector, {"model_path": "m.onnx", "labels": ["a"]}, "model_path", "no model file .*m.onnx"),
+    (RfdetrDetector, {"model_path": ONNX, "labels": "no.txt"}, "labels", "no label file .*no.txt"),
+    (RfdetrDetector, {"model_path": ONNX, "labels": "empty.txt"}, "labels", "empty.txt is empty"),
+    (RfdetrDetector, {"model_path": ONNX, "labels": ONNX}, "labels", "embedded.onnx cannot be read: .*utf-8"),
+    (
+        RfdetrDetector,
+        {"model_path": ONNX, "labels": ["a"], "class_map": {"b": "cube"}},
+        "class_map",
+        "class_map .* names b, which the model does not know; it knows a",
+    ),
+    (EmbeddedDetector, {"model_path": ONNX}, "model_path", 'option "model_path".*its options: none'),
+]
+
+
+@pytest.mark.parametrize(("kind", "options", "option", "text"), WRONG)
+def test_a_wrong_option_is_said_in_a_sentence_before_and_at_the_start(tmp_path, kind, options, option, text):
+    (tmp_path / "empty.txt").touch()
+    ((found, sentence),) = kind.check(configured(kind, **options), tmp_path)
+    assert found == option
+    with pytest.raises(InputError, match=text) as caught:
         build(kind, tmp_path, **options)
+    assert str(caught.value) == sentence
+
+
+def test_every_wrong_option_is_found_at_once(tmp_path):
+    config = configured(RfdetrDetector, colour=1, threads=0, model_path="m.onnx", labels=["a"])
+    assert [option for option, _ in RfdetrDetector.check(config, tmp_path)] == ["threads", "colour"]
+    config = configured(RfdetrDetector, model_path="m.onnx", labels="no.txt")
+    assert [option for option, _ in RfdetrDetector.check(config, tmp_path)] == ["model_path", "labels"]
+
+
+def test_the_labels_are_the_cells_names_and_no_model_is_read_for_them(tmp_path):
+    (tmp_path / "names.txt").write_text("one\ntwo\n")
+    options = {"model_path": "missing.onnx", "labels": "names.txt", "class_map": {"one": "cube"}}
+    assert RfdetrDetector.labels(configured(RfdetrDetector, **options), tmp_path) == ("cube", "two")
+    assert EmbeddedDetector.labels(configured(EmbeddedDetector), tmp_path) == tuple(
+        LABELS.read_text().split()
+    )
+
+
+@pytest.mark.parametrize("options", [{}, {"model_path": "m.onnx", "labels": "no.txt"}])
+def test_labels_that_the_options_do_not_say_are_not_known(tmp_path, options):
+    assert RfdetrDetector.labels(configured(RfdetrDetector, **options), tmp_path) is None

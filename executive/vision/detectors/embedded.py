@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 from executive.cell import Clock
 from executive.cell_config import CameraConfig, DetectorConfig, Section
 from executive.vision.detectors.onnx_model import OnnxModel, read_labels
-from executive.vision.detectors.rfdetr import RfdetrDetector, read_options
+from executive.vision.detectors.options import read_options, wrong_options
+from executive.vision.detectors.rfdetr import RfdetrDetector
 
 WEIGHTS = Path(__file__).parent.parent / "weights"
 MODEL = WEIGHTS / "embedded.onnx"
@@ -33,3 +35,15 @@ class EmbeddedDetector(RfdetrDetector):
         del base
         read_options(EmbeddedOptions, config)
         return cls(OnnxModel(MODEL, read_labels(LABELS)), config, table_view=camera.table_view, clock=clock)
+
+    @staticmethod
+    def check(config: DetectorConfig, base: Path) -> Iterator[tuple[str, str]]:
+        """Yield every option that was given, with a sentence: there are none."""
+        del base
+        yield from wrong_options(EmbeddedOptions, config)
+
+    @staticmethod
+    def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
+        """Return the classes that the shipped weights were trained on."""
+        del config, base
+        return read_labels(LABELS)

@@ -42,7 +42,7 @@ class OnnxModel:
         import onnxruntime
 
         if not path.is_file():
-            raise InputError(f"there is no model file {path}; check the path, relative to the cell file")
+            raise InputError(no_model(path))
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = threads
         options.inter_op_num_threads = 1
@@ -122,15 +122,24 @@ def without_duplicates(found: Sequence[Detection]) -> list[Detection]:
     return kept
 
 
+def no_model(path: Path) -> str:
+    """Return the sentence about a model file that is not there."""
+    return f"there is no model file {path}; check the path, relative to the cell file"
+
+
 def read_labels(path: Path) -> tuple[str, ...]:
     """Return the class names in a text file, one a line.
 
     Raises:
-        InputError: The file does not exist or is empty.
+        InputError: The file does not exist, is no text, or is empty.
     """
     if not path.is_file():
         raise InputError(f"there is no label file {path}; it has one class name a line, in the model's order")
-    names = tuple(line.strip() for line in path.read_text(encoding="utf-8").splitlines() if line.strip())
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"the label file {path} cannot be read: {error}") from error
+    names = tuple(line.strip() for line in lines if line.strip())
     if not names:
         raise InputError(f"the label file {path} is empty; it has one class name a line")
     return names

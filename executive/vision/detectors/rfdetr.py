@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TypeVar
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from executive.cell import Clock
 from executive.cell_config import CameraConfig, DetectorConfig, Section
 from executive.errors import InputError
 from executive.messages import Detection, Frame
-from executive.vision.detectors.onnx_model import OnnxModel, read_labels
+from executive.vision.detectors.onnx_model import OnnxModel, no_model, read_labels
+from executive.vision.detectors.options import read_options, wrong_options
 from executive.vision.detectors.requests import Pending, Worker
 from executive.vision.detectors.views import Finding, Part, merge, parts_of
-
-OptionsT = TypeVar("OptionsT", bound=Section)
 
 
 class RfdetrOptions(Section):
@@ -33,6 +31,14 @@ class RfdetrOptions(Section):
     """From the model's class names to the cell's, where they differ."""
     threads: int = Field(2, ge=1)
     """Threads one inference may use."""
+
+    def names(self, base: Path) -> tuple[str, ...]:
+        """Return the model's class names; `base` is the folder that paths start from.
+
+        Raises:
+            InputError: The file they stand in cannot be read.
+        """
+        return read_labels(base / self.labels) if isinstance(self.labels, str) else self.labels
 
 
 class RfdetrDetector:
@@ -77,27 +83,51 @@ class RfdetrDetector:
         Raises:
             InputError: An option is missing, unknown or wrong, or the model cannot be read.
         """
+        for _, sentence in cls.check(config, base):
+            raise InputError(sentence)
         options = read_options(RfdetrOptions, config)
-        labels = options.labels
-        names = read_labels(base / labels) if isinstance(labels, str) else labels
+        model = OnnxModel(base / options.model_path, options.names(base), options.threads)
+        return cls(model, config, table_view=camera.table_view, clock=clock, class_map=options.class_map)
+
+    @staticmethod
+    def check(config: DetectorConfig, base: Path) -> Iterator[tuple[str, str]]:
+        """Yield every option because of which the detector could not be built, with a sentence.
+
+        The model is not loaded.
+        """
+        try:
+            options = read_options(RfdetrOptions, config)
+        except InputError:
+            yield from wrong_options(RfdetrOptions, config)
+            return
+        if not (base / options.model_path).is_file():
+            yield "model_path", no_model(base / options.model_path)
+        try:
+            names = options.names(base)
+        except InputError as error:
+            yield "labels", str(error)
+            return
         strangers = [name for name in options.class_map if name not in names]
         if strangers:
-            raise InputError(
+            yield (
+                "class_map",
                 f"class_map of a detector of kind {config.kind} names {', '.join(strangers)}, which "
-                f"the model does not know; it knows {', '.join(names)}"
+                f"the model does not know; it knows {', '.join(names)}",
             )
-        model = OnnxModel(base / options.model_path, names, options.threads)
-        return cls(model, config, table_view=camera.table_view, clock=clock, class_map=options.class_map)
+
+    @staticmethod
+    def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
+        """Return the classes it finds, by the cell's names; None where its options do not say."""
+        try:
+            options = read_options(RfdetrOptions, config)
+            return tuple(options.class_map.get(name, name) for name in options.names(base))
+        except InputError:
+            return None
 
     @property
     def threshold(self) -> float:
         """Confidence from which a detection counts."""
         return self._config.threshold
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """The classes it can find, by the cell's names."""
-        return tuple(self._class_map.get(label, label) for label in self._model.labels)
 
     def request(self, frame: Frame, view: str) -> Pending:
         """Start to search `frame`: the `table` part or the `full` image."""
@@ -133,21 +163,3 @@ class RfdetrDetector:
             label = self._class_map.get(detection.label, detection.label)
             found.append(Detection(label, detection.confidence, box))
         return found
-
-
-def read_options(options: type[OptionsT], config: DetectorConfig) -> OptionsT:
-    """Return the options of a kind of detector, checked.
-
-    Raises:
-        InputError: An option is missing, unknown or wrong.
-    """
-    try:
-        return options.model_validate(config.options)
-    except ValidationError as error:
-        first = error.errors()[0]
-        name = ".".join(str(part) for part in first["loc"])
-        known = ", ".join(options.model_fields) or "none"
-        raise InputError(
-            f'option "{name}" of a detector of kind {config.kind}: {first["msg"].lower()}; '
-            f"its options: {known}"
-        ) from None

@@ -1,0 +1,62 @@
+"""Named poses that the arm must not take or that are of no use to the camera, found before anything moves."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+
+import numpy as np
+import pybullet
+
+from executive.cell_config import CellConfig
+from executive.motion.kinematics import Kinematics
+from executive.motion.limits import JointLimits
+from executive.motion.planner import Planner
+from executive.sim.arm import SimArm
+from executive.sim.camera import camera_pose
+from executive.sim.clearance import PathClearance
+from executive.sim.view import ArmShadow
+from executive.sim.world import World
+from executive.vision.camera_model import camera_matrix
+from executive.workcell import KeyPath
+
+
+def unfit_poses(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Yield a key of the cell file and a sentence for every pose that cannot serve.
+
+    No named pose may bring arm or tool nearer to table, bins or the arm itself than the margin, for there
+    is no motion to it then; and from every scan pose the camera must see the whole workspace.
+    """
+    try:
+        clearance = PathClearance(config)
+    except pybullet.error as error:
+        yield ("arm", "urdf"), f"the model {config.arm.urdf} cannot be loaded as an iiwa 14: {error}"
+        return
+    with contextlib.closing(clearance):
+        for name, pose in config.arm.poses_deg.items():
+            near = clearance.too_near(np.radians(pose))
+            if near:
+                yield (
+                    ("arm", "poses_deg", name),
+                    f'the pose "{name}" brings {near}; {config.motion.margin:.3f} m must stay free',
+                )
+        yield from _blind_poses(config, clearance.world)
+
+
+def _blind_poses(config: CellConfig, world: World) -> Iterator[tuple[KeyPath, str]]:
+    """Yield the scan poses from which a camera does not see the whole workspace."""
+    limits = JointLimits.of(config.arm.limits)
+    kinematics = Kinematics(config.tool.length, limits.position)
+    shadow = ArmShadow(SimArm(world, Planner(kinematics, limits), limits, config.arm), kinematics, config)
+    for name, camera in config.cameras.items():
+        matrix = camera_matrix(camera.width, camera.height, camera.fov_deg)
+        for index, pose in enumerate(camera.scan_poses):
+            if pose not in config.arm.poses_deg:
+                continue
+            world.set_arm(np.radians(config.arm.poses_deg[pose]))
+            if not shadow.sees_table(matrix, camera_pose(world, camera), (camera.width, camera.height)):
+                yield (
+                    ("cameras", name, "scan_poses", index),
+                    f'from the pose "{pose}" the camera {name} does not see the whole workspace: a part '
+                    "of it is outside of the image or behind the arm",
+                )

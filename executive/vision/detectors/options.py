@@ -1,0 +1,44 @@
+"""What only one kind of detector needs to know: the further keys of its section of a cell file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TypeVar
+
+from pydantic import ValidationError
+
+from executive.cell_config import DetectorConfig, Section
+from executive.errors import InputError
+
+OptionsT = TypeVar("OptionsT", bound=Section)
+
+
+def wrong_options(options: type[Section], config: DetectorConfig) -> Iterator[tuple[str, str]]:
+    """Yield every option of a kind of detector that is missing, unknown or wrong, with a sentence."""
+    try:
+        options.model_validate(config.options)
+    except ValidationError as error:
+        known = ", ".join(options.model_fields) or "none"
+        told = set()
+        for problem in error.errors():
+            option = str(problem["loc"][0])
+            if option in told:  # A value that is of none of several types has an error for each.
+                continue
+            told.add(option)
+            place = ".".join(str(part) for part in problem["loc"])
+            yield (
+                option,
+                f'option "{place}" of a detector of kind {config.kind}: {problem["msg"].lower()}; '
+                f"its options: {known}",
+            )
+
+
+def read_options(options: type[OptionsT], config: DetectorConfig) -> OptionsT:
+    """Return the options of a kind of detector, checked.
+
+    Raises:
+        InputError: An option is missing, unknown or wrong.
+    """
+    for _, sentence in wrong_options(options, config):
+        raise InputError(sentence)
+    return options.model_validate(config.options)
