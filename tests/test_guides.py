@@ -2,40 +2,175 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import re
 import sys
 from pathlib import Path
 from types import ModuleType
 
+import jsonschema
 import numpy as np
 import pytest
+from click.testing import CliRunner
+from guide_blocks import AUTHORS, GUIDES, ROOT, blocks, files, in_code, read, rows, shown, transcripts
 
+from executive.cli.main import main
+from executive.events import Event
 from executive.messages import Target
-from executive.mission.load import load_mission
-from executive.runtime.cells import robot_check
+from executive.mission.findings import MissionError
+from executive.mission.load import LoadedMission, load_mission
+from executive.mission.model import grammar
+from executive.mission.schema.files import mission_schema
+from executive.mission.source import Source
+from executive.mission.text.files import shipped_missions
+from executive.mission.text.yaml_text import parse_yaml, plain
+from executive.record.result import EXIT_CODES
+from executive.runtime.cells import cell_kind
+from executive.runtime.run import Run
 from executive.skill import discover
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 
-ROOT = Path(__file__).parent.parent
-GUIDES = ("README.md", "missions/README.md", "skills/README.md")
+LONGEST = 300.0
+"""Time on the run's clock within which every mission shown is done on the fake cell [s]."""
+
+CELL_NAMES = ("bin", "class", "detector", "pose")
+"""What a mission takes from its cell by name; there is a code `unknown-...` for each."""
+
+FILES = files()
+MISSIONS = [name for name, file in FILES.items() if "/" not in name and not file.block.is_mistake]
+MISTAKES = [name for name, file in FILES.items() if file.block.is_mistake]
+TRANSCRIPTS = [pytest.param(words, printed, id=where) for where, words, printed in transcripts()]
+PYTHON = [pytest.param(block.text, id=block.where) for block in shown("python")]
 
 
-def blocks(language: str) -> list[tuple[str, str]]:
-    """Return the fenced blocks of a language in all guides, each with where it stands."""
-    found = []
-    for guide in GUIDES:
-        text = (ROOT / guide).read_text(encoding="utf-8")
-        for match in re.finditer(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL):
-            line = text.count("\n", 0, match.start()) + 1
-            found.append((f"{guide}:{line}", match[1]))
-    return found
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder to work in, with every file that the author's guide shows."""
+    monkeypatch.chdir(tmp_path)
+    for name, file in FILES.items():
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(file.text, encoding="utf-8")
+    return tmp_path
 
 
-def shown(language: str) -> pytest.MarkDecorator:
-    """Parametrize a test with the text of every block of a language."""
-    return pytest.mark.parametrize("text", [pytest.param(text, id=where) for where, text in blocks(language)])
+def in_time(event: Event) -> None:
+    """Observe a run that must come to an end."""
+    assert event.clock < LONGEST, "it does not come to an end"
+
+
+def assert_does_its_work(loaded: LoadedMission) -> None:
+    assert loaded.warnings == ()
+    run = Run(loaded, discover(), seed=0, kind=FakeCell, requests=[*loaded.routes], observers=[in_time])
+    try:
+        outcome = run.execute()
+        assert (outcome.status, outcome.message) == ("SUCCESS", "")
+        items = run.items()
+        assert items["lost"] == 0
+        # Whoever says where things go brings at least one of them there.
+        assert items["placed"] >= bool(loaded.routes)
+    finally:
+        run.close()
+
+
+@pytest.mark.parametrize("name", MISSIONS)
+def test_every_mission_of_the_authors_guide_does_its_work(name: str, folder: Path) -> None:
+    assert_does_its_work(load_mission(name, discover(), kinds=cell_kind))
+
+
+def test_the_mission_on_the_front_page_does_its_work(tmp_path: Path) -> None:
+    (block,) = (block for block in blocks("README.md") if block.language == "yaml")
+    path = tmp_path / "shown.yaml"
+    path.write_text(block.text, encoding="utf-8")
+    assert_does_its_work(load_mission(path, discover(), kinds=cell_kind))
+
+
+@pytest.mark.parametrize("name", MISSIONS)
+def test_an_editor_marks_nothing_in_the_missions_of_the_authors_guide(name: str) -> None:
+    root, _ = parse_yaml(Source(name, FILES[name].text))
+    assert root is not None
+    jsonschema.validate(plain(root), mission_schema(discover()))
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_every_mistake_of_the_authors_guide_is_found(name: str, folder: Path) -> None:
+    with pytest.raises(MissionError):
+        load_mission(name, discover(), kinds=cell_kind)
+
+
+@pytest.mark.parametrize(("words", "printed"), TRANSCRIPTS)
+def test_every_command_of_the_authors_guide_prints_what_is_shown(
+    words: list[str], printed: str, folder: Path
+) -> None:
+    assert lasting(CliRunner().invoke(main, words).output) == lasting(printed)
+
+
+def lasting(printed: str) -> str:
+    """Return what is printed without what is different every time."""
+    printed = re.sub(r"[\d.]+ s by the wall clock", "... by the wall clock", printed)
+    return re.sub(r"runs/\S+", "runs/...", printed).rstrip()
+
+
+def test_every_library_and_cell_of_the_authors_guide_is_used_by_a_mission_of_it() -> None:
+    missions = "".join(FILES[name].text for name in MISSIONS)
+    assert [name for name in FILES if "/" in name and name not in missions] == []
+
+
+def test_the_authors_guide_tells_every_code_of_a_finding_and_no_other() -> None:
+    told = [code for cell in rows("## 10. What `executive check` finds") for code in in_code(cell)]
+    assert len(told) == len(set(told))
+    assert set(told) == {
+        code
+        for path in (ROOT / "executive" / "mission").rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for code in codes_of(node)
+    }
+
+
+def codes_of(node: ast.AST) -> set[str]:
+    """Return the codes of findings in a piece of a program: words with a hyphen, or second in a call."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return set(re.findall(r"^[a-z]+(?:-[a-z]+)+$", node.value))
+    if isinstance(node, ast.JoinedStr) and ast.unparse(node).startswith("f'unknown-{"):
+        return {f"unknown-{name}" for name in CELL_NAMES}
+    if isinstance(node, ast.Call) and len(node.args) >= 3 and isinstance(node.args[1], ast.Constant):
+        called = ast.unparse(node.func).rpartition(".")[2].lstrip("_")
+        return {str(node.args[1].value)} if called in ("error", "warning", "refuse", "finding") else set()
+    return set()
+
+
+@pytest.mark.parametrize("word", grammar.CONTROL)
+def test_the_authors_guide_names_every_key_of_a_control_node(word: str) -> None:
+    form = grammar.CONTROL[word]
+    keys, *_ = rows("### Control nodes")[f"`{word}`"]
+    assert set(in_code(keys)) == {*form.keys, *form.partners}
+
+
+def test_the_authors_guide_names_every_control_node_and_no_other() -> None:
+    assert {word for cell in rows("### Control nodes") for word in in_code(cell)} == set(grammar.CONTROL)
+
+
+def test_the_authors_guide_names_every_other_key_of_a_file() -> None:
+    mappings = {
+        "a mission": grammar.MISSION,
+        "a library": grammar.LIBRARY,
+        "a subtree": grammar.SUBTREE,
+        "a param": grammar.PARAM,
+        "an item of `catch`": grammar.CATCH,
+        "`backoff`": grammar.BACKOFF,
+    }
+    told = rows("### Keys")
+    assert {name: in_code(told[name][0]) for name in mappings} == {
+        name: list(keys) for name, keys in mappings.items()
+    }
+
+
+def test_the_authors_guide_names_every_shipped_mission_and_exit_code() -> None:
+    assert [word for cell in rows("### Shipped missions") for word in in_code(cell)] == shipped_missions()
+    told = read(AUTHORS).partition("### Exit codes\n")[2].partition("###")[0]
+    assert {int(code) for code in re.findall(r"\d+", told)} == {2, *EXIT_CODES.values()}
 
 
 def module_of(text: str, path: Path) -> ModuleType:
@@ -57,14 +192,7 @@ def module_of(text: str, path: Path) -> ModuleType:
     return module
 
 
-@shown("yaml")
-def test_every_mission_shown_can_be_run(text: str, tmp_path: Path) -> None:
-    path = tmp_path / "shown.yaml"
-    path.write_text(text, encoding="utf-8")
-    assert load_mission(path, discover(), robot_check=robot_check).warnings == ()
-
-
-@shown("python")
+@pytest.mark.parametrize("text", PYTHON)
 def test_every_piece_of_python_shown_runs_with_its_tests(text: str, tmp_path: Path) -> None:
     module = module_of(text, tmp_path / "shown.py")
     for name, member in list(vars(module).items()):
@@ -73,12 +201,13 @@ def test_every_piece_of_python_shown_runs_with_its_tests(text: str, tmp_path: Pa
 
 
 def test_the_guides_show_missions_and_skills() -> None:
-    assert len(blocks("yaml")) >= 2
-    assert len(blocks("python")) >= 3
+    assert len(MISSIONS) >= 15
+    assert len(MISTAKES) >= 3
+    assert len(PYTHON) >= 3
 
 
 def test_the_skill_to_copy_works(fake: FakeCell, tmp_path: Path) -> None:
-    (text,) = (text for _, text in blocks("python") if "class PointAt" in text)
+    (text,) = (block.text for block in shown("python") if "class PointAt" in block.text)
     skill = module_of(text, tmp_path / "point_at.py").PointAt
     target = Target("cube-1", "cube", np.array([0.5, 0.1, 0.025]), 0.9, 1, 0, 0.0)
     assert run_skill(skill(target=target, height=0.03), fake).status == "SUCCESS"
@@ -88,7 +217,7 @@ def test_the_skill_to_copy_works(fake: FakeCell, tmp_path: Path) -> None:
 
 
 def test_the_skill_on_the_front_page_declares_what_the_shipped_one_does(tmp_path: Path) -> None:
-    (text,) = (text for _, text in blocks("python") if "class Grasp" in text)
+    (text,) = (block.text for block in shown("python") if "class Grasp" in block.text)
     shown_skill, shipped = module_of(text, tmp_path / "grasp.py").Grasp, discover()["Grasp"]
     assert (shown_skill.params, shown_skill.reasons) == (shipped.params, shipped.reasons)
     assert list(shown_skill.ports) == list(shipped.ports)
@@ -96,7 +225,7 @@ def test_the_skill_on_the_front_page_declares_what_the_shipped_one_does(tmp_path
 
 def test_every_file_and_folder_that_a_guide_links_to_exists() -> None:
     for guide in (*GUIDES, "executive/README.md", "CONTRIBUTING.md"):
-        path = ROOT / guide
-        links = re.findall(r"\]\(([^)#]+)\)", path.read_text(encoding="utf-8"))
-        missing = [link for link in links if "://" not in link and not (path.parent / link).exists()]
+        folder = (ROOT / guide).parent
+        links = re.findall(r"\]\(([^)#]+)\)", read(guide))
+        missing = [link for link in links if "://" not in link and not (folder / link).exists()]
         assert not [link for link in missing if not link.endswith(".png")], guide

@@ -16,7 +16,7 @@ def load_cells(names: tuple[str, ...]) -> dict[str, CellConfig]:
         InputError: There is no such cell, two have one name, or something is wrong with a file.
     """
     from executive.errors import InputError
-    from executive.mission.cell_file import load_cell
+    from executive.mission.parse.cell_file import load_cell
 
     cells: dict[str, CellConfig] = {}
     for name in names:
@@ -34,8 +34,8 @@ def find_cell(name: str) -> Path:
         InputError: There is none.
     """
     from executive.errors import InputError
-    from executive.mission.files import shipped_folder
     from executive.mission.findings import alternatives
+    from executive.mission.text.files import shipped_folder
 
     path = Path(name)
     if path.is_file():

@@ -17,8 +17,8 @@ def command(file: str | None) -> None:
     it to every editor with the YAML language server.
     """
     with stdout_kept_clean():
-        from executive.mission.schema import library_schema, mission_schema
-        from executive.mission.schema_types import cell_schema
+        from executive.mission.schema.files import library_schema, mission_schema
+        from executive.mission.schema.types import cell_schema
         from executive.skill import discover
 
         if file == "cell":

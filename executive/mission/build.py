@@ -24,11 +24,11 @@ from executive.control.succeed import Succeed
 from executive.control.timeout import Timeout
 from executive.control.while_loop import While
 from executive.events import Emit
-from executive.mission import nodes
 from executive.mission.load import LoadedMission
-from executive.mission.typed import convert
-from executive.mission.values import Match
-from executive.mission.wiring import literals, wires
+from executive.mission.model import nodes
+from executive.mission.model.typed import convert
+from executive.mission.model.values import Match
+from executive.mission.model.wiring import literals, wires
 from executive.skill import Direction, Param, Port, Skill
 
 TreeNode = ControlNode | SkillNode

@@ -9,16 +9,16 @@ from typing import Any
 
 from executive.cell_config import CellConfig
 from executive.errors import InputError
-from executive.mission.case import Case
-from executive.mission.check import check
-from executive.mission.endings import Ending, endings
-from executive.mission.expand import expand
-from executive.mission.files import find_mission
+from executive.mission.check.case import Case
+from executive.mission.check.checks import check
+from executive.mission.expand.expand import expand
 from executive.mission.findings import Finding, MissionError, in_file_order
-from executive.mission.model import Mission
-from executive.mission.nodes import Node
-from executive.mission.paths import with_paths
-from executive.mission.read_mission import MissionFiles, read_mission
+from executive.mission.flow.endings import Ending, endings
+from executive.mission.model.mission import Mission
+from executive.mission.model.nodes import Node
+from executive.mission.model.paths import with_paths
+from executive.mission.parse.read_mission import MissionFiles, read_mission
+from executive.mission.text.files import find_mission
 from executive.skill import Skill
 from executive.workcell import CellKind
 

@@ -42,3 +42,7 @@ class Mark:
     line: int
     col: int
     length: int
+
+    def place(self, source: Source) -> str:
+        """Return where this is for who reads `source`: the line, and the file where it is another."""
+        return f"line {self.line}" if self.source is source else f"{self.source.path}:{self.line}"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from executive.mission.endings import Ending
 from executive.mission.findings import Finding
+from executive.mission.flow.endings import Ending
 
 
 def verdict(mission: str, findings: Iterable[Finding], endings: Sequence[Ending]) -> str:
@@ -18,13 +18,13 @@ def verdict(mission: str, findings: Iterable[Finding], endings: Sequence[Ending]
 
 
 def _places(endings: Sequence[Ending]) -> list[str]:
-    """Return a line per failure and place in the file; a subtree used twice is one place."""
-    groups: dict[tuple[str, str, int], list[str]] = {}
+    """Return a line per node in the file; a subtree used twice is one place."""
+    places: dict[tuple[str, str, int], list[Ending]] = {}
     for ending in endings:
-        groups.setdefault((ending.reason, ending.path, ending.line), []).append(ending.node)
-    width = max(len(reason) for reason, _, _ in groups)
-    lines = []
-    for (reason, path, line), nodes in groups.items():
-        more = f" and {len(nodes) - 1} more of its uses" if len(nodes) > 1 else ""
-        lines.append(f"{reason:{width}}  {path}:{line}  {nodes[0]}{more}")
-    return lines
+        places.setdefault((ending.source, ending.path, ending.line), []).append(ending)
+    names = {
+        place: f"{place[0]}: {', '.join(dict.fromkeys(ending.reason for ending in found))}"
+        for place, found in places.items()
+    }
+    width = max(map(len, names.values()))
+    return [f"{name:{width}}  {place[1]}:{place[2]}" for place, name in names.items()]

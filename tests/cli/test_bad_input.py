@@ -60,6 +60,7 @@ CASES = {
         m.yaml:5:7: error[yaml]: not valid YAML: while parsing a flow mapping that began in line 4: expected ',' or '}', but got ':'
            5 | routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}
              |       ^
+          A bracket or brace that was opened is not closed.
         """,
         mission=("{attempts: 4}", "{attempts: 4"),
     ),
@@ -242,7 +243,7 @@ def test_a_mission_that_is_not_there_is_told_with_those_that_are(
         (
             "attempts=0",
             """
-            --set:1:10: error[out-of-range]: retry.attempts must be at least 1, not 0 (it is $attempts in line 13)
+            --set:1:10: error[out-of-range]: retry.attempts must be at least 1, not 0 (it is $attempts in m.yaml:13)
                1 | attempts=0
                  |          ^
             """,

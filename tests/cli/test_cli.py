@@ -13,8 +13,8 @@ from click.testing import CliRunner
 
 from executive.cli.main import COMMANDS, main
 from executive.errors import Fault, InputError
-from executive.mission.endings import Ending
 from executive.mission.findings import Finding, MissionError
+from executive.mission.flow.endings import Ending
 from executive.skill import In, Metres, Skill, param
 
 
@@ -239,21 +239,22 @@ def test_check_says_that_all_is_well(project):
 
 def test_check_tells_what_can_still_end_the_mission(project):
     project.endings = (
-        Ending("Detect.hidden", "tree/look/Detect", "sort.yaml", 9),
-        Ending("Detect.hidden", "tree/again/look/Detect", "sort.yaml", 9),
-        Ending("Release.stuck", "tree/Release", "sort.yaml", 12),
+        Ending("Detect", "hidden", "tree/look/Detect", "sort.yaml", 9),
+        Ending("Detect", "unsure", "tree/look/Detect", "sort.yaml", 9),
+        Ending("Detect", "hidden", "tree/again/look/Detect", "sort.yaml", 9),
+        Ending("Release", "stuck", "tree/Release", "sort.yaml", 12),
     )
     shown = invoke("check", "sort.yaml")
     assert shown.exit_code == 0
     assert shown.stdout.splitlines() == [
         "sort.yaml: ok",
         "  nothing deals with these failures; each would end the mission:",
-        "    Detect.hidden  sort.yaml:9  tree/look/Detect and 1 more of its uses",
-        "    Release.stuck  sort.yaml:12  tree/Release",
+        "    Detect: hidden, unsure  sort.yaml:9",
+        "    Release: stuck          sort.yaml:12",
     ]
     (report,) = json.loads(invoke("check", "sort.yaml", "--json").stdout)
-    assert report["endings"][2] == {
-        "reason": "Release.stuck", "node": "tree/Release", "path": "sort.yaml", "line": 12,
+    assert report["endings"][3] == {
+        "source": "Release", "reason": "stuck", "node": "tree/Release", "path": "sort.yaml", "line": 12,
     }  # fmt: skip
 
 

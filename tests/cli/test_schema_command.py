@@ -8,8 +8,8 @@ import pytest
 from click.testing import CliRunner
 
 from executive.cli.main import main
-from executive.mission.schema import library_schema, mission_schema
-from executive.mission.schema_types import cell_schema
+from executive.mission.schema.files import library_schema, mission_schema
+from executive.mission.schema.types import cell_schema
 from executive.skill import discover
 
 

@@ -124,7 +124,7 @@ def test_five_mistakes_in_one_file_are_five_findings_in_one_call(look: Look) -> 
 
 def test_every_kind_of_finding_has_a_broken_mission() -> None:
     checker = Path(executive.mission.__file__).parent
-    possible = {code for module in checker.glob("*.py") for code in codes_in(module)}
+    possible = {code for module in checker.rglob("*.py") for code in codes_in(module)}
     # Their codes are put together from what a param or port names.
     possible |= {f"unknown-{named}" for named in ("bin", "class", "detector", "pose")}
     assert {place.code for path in BROKEN for place in expected(path)} == possible

@@ -12,9 +12,9 @@ from py_trees.common import Status
 from executive.control.scope import Scope
 from executive.events import ignore
 from executive.mission.build import build
-from executive.mission.files import shipped_folder
 from executive.mission.load import LoadedMission
 from executive.mission.outline import outline
+from executive.mission.text.files import shipped_folder
 from executive.skill import Skill
 
 HEAD = "mission: m\ncell: cells/small.yaml\n"

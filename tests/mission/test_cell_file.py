@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from executive.errors import InputError
-from executive.mission.cell_file import load_cell
-from executive.mission.files import shipped_folder
 from executive.mission.findings import MissionError
+from executive.mission.parse.cell_file import load_cell
+from executive.mission.text.files import shipped_folder
 
 
 @pytest.fixture(autouse=True)

@@ -21,6 +21,7 @@ CASES = {
         m.yaml:2:21: error[yaml]: not valid YAML: while parsing a flow sequence that began in line 2: expected ',' or ']', but got '<stream end>'
            2 | tree: [Look, {Pick: }
              |                     ^
+          A bracket or brace that was opened is not closed.
         """,
     ),
     "unknown top key": (
@@ -231,6 +232,7 @@ CASES = {
         m.yaml:3:25: error[wrong-type]: with takes a mapping of names to values, not the text "full"
            3 | tree: {use: look, with: full}
              |                         ^^^^
+          Write it as with: {name: full}.
         """,
     ),
     "skill not mapping": (
@@ -243,6 +245,7 @@ CASES = {
         m.yaml:3:14: error[wrong-type]: Look takes a mapping of names to values, not the text "full"
            3 | tree: {Look: full}
              |              ^^^^
+          Write it as Look: {name: full}.
         """,
     ),
     "subtree without do": (

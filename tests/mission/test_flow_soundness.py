@@ -15,14 +15,14 @@ from executive.control.halting import halt
 from executive.control.scope import Scope
 from executive.events import ignore
 from executive.mission.build import Builder
-from executive.mission.case import Case
-from executive.mission.check import check
-from executive.mission.endings import endings
-from executive.mission.expand import expand
-from executive.mission.parse import parse_mission
-from executive.mission.paths import with_paths
+from executive.mission.check.case import Case
+from executive.mission.check.checks import check
+from executive.mission.expand.expand import expand
+from executive.mission.flow.endings import endings
+from executive.mission.model.paths import with_paths
+from executive.mission.parse.mission_file import parse_mission
 from executive.mission.source import Source
-from executive.mission.text import parse_yaml
+from executive.mission.text.yaml_text import parse_yaml
 from executive.skill import ANY, EMPTY, HOLDING, In, Out, Skill, port
 
 MOST_TICKS = 400
@@ -235,7 +235,7 @@ def test_what_happens_was_foreseen(tree: Tree, seed: int) -> None:
             ends = {(f.source, f.reason, f.origin): after for f, after in flow.result.failures.items()}
             key = failure.source, failure.reason, failure.path
             assert key in ends, f"the checker has not foreseen {key}"
-            assert str(failure) in [ending.reason for ending in endings(flow)]
+            assert str(failure) in [f"{ending.source}.{ending.reason}" for ending in endings(flow)]
             state = ends[key]
         assert state.may_be(HOLDING if world.holding else EMPTY), "the checker thinks the tool otherwise"
 

@@ -11,10 +11,10 @@ import pytest
 
 from executive.cell_config import CellConfig
 from executive.errors import InputError
-from executive.mission import nodes
-from executive.mission.files import find_mission, shipped_folder
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission, load_mission
+from executive.mission.model import nodes
+from executive.mission.text.files import find_mission, shipped_folder
 from executive.skill import Skill
 from executive.testing.fake_cell import FakeCell
 
@@ -67,7 +67,7 @@ def test_an_override_out_of_range_is_shown_where_it_was_given(load: Load) -> Non
     with pytest.raises(MissionError) as caught:
         load(text, {"tries": "0"})
     assert str(caught.value) == (
-        "--set:1:7: error[out-of-range]: retry.attempts must be at least 1, not 0 (it is $tries in line 4)\n"
+        "--set:1:7: error[out-of-range]: retry.attempts must be at least 1, not 0 (it is $tries in m.yaml:4)\n"
         "   1 | tries=0\n"
         "     |       ^"
     )

@@ -9,8 +9,8 @@ import pytest
 
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission
-from executive.mission.nodes import SkillNode
-from executive.mission.wiring import wires
+from executive.mission.model.nodes import SkillNode
+from executive.mission.model.wiring import wires
 from executive.skill import Direction, Skill
 
 Load = Callable[..., LoadedMission]

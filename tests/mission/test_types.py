@@ -8,7 +8,7 @@ from typing import Any, Optional
 import pytest
 
 from executive.messages import Detection, Target
-from executive.mission.types import called, element_of, fits
+from executive.mission.model.port_types import called, element_of, fits
 
 
 class Special(Target):

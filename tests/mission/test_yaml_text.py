@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.mission.scalars import core_value
 from executive.mission.source import Source
-from executive.mission.text import Mapping, Scalar, parse_yaml, plain
+from executive.mission.text.scalars import core_value
+from executive.mission.text.yaml_text import Mapping, Scalar, parse_yaml, plain
 
 
 def read(text: str) -> tuple[Any, list[str]]:
@@ -103,3 +103,13 @@ def test_no_text_breaks_the_reader(text: str) -> None:
     assert (root is None) <= bool(findings)
     for finding in findings:
         str(finding)
+
+
+def test_half_a_surrogate_pair_is_refused() -> None:
+    # Only an escape can name one; printed, it would end in a traceback.
+    root, findings = parse_yaml(Source("m.yaml", 'a: "x\\ud800"\n'))
+    assert root is not None
+    assert [(f.line, f.col, f.message) for f in findings] == [
+        (1, 4, "half of a surrogate pair is no character")
+    ]
+    assert plain(root) == {"a": "x?"}

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from executive.cell_config import CellConfig
-from executive.mission.cell_file import load_cell
+from executive.mission.parse.cell_file import load_cell
 from executive.runtime.cells import cell_kind
 from executive.testing.fake_cell import FakeCell
 

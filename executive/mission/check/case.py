@@ -1,0 +1,94 @@
+"""What the checks look at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from executive.cell import LeastTimes
+from executive.cell_config import CellConfig
+from executive.mission.findings import alternatives
+from executive.mission.flow.analysis import Analysis
+from executive.mission.model.mission import Mission
+from executive.mission.model.nodes import Node, SkillNode, UseNode
+from executive.mission.model.values import Reference
+from executive.mission.model.wiring import Wire, wires, written_below
+from executive.skill import Direction, Skill
+
+
+@dataclass(frozen=True)
+class Case:
+    """A mission before a check.
+
+    Attributes:
+        mission: As written.
+        tree: The tree that runs, expanded, with paths; None where it could not be read.
+        unused: Expanded subtrees that nothing uses.
+        skills: Installed skills by name.
+        cell: The cell, or None where its file has findings of its own.
+        labels: For every detector of the cell the classes its model knows, None where it cannot be known.
+        least: Lower bounds of what things take in the cell, or None where they are not known.
+    """
+
+    mission: Mission
+    tree: Node | None
+    unused: tuple[Node, ...]
+    skills: Mapping[str, type[Skill]]
+    cell: CellConfig | None
+    labels: Mapping[str, tuple[str, ...] | None]
+    least: LeastTimes | None
+
+    @cached_property
+    def flow(self) -> Analysis | None:
+        """What can happen in the tree that runs, or None where there is none."""
+        return None if self.tree is None else Analysis(self.tree, self.skills)
+
+    def nodes(self) -> Iterator[Node]:
+        """Yield every node, also of the subtrees that nothing uses."""
+        for root in (self.tree, *self.unused):
+            if root is not None:
+                yield from root.walk()
+
+    def known_skills(self) -> Iterator[tuple[SkillNode, type[Skill]]]:
+        """Yield every node that names an installed skill, with the skill."""
+        for node in self.nodes():
+            if isinstance(node, SkillNode) and node.skill in self.skills:
+                yield node, self.skills[node.skill]
+
+    @cached_property
+    def doors(self) -> Mapping[str, UseNode]:
+        """For every node that stands in a library, the `use` in the mission's own file that leads to it."""
+        doors: dict[str, UseNode] = {}
+
+        def walk(node: Node, door: UseNode | None) -> None:
+            if node.mark.source is own:
+                door = node if isinstance(node, UseNode) else None
+            elif door is not None:
+                doors[node.path] = door
+            for child in node.children:
+                walk(child, door)
+
+        if self.tree is not None:
+            own = self.tree.mark.source
+            walk(self.tree, None)
+        return doors
+
+    def constant_hint(self, reference: Reference) -> str:
+        """Return what to write where a variable stands in the place of a constant."""
+        params = self.mission.params
+        if reference.name in params:
+            return "A library sees its own arguments only: declare it under args and give it with `with`."
+        return alternatives(f"${reference.name}", [f"${name}" for name in params], "The mission's params")
+
+    def variable_hint(self, word: object) -> str:
+        """Return what to write where the name of a variable lacks its `$`, or ""."""
+        if self.tree is None or not isinstance(word, str):
+            return ""
+        written = written_below(self.tree, self.skills)
+        return f"For the variable write ${word}." if word in written else ""
+
+    def wires(self, node: Node, direction: Direction) -> Iterator[Wire]:
+        """Yield the variables that a node reads or writes through the ports of its skill, if it is one."""
+        if isinstance(node, SkillNode) and node.skill in self.skills:
+            yield from wires(node, self.skills[node.skill], direction)

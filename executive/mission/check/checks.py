@@ -1,0 +1,59 @@
+"""Everything that can be known to be wrong with a mission before it runs; one function per check."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from executive.mission.check import (
+    cell,
+    constants,
+    labels,
+    parallel,
+    port_types,
+    reach,
+    reasons,
+    skills,
+    timeouts,
+    tool,
+    variables,
+)
+from executive.mission.check.case import Case
+from executive.mission.findings import Finding
+
+Check = Callable[[Case], Iterator[Finding]]
+
+CHECKS: tuple[Check, ...] = (
+    skills.unknown_skills,
+    skills.unknown_settings,
+    skills.missing_params,
+    skills.param_values,
+    skills.input_values,
+    skills.output_wiring,
+    constants.constants,
+    labels.labels,
+    cell.routes,
+    cell.names,
+    cell.known_classes,
+    reasons.matches,
+    variables.unwritten_inputs,
+    variables.unread_variables,
+    variables.broken_promises,
+    port_types.port_types,
+    port_types.element_names,
+    tool.tool_states,
+    tool.held_at_the_end,
+    reach.unreachable,
+    reach.shadowed_catches,
+    reach.endless_loops,
+    reach.unchanging_retries,
+    reach.single_attempts,
+    parallel.shared_resources,
+    parallel.shared_variables,
+    timeouts.short_timeouts,
+)
+"""Each holds whatever else is wrong: what is unknown in one place makes no findings in others."""
+
+
+def check(case: Case) -> list[Finding]:
+    """Return the findings of every check."""
+    return [finding for one in CHECKS for finding in one(case)]

@@ -1,0 +1,72 @@
+"""Checks of what happens at the same time: no two may use one thing or write one variable."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+from executive.mission.check.case import Case
+from executive.mission.findings import Finding, error
+from executive.mission.model.nodes import ForEachNode, Node, ParallelNode, SkillNode
+from executive.mission.source import Mark
+from executive.skill import Direction
+
+
+def shared_resources(case: Case) -> Iterator[Finding]:
+    """Find every two branches of a parallel that use the same part of the cell."""
+    for node in case.nodes():
+        if not isinstance(node, ParallelNode):
+            continue
+        for first, second in combinations([_uses(case, branch) for branch in node.branches], 2):
+            shared = dict.fromkeys(resource for resource in second if resource in first)
+            for users in {(first[r].skill, second[r].skill, second[r].mark): r for r in shared}.values():
+                one, other = first[users], second[users]
+                message = (
+                    f"{other.skill} uses the {users} while {one.skill} in "
+                    f"{one.mark.place(other.mark.source)} may use it, in another branch of the same parallel"
+                )
+                hint = "Write a sequence, or put both into one branch."
+                yield error(other.mark, "shared-resource", message, hint)
+
+
+def shared_variables(case: Case) -> Iterator[Finding]:
+    """Find every two branches of a parallel that write the same variable."""
+    for node in case.nodes():
+        if not isinstance(node, ParallelNode):
+            continue
+        for first, second in combinations([_writes(case, branch) for branch in node.branches], 2):
+            for variable, (other, mark, hint) in second.items():
+                if variable in first:
+                    one, place, _ = first[variable]
+                    message = (
+                        f"{other} writes ${variable}, and so does {one} in {place.place(mark.source)}, "
+                        "in another branch of the same parallel"
+                    )
+                    yield error(mark, "shared-variable", message, hint)
+
+
+def _uses(case: Case, branch: Node) -> dict[str, SkillNode]:
+    """Return the first user of every part of the cell below `branch`."""
+    users: dict[str, SkillNode] = {}
+    on_wrist = case.cell is not None and any(c.mount == "wrist" for c in case.cell.cameras.values())
+    for node in branch.walk():
+        if not isinstance(node, SkillNode) or node.skill not in case.skills:
+            continue
+        for resource in case.skills[node.skill].uses:
+            # A camera on the wrist sees from where the arm is: to look is to use the arm.
+            for used in ("arm", resource) if resource == "camera" and on_wrist else (resource,):
+                users.setdefault(used, node)
+    return users
+
+
+def _writes(case: Case, branch: Node) -> dict[str, tuple[str, Mark, str]]:
+    """Return the first writer of every variable below `branch`, its place, and how to call it otherwise."""
+    writers: dict[str, tuple[str, Mark, str]] = {}
+    for node in branch.walk():
+        if isinstance(node, ForEachNode):
+            hint = "Give one of them another variable, as each: other."
+            writers.setdefault(node.each.name, ("for_each", node.each.mark, hint))
+        for wire in case.wires(node, Direction.OUT):
+            hint = f"Give one of them another variable, as {wire.port.name}: $other."
+            writers.setdefault(wire.variable, (wire.skill, wire.mark, hint))
+    return writers

@@ -1,0 +1,117 @@
+"""Checks of timeouts: could what stands under them ever be done in time?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from executive.mission.check.case import Case
+from executive.mission.findings import Finding, error
+from executive.mission.model import nodes
+from executive.mission.model.nodes import Node, SkillNode
+from executive.mission.model.typed import WrongType, convert
+from executive.mission.model.values import Literal, Value
+from executive.mission.model.wiring import literals
+
+
+def short_timeouts(case: Case) -> Iterator[Finding]:
+    """Find every timeout that ends before its body possibly can."""
+    for node in case.nodes():
+        if not isinstance(node, nodes.TimeoutNode) or case.least is None:
+            continue
+        seconds = _number(node.seconds)
+        shortest = least_time(case, node.do)
+        if seconds is not None and 0 < seconds < shortest:
+            origin = node.seconds.origin if isinstance(node.seconds, Literal) else ""
+            message = (
+                f"timeout.seconds is {seconds:g} s, but its body takes {shortest:.2f} s at the very least"
+            )
+            parts = [
+                f"{inner.skill} {time:.2f} s"
+                for inner in node.do.walk()
+                if isinstance(inner, SkillNode) and (time := least_time(case, inner)) > 0
+            ]
+            message += f" (it is {origin})" if origin else ""
+            yield error(node.seconds.mark, "short-timeout", message, f"At the least: {', '.join(parts)}.")
+
+
+def least_time(case: Case, node: Node | None) -> float:
+    """Return the least time in which a node can succeed [s]; 0 where nothing is known."""
+    return 0.0 if node is None else _LEAST.get(type(node), _nothing)(case, node)
+
+
+def _nothing(case: Case, node: Any) -> float:
+    del case, node
+    return 0.0
+
+
+def _skill(case: Case, node: Any) -> float:
+    skill = case.skills.get(node.skill)
+    if skill is None or case.least is None:
+        return 0.0
+    declared: Mapping[str, Any] = {**skill.params, **skill.ports}
+    given = {name: param.default for name, param in skill.params.items() if not param.required}
+    for name, value in literals(node):
+        try:
+            given[name] = convert(value.value, declared[name].type)
+        except (KeyError, WrongType):
+            # Another check says so.
+            return 0.0
+    return skill.shortest(case.least, given)
+
+
+def _sum(case: Case, node: Any) -> float:
+    return sum(least_time(case, child) for child in node.children)
+
+
+def _least(case: Case, node: Any) -> float:
+    return min((least_time(case, child) for child in node.children), default=0.0)
+
+
+def _body(case: Case, node: Any) -> float:
+    return least_time(case, node.do)
+
+
+def _times(case: Case, node: Any) -> float:
+    times = None if node.times is None else _number(node.times)
+    return 0.0 if times is None or node.until else times * least_time(case, node.do)
+
+
+def _elements(case: Case, node: Any) -> float:
+    listed = node.source.value if isinstance(node.source, Literal) else ()
+    return len(listed) * least_time(case, node.do) if isinstance(listed, list) else 0.0
+
+
+def _try(case: Case, node: Any) -> float:
+    ways = [node.do, *(catch.do for catch in node.catches)]
+    return min(least_time(case, way) for way in ways) + least_time(case, node.finish)
+
+
+def _parallel(case: Case, node: Any) -> float:
+    times = sorted(least_time(case, branch) for branch in node.branches)
+    wait_for = node.wait_for.value if isinstance(node.wait_for, Literal) else "any"
+    count = len(times) if wait_for == "all" else 1 if wait_for == "any" else wait_for
+    return times[count - 1] if isinstance(count, int) and 0 < count <= len(times) else 0.0
+
+
+def _use(case: Case, node: Any) -> float:
+    return least_time(case, node.body)
+
+
+def _number(value: Value) -> float | None:
+    number = value.value if isinstance(value, Literal) else None
+    return number if isinstance(number, int | float) and not isinstance(number, bool) else None
+
+
+_LEAST: Mapping[type[Node], Callable[[Case, Any], float]] = {
+    nodes.SkillNode: _skill,
+    nodes.SequenceNode: _sum,
+    nodes.FallbackNode: _least,
+    nodes.ParallelNode: _parallel,
+    nodes.RetryNode: _body,
+    nodes.RepeatNode: _times,
+    nodes.ForEachNode: _elements,
+    nodes.TryNode: _try,
+    nodes.TimeoutNode: _body,
+    nodes.UseNode: _use,
+}

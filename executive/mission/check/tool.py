@@ -1,0 +1,56 @@
+"""Checks of what the tool may hold where, over success, failure, retry and recover."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from executive.mission.check.case import Case
+from executive.mission.findings import Finding, error, warning
+from executive.mission.flow.analysis import Analysis
+from executive.mission.flow.state import Grip
+from executive.mission.model.nodes import SkillNode
+from executive.mission.source import Mark
+from executive.skill import EMPTY, HOLDING
+
+
+def tool_states(case: Case) -> Iterator[Finding]:
+    """Find every skill that needs an empty tool where it may hold something, or the other way round."""
+    flow = case.flow
+    if flow is None:
+        return
+    for path, entry in flow.entry.items():
+        node = flow.nodes[path]
+        skill = case.skills.get(node.skill) if isinstance(node, SkillNode) else None
+        if skill is None or not isinstance(node, SkillNode):
+            continue
+        door = case.doors.get(path)
+        mark = door.mark if door else node.mark
+        who = f'{node.skill} in the subtree "{door.name}"' if door else node.skill
+        if skill.tool_state[0] is EMPTY and (grip := entry.may_be(HOLDING)):
+            message = f"{who} needs an empty tool, but something may still be held here"
+            hint = f"{_since(flow, grip, mark)} Put it down on every way from there to here."
+            yield error(mark, "tool-state", message, hint)
+        if skill.tool_state[0] is HOLDING and (grip := entry.may_be(EMPTY)):
+            message = f"{who} needs something in the tool, but it may be empty here"
+            yield error(mark, "tool-state", message, _since(flow, grip, mark))
+
+
+def held_at_the_end(case: Case) -> Iterator[Finding]:
+    """Find out whether the mission may succeed with something in the tool."""
+    flow = case.flow
+    if flow is None or case.tree is None or flow.result.success is None:
+        return
+    if grip := flow.result.success.may_be(HOLDING):
+        message = "the mission may end well with something still in the tool"
+        yield warning(case.tree.mark, "tool-state", message, _since(flow, grip, case.tree.mark))
+
+
+def _since(flow: Analysis, grip: Grip, mark: Mark) -> str:
+    """Return since when the tool may be so, and which failure led on from there."""
+    node = flow.nodes.get(grip.since)
+    after = f", when {grip.after} is dealt with" if grip.after else ""
+    if node is None:
+        return f"Nothing has been grasped before{after}."
+    name = node.skill if isinstance(node, SkillNode) else "the node"
+    verb = "may hold something" if grip.tool is HOLDING else "may be empty"
+    return f"It {verb} since {name} in {node.mark.place(mark.source)}{after}."

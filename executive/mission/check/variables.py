@@ -1,0 +1,137 @@
+"""Checks of the variables: who writes what before whom, and who reads it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from executive.mission.check.case import Case
+from executive.mission.findings import Finding, alternatives, error, warning
+from executive.mission.model.nodes import ForEachNode, Node, UseNode
+from executive.mission.model.values import Reference
+from executive.mission.model.wiring import wires, written_below
+from executive.mission.source import Mark
+from executive.skill import Direction, Skill
+
+Read = tuple[Node, str, str, Mark]
+"""A node that reads, what reads it (`Approach.target`), the variable, and where the mission says so."""
+
+
+def unwritten_inputs(case: Case) -> Iterator[Finding]:
+    """Find everything that reads a variable which is not written on every way to it.
+
+    What a subtree of a library lacks is told where the mission uses it, once for all its variables.
+    """
+    if case.flow is None or case.tree is None:
+        return
+    written = written_below(case.tree, case.skills)
+    lacking: dict[str, dict[str, str]] = {}
+    doors: dict[str, UseNode] = {}
+    for node, what, variable, mark in _reads(case, case.tree):
+        entry = case.flow.entry.get(node.path)
+        if entry is None or entry.written is None or variable in entry.written:
+            continue
+        door = case.doors.get(node.path)
+        if door is not None and mark.source is not case.tree.mark.source:
+            doors[door.path] = door
+            lacking.setdefault(door.path, {}).setdefault(variable, what)
+        elif variable in written:
+            message = f"{what} reads ${variable}, which is not written on every way to here"
+            yield error(mark, "unwritten", message, f"It is written by {_writers(case, variable, mark)}.")
+        else:
+            message = f"{what} reads ${variable}, which nothing writes"
+            yield error(mark, "unwritten", message, _who_could(case, variable, written))
+    for path, variables in lacking.items():
+        door = doors[path]
+        names = " and ".join(f"${name} (for {what})" for name, what in sorted(variables.items()))
+        are = "is" if len(variables) == 1 else "are"
+        message = f'the subtree "{door.name}" needs {names}, which {are} not written on every way to here'
+        hints = [f"${name} is written by {_who(case, name, door.mark)}." for name in sorted(variables)]
+        yield error(door.mark, "unwritten", message, " ".join(hints))
+
+
+def unread_variables(case: Case) -> Iterator[Finding]:
+    """Find every variable that the mission names for an output and that nothing reads."""
+    if case.tree is None:
+        return
+    read = {variable for _, _, variable, _ in _reads(case, case.tree, all_inputs=True)}
+    for node in case.tree.walk():
+        if isinstance(node, ForEachNode) and node.each.name not in read | set(case.mission.params):
+            message = f"nothing in this for_each reads ${node.each.name}"
+            yield warning(node.each.mark, "unread", message, f"Write ${node.each.name} where it is meant.")
+        for wire in case.wires(node, Direction.OUT):
+            if wire.explicit and wire.variable not in read:
+                message = f"{wire} writes ${wire.variable}, which nothing reads"
+                yield warning(wire.mark, "unread", message)
+        if isinstance(node, UseNode):
+            yield from _unread_returns(node, read)
+
+
+def _unread_returns(use: UseNode, read: set[str]) -> Iterator[Finding]:
+    for setting in use.returns.values():
+        value = setting.value
+        if isinstance(value, Reference) and value.name in use.promised and value.name not in read:
+            message = f"nothing reads ${value.name}, which the subtree returns here"
+            yield warning(value.mark, "unread", message)
+
+
+def broken_promises(case: Case) -> Iterator[Finding]:
+    """Find every variable that a subtree says it `returns` and that it does not write before it succeeds."""
+    if case.flow is None or case.tree is None:
+        return
+    for use in case.tree.walk():
+        if not isinstance(use, UseNode) or use.body is None:
+            continue
+        subtree = case.mission.trees[use.name]
+        after = case.flow.bodies.get(use.path)
+        if after is None or after.written is None:
+            continue
+        written = written_below(use.body, case.skills)
+        for name, mark in (subtree.returns or {}).items():
+            outside = use.returns.get(name)
+            variable = outside.value.name if outside and isinstance(outside.value, Reference) else name
+            if variable not in written:
+                message = f'the subtree "{use.name}" returns ${name}, which nothing in it writes'
+                shown = sorted(word.rpartition(".")[2] for word in written)
+                yield error(mark, "unwritten", message, alternatives(name, shown, "It writes"))
+            elif variable not in after.written:
+                message = f'the subtree "{use.name}" returns ${name}, which it does not write on every way'
+                hint = f"It is written by {_writers(case, variable, mark)}."
+                yield error(mark, "unwritten", message, hint)
+
+
+def _reads(case: Case, tree: Node, all_inputs: bool = False) -> Iterator[Read]:
+    """Yield everything that needs a variable; with `all_inputs` also what can do without it."""
+    for node in tree.walk():
+        if isinstance(node, ForEachNode) and isinstance(node.source, Reference):
+            yield node, "for_each", node.source.name, node.source.mark
+        for wire in case.wires(node, Direction.IN):
+            if all_inputs or wire.port.required or wire.explicit:
+                yield node, str(wire), wire.variable, wire.mark
+
+
+def _writers(case: Case, variable: str, mark: Mark) -> str:
+    """Return who writes a variable and where, the first in the file first, or ""."""
+    found: dict[str, None] = {}
+    for node, skill in sorted(case.known_skills(), key=lambda pair: pair[0].mark.line):
+        if any(wire.variable == variable for wire in wires(node, skill, Direction.OUT)):
+            found[f"{node.skill} in {node.mark.place(mark.source)}"] = None
+    return " and ".join(found) or "the for_each around its body alone"
+
+
+def _who(case: Case, variable: str, mark: Mark) -> str:
+    """Return who writes a variable: in this file, or which skills could."""
+    own = [part for part in _writers(case, variable, mark).split(" and ") if " in line " in part]
+    could = [name for name, skill in case.skills.items() if _writes(skill, variable)]
+    return " and ".join(own) or ", ".join(could) or "nothing"
+
+
+def _who_could(case: Case, variable: str, written: set[str]) -> str:
+    writers = [name for name, skill in case.skills.items() if _writes(skill, variable)]
+    if writers:
+        return f"It is written by: {', '.join(writers)}."
+    names = [f"${name}" for name in sorted(written)]
+    return alternatives(f"${variable}", names, "Variables that are written")
+
+
+def _writes(skill: type[Skill], name: str) -> bool:
+    return name in skill.ports and skill.ports[name].direction is Direction.OUT

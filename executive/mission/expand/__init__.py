@@ -1,0 +1,1 @@
+"""Subtrees, params and arguments put in the places where they are used."""

@@ -1,0 +1,1 @@
+"""An abstract run of the tree over every way it can go."""

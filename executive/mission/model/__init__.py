@@ -1,0 +1,1 @@
+"""What a mission says, as typed values: the grammar, the nodes, what they are wired to."""

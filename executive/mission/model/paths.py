@@ -1,0 +1,105 @@
+"""A unique, readable path for every node of the tree that runs.
+
+A path names what is on the way: `tree/repeat/do/2:try/retry/do/Grasp`. A skill goes by its name or
+label; in a list, control nodes and whatever stands there twice carry their number.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from executive.mission.model import nodes
+from executive.mission.model.nodes import Node
+
+WORDS: Mapping[type[Node], str] = {
+    nodes.SequenceNode: "sequence",
+    nodes.FallbackNode: "fallback",
+    nodes.ParallelNode: "parallel",
+    nodes.RetryNode: "retry",
+    nodes.RepeatNode: "repeat",
+    nodes.WhileNode: "while",
+    nodes.ForEachNode: "for_each",
+    nodes.TryNode: "try",
+    nodes.TimeoutNode: "timeout",
+    nodes.InvertNode: "invert",
+    nodes.SucceedNode: "succeed",
+    nodes.UnknownNode: "unknown",
+}
+"""What each control node is called in a mission."""
+
+_LISTS = {
+    nodes.SequenceNode: "steps",
+    nodes.FallbackNode: "choices",
+    nodes.ParallelNode: "branches",
+    nodes.UnknownNode: "parts",
+}
+
+
+def with_paths(root: Node) -> Node:
+    """Return the tree with the path of every node set."""
+    return _placed(root, "", "tree")
+
+
+def name_of(node: Node) -> str:
+    """Return what a node is called in a path."""
+    if node.label:
+        return node.label
+    if isinstance(node, nodes.SkillNode):
+        return node.skill
+    return node.name if isinstance(node, nodes.UseNode) else WORDS[type(node)]
+
+
+def _placed(node: Node, parent: str, slot: str, name: str | None = None) -> Node:
+    """Return the node as it stands in `slot` of `parent`, or there under another name.
+
+    A bare list is the slot itself; any other node adds its own name to the path.
+    """
+    path = _join(parent, slot)
+    if name is not None or not _is_bare(node):
+        path = _join(path, name or name_of(node))
+    changes: dict[str, Any] = {"path": path}
+    if isinstance(node, nodes.UseNode):
+        return replace(node, path=path, body=node.body and _body(node, node.body, path))
+    for field in ("do", "recover", "condition"):
+        part = getattr(node, field, None)
+        if part is not None:
+            changes[field] = _placed(part, path, field)
+    if type(node) in _LISTS:
+        field = _LISTS[type(node)]
+        changes[field] = _listed(getattr(node, field), path)
+    if isinstance(node, nodes.TryNode):
+        changes["do"] = _placed(node.do, path, "do" if _is_bare(node.do) else "")
+        changes["catches"] = tuple(
+            replace(catch, do=_placed(catch.do, path, f"catch/{index}"))
+            for index, catch in enumerate(node.catches, 1)
+        )
+        changes["finish"] = node.finish and _placed(node.finish, path, "finally")
+    return replace(node, **changes)
+
+
+def _body(use: nodes.UseNode, body: Node, path: str) -> Node:
+    """Return the body of a subtree: a list stands in the place of its use, unless that has a label."""
+    return _placed(body, path, "do" if use.label else "")
+
+
+def _listed(items: Sequence[Node], parent: str) -> tuple[Node, ...]:
+    """Return the nodes of a list, named so that no two have the same path."""
+    names = [name_of(node) for node in items]
+    count = Counter(names)
+    placed = []
+    for index, (node, name) in enumerate(zip(items, names, strict=True), 1):
+        named = bool(node.label) or isinstance(node, nodes.SkillNode | nodes.UseNode)
+        unique = name if named and count[name] == 1 else f"{index}:{name}"
+        placed.append(_placed(node, parent, "", unique))
+    return tuple(placed)
+
+
+def _is_bare(node: Node) -> bool:
+    return isinstance(node, nodes.SequenceNode) and node.listed
+
+
+def _join(*parts: str) -> str:
+    return "/".join(part for part in parts if part)

@@ -1,0 +1,64 @@
+"""What a mission's settings of a skill mean: constants, variables read and variables written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from executive.mission.model.nodes import ForEachNode, Node, SkillNode
+from executive.mission.model.values import Literal, Reference
+from executive.mission.source import Mark
+from executive.skill import Direction, Port, Skill
+
+
+@dataclass(frozen=True)
+class Wire:
+    """A port and the variable it is connected to.
+
+    Attributes:
+        skill: Name of the skill.
+        port: Its port.
+        variable: Name of the variable.
+        mark: Where the mission says so, or the skill itself where the port goes by its own name.
+        explicit: True where the mission names the variable.
+    """
+
+    skill: str
+    port: Port
+    variable: str
+    mark: Mark
+    explicit: bool
+
+    def __str__(self) -> str:
+        return f"{self.skill}.{self.port.name}"
+
+
+def wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Iterator[Wire]:
+    """Yield how every port of this direction is connected; an input with a value of its own is not."""
+    for port in skill.ports.values():
+        if port.direction is not direction:
+            continue
+        setting = node.settings.get(port.name)
+        if setting is None or (direction is Direction.OUT and isinstance(setting.value, Literal)):
+            # A constant for an output is a mistake that is told elsewhere.
+            yield Wire(node.skill, port, node.names.get(port.name, port.name), node.mark, explicit=False)
+        elif isinstance(setting.value, Reference):
+            yield Wire(node.skill, port, setting.value.name, setting.value.mark, explicit=True)
+
+
+def literals(node: SkillNode) -> Iterator[tuple[str, Literal]]:
+    """Yield every setting with a value instead of a variable."""
+    for name, setting in node.settings.items():
+        if isinstance(setting.value, Literal):
+            yield name, setting.value
+
+
+def written_below(root: Node, skills: Mapping[str, type[Skill]]) -> set[str]:
+    """Return the variables that something in the tree may write."""
+    written = set()
+    for node in root.walk():
+        if isinstance(node, ForEachNode):
+            written.add(node.each.name)
+        elif isinstance(node, SkillNode) and node.skill in skills:
+            written |= {wire.variable for wire in wires(node, skills[node.skill], Direction.OUT)}
+    return written

@@ -1,0 +1,184 @@
+"""A cell file, put together with the files it is based on, and checked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from collections.abc import Mapping as Mapped
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
+
+from executive.cell_config import CellConfig
+from executive.errors import InputError
+from executive.mission.findings import Finding, MissionError, error, in_file_order
+from executive.mission.parse.overrides import CELL, override_cell, override_source
+from executive.mission.parse.validate import KeyPath, mark_of, validate
+from executive.mission.source import Source
+from executive.mission.text.files import below, read_source
+from executive.mission.text.yaml_text import Mapping, Node, Scalar, parse_yaml, plain
+from executive.mission.words import describe
+
+BASE = "base"
+"""The key that names the file which gives every key of the first level that this one does not."""
+
+DEEPEST = 5
+"""How many files may stand below a cell file, each the base of the one before."""
+
+
+@dataclass(frozen=True)
+class CellFile:
+    """What a cell file says.
+
+    Attributes:
+        config: Its content, or None where findings say why not.
+        root: Its nodes and those of its bases, for placing findings that come later; None where it or a
+            base is no YAML.
+    """
+
+    config: CellConfig | None
+    source: Source
+    root: Node | None
+    findings: tuple[Finding, ...]
+
+    def finding(self, path: KeyPath, code: str, message: str) -> Finding:
+        """Return an error about the value at `path`."""
+        mark = mark_of(self.root, path) if self.root else self.source.mark()
+        return error(mark, code, message)
+
+
+def load_cell(path: Path, overrides: Mapped[str, str] | None = None) -> CellConfig:
+    """Return the content of the cell file at `path`; `overrides` name its keys as `cell.<key>.<key>`.
+
+    Raises:
+        MissionError: Something is wrong with it; every finding is in the text.
+        InputError: There is no such file.
+    """
+    file = read_cell(path, overrides or {})
+    if file.config is None or file.findings:
+        raise MissionError(in_file_order(file.findings, str(path)))
+    return file.config
+
+
+def read_cell(path: Path, overrides: Mapped[str, str]) -> CellFile:
+    """Return what a cell file and its bases say and everything that is wrong with them.
+
+    Raises:
+        InputError: There is no such file.
+    """
+    source = read_source(path)
+    parts = _Parts()
+    root = parts.tree(path, source, ())
+    if root is None:
+        return CellFile(None, source, None, tuple(parts.findings))
+    root, wrong = override_cell(root, overrides)
+    wrong += _rebased(overrides)
+    validated = validate(root, CellConfig)
+    file = CellFile(validated.model, source, root, (*parts.findings, *wrong, *validated.findings))
+    if validated.model is None:
+        return file
+    later = (*_links(file, validated.model), *_assets(file, validated.model))
+    found = _models_found(file, validated.model, parts.folders)
+    return CellFile(found, source, root, (*file.findings, *later))
+
+
+class _Parts:
+    """The files that a cell is put together from, gathered while they are read.
+
+    Attributes:
+        folders: Where each of them is.
+        findings: What is wrong with their form.
+    """
+
+    def __init__(self) -> None:
+        self.folders: dict[Source, Path] = {}
+        self.findings: list[Finding] = []
+
+    def tree(self, path: Path, source: Source, above: tuple[Path, ...]) -> Node | None:
+        """Return the nodes of a file with those of its base put in, or None where one is no YAML.
+
+        `above` are the files that are based on this one, the cell file itself first.
+        """
+        self.folders[source] = path.parent
+        root, wrong = parse_yaml(source)
+        self.findings += wrong
+        if not isinstance(root, Mapping):
+            return root
+        named = root.get(BASE)
+        # A base that is no text stays where it is, for validation to complain of.
+        if not isinstance(named, Scalar) or not isinstance(named.value, str):
+            return root
+        base = self._base(named, (*above, path))
+        if base is None:
+            return None
+        own = tuple(entry for entry in root.entries if entry.key.text != BASE)
+        inherited = tuple(entry for entry in base.entries if entry.key.text not in root.keys)
+        return replace(root, entries=(*own, *inherited))
+
+    def _base(self, named: Scalar, files: tuple[Path, ...]) -> Mapping | None:
+        """Return the nodes of the base that the last of `files` names, or None where there are none."""
+        try:
+            path = below(files[-1].parent, named.text, ("cells", ""))
+            if any(file.samefile(path) for file in files):
+                ring = " -> ".join(file.name for file in (*files, path))
+                raise InputError(f'"{named.text}" is itself based on this file: {ring}')
+            if len(files) > DEEPEST:
+                raise InputError(
+                    f"at most {DEEPEST} files may stand below {files[0].name}, one as base of another"
+                )
+            source = read_source(path)
+            root = self.tree(path, source, files)
+            if root is not None and not isinstance(root, Mapping):
+                raise InputError(f"{source.path} must be a mapping, not {describe(plain(root))}")
+        except InputError as problem:
+            self.findings.append(error(named.mark, "no-base", str(problem)))
+            return None
+        return root
+
+
+def _rebased(overrides: Mapped[str, str]) -> Iterator[Finding]:
+    """Yield a finding where an override names another base: that is for the file to say."""
+    key = f"{CELL}{BASE}"
+    if key in overrides:
+        mark = override_source(key, overrides[key]).mark(1, 1, len(key))
+        yield error(mark, "unknown-key", "a cell's base cannot be changed here; name it in the cell file")
+
+
+def _links(file: CellFile, config: CellConfig) -> Iterator[Finding]:
+    """Yield every scan pose that the arm does not have."""
+    poses = config.arm.poses_deg
+    for name, camera in config.cameras.items():
+        for index, pose in enumerate(camera.scan_poses):
+            if pose not in poses:
+                message = f'the arm has no pose "{pose}"; arm.poses_deg has: {", ".join(poses)}'
+                yield file.finding(("cameras", name, "scan_poses", index), "unknown-pose", message)
+
+
+def _models(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Yield the keys and the path, as written, of every model file that a cell names."""
+    yield ("arm", "urdf"), config.arm.urdf
+    for label, kind in config.objects.items():
+        yield ("objects", label, "urdf"), kind.urdf
+
+
+def _models_found(file: CellFile, config: CellConfig, folders: Mapped[Source, Path]) -> CellConfig:
+    """Return the cell with the models beside the file that names them by full path; others stay as named."""
+    assert file.root is not None
+    found = {}
+    for keys, urdf in _models(config):
+        folder = folders.get(mark_of(file.root, keys).source, folders[file.source])
+        path = (folder / urdf).resolve()
+        found[keys] = str(path) if path.is_file() else urdf
+    objects = {
+        label: kind.model_copy(update={"urdf": found["objects", label, "urdf"]})
+        for label, kind in config.objects.items()
+    }
+    arm = config.arm.model_copy(update={"urdf": found["arm", "urdf"]})
+    return config.model_copy(update={"arm": arm, "objects": objects})
+
+
+def _assets(file: CellFile, config: CellConfig) -> Iterator[Finding]:
+    """Yield every model file that cannot lie below the cell's own folder or pybullet_data."""
+    for keys, urdf in _models(config):
+        written = PurePosixPath(urdf)
+        if written.is_absolute() or ".." in written.parts:
+            message = f'"{urdf}" must be a relative path without ".."'
+            yield file.finding(keys, "outside", message)

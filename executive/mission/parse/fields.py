@@ -1,0 +1,168 @@
+"""Reading one mapping of a mission file key by key, collecting what is wrong with it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+
+from executive.mission.findings import Finding, alternatives, error
+from executive.mission.model.values import Literal, Match, Reference, Setting, Value
+from executive.mission.source import Mark
+from executive.mission.text.yaml_text import Mapping, Node, Scalar, Sequence, plain, scalars
+from executive.mission.words import describe
+
+NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_MATCH = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)\.([A-Za-z_][A-Za-z0-9_]*)")
+
+
+class Fields:
+    """The keys of one mapping.
+
+    Attributes:
+        owner: What the mapping belongs to, for sentences.
+        mark: Where the owner stands, for what is missing.
+    """
+
+    def __init__(
+        self, owner: str, mark: Mark, node: Node, known: Iterable[str], findings: list[Finding]
+    ) -> None:
+        self.owner, self.mark, self.findings = owner, mark, findings
+        self._node = node if isinstance(node, Mapping) else None
+        known = list(known)
+        if self._node is None:
+            message = f"{owner} takes a mapping, not {describe(plain(node))}"
+            self._refuse(node.mark, "wrong-type", message, f"It takes: {', '.join(known)}.")
+            return
+        for entry in self._node.entries:
+            if entry.key.text not in known:
+                hint = alternatives(entry.key.text, known, "It takes")
+                message = f'{owner} has no key "{entry.key.text}"'
+                self._refuse(entry.key.mark, "unknown-key", message, hint)
+
+    @property
+    def sound(self) -> bool:
+        """False where there is no mapping to read."""
+        return self._node is not None
+
+    def get(self, key: str) -> Node | None:
+        """Return the value of `key`, or None."""
+        return self._node.get(key) if self._node else None
+
+    def key_mark(self, key: str) -> Mark:
+        """Return where `key` stands, or the owner where it is missing."""
+        entry = self._node.entry(key) if self._node else None
+        return entry.key.mark if entry else self.mark
+
+    def value_mark(self, key: str) -> Mark:
+        """Return where the value of `key` stands, or the owner where it is missing."""
+        node = self.get(key)
+        return node.mark if node else self.mark
+
+    def required(self, key: str) -> Node | None:
+        """Return the value of `key`; its absence is a finding."""
+        node = self.get(key)
+        if node is None and self.sound:
+            self._refuse(self.mark, "missing-key", f'{self.owner} needs the key "{key}"')
+        return node
+
+    def text(self, key: str, default: str = "") -> str:
+        """Return the text of `key`, or `default`."""
+        node = self.get(key)
+        if node is None:
+            return default
+        if isinstance(node, Scalar) and node.value is not None:
+            return node.text
+        return self._wrong(node, f"{self.owner}.{key} must be a text", default)
+
+    def value(self, key: str) -> Value | None:
+        """Return a value or `$reference` of `key`, or None where it is not given."""
+        node = self.get(key)
+        return None if node is None else value_of(node, self.findings)
+
+    def settings(self, key: str) -> dict[str, Setting]:
+        """Return the mapping of values under `key`, empty where it is not given."""
+        node = self.get(key)
+        return {} if node is None else settings_of(node, f"{self.owner}.{key}", self.findings)
+
+    def matches(self, key: str) -> tuple[Match, ...]:
+        """Return the `Skill.reason` names under `key`: one, or a list of them."""
+        node = self.get(key)
+        if node is None:
+            return ()
+        found = []
+        if isinstance(node, Sequence) and not node.items:
+            hint = f'For every failure leave out "{key}".'
+            self._refuse(node.mark, "empty-list", f"{self.owner}.{key} names no failure", hint)
+        for item in self.items(key):
+            written = item.text if isinstance(item, Scalar) else ""
+            if form := _MATCH.fullmatch(written):
+                found.append(Match(form[1], form[2], item.mark))
+            else:
+                shown = f'"{written}"' if written else describe(plain(item))
+                message = f"{self.owner}.{key} names failures as Skill.reason or label.reason, not {shown}"
+                self._refuse(item.mark, "bad-match", message)
+        return tuple(found)
+
+    def items(self, key: str) -> tuple[Node, ...]:
+        """Return the items of the list under `key`; a single value counts as a list of one."""
+        node = self.get(key)
+        if isinstance(node, Sequence):
+            return node.items
+        return () if node is None else (node,)
+
+    def mapping(self, key: str, read: Callable[[str, Mark, Node], None]) -> None:
+        """Call `read(name, place of the name, value)` for every entry of the mapping under `key`."""
+        node = self.get(key)
+        if isinstance(node, Mapping):
+            for entry in node.entries:
+                read(entry.key.text, entry.key.mark, entry.value)
+        elif node is not None and not (isinstance(node, Scalar) and node.value is None):
+            self._wrong(node, f"{self.owner}.{key} must be a mapping", "")
+
+    def _wrong(self, node: Node, sentence: str, default: str) -> str:
+        self._refuse(node.mark, "wrong-type", f"{sentence}, not {describe(plain(node))}")
+        return default
+
+    def _refuse(self, mark: Mark, code: str, message: str, hint: str = "") -> None:
+        self.findings.append(error(mark, code, message, hint))
+
+
+def settings_of(node: Node, owner: str, findings: list[Finding]) -> dict[str, Setting]:
+    """Return a mapping of values; nothing at all counts as an empty one."""
+    if isinstance(node, Scalar) and node.value is None:
+        return {}
+    if not isinstance(node, Mapping):
+        message = f"{owner} takes a mapping of names to values, not {describe(plain(node))}"
+        hint = f"Write it as {owner}: {{name: {node.text}}}." if isinstance(node, Scalar) else ""
+        findings.append(error(node.mark, "wrong-type", message, hint))
+        return {}
+    values = [(entry.key, value_of(entry.value, findings)) for entry in node.entries]
+    return {key.text: Setting(key.mark, value) for key, value in values if value is not None}
+
+
+def value_of(node: Node, findings: list[Finding]) -> Value | None:
+    """Return a value: `$name` is a reference, `$$text` the text `$text`; None where a `$` is misplaced."""
+    if isinstance(node, Scalar) and isinstance(node.value, str) and node.value.startswith("$"):
+        name = node.value[1:]
+        if name.startswith("$"):
+            return Literal(name, node.mark)
+        if NAME.fullmatch(name):
+            return Reference(name, node.mark)
+    misplaced = list(_misplaced_dollars(node))
+    findings += misplaced
+    return None if misplaced else literal_of(node)
+
+
+def literal_of(node: Node) -> Literal:
+    """Return a node as a value that knows where it and its elements stand."""
+    elements = tuple(item.mark for item in node.items) if isinstance(node, Sequence) else ()
+    return Literal(plain(node), node.mark, elements=elements)
+
+
+def _misplaced_dollars(node: Node) -> Iterator[Finding]:
+    """Find every `$` that would be taken for text: in the wrong form, or inside a list or mapping."""
+    for scalar in scalars(node):
+        if isinstance(scalar.value, str) and scalar.value.startswith("$"):
+            message = f'"{scalar.text}" is no reference: only a whole value can be one, as in key: $name'
+            hint = f'For the text itself write "${scalar.text}".'
+            yield error(scalar.mark, "bad-reference", message, hint)

@@ -1,0 +1,74 @@
+"""Values given beside the file: `--set name=value` for params, `--set cell.key.key=value` for the cell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Mapped
+from dataclasses import replace
+
+from executive.mission.findings import Finding, alternatives, error
+from executive.mission.source import Mark, Source
+from executive.mission.text.yaml_text import Entry, Mapping, Node, Scalar, parse_yaml
+
+CELL = "cell."
+
+
+def override_source(key: str, value: str) -> Source:
+    """Return the text that findings about an override show."""
+    return Source("--set", f"{key}={value}")
+
+
+def override_node(key: str, value: str, as_text: bool = False) -> tuple[Node | None, list[Finding]]:
+    """Return the value of an override as a node that stands in its `--set`, or what is wrong with it."""
+    source = override_source(key, value)
+    whole = source.mark(1, len(key) + 2, max(1, len(value)))
+    if as_text:
+        return Scalar(whole, value, value), []
+    # Blanks in place of the key keep the columns right.
+    padded = Source("--set", " " * (len(key) + 1) + value)
+    root, findings = parse_yaml(padded)
+    shown = [replace(finding, excerpt=source.text) for finding in findings]
+    return (_moved(root, whole) if root else None), shown
+
+
+def override_cell(root: Node, overrides: Mapped[str, str]) -> tuple[Node, list[Finding]]:
+    """Return the cell file's tree with every `cell.<key>.<key>=value` put in its place."""
+    findings: list[Finding] = []
+    for key, value in overrides.items():
+        if not key.startswith(CELL):
+            continue
+        node, wrong = override_node(key, value)
+        findings += wrong
+        if node is not None:
+            root = _put(root, key.removeprefix(CELL).split("."), node, findings)
+    return root, findings
+
+
+def _put(root: Node, path: list[str], value: Node, findings: list[Finding]) -> Node:
+    first, *rest = path
+    if not isinstance(root, Mapping):
+        message = f'there is no key "{first}" there: the value above it is no mapping'
+        findings.append(error(value.mark, "unknown-key", message))
+        return root
+    entry = root.entry(first)
+    if entry is None:
+        if rest:
+            hint = alternatives(first, root.keys, "The file has")
+            findings.append(error(value.mark, "unknown-key", f'the cell has no key "{first}"', hint))
+            return root
+        # A key the file leaves at its default; whether the cell knows it is for validation to say.
+        return replace(root, entries=(*root.entries, Entry(Scalar(value.mark, first, first), value)))
+    if rest:
+        changed = Entry(entry.key, _put(entry.value, rest, value, findings))
+    else:
+        changed = Entry(replace(entry.key, mark=value.mark), value)
+    return replace(root, entries=tuple(changed if e is entry else e for e in root.entries))
+
+
+def _moved(node: Node, mark: Mark) -> Node:
+    """Return the node standing as a whole at `mark`: an override is short enough for one place."""
+    if isinstance(node, Scalar):
+        return replace(node, mark=mark)
+    if isinstance(node, Mapping):
+        moved = tuple(Entry(replace(e.key, mark=mark), _moved(e.value, mark)) for e in node.entries)
+        return replace(node, mark=mark, entries=moved)
+    return replace(node, mark=mark, items=tuple(_moved(item, mark) for item in node.items))

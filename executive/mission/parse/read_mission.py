@@ -1,0 +1,105 @@
+"""A mission file with its libraries and its cell file: read, and everything that is wrong with their form."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from executive.errors import InputError
+from executive.mission.findings import Finding, MissionError, error, in_file_order
+from executive.mission.model.mission import Mission, Subtree
+from executive.mission.model.values import Named
+from executive.mission.parse.cell_file import CellFile, read_cell
+from executive.mission.parse.mission_file import parse_mission
+from executive.mission.parse.trees import parse_library
+from executive.mission.source import Source
+from executive.mission.text.files import below, read_source
+from executive.mission.text.yaml_text import parse_yaml
+
+
+@dataclass(frozen=True)
+class MissionFiles:
+    """What a mission is written in.
+
+    Attributes:
+        source: The mission file.
+        mission: What it says, the subtrees of its libraries included.
+        libraries: The text of every library file by its path as the mission writes it.
+        cell: The cell file, or None where it could not be read.
+        cell_path: Where it is.
+        findings: What is wrong with the form of any of them.
+    """
+
+    source: Source
+    mission: Mission
+    libraries: Mapping[str, str]
+    cell: CellFile | None
+    cell_path: Path | None
+    findings: tuple[Finding, ...]
+
+
+def read_mission(file: Path, overrides: Mapping[str, str]) -> MissionFiles:
+    """Return a mission file and the files that it names.
+
+    Raises:
+        MissionError: The mission file is no YAML that a mission could be.
+        InputError: There is no such file.
+    """
+    source = read_source(file)
+    root, findings = parse_yaml(source)
+    if root is None:
+        raise MissionError(in_file_order(findings, source.path))
+    mission, malformed = parse_mission(root, overrides)
+    findings += malformed
+    trees: dict[str, Subtree] = dict(mission.trees)
+    read = {named.name: _add_library(named, file.parent, trees, findings) for named in mission.libraries}
+    texts = {name: text for name, text in read.items() if text is not None}
+    whole = len(texts) == len(read)
+    cell_path, cell = _cell(mission.cell, file.parent, overrides, findings)
+    return MissionFiles(
+        source, replace(mission, trees=trees, whole=whole), texts, cell, cell_path, tuple(findings)
+    )
+
+
+def _add_library(
+    named: Named, folder: Path, trees: dict[str, Subtree], findings: list[Finding]
+) -> str | None:
+    """Add the subtrees of a library to `trees` and return its text, or None where it cannot be read."""
+    try:
+        source = read_source(below(folder, named.name))
+    except InputError as problem:
+        findings.append(error(named.mark, "no-library", str(problem)))
+        return None
+    root, wrong = parse_yaml(source)
+    findings += wrong
+    if root is None:
+        return None
+    library, malformed = parse_library(root)
+    findings += malformed
+    for name, subtree in library.trees.items():
+        if name in trees:
+            first = trees[name].mark
+            message = (
+                f'there are two subtrees "{name}"; the other is in {first.source.path}, line {first.line}'
+            )
+            findings.append(error(subtree.mark, "duplicate-tree", message, "Rename one of them."))
+        else:
+            trees[name] = subtree
+    return source.text
+
+
+def _cell(
+    named: Named, folder: Path, overrides: Mapping[str, str], findings: list[Finding]
+) -> tuple[Path | None, CellFile | None]:
+    """Return the mission's cell file; what is wrong with it is added to the findings."""
+    if not named.name:
+        return None, None
+    try:
+        path = below(folder, named.name)
+        cell = read_cell(path, overrides)
+    except InputError as problem:
+        findings.append(error(named.mark, "no-cell", str(problem)))
+        return None, None
+    findings += cell.findings
+    return path, cell

@@ -1,0 +1,83 @@
+"""Subtrees: those of a mission file and those of a library."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from executive.mission.findings import Finding
+from executive.mission.model import grammar
+from executive.mission.model.mission import Argument, Library, Subtree
+from executive.mission.parse.fields import NAME, Fields, value_of
+from executive.mission.parse.nodes import NodeParser
+from executive.mission.source import Mark
+from executive.mission.text.yaml_text import Mapping, Node, Scalar, Sequence
+
+
+def parse_library(root: Node) -> tuple[Library, list[Finding]]:
+    """Return what a library file says, as far as it can be read, and what is wrong with its form."""
+    findings: list[Finding] = []
+    start = replace(root.mark, length=1)
+    fields = Fields("the library", start, root, grammar.LIBRARY, findings)
+    for key in ("library", "trees"):
+        fields.required(key)
+    name = fields.text("library")
+    return Library(name, parse_trees(fields, NodeParser(findings), name or "library")), findings
+
+
+def parse_trees(fields: Fields, parser: NodeParser, library: str = "") -> dict[str, Subtree]:
+    """Return the subtrees under the key `trees`; `library` names the library they belong to."""
+    trees: dict[str, Subtree] = {}
+
+    def read(name: str, mark: Mark, node: Node) -> None:
+        if not NAME.fullmatch(name):
+            parser.refuse(mark, "bad-name", f'a subtree is named by letters, digits and "_", not "{name}"')
+        if isinstance(node, Mapping) and set(grammar.SUBTREE) & set(node.keys):
+            whole = node.get("do") is not None
+            if not whole:
+                parser.refuse(mark, "missing-key", f'the subtree "{name}" needs the key "do"')
+            trees[name] = _subtree(name, mark, node, parser if whole else NodeParser([]), library)
+        else:
+            trees[name] = Subtree(name, mark, "", {}, None, parser.node(node, mark), library)
+
+    fields.mapping("trees", read)
+    return trees
+
+
+def _subtree(name: str, mark: Mark, node: Mapping, parser: NodeParser, library: str) -> Subtree:
+    fields = Fields(f'the subtree "{name}"', mark, node, grammar.SUBTREE, parser.findings)
+    args: dict[str, Argument] = {}
+
+    def read(argument: str, where: Mark, value: Node) -> None:
+        if not NAME.fullmatch(argument):
+            hint = "Write the bare name; inside, its value is $name."
+            parser.refuse(where, "bad-name", f'"{argument}" cannot name an argument', hint)
+            argument = argument.removeprefix("$")
+        required = isinstance(value, Scalar) and value.value is None
+        args[argument] = Argument(where, None if required else value_of(value, parser.findings))
+
+    if isinstance(fields.get("args"), Sequence):
+        for item in fields.items("args"):
+            if isinstance(item, Scalar):
+                read(item.text, item.mark, Scalar(item.mark, None, ""))
+            else:
+                parser.refuse(
+                    item.mark, "wrong-type", "an argument in a list is a name; for a default write a mapping"
+                )
+    else:
+        fields.mapping("args", read)
+    body = parser.node(fields.get("do"), fields.key_mark("do"))
+    return Subtree(name, mark, fields.text("doc"), args, _returns(fields, parser), body, library)
+
+
+def _returns(fields: Fields, parser: NodeParser) -> dict[str, Mark] | None:
+    """Return the names under `returns` with their places, or None where the key is missing."""
+    if fields.get("returns") is None:
+        return None
+    names: dict[str, Mark] = {}
+    for item in fields.items("returns"):
+        written = item.text.removeprefix("$") if isinstance(item, Scalar) else ""
+        if NAME.fullmatch(written):
+            names[written] = item.mark
+        else:
+            parser.refuse(item.mark, "bad-name", "returns takes the names of variables, as [targets]")
+    return names

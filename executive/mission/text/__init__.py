@@ -1,0 +1,1 @@
+"""Files, their text, and where things stand in it."""

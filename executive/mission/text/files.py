@@ -1,0 +1,91 @@
+"""Which files a mission means: its own, those below its folder, and the shipped ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path, PurePosixPath
+
+import executive
+from executive.errors import InputError
+from executive.mission.findings import alternatives
+from executive.mission.source import Source
+
+_LARGEST = 1_000_000
+
+
+def shipped_folder() -> Path:
+    """Return the folder of the missions that come with the executive: in a wheel, or in a checkout."""
+    package = Path(executive.__file__).parent
+    installed = package / "shipped"
+    return installed if installed.is_dir() else package.parent / "missions"
+
+
+def shipped_missions() -> list[str]:
+    """Return the names of the shipped missions."""
+    return sorted(path.stem for path in shipped_folder().glob("*.yaml"))
+
+
+def find_mission(name: str | Path) -> Path:
+    """Return the mission file that `name` means: a path, or the name of a shipped mission.
+
+    Raises:
+        InputError: There is neither.
+    """
+    path = Path(name)
+    if path.is_file():
+        return path
+    if path.is_dir():
+        raise InputError(f'"{name}" is a folder; name one of its files')
+    bare = PurePosixPath(str(name).removeprefix("missions/")).with_suffix("")
+    if len(bare.parts) == 1 and (shipped := shipped_folder() / f"{bare}.yaml").is_file():
+        return shipped
+    hint = alternatives(str(bare), shipped_missions(), "Shipped missions")
+    raise InputError(f'there is no mission file "{name}", and no shipped mission of that name. {hint}')
+
+
+def below(folder: Path, reference: str, shipped: Sequence[str] = ("",)) -> Path:
+    """Return the file that `reference` names below `folder`, or else below one of the `shipped` folders.
+
+    Raises:
+        InputError: The reference leaves the folder, or there is no such file.
+    """
+    written = PurePosixPath(reference)
+    if written.is_absolute() or ".." in written.parts or "\\" in reference:
+        raise InputError(
+            f'"{reference}" is not below the folder of the file that names it; '
+            'give a relative path without ".."'
+        )
+    bases = (folder, *(shipped_folder() / part for part in shipped))
+    for base in bases:
+        path = base / reference
+        if path.is_file():
+            if not path.resolve().is_relative_to(base.resolve()):
+                raise InputError(f'"{reference}" is a link out of {base}')
+            return path
+    known = {p.relative_to(b).as_posix() for b in bases for p in (b / written.parent).glob("*.yaml")}
+    hint = alternatives(reference, sorted(known), "There are")
+    raise InputError(f'there is no file "{reference}" beside this one, and none is shipped. {hint}')
+
+
+def read_source(path: Path) -> Source:
+    """Return the text of a file.
+
+    Raises:
+        InputError: It is missing, too large, or no UTF-8 text.
+    """
+    try:
+        if path.stat().st_size > _LARGEST:
+            raise InputError(f"{path} is larger than {_LARGEST} bytes; it cannot be a mission or a cell")
+        return Source(_shown(path), path.read_bytes().decode("utf-8-sig"))
+    except FileNotFoundError:
+        raise InputError(f"there is no file {path}") from None
+    except UnicodeDecodeError as problem:
+        raise InputError(f"{path} is not UTF-8 text: byte {problem.start} does not fit") from None
+    except OSError as problem:
+        raise InputError(f"{path} cannot be read: {problem.strerror}") from None
+
+
+def _shown(path: Path) -> str:
+    """Return the path as the user would write it here."""
+    here = Path.cwd()
+    return str(path.relative_to(here)) if path.is_absolute() and path.is_relative_to(here) else str(path)

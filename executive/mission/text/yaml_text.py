@@ -1,0 +1,249 @@
+"""YAML text as a tree of nodes that know where they stand.
+
+Only what a mission needs is read: mappings with text keys, sequences and scalars of YAML 1.2.
+Tags and merge keys are refused, and aliases may not blow the tree up, so no file can run code or
+grow in memory. What an alias stands for keeps the place where it is written out.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import yaml
+
+from executive.mission.findings import Finding, error
+from executive.mission.source import Mark, Source
+from executive.mission.text.scalars import ScalarValue, core_value
+
+_DEEPEST = 60
+_HALF = re.compile("[\ud800-\udfff]")
+_MOST_NODES = 100_000
+_ADVICE = {
+    "mapping values are not allowed here": (
+        'A text that holds ": " needs quotes. Otherwise compare the indentation with the line above.'
+    ),
+    "found character '\\t' that cannot start any token": "Indent with blanks instead of tabs.",
+    "expected <block end>": "Compare the indentation with the lines above.",
+    "expected ',' or": "A bracket or brace that was opened is not closed.",
+}
+"""What to do about problems that PyYAML names in words of its own trade, by how they begin."""
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """A single value; `text` is how it is written, without quotes."""
+
+    mark: Mark
+    value: ScalarValue
+    text: str
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """A list."""
+
+    mark: Mark
+    items: tuple[Node, ...]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One `key: value`."""
+
+    key: Scalar
+    value: Node
+
+
+@dataclass(frozen=True)
+class Mapping:
+    """A list of `key: value` with different keys, in the order of the text."""
+
+    mark: Mark
+    entries: tuple[Entry, ...]
+
+    def entry(self, key: str) -> Entry | None:
+        """Return the entry of `key`, or None."""
+        return next((entry for entry in self.entries if entry.key.text == key), None)
+
+    def get(self, key: str) -> Node | None:
+        """Return the value of `key`, or None."""
+        entry = self.entry(key)
+        return entry.value if entry else None
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The keys in the order of the text."""
+        return tuple(entry.key.text for entry in self.entries)
+
+
+Node = Scalar | Sequence | Mapping
+
+
+def plain(node: Node) -> Any:
+    """Return the node as plain Python values."""
+    if isinstance(node, Scalar):
+        return node.value
+    if isinstance(node, Sequence):
+        return [plain(item) for item in node.items]
+    return {entry.key.text: plain(entry.value) for entry in node.entries}
+
+
+def scalars(node: Node) -> Iterator[Scalar]:
+    """Yield every single value of the node and below it, in the order of the text; keys are none."""
+    if isinstance(node, Scalar):
+        yield node
+        return
+    for part in node.items if isinstance(node, Sequence) else (entry.value for entry in node.entries):
+        yield from scalars(part)
+
+
+def parse_yaml(source: Source) -> tuple[Node | None, list[Finding]]:
+    """Return the root node, or None where there is no sound tree, and what is wrong with the text."""
+    composer = _Composer(source)
+    try:
+        root = composer.document()
+    except yaml.MarkedYAMLError as problem:
+        return None, [*composer.findings, _syntax(source, problem)]
+    except yaml.reader.ReaderError as problem:
+        return None, [*composer.findings, _unreadable(source, problem)]
+    except _Unsound:
+        return None, composer.findings
+    return root, composer.findings
+
+
+class _Unsound(Exception):
+    """The tree cannot be completed; the findings say why."""
+
+
+class _Composer:
+    """Builds nodes from PyYAML's events and collects what is wrong."""
+
+    def __init__(self, source: Source) -> None:
+        self.source = source
+        self.findings: list[Finding] = []
+        # The parser in Python: its messages do not change with the libyaml that happens to be there.
+        self._events: Iterator[Any] = yaml.parse(source.text, Loader=yaml.SafeLoader)
+        self._anchors: dict[str, tuple[Node, int]] = {}
+        self._count = 0
+
+    def document(self) -> Node:
+        next(self._events)  # the stream's start
+        if isinstance(next(self._events), yaml.StreamEndEvent):
+            self._refuse(self.source.mark(), "empty", "the file is empty")
+            raise _Unsound
+        root = self._node(next(self._events), 0)
+        next(self._events)  # the document's end
+        after = next(self._events)
+        if not isinstance(after, yaml.StreamEndEvent):
+            self._refuse(self._mark(after, 3), "two-documents", 'a second document starts here, after "---"')
+            raise _Unsound
+        return root
+
+    def _node(self, event: Any, depth: int) -> Node:
+        if isinstance(event, yaml.AliasEvent):
+            return self._alias(event, depth)
+        before = self._count
+        self._count += 1
+        if event.tag is not None:
+            self._refuse(self._mark(event), "tag", f'the tag "{event.tag}" is not allowed')
+        node = self._value(event, depth)
+        if event.anchor is not None:
+            self._anchors[event.anchor] = node, self._count - before
+        return node
+
+    def _alias(self, event: Any, depth: int) -> Node:
+        if event.anchor not in self._anchors:
+            self._refuse(self._mark(event), "alias", f'nothing above is marked "&{event.anchor}"')
+            raise _Unsound
+        node, size = self._anchors[event.anchor]
+        if depth + _height(node) > _DEEPEST:
+            self._refuse(self._mark(event), "too-deep", f"nested more than {_DEEPEST} levels deep")
+            raise _Unsound
+        self._count += size
+        if self._count > _MOST_NODES:
+            message = f"with its aliases written out, the file has more than {_MOST_NODES} values"
+            self._refuse(self._mark(event), "too-large", message)
+            raise _Unsound
+        return node
+
+    def _value(self, event: Any, depth: int) -> Node:
+        if isinstance(event, yaml.ScalarEvent):
+            return self._scalar(event)
+        if depth >= _DEEPEST:
+            self._refuse(self._mark(event, 1), "too-deep", f"nested more than {_DEEPEST} levels deep")
+            raise _Unsound
+        if isinstance(event, yaml.SequenceStartEvent):
+            items = []
+            while not isinstance(item := next(self._events), yaml.SequenceEndEvent):
+                items.append(self._node(item, depth + 1))
+            return Sequence(self._mark(event, 1), tuple(items))
+        return self._mapping(event, depth)
+
+    def _scalar(self, event: Any) -> Scalar:
+        text, mark = event.value, self._mark(event)
+        if _HALF.search(text):
+            # An escape can name one; no file or terminal can take it.
+            self._refuse(mark, "yaml", "half of a surrogate pair is no character")
+            text = _HALF.sub("?", text)
+        return Scalar(mark, core_value(text) if event.implicit[0] else text, text)
+
+    def _mapping(self, event: Any, depth: int) -> Mapping:
+        entries: dict[str, Entry] = {}
+        while not isinstance(start := next(self._events), yaml.MappingEndEvent):
+            key = self._node(start, depth + 1)
+            value = self._node(next(self._events), depth + 1)
+            if not isinstance(key, Scalar):
+                self._refuse(key.mark, "bad-key", "a key must be a single word")
+            elif key.text == "<<":
+                self._refuse(key.mark, "merge-key", 'the merge key "<<" is not allowed; write the keys out')
+            elif key.text in entries:
+                first = entries[key.text].key.mark.line
+                message = f'the key "{key.text}" stands here twice; the first is in line {first}'
+                self._refuse(key.mark, "duplicate-key", message)
+            else:
+                entries[key.text] = Entry(key, value)
+        return Mapping(self._mark(event, 1), tuple(entries.values()))
+
+    def _mark(self, event: Any, length: int = 0) -> Mark:
+        start, end = event.start_mark, event.end_mark
+        if not length:
+            same_line = start.line == end.line
+            length = max(1, end.column - start.column) if same_line else 1000
+        return Mark(self.source, start.line + 1, start.column + 1, length)
+
+    def _refuse(self, mark: Mark, code: str, message: str) -> None:
+        self.findings.append(error(mark, code, message))
+
+
+def _height(node: Node) -> int:
+    if isinstance(node, Scalar):
+        return 0
+    inner = node.items if isinstance(node, Sequence) else [entry.value for entry in node.entries]
+    return 1 + max(map(_height, inner), default=0)
+
+
+def _syntax(source: Source, problem: yaml.MarkedYAMLError) -> Finding:
+    place = problem.problem_mark or problem.context_mark
+    mark = source.mark(place.line + 1, place.column + 1, 1) if place else source.mark()
+    if place and not source.line(mark.line):
+        # The text ended too early: show its last line instead of nothing.
+        written = source.text.rstrip()
+        last = written.count("\n") + 1
+        mark = source.mark(last, max(1, len(source.line(last))), 1)
+    context = f" {problem.context}" if problem.context else ""
+    began = problem.context_mark
+    since = f" that began in line {began.line + 1}" if context and began and began is not place else ""
+    message = f"not valid YAML:{context}{since}: {problem.problem}".replace("::", ":")
+    said = str(problem.problem)
+    advice = next((advice for begin, advice in _ADVICE.items() if said.startswith(begin)), "")
+    return error(mark, "yaml", message, advice)
+
+
+def _unreadable(source: Source, problem: yaml.reader.ReaderError) -> Finding:
+    before = source.text[: problem.position]
+    line, col = before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
+    character = source.text[problem.position : problem.position + 1]
+    return error(source.mark(line, col, 1), "yaml", f"the character {character!r} is not allowed in YAML")

@@ -1,0 +1,126 @@
+"""The guides as the tests read them: fenced blocks, files and tables.
+
+The author's guide, `missions/README.md`, marks what a reader sees anyway by comments above a block:
+
+* `<!-- complete: NAME -->`: a part of a mission; what it does not show is as in the mission NAME.
+* `<!-- mistake -->`: `executive check` finds something in it.
+
+Its mission `hello` is the file `hello.yaml`, its library `mine` `library/mine.yaml`, its cell `trays`
+`cells/trays.yaml`. A ```text block holds what is printed by the command in the ```console block before
+it, or by `executive check` of the mistake before it.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+ROOT = Path(__file__).parent.parent
+AUTHORS = "missions/README.md"
+GUIDES = ("README.md", AUTHORS, "skills/README.md")
+
+_FENCED = re.compile(r"((?:^<!-- [^\n]* -->\n)*)^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+_KEY = re.compile(r"^(\w+:)(.*?)(?=^\w|\Z)", re.MULTILINE | re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block of a guide; `marks` are the comments above it, `where` is guide and line."""
+
+    where: str
+    language: str
+    marks: tuple[str, ...]
+    text: str
+
+    @property
+    def is_mistake(self) -> bool:
+        """Whether it shows a mistake."""
+        return "mistake" in self.marks
+
+
+@dataclass(frozen=True)
+class File:
+    """A file that the author's guide shows, with the keys put in that the block leaves out."""
+
+    name: str
+    block: Block
+    text: str
+
+
+def blocks(guide: str) -> Iterator[Block]:
+    """Yield every fenced block of a guide."""
+    text = read(guide)
+    for match in _FENCED.finditer(text):
+        line = text.count("\n", 0, match.start(2)) + 1
+        yield Block(f"{guide}:{line}", match[2], tuple(re.findall(r"<!-- (.*) -->", match[1])), match[3])
+
+
+def shown(language: str) -> list[Block]:
+    """Return every block of a language in all guides."""
+    return [block for guide in GUIDES for block in blocks(guide) if block.language == language]
+
+
+def files() -> dict[str, File]:
+    """Return every file that the author's guide shows, by its name."""
+    found: dict[str, File] = {}
+    for block in blocks(AUTHORS):
+        if block.language == "yaml":
+            text = block.text
+            for mark in block.marks:
+                if mark.startswith("complete: "):
+                    text = _completed(text, found[f"{mark.removeprefix('complete: ')}.yaml"].text)
+            name = _file_name(text)
+            assert name not in found, f"{block.where} shows {name} once more"
+            found[name] = File(name, block, text)
+    return found
+
+
+def transcripts() -> Iterator[tuple[str, list[str], str]]:
+    """Yield where it stands, the words after `executive`, and what is printed, of every command shown."""
+    names = {file.block.where: name for name, file in files().items()}
+    before = None
+    for block in blocks(AUTHORS):
+        if before is not None and before.language == "console":
+            prompt, program, *words = shlex.split(before.text)
+            assert (prompt, program, block.language) == ("$", "executive", "text"), before.where
+            yield before.where, words, block.text
+        elif before is not None and before.is_mistake:
+            assert block.language == "text", f"{before.where}: what check says is missing"
+            yield before.where, ["check", names[before.where]], block.text
+        before = block
+
+
+def rows(heading: str) -> dict[str, list[str]]:
+    """Return the rows of the tables below a heading of the author's guide, by their first cell."""
+    _, _, rest = read(AUTHORS).partition(f"{heading}\n")
+    section = re.split(r"^#", rest, maxsplit=1, flags=re.MULTILINE)[0]
+    lines = re.findall(r"^\| (.*) \|$", section, re.MULTILINE)
+    return {first: others for first, *others in (line.split(" | ") for line in lines)}
+
+
+def in_code(cell: str) -> list[str]:
+    """Return the words of a table's cell that are set as code."""
+    return re.findall(r"`([^`]+)`", cell)
+
+
+def read(guide: str) -> str:
+    """Return the text of a guide."""
+    return (ROOT / guide).read_text(encoding="utf-8")
+
+
+def _completed(part: str, whole: str) -> str:
+    """Return a part of a mission with the keys of the whole one that it does not show, in its order."""
+    keys = {**dict(_KEY.findall(whole)), **dict(_KEY.findall(part))}
+    return "".join(key + text for key, text in keys.items())
+
+
+def _file_name(text: str) -> str:
+    folders = {"mission": "", "library": "library/", "cell": "cells/"}
+    content = yaml.safe_load(text)
+    key = next(key for key in folders if key in content)
+    return f"{folders[key]}{content[key]}.yaml"

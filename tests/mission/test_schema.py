@@ -1,0 +1,200 @@
+"""The JSON Schema of mission, library and cell files: what it accepts, what it marks, and where."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from jsonschema import Draft7Validator
+
+from executive.mission.findings import MissionError
+from executive.mission.load import LoadedMission
+from executive.mission.model import grammar
+from executive.mission.schema.files import library_schema, mission_schema
+from executive.mission.schema.types import cell_schema
+from executive.mission.source import Source
+from executive.mission.text.files import shipped_folder
+from executive.mission.text.yaml_text import parse_yaml, plain
+from executive.skill import Skill, discover
+
+MISSIONS = shipped_folder()
+SCHEMAS: dict[str, tuple[Callable[[], dict[str, Any]], str, str]] = {
+    "mission.schema.json": (lambda: mission_schema(discover()), "", "*.yaml"),
+    "library/library.schema.json": (lambda: library_schema(discover()), " --library", "library/*.yaml"),
+    "cells/cell.schema.json": (cell_schema, " --cell", "cells/*.yaml"),
+}
+"""The shipped schemas: how each is made, the option that prints it, and the files it is for."""
+
+
+def problems(schema: dict[str, Any], text: str) -> list[str]:
+    """Return the place and the reason of everything that the schema finds wrong with a YAML text."""
+    root, findings = parse_yaml(Source("shown.yaml", text))
+    assert root is not None
+    assert not findings
+    found = Draft7Validator(schema).iter_errors(plain(root))
+    return [f"{'.'.join(map(str, problem.absolute_path))}: {problem.message}" for problem in found]
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_the_shipped_schema_is_the_generated_one(name: str) -> None:
+    make, option, _ = SCHEMAS[name]
+    written = json.loads((MISSIONS / name).read_text(encoding="utf-8"))
+    assert written == make(), f"run `executive schema{option} > missions/{name}`"
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_the_schema_is_sound_draft_07(name: str) -> None:
+    schema = SCHEMAS[name][0]()
+    Draft7Validator.check_schema(schema)
+    referred = set(re.findall(r'"\$ref": "#/definitions/(\w+)"', json.dumps(schema)))
+    assert referred <= set(schema["definitions"])
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_the_schema_accepts_every_shipped_file(name: str) -> None:
+    make, _, files = SCHEMAS[name]
+    schema = make()
+    found = {path.name: problems(schema, path.read_text(encoding="utf-8")) for path in MISSIONS.glob(files)}
+    assert not {file: wrong for file, wrong in found.items() if wrong}
+
+
+HEAD = "mission: m\ncell: cells/small.yaml\n"
+
+WELL_FORMED = """
+mission: m-1
+description: Everything that the language has.
+cell: cells/small.yaml
+library: [library/one.yaml]
+params:
+  tries: 2
+  names: [a, b]
+  height: {default: 0.2, type: number, min: 0, max: 1, doc: How high.}
+  kind: {type: text, choices: [cube, duck]}
+routes: {cube: red_bin, duck: [red_bin, blue_bin]}
+tree:
+  - Look
+  - Look:
+  - Look: {view: $view, seen: $first}
+    as: first
+  - Pick: {seen: $first, height: 0.2, only: null}
+  - parallel: [Look, succeed]
+  - parallel: {wait_for: any, halt: true, do: [Look, {Drop: {bin: red_bin}}]}
+  - fallback: [{sequence: [Look]}, {invert: Look}, {succeed: Look}, {succeed: }]
+  - retry:
+      attempts: $tries
+      on: Pick.missed
+      backoff: {first: 0.5, factor: 2, most: 8}
+      recover: Look
+      do: [Look, Pick]
+  - retry: {attempts: 2, backoff: 1, do: Look}
+  - repeat: {times: 3, until: [Look.unsure, first.hidden], do: Look}
+  - while: {condition: Look, do: Pick}
+  - for_each: {each: name, in: $names, do: Pick}
+  - for_each: {each: name, in: [a, b], do: Pick}
+  - try: Pick
+    catch: [{on: Pick.missed, do: Look}]
+    finally: Look
+    as: tried
+  - timeout: {seconds: 1.5, do: Look}
+  - use: look
+    with: {view: full, height: 0.1}
+    returns: {seen: $mine}
+trees:
+  look: {doc: A look., args: {view: table, height: }, returns: [seen], do: {Look: {view: $view}}}
+  twice: {args: [height], do: [Look, Look]}
+  again: {returns: $seen, do: Look}
+  short: [Look, Pick]
+  shorter: Look
+"""
+
+
+def test_everything_of_the_language_is_accepted(skills: dict[str, type[Skill]]) -> None:
+    assert problems(mission_schema(skills), WELL_FORMED) == []
+    written = set(re.findall(r"[a-z_]+(?=:)", WELL_FORMED))
+    assert set(grammar.CONTROL) <= written, "the example must show every control node"
+
+
+BROKEN = {
+    "unknown top key": ("tre: Look\ntree: Look", "'tre' was unexpected"),
+    "no tree": ("trees: {a: Look}", "'tree' is a required property"),
+    "unknown skill": ("tree: Lok", "tree: 'Lok' is not valid"),
+    "unknown skill in a list": ("tree: [Look, Pik]", "tree: ['Look', 'Pik'] is not valid"),
+    "unknown control node": ("tree: {rety: {attempts: 2, do: Look}}", "'rety' was unexpected"),
+    "control node without a body": ("tree: retry", "tree: 'retry' is not valid"),
+    "skill without what it needs": ("tree: Drop", "tree: 'Drop' is not valid"),
+    "empty list": ("tree: []", "tree: [] should be non-empty"),
+    "empty mapping": ("tree: {}", "tree: {} should be non-empty"),
+    "label alone": ("tree: {as: a}", "tree: {'as': 'a'} does not have enough properties"),
+    "two heads": ("tree: {Look: , Pick: }", "'Pick' was unexpected"),
+    "catch beside retry": ("tree: {retry: {attempts: 2, do: Look}, catch: []}", "'catch' was unexpected"),
+    "catch alone": ("tree: {catch: []}", "'catch' was unexpected"),
+    "bad label": ("tree: {Look: , as: First}", "tree.as: 'First' does not match"),
+    "unknown param": ("tree: {Look: {vieww: full}}", "tree.Look: Additional properties"),
+    "no mapping of params": ("tree: {Look: full}", "tree.Look: 'full' is not of type"),
+    "no such choice": ("tree: {Look: {view: ful}}", "tree.Look.view: 'ful' is not valid"),
+    "too large": ("tree: {Pick: {height: 0.9}}", "tree.Pick.height: 0.9 is not valid"),
+    "text for a number": ("tree: {Pick: {height: high}}", "tree.Pick.height: 'high' is not valid"),
+    "misplaced dollar": ("tree: {Pick: {height: $}}", "tree.Pick.height: '$' is not valid"),
+    "missing param": ("tree: {Drop: {}}", "tree.Drop: 'bin' is a required property"),
+    "value for an output": ("tree: {Look: {seen: first}}", "tree.Look.seen: 'first' does not match"),
+    "missing key": ("tree: {retry: {do: Look}}", "tree.retry: 'attempts' is a required property"),
+    "misspelt key": ("tree: {retry: {attemps: 2, do: Look}}", "'attemps' was unexpected"),
+    "no attempts": ("tree: {retry: {attempts: 0, do: Look}}", "tree.retry.attempts: 0 is not valid"),
+    "half an attempt": ("tree: {retry: {attempts: 1.5, do: Look}}", "tree.retry.attempts: 1.5 is not valid"),
+    "unknown reason": ("tree: {repeat: {until: Pick.mised, do: Look}}", "tree.repeat.until: 'Pick.mised'"),
+    "reason alone": ("tree: {repeat: {until: [missed], do: Pick}}", "tree.repeat.until: ['missed'] is not"),
+    "misspelt catch": ("tree: {try: Look, catch: [{no: Look.hidden, do: Look}]}", "'no' was unexpected"),
+    "catch as a word": ("tree: {try: Look, catch: Look}", "tree.catch: 'Look'"),
+    "no time": ("tree: {timeout: {seconds: 0, do: Look}}", "tree.timeout.seconds: 0 is not valid"),
+    "wait for al": ("tree: {parallel: {wait_for: al, do: [Look]}}", "tree.parallel: {'wait_for': 'al'"),
+    "misspelt backoff": ("tree: {retry: {attempts: 2, backoff: {frst: 1}, do: Look}}", "tree.retry.backoff"),
+    "loop variable with dollar": ("tree: {for_each: {each: $n, in: [a], do: Look}}", "tree.for_each.each"),
+    "arguments as a text": ("tree: {use: a, with: b}\ntrees: {a: Look}", "tree.with: 'b' is not of type"),
+    "subtree without do": ("tree: Look\ntrees: {a: {doc: A., args: []}}", "trees.a: {'doc'"),
+    "bad name of a param": ("params: {a-b: 1}\ntree: Look", "params: 'a-b' does not match"),
+    "misspelt declaration": ("params: {a: {default: 1, mim: 2}}\ntree: Look", "'mim' was unexpected"),
+    "no such type": ("params: {a: {default: 1, type: float}}\ntree: Look", "params.a.type: 'float' is not"),
+    "route to a number": ("routes: {cube: 3}\ntree: Look", "routes.cube: 3 is not of type"),
+    "route to nowhere": ("routes: {cube: []}\ntree: Look", "routes.cube: [] should be non-empty"),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_what_is_wrong_is_marked(case: str, skills: dict[str, type[Skill]]) -> None:
+    text, expected = BROKEN[case]
+    found = problems(mission_schema(skills), HEAD + text)
+    assert expected in "\n".join(found)
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_what_the_schema_marks_is_an_error_of_check_too(
+    case: str, load: Callable[..., LoadedMission]
+) -> None:
+    with pytest.raises(MissionError):
+        load(HEAD + BROKEN[case][0] + "\n")
+
+
+def test_a_library_has_subtrees_and_no_tree(skills: dict[str, type[Skill]]) -> None:
+    schema = library_schema(skills)
+    assert problems(schema, "library: sorting\ntrees: {look: Look}") == []
+    assert "'tree' was unexpected" in problems(schema, "library: a\ntrees: {}\ntree: Look")[0]
+    assert "trees.look" in problems(schema, "library: a\ntrees: {look: {do: {Look: {vieww: a}}}}")[0]
+
+
+def test_a_cell_with_a_base_needs_no_other_key(small_cell: str) -> None:
+    schema = cell_schema()
+    assert problems(schema, small_cell) == []
+    assert problems(schema, "base: small.yaml") == []
+    assert ": 'arm' is a required property" in problems(schema, "cell: a")
+    assert "'tabel' was unexpected" in problems(schema, "base: small.yaml\ntabel: {}")[0]
+    assert "safe_place: [0, 0] is too short" in problems(schema, "base: a.yaml\nsafe_place: [0, 0]")[0]
+
+
+def test_a_param_says_its_unit_bounds_and_default(skills: dict[str, type[Skill]]) -> None:
+    (shape,) = mission_schema(skills)["definitions"]["Pick"]["allOf"]
+    height = shape["properties"]["height"]
+    assert height["description"] == "[m] (at least 0, at most 0.5, 0.1 if not given)"
+    assert height["anyOf"][0] == {"type": "number", "minimum": 0, "maximum": 0.5, "default": 0.1}
