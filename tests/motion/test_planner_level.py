@@ -7,7 +7,7 @@ import pytest
 
 from executive.cell import Via
 from executive.messages import ObjectClass
-from executive.mission.cell_file import load_cell
+from executive.mission.parse.cell_file import load_cell
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.planner import SAG_LOADED, Planner

@@ -11,8 +11,8 @@ import pytest
 from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.messages import Detections
-from executive.mission.cell_file import load_cell
 from executive.mission.load import load_mission
+from executive.mission.parse.cell_file import load_cell
 from executive.runtime.run import Run
 from executive.skill import discover
 from executive.testing.fake_cell import FakeCell, SilentOperator

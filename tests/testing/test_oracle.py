@@ -10,7 +10,7 @@ import pytest
 from executive.events import ignore
 from executive.geometry import Pose
 from executive.messages import Detection
-from executive.mission.cell_file import load_cell
+from executive.mission.parse.cell_file import load_cell
 from executive.sim.cell import SimCell
 from executive.testing.fake_cell import ROUTES, SilentOperator
 from executive.testing.oracle import TrueFrame, oracle_cell
