@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from executive.mission.check.case import Case
 from executive.mission.findings import Finding, alternatives, error, warning
 from executive.mission.model.nodes import ForEachNode, Node, UseNode
-from executive.mission.model.values import Reference
+from executive.mission.model.values import Named, Reference
 from executive.mission.model.wiring import wires, written_below
 from executive.mission.source import Mark
 from executive.skill import Direction, Skill
@@ -64,6 +64,30 @@ def unread_variables(case: Case) -> Iterator[Finding]:
                 yield warning(wire.mark, "unread", message)
         if isinstance(node, UseNode):
             yield from _unread_returns(node, read)
+
+
+def taken_names(case: Case) -> Iterator[Finding]:
+    """Find every loop whose variable something else writes too: it is gone when the loop ends."""
+    if case.tree is None:
+        return
+    writers = {wire.variable: wire for node in case.tree.walk() for wire in case.wires(node, Direction.OUT)}
+
+    def walk(node: Node, around: Mapping[str, Named]) -> Iterator[Finding]:
+        if isinstance(node, ForEachNode):
+            each = node.each
+            other = writers.get(each.name)
+            place = other.mark if other else around[each.name].mark if each.name in around else None
+            if place is not None:
+                who = other or "another for_each"
+                message = (
+                    f"for_each writes ${each.name}, and so does {who} in {place.place(each.mark.source)}"
+                )
+                yield error(each.mark, "shadowed-variable", message, "Call the loop's variable otherwise.")
+            around = {**around, each.name: each}
+        for child in node.children:
+            yield from walk(child, around)
+
+    yield from walk(case.tree, {})
 
 
 def _unread_returns(use: UseNode, read: set[str]) -> Iterator[Finding]:

@@ -11,7 +11,8 @@ from dataclasses import replace
 from typing import Any
 
 from executive.mission.findings import suggest
-from executive.mission.flow.grips import grips_at_end, left_after, left_after_failure, required, together
+from executive.mission.flow.grips import left_after, left_after_failure, required
+from executive.mission.flow.parallel import at_once
 from executive.mission.flow.state import ANYTHING, BEGINNING, UNKNOWN, Flow, Raise, State, joined
 from executive.mission.model import nodes
 from executive.mission.model.nodes import Node
@@ -102,30 +103,7 @@ class Analysis:
 
     def _parallel(self, node: Any, state: State) -> Flow:
         flows = [self._run(branch, state) for branch in node.branches]
-        total = len(flows)
-        needed = {"all": total, "any": 1}.get(_constant(node.wait_for), _constant(node.wait_for))
-        needed = min(max(needed, 1), total) if isinstance(needed, int) else total
-        halts = needed < total or _constant(node.halt) is True
-        ends = [grips_at_end(flow, state, halts) for flow in flows]
-        succeeding = [flow.success for flow in flows if flow.success is not None]
-        success = None
-        if len(succeeding) >= needed:
-            success = joined(succeeding) or state
-            if needed == total:
-                success = success.writing(name for end in succeeding for name in end.written or ())
-                ends_well = [end.grips for end in succeeding]
-            else:
-                ends_well = list(ends)
-            success = success.gripping(together(state.grips, ends_well))
-        failures = {}
-        if sum(bool(flow.failures) for flow in flows) > total - needed:
-            for index, flow in enumerate(flows):
-                others = ends[:index] + ends[index + 1 :]
-                for failure, after in flow.failures.items():
-                    failures[failure] = after.gripping(together(state.grips, [after.grips, *others]))
-        halted = joined(flow.halted for flow in flows)
-        everything = together(state.grips, [grips_at_end(flow, state, halts=True) for flow in flows])
-        return Flow(success, failures, halted and halted.gripping(everything))
+        return at_once(flows, state, _constant(node.wait_for), _constant(node.halt) is True)
 
     def _retry(self, node: Any, state: State) -> Flow:
         recovery: list[Flow] = []

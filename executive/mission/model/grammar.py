@@ -154,6 +154,15 @@ CONTROL: Mapping[str, Form] = {
 }
 """Every control node by its word."""
 
+ELSEWHERE: Mapping[str, str] = {
+    "if": "To go another way when something fails, write try and catch, or a fallback.",
+    "else": "To go another way when something fails, write try and catch, or a fallback.",
+    "selector": "It is called fallback here.",
+    "for": "It is called for_each here.",
+    "loop": "It is called repeat here, or while with a condition.",
+}
+"""What to write instead of words that other languages have."""
+
 MISSION: Mapping[str, Key] = {
     "mission": Key("word", "Its name.", required=True),
     "description": Key("text", "What it does, one sentence."),

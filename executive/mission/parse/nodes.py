@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from executive.mission.findings import Finding, alternatives, error, suggest
@@ -16,14 +16,6 @@ from executive.mission.text.yaml_text import Entry, Mapping, Node, Scalar, Seque
 from executive.mission.words import describe
 
 _LABEL = re.compile(grammar.LABEL)
-_ELSEWHERE = {
-    "if": "To go another way when something fails, write try and catch, or a fallback.",
-    "else": "To go another way when something fails, write try and catch, or a fallback.",
-    "selector": "It is called fallback here.",
-    "for": "It is called for_each here.",
-    "loop": "It is called repeat here, or while with a condition.",
-}
-"""What to write instead of words that other languages have."""
 _SKILL = re.compile(r"[A-Z][A-Za-z0-9]*")
 
 
@@ -129,8 +121,8 @@ class NodeParser:
 
     def _unknown(self, mark: Mark, word: str) -> None:
         hint = alternatives(word, CONTROL, "Control nodes are")
-        if word in _ELSEWHERE:
-            self.refuse(mark, "unknown-node", f'there is no control node "{word}"', _ELSEWHERE[word])
+        if word in grammar.ELSEWHERE:
+            self.refuse(mark, "unknown-node", f'there is no control node "{word}"', grammar.ELSEWHERE[word])
             return
         if suggest(word, CONTROL) is None and NAME.fullmatch(word):
             skill = "".join(part[:1].upper() + part[1:] for part in word.split("_"))
@@ -241,27 +233,29 @@ def _for_each(parser: NodeParser, head: Head) -> model.Node:
 
 
 def _try(parser: NodeParser, head: Head) -> model.Node:
-    catches = []
     caught, finish = head.node.get("catch"), head.node.get("finally")
     if caught is None and finish is None:
         parser.refuse(head.mark, "missing-key", 'try needs a "catch" or a "finally" beside it')
-    if caught is not None and not isinstance(caught, Sequence | Mapping):
-        message = f'catch takes "on" and "do", or a list of them, not {describe(plain(caught))}'
-        parser.refuse(caught.mark, "wrong-type", message)
-    # As with `on`, one needs no list.
-    one = (caught,) if isinstance(caught, Mapping) else ()
-    for item in caught.items if isinstance(caught, Sequence) else one:
-        fields = Fields("catch", item.mark, item, grammar.CATCH, parser.findings)
-        fields.required("on")
-        body = parser.node(fields.required("do"), fields.key_mark("do"))
-        catches.append(model.Catch(fields.matches("on"), body))
     return model.TryNode(
         head.mark,
         head.label,
         parser.node(head.value, head.mark),
-        tuple(catches),
+        () if caught is None else tuple(_catches(parser, caught)),
         None if finish is None else parser.node(finish, finish.mark),
     )
+
+
+def _catches(parser: NodeParser, caught: Node) -> Iterator[model.Catch]:
+    """Yield what is caught: as with `on`, one needs no list."""
+    if not isinstance(caught, Sequence | Mapping):
+        message = f'catch takes "on" and "do", or a list of them, not {describe(plain(caught))}'
+        parser.refuse(caught.mark, "wrong-type", message)
+        return
+    for item in caught.items if isinstance(caught, Sequence) else (caught,):
+        fields = Fields("catch", item.mark, item, grammar.CATCH, parser.findings)
+        fields.required("on")
+        body = parser.node(fields.required("do"), fields.key_mark("do"))
+        yield model.Catch(fields.matches("on"), body)
 
 
 def _timeout(parser: NodeParser, head: Head) -> model.Node:

@@ -1,0 +1,50 @@
+"""How a parallel may end, from how its branches may."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from executive.mission.flow.grips import grips_at_end, together
+from executive.mission.flow.state import Flow, State, joined
+
+
+def at_once(flows: Sequence[Flow], state: State, wait_for: Any, halt: bool) -> Flow:
+    """Return how branches may end that all begin in `state`.
+
+    Args:
+        flows: How each branch may end.
+        state: What is true where they begin.
+        wait_for: How many must succeed, `all` or `any`; whatever else it is counts as all.
+        halt: Whether a failure halts the others.
+    """
+    needed = _needed(wait_for, len(flows))
+    ends = [grips_at_end(flow, state, halt or needed < len(flows)) for flow in flows]
+    failures = {}
+    if sum(bool(flow.failures) for flow in flows) > len(flows) - needed:
+        for index, flow in enumerate(flows):
+            others = [*ends[:index], *ends[index + 1 :]]
+            for failure, after in flow.failures.items():
+                failures[failure] = after.gripping(together(state.grips, [after.grips, *others]))
+    halted = joined(flow.halted for flow in flows)
+    everything = together(state.grips, [grips_at_end(flow, state, halts=True) for flow in flows])
+    return Flow(_success(flows, state, needed), failures, halted and halted.gripping(everything))
+
+
+def _success(flows: Sequence[Flow], state: State, needed: int) -> State | None:
+    """Return what is true once enough branches have succeeded; None where so many cannot."""
+    succeeding = [flow.success for flow in flows if flow.success is not None]
+    success = joined(succeeding)
+    if success is None or len(succeeding) < needed:
+        return None
+    if needed < len(flows):
+        ends = [grips_at_end(flow, state, halts=True) for flow in flows]
+        return success.gripping(together(state.grips, ends))
+    everything = success.writing(name for end in succeeding for name in end.written or ())
+    return everything.gripping(together(state.grips, [end.grips for end in succeeding]))
+
+
+def _needed(wait_for: Any, total: int) -> int:
+    if wait_for == "any":
+        return 1
+    return min(max(wait_for, 1), total) if isinstance(wait_for, int) else total
