@@ -1,16 +1,15 @@
-"""From positioned nodes to the nodes of a mission's tree; one function per control node."""
+"""From positioned nodes to the nodes of a mission's tree: words, lists and mappings."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from executive.mission.findings import Finding, alternatives, error, suggest
 from executive.mission.model import grammar
 from executive.mission.model import nodes as model
-from executive.mission.model.values import Literal, Named, Value
-from executive.mission.parse.fields import NAME, Fields, settings_of
+from executive.mission.parse.control import CONTROL, Head, unread
+from executive.mission.parse.fields import NAME, settings_of
 from executive.mission.source import Mark
 from executive.mission.text.yaml_text import Entry, Mapping, Node, Scalar, Sequence, plain
 from executive.mission.words import describe
@@ -33,7 +32,7 @@ class NodeParser:
         if node is None or (isinstance(node, Scalar) and node.value is None):
             if node is not None:
                 self.refuse(mark, "missing-node", "a node is missing here")
-            return _nothing(mark)
+            return unread(mark)
         if isinstance(node, Sequence):
             return self._list(node)
         if isinstance(node, Scalar):
@@ -57,7 +56,7 @@ class NodeParser:
 
     def _list(self, node: Sequence) -> model.Node:
         steps = self.nodes(node, "a list of steps")
-        return model.SequenceNode(node.mark, "", steps) if steps else _nothing(node.mark)
+        return model.SequenceNode(node.mark, "", steps) if steps else unread(node.mark)
 
     def _word(self, node: Scalar) -> model.Node:
         word = node.text
@@ -69,7 +68,7 @@ class NodeParser:
             self.refuse(node.mark, "missing-node", f'"{word}" needs a body: write {word}: ...')
         else:
             self._unknown(node.mark, word)
-        return _nothing(node.mark)
+        return unread(node.mark)
 
     def _mapping(self, node: Mapping) -> model.Node:
         label = self._label(node)
@@ -80,7 +79,7 @@ class NodeParser:
                 self._unknown(entry.key.mark, entry.key.text)
             if not words:
                 self.refuse(node.mark, "missing-node", "a node is missing here: the mapping names none")
-            return _nothing(node.mark)
+            return unread(node.mark)
         head, *others = heads
         for entry in others:
             message = f'"{head.key.text}" and "{entry.key.text}" stand in one node; a node has one name'
@@ -128,178 +127,3 @@ class NodeParser:
             skill = "".join(part[:1].upper() + part[1:] for part in word.split("_"))
             hint = f'If a skill is meant, write it as "{skill}". {hint}'
         self.refuse(mark, "unknown-node", f'there is no control node "{word}"', hint)
-
-
-class Head:
-    """One control node in the file: the mapping it stands in, its word, its label, its value."""
-
-    def __init__(self, node: Mapping, word: str, mark: Mark, label: str, value: Node) -> None:
-        self.node, self.word, self.mark, self.label, self.value = node, word, mark, label, value
-
-
-def _nothing(mark: Mark) -> model.Node:
-    return model.UnknownNode(mark, "")
-
-
-def _fields(parser: NodeParser, head: Head) -> Fields:
-    return Fields(head.word, head.mark, head.value, grammar.CONTROL[head.word].keys, parser.findings)
-
-
-def _sequence(parser: NodeParser, head: Head) -> model.Node:
-    steps = parser.nodes(head.value, "sequence")
-    return model.SequenceNode(head.mark, head.label, steps, listed=False) if steps else _nothing(head.mark)
-
-
-def _fallback(parser: NodeParser, head: Head) -> model.Node:
-    choices = parser.nodes(head.value, "fallback")
-    return model.FallbackNode(head.mark, head.label, choices) if choices else _nothing(head.mark)
-
-
-def _parallel(parser: NodeParser, head: Head) -> model.Node:
-    wait_for: Value = Literal("all", head.mark)
-    halt: Value = Literal(False, head.mark)
-    body: Node | None = head.value
-    if not isinstance(head.value, Sequence):
-        fields = _fields(parser, head)
-        wait_for, halt = fields.value("wait_for") or wait_for, fields.value("halt") or halt
-        body = fields.required("do")
-    branches = () if body is None else parser.nodes(body, "parallel")
-    if not branches:
-        return _nothing(head.mark)
-    return model.ParallelNode(head.mark, head.label, branches, wait_for, halt)
-
-
-def _retry(parser: NodeParser, head: Head) -> model.Node:
-    fields = _fields(parser, head)
-    fields.required("attempts")
-    attempts = fields.value("attempts") or Literal(1, head.mark)
-    recover = fields.get("recover")
-    return model.RetryNode(
-        head.mark,
-        head.label,
-        attempts,
-        fields.matches("on"),
-        None if recover is None else parser.node(recover, fields.key_mark("recover")),
-        _backoff(parser, fields),
-        parser.node(fields.required("do"), fields.key_mark("do")),
-    )
-
-
-def _backoff(parser: NodeParser, fields: Fields) -> model.Backoff | None:
-    node = fields.get("backoff")
-    same: Value = Literal(1.0, fields.key_mark("backoff"))
-    if not isinstance(node, Mapping):
-        first = fields.value("backoff")
-        return None if first is None else model.Backoff(first, same, None)
-    inner = Fields("backoff", fields.key_mark("backoff"), node, grammar.BACKOFF, parser.findings)
-    inner.required("first")
-    first = inner.value("first")
-    if first is None:
-        return None
-    return model.Backoff(first, inner.value("factor") or same, inner.value("most"))
-
-
-def _repeat(parser: NodeParser, head: Head) -> model.Node:
-    fields = _fields(parser, head)
-    times, until = fields.value("times"), fields.matches("until")
-    if fields.sound and fields.get("times") is None and fields.get("until") is None:
-        message = 'repeat needs one of "until" and "times", to know when it is done'
-        parser.refuse(head.mark, "missing-key", message)
-    body = parser.node(fields.required("do"), fields.key_mark("do"))
-    return model.RepeatNode(head.mark, head.label, times, until, body)
-
-
-def _while(parser: NodeParser, head: Head) -> model.Node:
-    fields = _fields(parser, head)
-    condition = parser.node(fields.required("condition"), fields.key_mark("condition"))
-    body = parser.node(fields.required("do"), fields.key_mark("do"))
-    return model.WhileNode(head.mark, head.label, condition, body)
-
-
-def _for_each(parser: NodeParser, head: Head) -> model.Node:
-    fields = _fields(parser, head)
-    for key in ("each", "in"):
-        fields.required(key)
-    each = Named(fields.text("each"), fields.value_mark("each"))
-    if each.name and not NAME.fullmatch(each.name):
-        hint = "Write the bare name, for instance each: target; its value is $target."
-        parser.refuse(each.mark, "bad-name", f'"{each.name}" cannot name a variable', hint)
-        each = Named(each.name.removeprefix("$"), each.mark)
-    source = fields.value("in")
-    body = parser.node(fields.required("do"), fields.key_mark("do"))
-    if source is None or not NAME.fullmatch(each.name):
-        return model.UnknownNode(head.mark, head.label, (body,))
-    return model.ForEachNode(head.mark, head.label, each, source, body)
-
-
-def _try(parser: NodeParser, head: Head) -> model.Node:
-    caught, finish = head.node.get("catch"), head.node.get("finally")
-    if caught is None and finish is None:
-        parser.refuse(head.mark, "missing-key", 'try needs a "catch" or a "finally" beside it')
-    return model.TryNode(
-        head.mark,
-        head.label,
-        parser.node(head.value, head.mark),
-        () if caught is None else tuple(_catches(parser, caught)),
-        None if finish is None else parser.node(finish, finish.mark),
-    )
-
-
-def _catches(parser: NodeParser, caught: Node) -> Iterator[model.Catch]:
-    """Yield what is caught: as with `on`, one needs no list."""
-    if not isinstance(caught, Sequence | Mapping):
-        message = f'catch takes "on" and "do", or a list of them, not {describe(plain(caught))}'
-        parser.refuse(caught.mark, "wrong-type", message)
-        return
-    for item in caught.items if isinstance(caught, Sequence) else (caught,):
-        fields = Fields("catch", item.mark, item, grammar.CATCH, parser.findings)
-        fields.required("on")
-        body = parser.node(fields.required("do"), fields.key_mark("do"))
-        yield model.Catch(fields.matches("on"), body)
-
-
-def _timeout(parser: NodeParser, head: Head) -> model.Node:
-    fields = _fields(parser, head)
-    fields.required("seconds")
-    seconds = fields.value("seconds") or Literal(1.0, head.mark)
-    body = parser.node(fields.required("do"), fields.key_mark("do"))
-    return model.TimeoutNode(head.mark, head.label, seconds, body)
-
-
-def _invert(parser: NodeParser, head: Head) -> model.Node:
-    return model.InvertNode(head.mark, head.label, parser.node(head.value, head.mark))
-
-
-def _succeed(parser: NodeParser, head: Head) -> model.Node:
-    empty = isinstance(head.value, Scalar) and head.value.value is None
-    body = None if empty else parser.node(head.value, head.mark)
-    return model.SucceedNode(head.mark, head.label, body)
-
-
-def _use(parser: NodeParser, head: Head) -> model.Node:
-    given = {key: head.node.get(key) for key in ("with", "returns")}
-    arguments, returns = (
-        {} if node is None else settings_of(node, key, parser.findings) for key, node in given.items()
-    )
-    if not (isinstance(head.value, Scalar) and isinstance(head.value.value, str)):
-        message = f"use takes the name of a subtree, not {describe(plain(head.value))}"
-        parser.refuse(head.value.mark, "wrong-type", message)
-        return _nothing(head.mark)
-    return model.UseNode(head.value.mark, head.label, head.value.text, arguments, returns)
-
-
-CONTROL: dict[str, Callable[[NodeParser, Head], model.Node]] = {
-    "sequence": _sequence,
-    "fallback": _fallback,
-    "parallel": _parallel,
-    "retry": _retry,
-    "repeat": _repeat,
-    "while": _while,
-    "for_each": _for_each,
-    "try": _try,
-    "timeout": _timeout,
-    "invert": _invert,
-    "succeed": _succeed,
-    "use": _use,
-}
-"""Every control node by its word in the file."""
