@@ -173,3 +173,20 @@ def test_a_hundred_nodes_load_in_a_tenth_of_a_second(load: Load, skills: dict[st
     began = time.process_time()
     load_mission("m.yaml", skills)
     assert time.process_time() - began < 0.1
+
+
+def test_a_name_that_no_file_can_have_is_not_there(load: Load) -> None:
+    long = "x" * 300
+    with pytest.raises(InputError, match="there is no mission file"):
+        find_mission(long)
+    with pytest.raises(MissionError, match=r"2:7: error\[no-cell\]: there is no file"):
+        load(f"mission: m\ncell: {long}\ntree: Look\n")
+
+
+def test_empty_names_are_findings(load: Load) -> None:
+    with pytest.raises(MissionError) as caught:
+        load('mission: ""\ncell: ""\ntree: Look\n')
+    assert [(f.line, f.col, f.code) for f in caught.value.findings] == [
+        (1, 10, "bad-name"),
+        (2, 7, "bad-name"),
+    ]

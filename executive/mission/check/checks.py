@@ -50,6 +50,7 @@ CHECKS: tuple[Check, ...] = (
     reach.single_attempts,
     parallel.shared_resources,
     parallel.shared_variables,
+    parallel.racing_reads,
     timeouts.short_timeouts,
 )
 """Each holds whatever else is wrong: what is unknown in one place makes no findings in others."""

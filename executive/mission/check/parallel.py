@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations
+from itertools import combinations, permutations
 
 from executive.mission.check.case import Case
 from executive.mission.findings import Finding, error
 from executive.mission.model.nodes import ForEachNode, Node, ParallelNode, SkillNode
+from executive.mission.model.wiring import Wire
 from executive.mission.source import Mark
 from executive.skill import Direction
 
@@ -45,6 +46,34 @@ def shared_variables(case: Case) -> Iterator[Finding]:
                     yield error(mark, "shared-variable", message, hint)
 
 
+def racing_reads(case: Case) -> Iterator[Finding]:
+    """Find every variable that one branch of a parallel reads while another may write it."""
+    for node in case.nodes():
+        if not isinstance(node, ParallelNode):
+            continue
+        for reading, writing in permutations(node.branches, 2):
+            written, own = _writes(case, writing), _writes(case, reading)
+            for wire in _reads(case, reading):
+                # What both write is told as such.
+                if wire.variable in written and wire.variable not in own:
+                    other, place, hint = written[wire.variable]
+                    message = (
+                        f"{wire} reads ${wire.variable}, while {other} in {place.place(wire.mark.source)} "
+                        "may write it, in another branch of the same parallel"
+                    )
+                    yield error(wire.mark, "shared-variable", message, hint)
+
+
+def _reads(case: Case, branch: Node) -> Iterator[Wire]:
+    """Yield everything below `branch` that reads a variable which is or may be written before it."""
+    for node in branch.walk():
+        entry = case.flow.entry.get(node.path) if case.flow else None
+        for wire in case.wires(node, Direction.IN):
+            # What is surely not written yet is told as unwritten.
+            if entry and (entry.written is None or wire.variable in entry.written or not wire.port.required):
+                yield wire
+
+
 def _uses(case: Case, branch: Node) -> dict[str, SkillNode]:
     """Return the first user of every part of the cell below `branch`."""
     users: dict[str, SkillNode] = {}
@@ -64,9 +93,9 @@ def _writes(case: Case, branch: Node) -> dict[str, tuple[str, Mark, str]]:
     writers: dict[str, tuple[str, Mark, str]] = {}
     for node in branch.walk():
         if isinstance(node, ForEachNode):
-            hint = "Give one of them another variable, as each: other."
+            hint = "Write to another variable there, as each: other."
             writers.setdefault(node.each.name, ("for_each", node.each.mark, hint))
         for wire in case.wires(node, Direction.OUT):
-            hint = f"Give one of them another variable, as {wire.port.name}: $other."
+            hint = f"Write to another variable there, as {wire.port.name}: $other."
             writers.setdefault(wire.variable, (wire.skill, wire.mark, hint))
     return writers

@@ -10,7 +10,7 @@ from executive.mission.check.case import Case
 from executive.mission.findings import Finding, error
 from executive.mission.model.nodes import ForEachNode
 from executive.mission.model.port_types import called, element_of, fits
-from executive.mission.model.typed import WrongType, convert
+from executive.mission.model.typed import WrongType, convert, takes_values
 from executive.mission.model.values import Literal, Reference
 from executive.mission.model.wiring import Wire
 from executive.mission.source import Mark
@@ -80,9 +80,7 @@ def _misfits(wire: Wire, writer: Writer) -> Iterator[Finding]:
     """Find what is wrong with wiring an input to what a writer writes."""
     port, wanted = wire.port, f"{wire} takes {_wanted(wire.port)}"
     for value, mark in writer.values or ():
-        try:
-            convert(value, port.type)
-        except WrongType:
+        if not _is_taken(value, port):
             message = f"{wanted}, but for ${wire.variable} stands {describe(value)} here"
             yield error(mark, "port-type", message, f"It is read in {wire.mark.place(mark.source)}.")
     if writer.values is not None:
@@ -95,6 +93,13 @@ def _misfits(wire: Wire, writer: Writer) -> Iterator[Finding]:
     if holds:
         message = f"{wanted}, but ${wire.variable} holds {holds}"
         yield error(wire.mark, "port-type", message, f"It is written by {writer.seen_from(wire.mark)}.")
+
+
+def _is_taken(value: Any, port: Port) -> bool:
+    try:
+        return takes_values(port) and convert(value, port.type) is not ...
+    except WrongType:
+        return False
 
 
 def _wanted(port: Port) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from executive.mission.check.case import Case
 from executive.mission.findings import Finding, alternatives, error, suggest
 from executive.mission.model.nodes import SkillNode
-from executive.mission.model.typed import WrongType, convert, is_plain
+from executive.mission.model.typed import WrongType, convert, takes_values
 from executive.mission.model.values import Literal, Reference
 from executive.mission.model.wiring import literals
 from executive.mission.words import describe
@@ -64,7 +64,7 @@ def input_values(case: Case) -> Iterator[Finding]:
             port = skill.ports.get(name)
             if port is None or port.direction is not Direction.IN:
                 continue
-            if not is_plain(port.type):
+            if not takes_values(port):
                 sentence = f"takes a variable, written ${name}, not {describe(value.value)}"
                 yield _wrong(node, name, value, "wrong-type", sentence)
                 continue

@@ -12,6 +12,7 @@ from typing import Any, Union, get_args, get_origin
 from pydantic import TypeAdapter, ValidationError
 
 from executive.mission.words import violation
+from executive.skill import Port
 
 _SCALARS = (str, int, float, bool, type(None), Any)
 _CONTAINERS = (tuple, list, dict, frozenset, set)
@@ -31,6 +32,11 @@ def is_plain(declared: Any) -> bool:
     if origin in (Union, types.UnionType) or origin in _CONTAINERS:
         return all(is_plain(part) for part in get_args(declared))
     return False
+
+
+def takes_values(port: Port) -> bool:
+    """Tell whether a value for this input can stand in a mission file: items exist only in a run."""
+    return is_plain(port.type) and port.refers != "item"
 
 
 def convert(value: Any, declared: Any) -> Any:

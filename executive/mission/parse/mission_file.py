@@ -33,7 +33,7 @@ def parse_mission(root: Node, overrides: Mapped[str, str]) -> tuple[model.Missio
     mission = model.Mission(
         name=_name(fields),
         description=fields.text("description"),
-        cell=Named(fields.text("cell"), fields.value_mark("cell")),
+        cell=_cell(fields),
         libraries=_libraries(fields),
         params=parse_params(fields, overrides),
         routes=_routes(fields),
@@ -45,10 +45,17 @@ def parse_mission(root: Node, overrides: Mapped[str, str]) -> tuple[model.Missio
 
 def _name(fields: Fields) -> str:
     name = fields.text("mission")
-    if name and not _MISSION_NAME.fullmatch(name):
+    if isinstance(fields.get("mission"), Scalar) and not _MISSION_NAME.fullmatch(name):
         message = f'a mission is named by letters, digits, "_" and "-", at most 64, not "{name}"'
         fields.findings.append(error(fields.value_mark("mission"), "bad-name", message))
     return name
+
+
+def _cell(fields: Fields) -> Named:
+    cell = Named(fields.text("cell"), fields.value_mark("cell"))
+    if isinstance(fields.get("cell"), Scalar) and not cell.name:
+        fields.findings.append(error(cell.mark, "bad-name", "cell names no file"))
+    return cell
 
 
 def _routes(fields: Fields) -> tuple[model.Route, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os.path
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 
@@ -32,12 +33,13 @@ def find_mission(name: str | Path) -> Path:
         InputError: There is neither.
     """
     path = Path(name)
-    if path.is_file():
+    # Unlike Path's methods these say no to a name that no file can have.
+    if os.path.isfile(path):
         return path
-    if path.is_dir():
+    if os.path.isdir(path):
         raise InputError(f'"{name}" is a folder; name one of its files')
     bare = PurePosixPath(str(name).removeprefix("missions/")).with_suffix("")
-    if len(bare.parts) == 1 and (shipped := shipped_folder() / f"{bare}.yaml").is_file():
+    if len(bare.parts) == 1 and os.path.isfile(shipped := shipped_folder() / f"{bare}.yaml"):
         return shipped
     hint = alternatives(str(bare), shipped_missions(), "Shipped missions")
     raise InputError(f'there is no mission file "{name}", and no shipped mission of that name. {hint}')
@@ -58,7 +60,7 @@ def below(folder: Path, reference: str, shipped: Sequence[str] = ("",)) -> Path:
     bases = (folder, *(shipped_folder() / part for part in shipped))
     for base in bases:
         path = base / reference
-        if path.is_file():
+        if os.path.isfile(path):
             if not path.resolve().is_relative_to(base.resolve()):
                 raise InputError(f'"{reference}" is a link out of {base}')
             return path

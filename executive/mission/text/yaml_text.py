@@ -243,7 +243,7 @@ def _syntax(source: Source, problem: yaml.MarkedYAMLError) -> Finding:
 
 
 def _unreadable(source: Source, problem: yaml.reader.ReaderError) -> Finding:
-    before = source.text[: problem.position]
-    line, col = before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
+    lines = source.text[: problem.position + 1].splitlines()
+    line, col = len(lines), len(lines[-1])
     character = source.text[problem.position : problem.position + 1]
     return error(source.mark(line, col, 1), "yaml", f"the character {character!r} is not allowed in YAML")
