@@ -34,9 +34,9 @@ class SelectTarget(Skill):
         yield from ()
         candidates = [target for target in self.targets if self._eligible(cell, target)]
         if not candidates:
-            if self.same is None and cell.ledger.believes_empty():
-                raise self.failed("no_candidate", "nothing is left on the table but rejected items")
             sought = self.same or self.wanted or "object to sort"
+            if self.same is None and cell.ledger.believes_empty():
+                raise self.failed("no_candidate", f"no {sought} is left on the table but what was rejected")
             raise self.failed("unseen", f"the last look shows no {sought} that can be trusted; look again")
         here = cell.arm.tool_pose.position[:2]
         if self.prefer == "nearest":

@@ -82,7 +82,7 @@ def load_mission(
         InputError: There is no such mission.
     """
     file = find_mission(path)
-    files = read_mission(file, overrides or {})
+    files = read_mission(file, overrides or {}, skills)
     mission, config = files.mission, files.cell.config if files.cell else None
     findings = list(files.findings)
     kind = _kind(files, kinds, findings)

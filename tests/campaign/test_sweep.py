@@ -61,6 +61,15 @@ def interrupt(job: Job) -> dict:
     return result(job.seed)
 
 
+@pytest.fixture
+def sigint():
+    """Hear SIGINT: what a shell runs in the background begins with it ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("sigint")
 def test_after_ctrl_c_no_further_run_begins_and_the_results_so_far_are_kept():
     results = sweep("sort", range(9), overrides={}, runs=Path("runs"), workers=1, work=interrupt)
     assert [entry["seed"] for entry in results] == [0]

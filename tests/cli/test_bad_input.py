@@ -69,7 +69,7 @@ CASES = {
         m.yaml:2:18: error[yaml]: not valid YAML: mapping values are not allowed here
            2 | description: Sort: everything into its bin.
              |                  ^
-          A text that holds ": " needs quotes. Otherwise compare the indentation with the line above.
+          Is a colon missing at the end of the line above, or are braces, as in Detect: {view: full}? A text that holds ": " needs quotes.
         """,
         mission=("Put everything", "Sort: everything"),
     ),

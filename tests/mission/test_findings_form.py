@@ -101,7 +101,7 @@ CASES = {
         m.yaml:4:3: error[unknown-node]: there is no control node "rety"
            4 |   rety: {attempts: 2, do: Look}
              |   ^^^^
-          Did you mean "retry"? Control nodes are: sequence, fallback, parallel, retry, repeat, while, for_each, try, timeout, invert, succeed, use.
+          Did you mean "retry"? Control nodes are: sequence, fallback, parallel, retry, repeat, while, for_each, try, timeout, invert, succeed, use. A subtree is written as use: NAME.
         """,
     ),
     "unknown control key": (
@@ -245,7 +245,7 @@ CASES = {
         m.yaml:3:14: error[wrong-type]: Look takes a mapping of names to values, not the text "full"
            3 | tree: {Look: full}
              |              ^^^^
-          Write it as Look: {name: full}.
+          Write it as Look: {view: full}.
         """,
     ),
     "subtree without do": (

@@ -194,7 +194,7 @@ def sound(tree: Tree) -> Case | None:
     source = Source("m.yaml", json.dumps({"mission": "m", "cell": "none", "tree": tree}))
     root, wrong = parse_yaml(source)
     assert root is not None
-    mission, malformed = parse_mission(root, {})
+    mission, malformed = parse_mission(root, {}, SKILLS)
     expanded = expand(mission, SKILLS)
     placed = expanded.tree and with_paths(expanded.tree)
     case = Case(mission, placed, (), SKILLS, None, {}, None)

@@ -68,7 +68,7 @@ def test_two_empty_looks_at_the_full_frame_are_believed(fake: FakeCell, look) ->
     assert select(fake, look("full")).reason == "unseen"
     result = select(fake, look("full"))
     assert result.reason == "no_candidate"
-    assert result.message == "nothing is left on the table but rejected items"
+    assert result.message == "no object to sort is left on the table but what was rejected"
 
 
 def test_a_table_with_only_rejected_items_ends_the_work(fake: FakeCell, look) -> None:

@@ -50,7 +50,8 @@ def _problem(case: Case, name: str, key: Key, value: Value, node: Node) -> Findi
     try:
         number = convert(value.value, _KINDS[key.kind])
     except WrongType as problem:
-        return error(value.mark, "wrong-type", f"{name} {problem}{origin}")
+        meant = f"For the param write ${value.value}." if value.value in [*case.mission.params] else ""
+        return error(value.mark, "wrong-type", f"{name} {problem}{origin}", meant)
     if key.kind == "boolean" or key.allows(number):
         return None
     unit = " s" if "[s]" in key.doc else ""

@@ -22,12 +22,15 @@ def shared_resources(case: Case) -> Iterator[Finding]:
             shared = dict.fromkeys(resource for resource in second if resource in first)
             for users in {(first[r].skill, second[r].skill, second[r].mark): r for r in shared}.values():
                 one, other = first[users], second[users]
+                door = case.doors.get(other.path)
+                mark = door.mark if door else other.mark
+                who = f'{other.skill} in the subtree "{door.name}"' if door else other.skill
                 message = (
-                    f"{other.skill} uses the {users} while {one.skill} in "
-                    f"{one.mark.place(other.mark.source)} may use it, in another branch of the same parallel"
+                    f"{who} uses the {users} while {one.skill} in {one.mark.place(mark.source)} may use it, "
+                    "in another branch of the same parallel"
                 )
                 hint = "Write a sequence, or put both into one branch."
-                yield error(other.mark, "shared-resource", message, hint)
+                yield error(mark, "shared-resource", message, hint)
 
 
 def shared_variables(case: Case) -> Iterator[Finding]:

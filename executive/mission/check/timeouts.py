@@ -26,13 +26,17 @@ def short_timeouts(case: Case) -> Iterator[Finding]:
             message = (
                 f"timeout.seconds is {seconds:g} s, but its body takes {shortest:.2f} s at the very least"
             )
-            parts = [
-                f"{inner.skill} {time:.2f} s"
-                for inner in node.do.walk()
-                if isinstance(inner, SkillNode) and (time := least_time(case, inner)) > 0
-            ]
             message += f" (it is {origin})" if origin else ""
-            yield error(node.seconds.mark, "short-timeout", message, f"At the least: {', '.join(parts)}.")
+            yield error(node.seconds.mark, "short-timeout", message, _made_of(case, node.do, shortest))
+
+
+def _made_of(case: Case, body: Node, shortest: float) -> str:
+    """Return the least times of the skills in a body, or "" where they do not simply add up."""
+    skills = [inner for inner in body.walk() if isinstance(inner, SkillNode)]
+    times = [(skill.skill, time) for skill in skills if (time := least_time(case, skill)) > 0]
+    if abs(sum(time for _, time in times) - shortest) > 1e-9:
+        return ""
+    return f"At the least: {', '.join(f'{name} {time:.2f} s' for name, time in times)}."
 
 
 def least_time(case: Case, node: Node | None) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from executive.mission.check.case import Case
-from executive.mission.findings import Finding, alternatives, error, warning
+from executive.mission.findings import Finding, alternatives, error, suggest, warning
 from executive.mission.model.nodes import ForEachNode, Node, UseNode
 from executive.mission.model.values import Named, Reference
 from executive.mission.model.wiring import wires, written_below
@@ -153,8 +153,11 @@ def _who_could(case: Case, variable: str, written: set[str]) -> str:
     writers = [name for name, skill in case.skills.items() if _writes(skill, variable)]
     if writers:
         return f"It is written by: {', '.join(writers)}."
-    names = [f"${name}" for name in sorted(written)]
-    return alternatives(f"${variable}", names, "Variables that are written")
+    # What a subtree keeps to itself has a dot in its name.
+    known = sorted(name for name in written if "." not in name)
+    meant = suggest(variable, known)
+    listed = ", ".join(f"${name}" for name in known) or "none"
+    return (f'Did you mean "${meant}"? ' if meant else "") + f"Variables that are written: {listed}."
 
 
 def _writes(skill: type[Skill], name: str) -> bool:

@@ -20,7 +20,7 @@ class Grip:
     Attributes:
         tool: EMPTY or HOLDING.
         since: Path of the skill that made it so, or "" for the beginning of the run.
-        after: The first failure since then that something dealt with, or "".
+        after: The last failure since then that something dealt with, or "".
     """
 
     tool: ToolState
@@ -64,7 +64,7 @@ class State:
 
     def dealt_with(self, failure: Raise) -> State:
         """Return the state where something deals with a failure that led here."""
-        grips = [grip if grip.after else replace(grip, after=str(failure)) for grip in self.grips or ()]
+        grips = [replace(grip, after=str(failure)) for grip in self.grips or ()]
         return self if self.grips is None else self.gripping(frozenset(grips))
 
     def may_be(self, tool: ToolState) -> Grip | None:

@@ -160,6 +160,12 @@ ELSEWHERE: Mapping[str, str] = {
     "selector": "It is called fallback here.",
     "for": "It is called for_each here.",
     "loop": "It is called repeat here, or while with a condition.",
+    "then": "One after the other is a list.",
+    "do": "Only control nodes have a do; elsewhere the node stands there itself.",
+    "catch": "It stands beside try, not below it.",
+    "finally": "It stands beside try, not below it.",
+    "with": "It stands beside use, not below it.",
+    "returns": "It stands beside use, not below it.",
 }
 """What to write instead of words that other languages have."""
 

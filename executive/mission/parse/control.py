@@ -139,6 +139,8 @@ def _catches(parser: NodeParser, caught: Node) -> Iterator[model.Catch]:
         message = f'catch takes "on" and "do", or a list of them, not {describe(plain(caught))}'
         parser.refuse(caught.mark, "wrong-type", message)
         return
+    if isinstance(caught, Sequence) and not caught.items:
+        parser.refuse(caught.mark, "empty-list", "catch needs at least one on and do")
     for item in caught.items if isinstance(caught, Sequence) else (caught,):
         fields = Fields("catch", item.mark, item, grammar.CATCH, parser.findings)
         fields.required("on")

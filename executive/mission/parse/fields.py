@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from typing import Any
 
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.model.values import Literal, Match, Reference, Setting, Value
@@ -12,6 +14,7 @@ from executive.mission.text.yaml_text import Mapping, Node, Scalar, Sequence, pl
 from executive.mission.words import describe
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_DOLLAR = re.compile(r"^\$|\$(?=[A-Za-z_])")
 _MATCH = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)\.([A-Za-z_][A-Za-z0-9_]*)")
 
 
@@ -127,13 +130,16 @@ class Fields:
         self.findings.append(error(mark, code, message, hint))
 
 
-def settings_of(node: Node, owner: str, findings: list[Finding]) -> dict[str, Setting]:
-    """Return a mapping of values; nothing at all counts as an empty one."""
+def settings_of(node: Node, owner: str, findings: list[Finding], example: str = "name") -> dict[str, Setting]:
+    """Return a mapping of values; nothing at all counts as an empty one.
+
+    `example` is a key that a value without one may have been meant for.
+    """
     if isinstance(node, Scalar) and node.value is None:
         return {}
     if not isinstance(node, Mapping):
         message = f"{owner} takes a mapping of names to values, not {describe(plain(node))}"
-        hint = f"Write it as {owner}: {{name: {node.text}}}." if isinstance(node, Scalar) else ""
+        hint = f"Write it as {owner}: {{{example}: {node.text}}}." if isinstance(node, Scalar) else ""
         findings.append(error(node.mark, "wrong-type", message, hint))
         return {}
     values = [(entry.key, value_of(entry.value, findings)) for entry in node.entries]
@@ -141,16 +147,15 @@ def settings_of(node: Node, owner: str, findings: list[Finding]) -> dict[str, Se
 
 
 def value_of(node: Node, findings: list[Finding]) -> Value | None:
-    """Return a value: `$name` is a reference, `$$text` the text `$text`; None where a `$` is misplaced."""
+    """Return a value: `$name` is a reference, `$$` the character `$`; None where a `$` is misplaced."""
     if isinstance(node, Scalar) and isinstance(node.value, str) and node.value.startswith("$"):
         name = node.value[1:]
-        if name.startswith("$"):
-            return Literal(name, node.mark)
         if NAME.fullmatch(name):
             return Reference(name, node.mark)
     misplaced = list(_misplaced_dollars(node))
     findings += misplaced
-    return None if misplaced else literal_of(node)
+    literal = literal_of(node)
+    return None if misplaced else replace(literal, value=_unescaped(literal.value))
 
 
 def literal_of(node: Node) -> Literal:
@@ -160,9 +165,18 @@ def literal_of(node: Node) -> Literal:
 
 
 def _misplaced_dollars(node: Node) -> Iterator[Finding]:
-    """Find every `$` that would be taken for text: in the wrong form, or inside a list or mapping."""
+    """Find every `$` that would be taken for text: in the wrong form, or inside a text, list or mapping."""
     for scalar in scalars(node):
-        if isinstance(scalar.value, str) and scalar.value.startswith("$"):
+        if isinstance(scalar.value, str) and _DOLLAR.search(scalar.value.replace("$$", "")):
             message = f'"{scalar.text}" is no reference: only a whole value can be one, as in key: $name'
-            hint = f'For the text itself write "${scalar.text}".'
+            hint = f'For the text itself write "{scalar.text.replace("$", "$$")}".'
             yield error(scalar.mark, "bad-reference", message, hint)
+
+
+def _unescaped(value: Any) -> Any:
+    """Return a plain value with every `$$` in its texts as `$`."""
+    if isinstance(value, str):
+        return value.replace("$$", "$")
+    if isinstance(value, list):
+        return [_unescaped(item) for item in value]
+    return {key: _unescaped(item) for key, item in value.items()} if isinstance(value, dict) else value

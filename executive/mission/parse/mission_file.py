@@ -11,7 +11,7 @@ from executive.mission.model import grammar
 from executive.mission.model import mission as model
 from executive.mission.model.values import Named
 from executive.mission.parse.fields import Fields
-from executive.mission.parse.nodes import NodeParser
+from executive.mission.parse.nodes import NodeParser, Skills
 from executive.mission.parse.params import parse_params
 from executive.mission.parse.trees import parse_trees
 from executive.mission.source import Mark
@@ -21,14 +21,16 @@ from executive.mission.words import describe
 _MISSION_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 
 
-def parse_mission(root: Node, overrides: Mapped[str, str]) -> tuple[model.Mission, list[Finding]]:
+def parse_mission(
+    root: Node, overrides: Mapped[str, str], skills: Skills
+) -> tuple[model.Mission, list[Finding]]:
     """Return what the file says, as far as it can be read, and what is wrong with its form."""
     findings: list[Finding] = []
     start = replace(root.mark, length=1)
     fields = Fields("the mission", start, root, grammar.MISSION, findings)
     for key in ("mission", "cell", "tree"):
         fields.required(key)
-    parser = NodeParser(findings)
+    parser = NodeParser(findings, skills)
     tree = fields.get("tree")
     mission = model.Mission(
         name=_name(fields),

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping as SkillsByName
 from dataclasses import replace
 
-from executive.mission.findings import Finding, alternatives, error, suggest
+from executive.mission.findings import Finding, alternatives, error
 from executive.mission.model import grammar
 from executive.mission.model import nodes as model
 from executive.mission.parse.control import CONTROL, Head, unread
-from executive.mission.parse.fields import NAME, settings_of
+from executive.mission.parse.fields import settings_of
 from executive.mission.source import Mark
 from executive.mission.text.yaml_text import Entry, Mapping, Node, Scalar, Sequence, plain
 from executive.mission.words import describe
+from executive.skill import Skill
 
+Skills = SkillsByName[str, type[Skill]]
 _LABEL = re.compile(grammar.LABEL)
 _SKILL = re.compile(r"[A-Z][A-Za-z0-9]*")
 
@@ -24,8 +27,12 @@ class NodeParser:
     A node that cannot be read becomes an unknown one, so that reading goes on.
     """
 
-    def __init__(self, findings: list[Finding]) -> None:
-        self.findings = findings
+    def __init__(self, findings: list[Finding], skills: Skills) -> None:
+        self.findings, self._skills = findings, skills
+
+    def silent(self) -> NodeParser:
+        """Return a parser that keeps what is wrong to itself."""
+        return NodeParser([], self._skills)
 
     def node(self, node: Node | None, mark: Mark) -> model.Node:
         """Return the node that stands in the file, or an unknown one where there is none."""
@@ -86,14 +93,16 @@ class NodeParser:
             self.refuse(entry.key.mark, "two-nodes", message, "Write a list to run one after the other.")
         if others:
             # What the others lack is not worth telling as long as they stand in the wrong place.
-            parts = [NodeParser([])._head(node, other, "") for other in others]
+            parts = [self.silent()._head(node, other, "") for other in others]
             return model.UnknownNode(head.key.mark, label, (self._head(node, head, ""), *parts))
         name = head.key.text
         partners = grammar.CONTROL[name].partners if name in grammar.CONTROL else ()
         allowed = (name, "as", *partners)
         for entry in words:
             if entry not in heads and entry.key.text not in allowed:
-                hint = alternatives(entry.key.text, allowed[1:], f"Beside {name} may stand")
+                inside = name in grammar.CONTROL and entry.key.text in grammar.CONTROL[name].keys
+                hint = f"Indent it: it stands below {name}." if inside else ""
+                hint = hint or alternatives(entry.key.text, allowed[1:], f"Beside {name} may stand")
                 message = f'"{entry.key.text}" may not stand beside "{name}"'
                 self.refuse(entry.key.mark, "unknown-key", message, hint)
         read = self._head(node, head, label)
@@ -104,7 +113,8 @@ class NodeParser:
         name = head.key.text
         if name in CONTROL:
             return CONTROL[name](self, Head(node, name, head.key.mark, label, head.value))
-        settings = settings_of(head.value, name, self.findings)
+        known = self._skills[name].params if name in self._skills else {}
+        settings = settings_of(head.value, name, self.findings, next(iter(known), "name"))
         return model.SkillNode(head.key.mark, label, name, settings)
 
     def _label(self, node: Mapping) -> str:
@@ -119,11 +129,12 @@ class NodeParser:
         return ""
 
     def _unknown(self, mark: Mark, word: str) -> None:
-        hint = alternatives(word, CONTROL, "Control nodes are")
+        alike = {name.lower(): name for name in self._skills}
+        skill = alike.get(word.replace("_", "").replace(" ", "").lower())
         if word in grammar.ELSEWHERE:
-            self.refuse(mark, "unknown-node", f'there is no control node "{word}"', grammar.ELSEWHERE[word])
-            return
-        if suggest(word, CONTROL) is None and NAME.fullmatch(word):
-            skill = "".join(part[:1].upper() + part[1:] for part in word.split("_"))
-            hint = f'If a skill is meant, write it as "{skill}". {hint}'
+            hint = grammar.ELSEWHERE[word]
+        elif skill:
+            hint = f'Did you mean the skill "{skill}"?'
+        else:
+            hint = f"{alternatives(word, CONTROL, 'Control nodes are')} A subtree is written as use: NAME."
         self.refuse(mark, "unknown-node", f'there is no control node "{word}"', hint)

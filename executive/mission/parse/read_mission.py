@@ -12,6 +12,7 @@ from executive.mission.model.mission import Mission, Subtree
 from executive.mission.model.values import Named
 from executive.mission.parse.cell_file import CellFile, read_cell
 from executive.mission.parse.mission_file import parse_mission
+from executive.mission.parse.nodes import Skills
 from executive.mission.parse.trees import parse_library
 from executive.mission.source import Source
 from executive.mission.text.files import below, read_source
@@ -39,7 +40,7 @@ class MissionFiles:
     findings: tuple[Finding, ...]
 
 
-def read_mission(file: Path, overrides: Mapping[str, str]) -> MissionFiles:
+def read_mission(file: Path, overrides: Mapping[str, str], skills: Skills) -> MissionFiles:
     """Return a mission file and the files that it names.
 
     Raises:
@@ -50,10 +51,12 @@ def read_mission(file: Path, overrides: Mapping[str, str]) -> MissionFiles:
     root, findings = parse_yaml(source)
     if root is None:
         raise MissionError(in_file_order(findings, source.path))
-    mission, malformed = parse_mission(root, overrides)
+    mission, malformed = parse_mission(root, overrides, skills)
     findings += malformed
     trees: dict[str, Subtree] = dict(mission.trees)
-    read = {named.name: _add_library(named, file.parent, trees, findings) for named in mission.libraries}
+    read = {
+        named.name: _add_library(named, file.parent, skills, trees, findings) for named in mission.libraries
+    }
     texts = {name: text for name, text in read.items() if text is not None}
     whole = len(texts) == len(read)
     cell_path, cell = _cell(mission.cell, file.parent, overrides, findings)
@@ -63,7 +66,7 @@ def read_mission(file: Path, overrides: Mapping[str, str]) -> MissionFiles:
 
 
 def _add_library(
-    named: Named, folder: Path, trees: dict[str, Subtree], findings: list[Finding]
+    named: Named, folder: Path, skills: Skills, trees: dict[str, Subtree], findings: list[Finding]
 ) -> str | None:
     """Add the subtrees of a library to `trees` and return its text, or None where it cannot be read."""
     try:
@@ -75,7 +78,7 @@ def _add_library(
     findings += wrong
     if root is None:
         return None
-    library, malformed = parse_library(root)
+    library, malformed = parse_library(root, skills)
     findings += malformed
     for name, subtree in library.trees.items():
         if name in trees:

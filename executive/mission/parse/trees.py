@@ -8,12 +8,12 @@ from executive.mission.findings import Finding
 from executive.mission.model import grammar
 from executive.mission.model.mission import Argument, Library, Subtree
 from executive.mission.parse.fields import NAME, Fields, value_of
-from executive.mission.parse.nodes import NodeParser
+from executive.mission.parse.nodes import NodeParser, Skills
 from executive.mission.source import Mark
 from executive.mission.text.yaml_text import Mapping, Node, Scalar, Sequence
 
 
-def parse_library(root: Node) -> tuple[Library, list[Finding]]:
+def parse_library(root: Node, skills: Skills) -> tuple[Library, list[Finding]]:
     """Return what a library file says, as far as it can be read, and what is wrong with its form."""
     findings: list[Finding] = []
     start = replace(root.mark, length=1)
@@ -21,7 +21,7 @@ def parse_library(root: Node) -> tuple[Library, list[Finding]]:
     for key in ("library", "trees"):
         fields.required(key)
     name = fields.text("library")
-    return Library(name, parse_trees(fields, NodeParser(findings), name or "library")), findings
+    return Library(name, parse_trees(fields, NodeParser(findings, skills), name or "library")), findings
 
 
 def parse_trees(fields: Fields, parser: NodeParser, library: str = "") -> dict[str, Subtree]:
@@ -35,7 +35,7 @@ def parse_trees(fields: Fields, parser: NodeParser, library: str = "") -> dict[s
             whole = node.get("do") is not None
             if not whole:
                 parser.refuse(mark, "missing-key", f'the subtree "{name}" needs the key "do"')
-            trees[name] = _subtree(name, mark, node, parser if whole else NodeParser([]), library)
+            trees[name] = _subtree(name, mark, node, parser if whole else parser.silent(), library)
         else:
             trees[name] = Subtree(name, mark, "", {}, None, parser.node(node, mark), library)
 

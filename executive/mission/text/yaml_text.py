@@ -23,7 +23,8 @@ _HALF = re.compile("[\ud800-\udfff]")
 _MOST_NODES = 100_000
 _ADVICE = {
     "mapping values are not allowed here": (
-        'A text that holds ": " needs quotes. Otherwise compare the indentation with the line above.'
+        "Is a colon missing at the end of the line above, or are braces, as in Detect: {view: full}? "
+        'A text that holds ": " needs quotes.'
     ),
     "found character '\\t' that cannot start any token": "Indent with blanks instead of tabs.",
     "expected <block end>": "Compare the indentation with the lines above.",
