@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -42,6 +43,9 @@ def command(
     requests: tuple[str, ...],
 ) -> None:
     """Run MISSION (a file or the name of a shipped mission) and record it."""
+    if gui and not os.environ.get("DISPLAY"):
+        # The simulator would end the process with a line of its own.
+        raise click.UsageError("--gui needs a display, and DISPLAY names none; leave it out")
     with stdout_kept_clean():
         from executive.mission.load import load_mission
         from executive.record.recorded_run import recorded_run

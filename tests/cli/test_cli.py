@@ -309,3 +309,11 @@ def test_an_unknown_cell_is_recognized():
     shown = invoke("dataset", "overhed", "--out", "x")
     assert shown.exit_code == 2
     assert 'Did you mean "overhead"?' in shown.stderr
+
+
+def test_a_window_without_a_display_is_bad_input(project, monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    shown = invoke("run", "sort", "--gui")
+    assert shown.exit_code == 2
+    assert "--gui needs a display, and DISPLAY names none; leave it out" in shown.stderr
+    assert project.run == []
