@@ -11,7 +11,7 @@ from typing import Any, Union, get_args, get_origin
 
 from pydantic import TypeAdapter, ValidationError
 
-from executive.mission.words import violation
+from executive.mission.words import describe, violation
 from executive.skill import Port
 
 _SCALARS = (str, int, float, bool, type(None), Any)
@@ -45,6 +45,8 @@ def convert(value: Any, declared: Any) -> Any:
     Raises:
         WrongType: The value does not fit.
     """
+    if not is_plain(declared):
+        raise WrongType(f"takes a variable, not {describe(value)}")
     if isinstance(value, float) and not math.isfinite(value):
         raise WrongType(f"must be a finite number, not {value}")
     try:
