@@ -23,9 +23,7 @@ def make(
     events: list[Event] = []
     loaded = load_mission(missions / f"{name}.yaml", discover())
     observers = [events.append, *options.pop("observers", [])]
-    return Run(
-        loaded, discover(), seed=seed, observers=observers, kind=FakeCell, **options
-    ), events
+    return Run(loaded, discover(), seed=seed, observers=observers, kind=FakeCell, **options), events
 
 
 def fake_of(run: Run) -> FakeCell:
