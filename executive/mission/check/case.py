@@ -57,6 +57,18 @@ class Case:
                 yield node, self.skills[node.skill]
 
     @cached_property
+    def names(self) -> Mapping[str, list[str]]:
+        """The names of everything in the cell that a mission can refer to, by kind."""
+        if self.cell is None:
+            return {}
+        return {
+            "bin": list(self.cell.bins),
+            "detector": list(self.cell.detectors),
+            "pose": list(self.cell.arm.poses_deg),
+            "class": list(self.cell.objects),
+        }
+
+    @cached_property
     def doors(self) -> Mapping[str, UseNode]:
         """For every node that stands in a library, the `use` in the mission's own file that leads to it."""
         doors: dict[str, UseNode] = {}

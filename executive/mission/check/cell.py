@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
-from executive.cell_config import CellConfig
 from executive.mission.check.case import Case
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.model.wiring import literals
@@ -30,7 +29,7 @@ def names(case: Case) -> Iterator[Finding]:
     """Find every param and input that names something the cell does not have."""
     if case.cell is None:
         return
-    known = _known(case.cell)
+    known = case.names
     for node, skill in case.known_skills():
         for name, value in literals(node):
             declared = skill.params.get(name) or skill.ports.get(name)
@@ -67,13 +66,3 @@ def _named_classes(case: Case) -> Iterator[tuple[str, Mark]]:
             declared = skill.params.get(name) or skill.ports.get(name)
             if declared is not None and declared.refers == "class" and isinstance(value.value, str):
                 yield value.value, value.mark
-
-
-def _known(cell: CellConfig) -> Mapping[str, list[str]]:
-    """Return the names of everything a param can refer to."""
-    return {
-        "bin": list(cell.bins),
-        "detector": list(cell.detectors),
-        "pose": list(cell.arm.poses_deg),
-        "class": list(cell.objects),
-    }

@@ -40,7 +40,6 @@ CHECKS: tuple[Check, ...] = (
     variables.unread_variables,
     variables.broken_promises,
     port_types.port_types,
-    port_types.element_names,
     tool.tool_states,
     tool.held_at_the_end,
     reach.unreachable,

@@ -9,6 +9,9 @@ from executive.mission.findings import Finding, error
 from executive.mission.model import grammar
 from executive.mission.source import Mark
 
+_SLOTS = ("do", "recover", "condition", "catch", "finally")
+"""What nodes are to their parents; paths are made of these words too."""
+
 
 def labels(case: Case) -> Iterator[Finding]:
     """Find every label that stands for two nodes, or is a word of the language."""
@@ -17,7 +20,7 @@ def labels(case: Case) -> Iterator[Finding]:
         if not node.label:
             continue
         mark = node.label_mark or node.mark
-        if node.label in grammar.CONTROL:
+        if node.label in grammar.CONTROL or node.label in _SLOTS:
             message = f'"{node.label}" is a word of the language and cannot be a label'
             yield error(mark, "bad-label", message)
         # The same place twice is one node of a subtree that is used twice.

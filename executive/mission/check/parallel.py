@@ -7,8 +7,17 @@ from itertools import combinations, permutations
 
 from executive.mission.check.case import Case
 from executive.mission.findings import Finding, error
-from executive.mission.model.nodes import ForEachNode, Node, ParallelNode, SkillNode
-from executive.mission.model.wiring import Wire
+from executive.mission.model.nodes import (
+    ForEachNode,
+    Node,
+    ParallelNode,
+    SequenceNode,
+    SkillNode,
+    TimeoutNode,
+    TryNode,
+    UseNode,
+)  # fmt: skip
+from executive.mission.model.values import Reference
 from executive.mission.source import Mark
 from executive.skill import Direction
 
@@ -54,27 +63,40 @@ def racing_reads(case: Case) -> Iterator[Finding]:
     for node in case.nodes():
         if not isinstance(node, ParallelNode):
             continue
-        for reading, writing in permutations(node.branches, 2):
+        for (index, reading), (other_index, writing) in permutations(enumerate(node.branches), 2):
             written, own = _writes(case, writing), _writes(case, reading)
-            for wire in _reads(case, reading):
+            # A skill with which an earlier branch begins has read before anything else can write.
+            begins = _first(reading) if index < other_index else None
+            for reader, what, variable, mark in _reads(case, reading):
                 # What both write is told as such.
-                if wire.variable in written and wire.variable not in own:
-                    other, place, hint = written[wire.variable]
+                if reader is not begins and variable in written and variable not in own:
+                    other, place, hint = written[variable]
                     message = (
-                        f"{wire} reads ${wire.variable}, while {other} in {place.place(wire.mark.source)} "
+                        f"{what} reads ${variable}, while {other} in {place.place(mark.source)} "
                         "may write it, in another branch of the same parallel"
                     )
-                    yield error(wire.mark, "shared-variable", message, hint)
+                    yield error(mark, "shared-variable", message, hint)
 
 
-def _reads(case: Case, branch: Node) -> Iterator[Wire]:
+def _first(node: Node) -> Node:
+    """Return the node with which another begins in its first tick."""
+    if isinstance(node, SequenceNode | UseNode | TryNode | TimeoutNode) and node.children:
+        return _first(node.children[0])
+    return node
+
+
+def _reads(case: Case, branch: Node) -> Iterator[tuple[Node, str, str, Mark]]:
     """Yield everything below `branch` that reads a variable which is or may be written before it."""
     for node in branch.walk():
         entry = case.flow.entry.get(node.path) if case.flow else None
+        if entry is None:
+            continue
+        if isinstance(node, ForEachNode) and isinstance(node.source, Reference):
+            yield node, "for_each", node.source.name, node.source.mark
         for wire in case.wires(node, Direction.IN):
             # What is surely not written yet is told as unwritten.
-            if entry and (entry.written is None or wire.variable in entry.written or not wire.port.required):
-                yield wire
+            if entry.written is None or wire.variable in entry.written or not wire.port.required:
+                yield node, str(wire), wire.variable, wire.mark
 
 
 def _uses(case: Case, branch: Node) -> dict[str, SkillNode]:

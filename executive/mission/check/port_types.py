@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from executive.mission.check.case import Case
-from executive.mission.findings import Finding, error
-from executive.mission.model.nodes import ForEachNode
+from executive.mission.findings import Finding, alternatives, error
+from executive.mission.model.nodes import ForEachNode, Node
 from executive.mission.model.port_types import called, element_of, fits
 from executive.mission.model.typed import WrongType, convert, takes_values
 from executive.mission.model.values import Literal, Reference
@@ -41,48 +41,82 @@ class Writer:
         return f"{self.name} in {self.mark.place(mark.source)}"
 
 
+Loops = Mapping[str, Sequence[Writer]]
+"""What the loops around a node write to their variables."""
+
+
 def port_types(case: Case) -> Iterator[Finding]:
     """Find every input wired to a variable that may hold something else than it takes."""
-    if case.tree is None:
-        return
-    writers = _writers(case)
-    for node in case.tree.walk():
-        if isinstance(node, ForEachNode) and isinstance(node.source, Reference):
-            for writer in writers.get(node.source.name, ()):
-                if element_of(writer.type) is None:
-                    message = f"for_each.in takes a list, but ${node.source.name} holds {called(writer.type)}"
-                    hint = f"It is written by {writer.seen_from(node.source.mark)}."
-                    yield error(node.source.mark, "port-type", message, hint)
+    written: dict[str, list[Writer]] = {}
+    for node in case.tree.walk() if case.tree else ():
+        for wire in case.wires(node, Direction.OUT):
+            writer = Writer(str(wire), node.mark, wire.port.type, wire.port.refers)
+            written.setdefault(wire.variable, []).append(writer)
+
+    def walk(node: Node, loops: Loops) -> Iterator[Finding]:
+        if isinstance(node, ForEachNode):
+            sources = _sources(node, {**written, **loops})
+            yield from _no_lists(node, sources)
+            loops = {**loops, node.each.name: [element for s in sources for element in _elements(node, s)]}
         for wire in case.wires(node, Direction.IN):
-            for writer in writers.get(wire.variable, ()):
-                yield from _misfits(wire, writer)
+            for writer in loops.get(wire.variable, written.get(wire.variable, ())):
+                yield from _misfits(case, wire, writer)
+        for child in node.children:
+            yield from walk(child, loops)
+
+    if case.tree is not None:
+        yield from walk(case.tree, {})
 
 
-def element_names(case: Case) -> Iterator[Finding]:
-    """Find every element of a list in the file that names something the cell does not have."""
-    if case.tree is None or case.cell is None:
+def _sources(loop: ForEachNode, writers: Loops) -> Sequence[Writer]:
+    """Return what a loop's list may be: the one in the file, or what writes its variable."""
+    if isinstance(loop.source, Literal):
+        listed = loop.source.value, loop.source.mark
+        return [Writer("for_each", loop.mark, list[Any], "", (listed,))]
+    return writers.get(loop.source.name, ())
+
+
+def _no_lists(loop: ForEachNode, sources: Iterable[Writer]) -> Iterator[Finding]:
+    """Find whatever a loop goes through and is no list; one in the file has a check of its own."""
+    if not isinstance(loop.source, Reference):
         return
-    known = {"bin": list(case.cell.bins), "class": list(case.cell.objects)}
-    readers = _readers(case)
-    for node in case.tree.walk():
-        if not isinstance(node, ForEachNode) or not isinstance(node.source, Literal):
-            continue
-        for port, reader, _ in readers.get(node.each.name, ()):
-            for index, value in enumerate(node.source.value if isinstance(node.source.value, list) else ()):
-                names = known.get(port.refers)
-                if names is not None and isinstance(value, str) and value not in names:
-                    message = f'the cell has no {port.refers} "{value}" for {reader}'
-                    hint = f"{reader} takes: {', '.join(names)}."
-                    yield error(node.source.element_mark(index), f"unknown-{port.refers}", message, hint)
+    name, mark = loop.source.name, loop.source.mark
+    for source in sources:
+        for value, place in source.values or ():
+            if not isinstance(value, list):
+                message = f"for_each.in takes a list, but for ${name} stands {describe(value)} here"
+                yield error(place, "port-type", message, f"It is read in {mark.place(place.source)}.")
+        if source.values is None and element_of(source.type) is None:
+            message = f"for_each.in takes a list, but ${name} holds {called(source.type)}"
+            yield error(mark, "port-type", message, f"It is written by {source.seen_from(mark)}.")
 
 
-def _misfits(wire: Wire, writer: Writer) -> Iterator[Finding]:
+def _elements(loop: ForEachNode, source: Writer) -> Iterator[Writer]:
+    """Yield what a loop writes to its variable when it goes through such a list."""
+    if source.values is not None:
+        literal = loop.source if isinstance(loop.source, Literal) else None
+        values = [
+            (element, literal.element_mark(index) if literal else mark)
+            for value, mark in source.values
+            if isinstance(value, list)
+            for index, element in enumerate(value)
+        ]
+        yield Writer("for_each", loop.mark, Any, "", tuple(values))
+    elif (element := element_of(source.type)) is not None:
+        yield Writer("for_each", loop.mark, element, source.refers)
+
+
+def _misfits(case: Case, wire: Wire, writer: Writer) -> Iterator[Finding]:
     """Find what is wrong with wiring an input to what a writer writes."""
     port, wanted = wire.port, f"{wire} takes {_wanted(wire.port)}"
     for value, mark in writer.values or ():
+        known = case.names.get(port.refers)
         if not _is_taken(value, port):
             message = f"{wanted}, but for ${wire.variable} stands {describe(value)} here"
             yield error(mark, "port-type", message, f"It is read in {wire.mark.place(mark.source)}.")
+        elif known is not None and isinstance(value, str) and value not in known:
+            message = f'the cell has no {port.refers} "{value}" for {wire}'
+            yield error(mark, f"unknown-{port.refers}", message, alternatives(value, known, f"{wire} takes"))
     if writer.values is not None:
         return
     holds = ""
@@ -96,6 +130,8 @@ def _misfits(wire: Wire, writer: Writer) -> Iterator[Finding]:
 
 
 def _is_taken(value: Any, port: Port) -> bool:
+    if value is None and fits(type(None), port.type):
+        return True
     try:
         return takes_values(port) and convert(value, port.type) is not ...
     except WrongType:
@@ -108,40 +144,3 @@ def _wanted(port: Port) -> str:
 
 def _a(noun: str) -> str:
     return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"
-
-
-def _writers(case: Case) -> dict[str, list[Writer]]:
-    writers: dict[str, list[Writer]] = {}
-    loops = []
-    for node in case.tree.walk() if case.tree else ():
-        if isinstance(node, ForEachNode):
-            loops.append(node)
-        for wire in case.wires(node, Direction.OUT):
-            writer = Writer(str(wire), node.mark, wire.port.type, wire.port.refers)
-            writers.setdefault(wire.variable, []).append(writer)
-    for loop in loops:
-        writers.setdefault(loop.each.name, []).extend(_elements(loop, writers))
-    return writers
-
-
-def _elements(loop: ForEachNode, writers: dict[str, list[Writer]]) -> list[Writer]:
-    """Return what a loop writes to its variable."""
-    if isinstance(loop.source, Literal):
-        values = loop.source.value
-        if not isinstance(values, list):
-            return []
-        marked = [(value, loop.source.element_mark(index)) for index, value in enumerate(values)]
-        return [Writer("for_each", loop.mark, Any, "", tuple(marked))]
-    return [
-        Writer("for_each", loop.mark, element_of(writer.type), writer.refers)
-        for writer in writers.get(loop.source.name, ())
-        if element_of(writer.type) is not None
-    ]
-
-
-def _readers(case: Case) -> dict[str, list[tuple[Port, str, Mark]]]:
-    readers: dict[str, list[tuple[Port, str, Mark]]] = {}
-    for node in case.tree.walk() if case.tree else ():
-        for wire in case.wires(node, Direction.IN):
-            readers.setdefault(wire.variable, []).append((wire.port, str(wire), wire.mark))
-    return readers

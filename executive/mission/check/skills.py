@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from executive.mission.check.case import Case
 from executive.mission.findings import Finding, alternatives, error, suggest
 from executive.mission.model.nodes import SkillNode
+from executive.mission.model.port_types import fits
 from executive.mission.model.typed import WrongType, convert, takes_values
 from executive.mission.model.values import Literal, Reference
 from executive.mission.model.wiring import literals
@@ -63,6 +64,8 @@ def input_values(case: Case) -> Iterator[Finding]:
         for name, value in literals(node):
             port = skill.ports.get(name)
             if port is None or port.direction is not Direction.IN:
+                continue
+            if value.value is None and fits(type(None), port.type):
                 continue
             if not takes_values(port):
                 sentence = f"takes a variable, written ${name}, not {describe(value.value)}"

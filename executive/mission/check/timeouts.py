@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
+from executive.cell import LeastTimes
 from executive.mission.check.case import Case
 from executive.mission.findings import Finding, error
 from executive.mission.model import nodes
@@ -12,6 +13,10 @@ from executive.mission.model.nodes import Node, SkillNode
 from executive.mission.model.typed import WrongType, convert
 from executive.mission.model.values import Literal, Value
 from executive.mission.model.wiring import literals
+from executive.skill import HOLDING
+
+_SLACK = 0.005
+"""A clock of steps may end a wait up to half a step early [s]."""
 
 
 def short_timeouts(case: Case) -> Iterator[Finding]:
@@ -21,7 +26,7 @@ def short_timeouts(case: Case) -> Iterator[Finding]:
             continue
         seconds = _number(node.seconds)
         shortest = least_time(case, node.do)
-        if seconds is not None and 0 < seconds < shortest:
+        if seconds is not None and 0 < seconds < shortest - _SLACK:
             origin = node.seconds.origin if isinstance(node.seconds, Literal) else ""
             message = (
                 f"timeout.seconds is {seconds:g} s, but its body takes {shortest:.2f} s at the very least"
@@ -61,7 +66,33 @@ def _skill(case: Case, node: Any) -> float:
         except (KeyError, WrongType):
             # Another check says so.
             return 0.0
-    return skill.shortest(case.least, given)
+    entry = case.flow.entry.get(node.path) if case.flow else None
+    grips = entry.grips if entry else None
+    carries = skill.tool_state[0] is HOLDING
+    from_elsewhere = carries and (grips is None or any(grip.moved for grip in grips))
+    # How long a carry takes is known from where objects lie, not from wherever the arm went with its load.
+    return skill.shortest(_FromAnywhere(case.least) if from_elsewhere else case.least, given)
+
+
+class _FromAnywhere:
+    """Least times of a cell for an arm that may be anywhere with its load."""
+
+    def __init__(self, least: LeastTimes) -> None:
+        self._least = least
+
+    @property
+    def descent(self) -> float:
+        """The guarded last part of an approach [s]."""
+        return self._least.descent
+
+    def carry(self, bin: str | None) -> float:
+        """Nothing: it may be over the bin already."""
+        del bin
+        return 0.0
+
+    def answer(self, detector: str) -> float:
+        """From a frame to the answer of a detector [s]."""
+        return self._least.answer(detector)
 
 
 def _sum(case: Case, node: Any) -> float:

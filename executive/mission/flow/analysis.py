@@ -68,10 +68,11 @@ class Analysis:
         before, after = skill.tool_state
         state = state.gripping(required(state.grips, before, node.path))
         outputs = [wire.variable for wire in wires(node, skill, Direction.OUT)]
-        success = state.writing(outputs).gripping(left_after(state.grips, after, node.path))
+        end = state.moved() if skill.moves else state
+        success = end.writing(outputs).gripping(left_after(end.grips, after, node.path))
 
         def left(by: str) -> State:
-            return state.gripping(left_after_failure(state.grips, skill.tool_left.get(by), node.path))
+            return end.gripping(left_after_failure(end.grips, skill.tool_left.get(by), node.path))
 
         failures = {Raise(node.skill, reason, node.path): left(reason) for reason in skill.reasons}
         return Flow(success, failures, left(HALT))
@@ -160,11 +161,12 @@ class Analysis:
         elements, name = _constant(node.source), node.each.name
         if elements == []:
             return Flow(state, {}, None)
-        body, _ = self._round(node.do, state.writing([name]), lambda flow: flow.success)
+        body, entry = self._round(node.do, state.writing([name]), lambda flow: flow.success)
         success = joined((body.success, None if elements else state))
         failures = {failure: after.forgetting(name) for failure, after in body.failures.items()}
-        halted = body.halted and body.halted.forgetting(name)
-        return Flow(success and success.forgetting(name), failures, halted)
+        # A round that takes no time is followed by a wait for the next tick.
+        halted = joined((body.halted, entry))
+        return Flow(success and success.forgetting(name), failures, halted and halted.forgetting(name))
 
     def _try(self, node: Any, state: State) -> Flow:
         body = self._run(node.do, state)
@@ -233,7 +235,8 @@ class Analysis:
         if node.body is None:
             return _anything(node)
         flow = self._run(node.body, state)
-        self.bodies[node.path] = flow.success
+        # One use may be entered in several states: in a finally, in a loop.
+        self.bodies[node.path] = joined((self.bodies.get(node.path), flow.success))
         # A promise that is not kept is told there, not wherever somebody relies on it.
         promised = flow.success and flow.success.writing(node.promised)
         return replace(flow, success=promised)

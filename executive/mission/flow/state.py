@@ -21,11 +21,13 @@ class Grip:
         tool: EMPTY or HOLDING.
         since: Path of the skill that made it so, or "" for the beginning of the run.
         after: The last failure since then that something dealt with, or "".
+        moved: Whether the arm may have been moved since then.
     """
 
     tool: ToolState
     since: str = ""
     after: str = ""
+    moved: bool = False
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,11 @@ class State:
         """Return the state where something deals with a failure that led here."""
         grips = [replace(grip, after=str(failure)) for grip in self.grips or ()]
         return self if self.grips is None else self.gripping(frozenset(grips))
+
+    def moved(self) -> State:
+        """Return the state once the arm has been moved."""
+        moved = [replace(grip, moved=True) for grip in self.grips or ()]
+        return self if self.grips is None else self.gripping(frozenset(moved))
 
     def may_be(self, tool: ToolState) -> Grip | None:
         """Return how the tool may have become so, or None where it cannot be so."""

@@ -109,7 +109,7 @@ def _for_each(parser: NodeParser, head: Head) -> model.Node:
     for key in ("each", "in"):
         fields.required(key)
     each = Named(fields.text("each"), fields.value_mark("each"))
-    if each.name and not NAME.fullmatch(each.name):
+    if fields.get("each") is not None and not NAME.fullmatch(each.name):
         hint = "Write the bare name, for instance each: target; its value is $target."
         parser.refuse(each.mark, "bad-name", f'"{each.name}" cannot name a variable', hint)
         each = Named(each.name.removeprefix("$"), each.mark)
