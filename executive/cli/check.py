@@ -23,7 +23,7 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
     """
     with stdout_kept_clean():
         from executive.errors import InputError
-        from executive.mission.findings import MissionError
+        from executive.mission.findings import Finding, MissionError
         from executive.mission.load import load_mission
         from executive.runtime.cells import cell_kind
         from executive.skill import discover
@@ -44,7 +44,8 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
                 report["findings"] = [asdict(finding) for finding in error.findings]
                 texts.append(str(error))
             except InputError as error:
-                report["findings"] = [{"path": mission, "severity": "error", "message": str(error)}]
+                finding = Finding(mission, 0, 0, "error", "no-mission", str(error))
+                report["findings"] = [asdict(finding)]
                 texts.append(str(error))
             reports.append(report)
     if as_json:

@@ -8,21 +8,21 @@ from executive.cli.output import print_json, stdout_kept_clean
 
 
 @click.command(name="schema")
-@click.option("--cell", "file", flag_value="cell", help="The schema of cell files.")
-@click.option("--library", "file", flag_value="library", help="The schema of library files.")
-def command(file: str | None) -> None:
+@click.option("--cell", is_flag=True, help="The schema of cell files.")
+@click.option("--library", is_flag=True, help="The schema of library files.")
+def command(cell: bool, library: bool) -> None:
     """Print the JSON Schema of mission files, with the skills that are installed.
 
     A file that begins with `# yaml-language-server: $schema=mission.schema.json` names the schema beside
     it to every editor with the YAML language server.
     """
+    if cell and library:
+        raise click.UsageError("--cell and --library are two schemas; ask for one at a time")
     with stdout_kept_clean():
         from executive.mission.schema.files import library_schema, mission_schema
         from executive.mission.schema.types import cell_schema
         from executive.skill import discover
 
-        if file == "cell":
-            schema = cell_schema()
-        else:
-            schema = (library_schema if file == "library" else mission_schema)(discover())
+        of_missions = library_schema if library else mission_schema
+        schema = cell_schema() if cell else of_missions(discover())
     print_json(schema)

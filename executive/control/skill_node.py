@@ -67,7 +67,7 @@ class SkillNode(Behaviour):
         """The constants and the renamed variables, for outlines."""
         said = {name: _shown(value) for name, value in self.wiring.constants.items()}
         wired = {**self.wiring.inputs, **self.wiring.outputs}
-        said |= {port: f"${variable}" for port, variable in wired.items() if port != variable}
+        said |= {port: f"${name}" for port, name in _bare(wired).items() if port != name}
         if self.label:
             return ", ".join([self.skill_name, *(f"{key}: {value}" for key, value in said.items())])
         return ", ".join(f"{key}: {value}" for key, value in said.items())
@@ -195,6 +195,11 @@ class SkillNode(Behaviour):
             item=self._item,
             **more,
         )
+
+
+def _bare(wired: Mapping[str, str]) -> dict[str, str]:
+    """Return the variables by port, those a subtree keeps to itself as its author calls them."""
+    return {port: variable.rpartition(".")[2] for port, variable in wired.items()}
 
 
 def _shown(value: Any) -> str:

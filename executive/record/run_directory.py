@@ -79,11 +79,13 @@ class RunDirectory:
             InputError: The directory cannot be written to.
         """
         try:
-            (self.path / "mission.yaml").write_text(mission, encoding="utf-8")
+            # First, and under no name of the record's own.
             for reference, text in (libraries or {}).items():
                 library = self.path / reference
-                library.parent.mkdir(parents=True, exist_ok=True)
-                library.write_text(text, encoding="utf-8")
+                if library not in (self.journal, self.result) and self.frames not in library.parents:
+                    library.parent.mkdir(parents=True, exist_ok=True)
+                    library.write_text(text, encoding="utf-8")
+            (self.path / "mission.yaml").write_text(mission, encoding="utf-8")
             for name, content in (("params.yaml", params), ("cell.yaml", cell)):
                 text = yaml.safe_dump(plain(content), sort_keys=False, allow_unicode=True)
                 (self.path / name).write_text(text, encoding="utf-8")

@@ -254,7 +254,7 @@ def test_a_mission_that_is_not_there_is_told_with_those_that_are(
             --set:1:22: error[unknown-key]: the cell has no key "tols"
                1 | cell.tols.cup_radius=0.01
                  |                      ^^^^
-              Did you mean "tool"? The file has: cell, description, kind, arm, tool, table, bins, cameras, detectors, objects, safe_place.
+              Did you mean "tool"? It has: base, cell, description, kind, arm, tool, motion, table, bins, cameras, detectors, localization, objects, ledger, safe_place.
             """,
         ),
     ],

@@ -180,3 +180,29 @@ def test_empty_names_are_findings(load: Load) -> None:
         (1, 10, "bad-name"),
         (2, 7, "bad-name"),
     ]
+
+
+def test_a_section_that_the_cell_file_leaves_out_can_be_set(load: Load) -> None:
+    loaded = load(HEAD + "tree: Look\n", {"cell.motion.descent_speed": "0.05"})
+    assert loaded.cell_config.motion.descent_speed == 0.05
+
+
+def test_numbers_beyond_64_bits_are_no_whole_numbers(load: Load) -> None:
+    huge = "9" * 40
+    with pytest.raises(MissionError, match=r"repeat\.times must be a whole number"):
+        load(HEAD + f"tree: {{repeat: {{times: {huge}, do: Look}}}}\n")
+    with pytest.raises(MissionError, match=r'the param "a".min must be a number'):
+        load(
+            HEAD
+            + f"params: {{a: {{default: 1, min: 0x{'f' * 298}}}}}\ntree: {{repeat: {{times: $a, do: Look}}}}\n"
+        )
+
+
+def test_an_empty_override_is_nothing_and_no_file(load: Load) -> None:
+    with pytest.raises(MissionError, match=r"--set:1:\d+: error\[wrong-type\]"):
+        load(HEAD + "tree: Look\n", {"cell.kind": ""})
+
+
+def test_a_folder_that_is_not_there_is_no_mission(load: Load) -> None:
+    with pytest.raises(InputError, match="there is no mission file"):
+        find_mission("missions/")

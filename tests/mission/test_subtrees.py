@@ -176,7 +176,7 @@ def test_two_subtrees_of_one_name_are_an_error(load: Load) -> None:
     library("eyes", "library: eyes\ntrees: {look: Look}\n")
     with pytest.raises(MissionError) as caught:
         load(HEAD + "library: library/eyes.yaml\ntree: {use: look}\ntrees: {look: Look}\n")
-    assert 'there are two subtrees "look"; the other is in m.yaml, line 5' in str(caught.value)
+    assert 'there are two subtrees "look"; the other is in library/eyes.yaml:2' in str(caught.value)
 
 
 def test_what_a_library_has_and_nobody_uses_is_no_mistake(load: Load) -> None:

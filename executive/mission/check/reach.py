@@ -51,14 +51,14 @@ def endless_loops(case: Case) -> Iterator[Finding]:
 
 
 def unchanging_retries(case: Case) -> Iterator[Finding]:
-    """Find every retry that would meet the same again: nothing in it looks or moves."""
+    """Find every retry that would meet the same again: nothing in it looks, moves or waits."""
     for node in case.nodes():
-        if not isinstance(node, nodes.RetryNode):
+        if not isinstance(node, nodes.RetryNode) or node.backoff is not None:
             continue
         skills = [case.skills.get(inner.skill) for inner in node.walk() if isinstance(inner, nodes.SkillNode)]
         if skills and not any(skill is None or skill.senses or skill.moves for skill in skills):
-            message = "this retry changes nothing between its attempts: nothing in it looks or moves"
-            hint = "Put a look or a motion into do or recover."
+            message = "this retry changes nothing between its attempts: nothing in it looks, moves or waits"
+            hint = "Put a look or a motion into do or recover, or wait with backoff."
             yield warning(node.mark, "unchanging-retry", message, hint)
 
 

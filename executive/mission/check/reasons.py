@@ -103,7 +103,9 @@ def _meant(flow: Analysis, match: Match, coming: list[Raise]) -> list[Node]:
 
 
 def _ambiguous(match: Match, meant: list[Node]) -> Finding:
-    places = " and ".join(f"{node.mark.line}:{node.mark.col}" for node in meant)
-    message = f"{match} may come from more than one node here, at {places}"
-    hint = f"Label them with as: and name the one that is meant, as label.{match.reason}."
+    places = " and ".join(f"{node.mark.place(match.mark.source)}:{node.mark.col}" for node in meant)
+    message = f"{match} may come from more than one node here, in {places}"
+    hint = (
+        f"Label them, or the use that leads to them, with as: and name the one meant: label.{match.reason}."
+    )
     return error(match.mark, "ambiguous", message, hint)

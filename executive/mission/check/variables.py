@@ -35,7 +35,9 @@ def unwritten_inputs(case: Case) -> Iterator[Finding]:
             doors[door.path] = door
             lacking.setdefault(door.path, {}).setdefault(variable, what)
         elif variable in written:
-            message = f"{what} reads ${variable}, which is not written on every way to here"
+            # Inside a subtree its own variables go by their bare names.
+            bare = variable.rpartition(".")[2]
+            message = f"{what} reads ${bare}, which is not written on every way to here"
             yield error(mark, "unwritten", message, f"It is written by {_writers(case, variable, mark)}.")
         else:
             message = f"{what} reads ${variable}, which nothing writes"
@@ -150,6 +152,9 @@ def _who(case: Case, variable: str, mark: Mark) -> str:
 
 
 def _who_could(case: Case, variable: str, written: set[str]) -> str:
+    keepers = sorted({name.rpartition(".")[0] for name in written if name.endswith(f".{variable}")})
+    if keepers:
+        return f'The subtree "{keepers[0]}" writes one of its own: add {variable} to what it returns.'
     writers = [name for name, skill in case.skills.items() if _writes(skill, variable)]
     if writers:
         return f"It is written by: {', '.join(writers)}."

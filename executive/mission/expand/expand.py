@@ -49,12 +49,13 @@ def expand(mission: Mission, skills: Mapping[str, type[Skill]]) -> Expanded:
     expander = _Expander(mission, skills)
     tree = None if mission.tree is None else expander.whole(mission.tree, expander.params)
     unused = []
+    used = {use.name for tree in mission.trees.values() for use in tree.do.walk() if isinstance(use, UseNode)}
     for subtree in mission.trees.values():
         if subtree.name in expander.used or subtree.library or isinstance(subtree.do, UnknownNode):
             continue
-        expander.findings.append(
-            warning(subtree.mark, "unused-tree", f'nothing uses the subtree "{subtree.name}"')
-        )
+        if subtree.name not in used:
+            message = f'nothing uses the subtree "{subtree.name}"'
+            expander.findings.append(warning(subtree.mark, "unused-tree", message))
         defaults = {name: argument.default for name, argument in subtree.args.items()}
         given = {name: default for name, default in defaults.items() if default is not None}
         if len(given) == len(defaults):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os.path
 from collections.abc import Iterator
 from collections.abc import Mapping as Mapped
 from dataclasses import dataclass, replace
@@ -165,8 +166,8 @@ def _models_found(file: CellFile, config: CellConfig, folders: Mapped[Source, Pa
     found = {}
     for keys, urdf in _models(config):
         folder = folders.get(mark_of(file.root, keys).source, folders[file.source])
-        path = (folder / urdf).resolve()
-        found[keys] = str(path) if path.is_file() else urdf
+        path = folder / urdf
+        found[keys] = str(path.resolve()) if os.path.isfile(path) else urdf
     objects = {
         label: kind.model_copy(update={"urdf": found["objects", label, "urdf"]})
         for label, kind in config.objects.items()

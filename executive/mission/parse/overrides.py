@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping as Mapped
 from dataclasses import replace
 
+from executive.cell_config import CellConfig
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.source import Mark, Source
 from executive.mission.text.yaml_text import Entry, Mapping, Node, Scalar, parse_yaml
@@ -23,6 +24,8 @@ def override_node(key: str, value: str, as_text: bool = False) -> tuple[Node | N
     whole = source.mark(1, len(key) + 2, max(1, len(value)))
     if as_text:
         return Scalar(whole, value, value), []
+    if not value.strip():
+        return Scalar(whole, None, value), []
     # Blanks in place of the key keep the columns right.
     padded = Source("--set", " " * (len(key) + 1) + value)
     root, findings = parse_yaml(padded)
@@ -38,9 +41,20 @@ def override_cell(root: Node, overrides: Mapped[str, str]) -> tuple[Node, list[F
             continue
         node, wrong = override_node(key, value)
         findings += wrong
-        if node is not None:
-            root = _put(root, key.removeprefix(CELL).split("."), node, findings)
+        path = key.removeprefix(CELL).split(".")
+        if node is not None and _is_known(root, path, node, findings):
+            root = _put(root, path, node, findings)
     return root, findings
+
+
+def _is_known(root: Node, path: list[str], value: Node, findings: list[Finding]) -> bool:
+    """Tell whether the cell has the section an override begins with; if not, it is a finding."""
+    written = root.keys if isinstance(root, Mapping) else ()
+    if len(path) == 1 or path[0] in (*written, *CellConfig.model_fields):
+        return True
+    hint = alternatives(path[0], CellConfig.model_fields, "It has")
+    findings.append(error(value.mark, "unknown-key", f'the cell has no key "{path[0]}"', hint))
+    return False
 
 
 def _put(root: Node, path: list[str], value: Node, findings: list[Finding]) -> Node:
@@ -51,11 +65,9 @@ def _put(root: Node, path: list[str], value: Node, findings: list[Finding]) -> N
         return root
     entry = root.entry(first)
     if entry is None:
-        if rest:
-            hint = alternatives(first, root.keys, "The file has")
-            findings.append(error(value.mark, "unknown-key", f'the cell has no key "{first}"', hint))
-            return root
-        # A key the file leaves at its default; whether the cell knows it is for validation to say.
+        # What the file leaves at its default; whether the cell knows it is for validation to say.
+        for key in reversed(rest):
+            value = Mapping(value.mark, (Entry(Scalar(value.mark, key, key), value),))
         return replace(root, entries=(*root.entries, Entry(Scalar(value.mark, first, first), value)))
     if rest:
         changed = Entry(entry.key, _put(entry.value, rest, value, findings))

@@ -68,6 +68,15 @@ def _param(name: str, mark: Mark, node: Node, given: bool, findings: list[Findin
         None if choices is None else tuple(plain(item) for item in fields.items("choices")),
         fields.text("doc"),
     )
+    if param.minimum is not None and param.maximum is not None and param.minimum > param.maximum:
+        message = f"{name} can have no value: min {param.minimum:g} is above max {param.maximum:g}"
+        findings.append(error(fields.value_mark("min"), "out-of-range", message))
+        return replace(param, value=Literal(_any_value(param), mark))
+    if param.choices == ():
+        findings.append(
+            error(fields.value_mark("choices"), "empty-list", f"{name} can have no value: no choices")
+        )
+        return replace(param, value=Literal(_any_value(param), mark))
     if default is None:
         if not given:
             message = f'the param "{name}" has no default and was not given'

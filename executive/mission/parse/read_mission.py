@@ -81,14 +81,15 @@ def _add_library(
     library, malformed = parse_library(root, skills)
     findings += malformed
     for name, subtree in library.trees.items():
-        if name in trees:
-            first = trees[name].mark
-            message = (
-                f'there are two subtrees "{name}"; the other is in {first.source.path}, line {first.line}'
-            )
-            findings.append(error(subtree.mark, "duplicate-tree", message, "Rename one of them."))
-        else:
+        if name not in trees:
             trees[name] = subtree
+            continue
+        # The author can mend their own file: a subtree there, or the list of libraries.
+        other, own = trees[name], not trees[name].library
+        mark, place = (other.mark, subtree.mark) if own else (named.mark, other.mark)
+        message = f'there are two subtrees "{name}"; the other is in {place.place(mark.source)}'
+        hint = "Rename one of them." if own else "Leave one of the libraries out."
+        findings.append(error(mark, "duplicate-tree", message, hint))
     return source.text
 
 

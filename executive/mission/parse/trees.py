@@ -52,6 +52,10 @@ def _subtree(name: str, mark: Mark, node: Mapping, parser: NodeParser, library: 
             hint = "Write the bare name; inside, its value is $name."
             parser.refuse(where, "bad-name", f'"{argument}" cannot name an argument', hint)
             argument = argument.removeprefix("$")
+        if argument in args:
+            first = args[argument].mark.line
+            message = f'the argument "{argument}" stands here twice; the first is in line {first}'
+            parser.refuse(where, "duplicate-key", message)
         required = isinstance(value, Scalar) and value.value is None
         args[argument] = Argument(where, None if required else value_of(value, parser.findings))
 

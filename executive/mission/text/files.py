@@ -38,7 +38,7 @@ def find_mission(name: str | Path) -> Path:
         return path
     if os.path.isdir(path):
         raise InputError(f'"{name}" is a folder; name one of its files')
-    bare = PurePosixPath(str(name).removeprefix("missions/")).with_suffix("")
+    bare = PurePosixPath(str(name).removeprefix("missions/").removesuffix(".yaml"))
     if len(bare.parts) == 1 and os.path.isfile(shipped := shipped_folder() / f"{bare}.yaml"):
         return shipped
     hint = alternatives(str(bare), shipped_missions(), "Shipped missions")
@@ -64,7 +64,8 @@ def below(folder: Path, reference: str, shipped: Sequence[str] = ("",)) -> Path:
             if not path.resolve().is_relative_to(base.resolve()):
                 raise InputError(f'"{reference}" is a link out of {base}')
             return path
-    known = {p.relative_to(b).as_posix() for b in bases for p in (b / written.parent).glob("*.yaml")}
+    folders = [(base, base / written.parent) for base in bases if os.path.isdir(base / written.parent)]
+    known = {p.relative_to(base).as_posix() for base, folder in folders for p in folder.glob("*.yaml")}
     hint = alternatives(reference, sorted(known), "There are")
     raise InputError(f'there is no file "{reference}" beside this one, and none is shipped. {hint}')
 

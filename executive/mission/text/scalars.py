@@ -5,6 +5,7 @@ PyYAML follows YAML 1.1, where `no` is false, `1e-3` a text, `12:30` the number 
 
 from __future__ import annotations
 
+import math
 import re
 
 _NULL = frozenset({"", "~", "null", "Null", "NULL"})
@@ -32,13 +33,23 @@ def core_value(text: str) -> ScalarValue:
     if text[0] not in "+-.0123456789" or len(text) > _LONGEST_NUMBER:
         return text
     if _INTEGER.fullmatch(text):
-        return int(text)
+        return _whole(int(text))
     if _OCTAL.fullmatch(text):
-        return int(text[2:], 8)
+        return _whole(int(text[2:], 8))
     if _HEXADECIMAL.fullmatch(text):
-        return int(text[2:], 16)
+        return _whole(int(text[2:], 16))
     if _FLOAT.fullmatch(text):
         return float(text)
     if _INFINITE.fullmatch(text):
         return float(text.replace(".", ""))
     return float("nan") if text in _NAN else text
+
+
+def _whole(number: int) -> int | float:
+    """Return a whole number that 64 bits hold as it is, a larger one as a float, as JSON readers do."""
+    if -(2**63) <= number < 2**63:
+        return number
+    try:
+        return float(number)
+    except OverflowError:
+        return math.inf if number > 0 else -math.inf
