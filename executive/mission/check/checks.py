@@ -36,6 +36,7 @@ CHECKS: tuple[Check, ...] = (
     cell.known_classes,
     reasons.matches,
     variables.unwritten_inputs,
+    variables.unwritten_needs,
     variables.taken_names,
     variables.unread_variables,
     variables.broken_promises,

@@ -17,31 +17,25 @@ Read = tuple[Node, str, str, Mark]
 
 
 def unwritten_inputs(case: Case) -> Iterator[Finding]:
-    """Find everything that reads a variable which is not written on every way to it.
-
-    What a subtree of a library lacks is told where the mission uses it, once for all its variables.
-    """
-    if case.flow is None or case.tree is None:
-        return
-    written = written_below(case.tree, case.skills)
-    lacking: dict[str, dict[str, str]] = {}
-    doors: dict[str, UseNode] = {}
-    for node, what, variable, mark in _reads(case, case.tree):
-        entry = case.flow.entry.get(node.path)
-        if entry is None or entry.written is None or variable in entry.written:
-            continue
-        door = case.doors.get(node.path)
-        if door is not None and mark.source is not case.tree.mark.source:
-            doors[door.path] = door
-            lacking.setdefault(door.path, {}).setdefault(variable, what)
-        elif variable in written:
-            # Inside a subtree its own variables go by their bare names.
-            bare = variable.rpartition(".")[2]
+    """Find everything in the mission's own file that reads a variable not written on every way to it."""
+    for _, what, variable, mark in _unwritten(case, libraries=False):
+        written = written_below(case.tree, case.skills) if case.tree else set()
+        # Inside a subtree its own variables go by their bare names.
+        bare = variable.rpartition(".")[2]
+        if variable in written:
             message = f"{what} reads ${bare}, which is not written on every way to here"
             yield error(mark, "unwritten", message, f"It is written by {_writers(case, variable, mark)}.")
         else:
-            message = f"{what} reads ${variable}, which nothing writes"
+            message = f"{what} reads ${bare}, which nothing writes"
             yield error(mark, "unwritten", message, _who_could(case, variable, written))
+
+
+def unwritten_needs(case: Case) -> Iterator[Finding]:
+    """Find every use of a library's subtree that lacks variables it reads: told there, once for all."""
+    lacking: dict[str, dict[str, str]] = {}
+    for node, what, variable, _ in _unwritten(case, libraries=True):
+        lacking.setdefault(case.doors[node.path].path, {}).setdefault(variable, what)
+    doors = {door.path: door for door in case.doors.values()}
     for path, variables in lacking.items():
         door = doors[path]
         names = " and ".join(f"${name} (for {what})" for name, what in sorted(variables.items()))
@@ -49,6 +43,19 @@ def unwritten_inputs(case: Case) -> Iterator[Finding]:
         message = f'the subtree "{door.name}" needs {names}, which {are} not written on every way to here'
         hints = [f"${name} is written by {_who(case, name, door.mark)}." for name in sorted(variables)]
         yield error(door.mark, "unwritten", message, " ".join(hints))
+
+
+def _unwritten(case: Case, libraries: bool) -> Iterator[Read]:
+    """Yield what reads an unwritten variable: where a library says so, or where the mission does."""
+    if case.flow is None or case.tree is None:
+        return
+    for node, what, variable, mark in _reads(case, case.tree):
+        entry = case.flow.entry.get(node.path)
+        if entry is None or entry.written is None or variable in entry.written:
+            continue
+        in_library = node.path in case.doors and mark.source is not case.tree.mark.source
+        if in_library is libraries:
+            yield node, what, variable, mark
 
 
 def unread_variables(case: Case) -> Iterator[Finding]:
