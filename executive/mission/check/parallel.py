@@ -16,7 +16,7 @@ from executive.mission.model.nodes import (
     TimeoutNode,
     TryNode,
     UseNode,
-)  # fmt: skip
+)
 from executive.mission.model.values import Reference
 from executive.mission.source import Mark
 from executive.skill import Direction
@@ -24,18 +24,17 @@ from executive.skill import Direction
 
 def shared_resources(case: Case) -> Iterator[Finding]:
     """Find every two branches of a parallel that use the same part of the cell."""
-    for node in case.nodes():
-        if not isinstance(node, ParallelNode):
-            continue
+    for node in _parallels(case):
         for first, second in combinations([_uses(case, branch) for branch in node.branches], 2):
-            shared = dict.fromkeys(resource for resource in second if resource in first)
-            for users in {(first[r].skill, second[r].skill, second[r].mark): r for r in shared}.values():
-                one, other = first[users], second[users]
+            # Two skills that share arm and tool clash once.
+            clashes = {(first[part].mark, second[part].mark): part for part in second if part in first}
+            for part in clashes.values():
+                one, other = first[part], second[part]
                 door = case.doors.get(other.path)
                 mark = door.mark if door else other.mark
                 who = f'{other.skill} in the subtree "{door.name}"' if door else other.skill
                 message = (
-                    f"{who} uses the {users} while {one.skill} in {one.mark.place(mark.source)} may use it, "
+                    f"{who} uses the {part} while {one.skill} in {one.mark.place(mark.source)} may use it, "
                     "in another branch of the same parallel"
                 )
                 hint = "Write a sequence, or put both into one branch."
@@ -44,9 +43,7 @@ def shared_resources(case: Case) -> Iterator[Finding]:
 
 def shared_variables(case: Case) -> Iterator[Finding]:
     """Find every two branches of a parallel that write the same variable."""
-    for node in case.nodes():
-        if not isinstance(node, ParallelNode):
-            continue
+    for node in _parallels(case):
         for first, second in combinations([_writes(case, branch) for branch in node.branches], 2):
             for variable, (other, mark, hint) in second.items():
                 if variable in first:
@@ -60,9 +57,7 @@ def shared_variables(case: Case) -> Iterator[Finding]:
 
 def racing_reads(case: Case) -> Iterator[Finding]:
     """Find every variable that one branch of a parallel reads while another may write it."""
-    for node in case.nodes():
-        if not isinstance(node, ParallelNode):
-            continue
+    for node in _parallels(case):
         for (index, reading), (other_index, writing) in permutations(enumerate(node.branches), 2):
             written, own = _writes(case, writing), _writes(case, reading)
             # A skill with which an earlier branch begins has read before anything else can write.
@@ -76,6 +71,10 @@ def racing_reads(case: Case) -> Iterator[Finding]:
                         "may write it, in another branch of the same parallel"
                     )
                     yield error(mark, "shared-variable", message, hint)
+
+
+def _parallels(case: Case) -> Iterator[ParallelNode]:
+    return (node for node in case.nodes() if isinstance(node, ParallelNode))
 
 
 def _first(node: Node) -> Node:

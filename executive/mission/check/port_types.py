@@ -10,7 +10,7 @@ from executive.mission.check.case import Case
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.model.nodes import ForEachNode, Node
 from executive.mission.model.port_types import called, element_of, fits
-from executive.mission.model.typed import WrongType, convert, takes_values
+from executive.mission.model.typed import input_fault
 from executive.mission.model.values import Literal, Reference
 from executive.mission.model.wiring import Wire
 from executive.mission.source import Mark
@@ -111,7 +111,7 @@ def _misfits(case: Case, wire: Wire, writer: Writer) -> Iterator[Finding]:
     port, wanted = wire.port, f"{wire} takes {_wanted(wire.port)}"
     for value, mark in writer.values or ():
         known = case.names.get(port.refers)
-        if not _is_taken(value, port):
+        if input_fault(value, port):
             message = f"{wanted}, but for ${wire.variable} stands {describe(value)} here"
             yield error(mark, "port-type", message, f"It is read in {wire.mark.place(mark.source)}.")
         elif known is not None and isinstance(value, str) and value not in known:
@@ -127,15 +127,6 @@ def _misfits(case: Case, wire: Wire, writer: Writer) -> Iterator[Finding]:
     if holds:
         message = f"{wanted}, but ${wire.variable} holds {holds}"
         yield error(wire.mark, "port-type", message, f"It is written by {writer.seen_from(wire.mark)}.")
-
-
-def _is_taken(value: Any, port: Port) -> bool:
-    if value is None and fits(type(None), port.type):
-        return True
-    try:
-        return takes_values(port) and convert(value, port.type) is not ...
-    except WrongType:
-        return False
 
 
 def _wanted(port: Port) -> str:

@@ -40,12 +40,13 @@ def shadowed_catches(case: Case) -> Iterator[Finding]:
 
 def endless_loops(case: Case) -> Iterator[Finding]:
     """Find every loop that cannot end but by a failure."""
-    for node in case.nodes():
-        flow = case.flow.flows.get(node.path) if case.flow else None
-        if flow is None or not isinstance(node, nodes.WhileNode) or case.flow is None:
+    if case.flow is None:
+        return
+    for node in case.flow.nodes.values():
+        if not isinstance(node, nodes.WhileNode):
             continue
-        condition = case.flow.flows[node.condition.path]
-        if not condition.failures:
+        condition = case.flow.flows.get(node.condition.path)
+        if condition is not None and not condition.failures:
             message = f"this loop never ends: its condition, {name_of(node.condition)}, cannot fail"
             yield error(node.mark, "endless", message, "Use repeat with times or until.")
 

@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from executive.mission.check.case import Case
 from executive.mission.findings import Finding, alternatives, error, suggest
 from executive.mission.model.nodes import SkillNode
-from executive.mission.model.port_types import fits
-from executive.mission.model.typed import WrongType, convert, takes_values
+from executive.mission.model.typed import WrongType, convert, input_fault
 from executive.mission.model.values import Literal, Reference
 from executive.mission.model.wiring import literals
 from executive.mission.words import describe
@@ -65,17 +64,8 @@ def input_values(case: Case) -> Iterator[Finding]:
             port = skill.ports.get(name)
             if port is None or port.direction is not Direction.IN:
                 continue
-            if value.value is None and fits(type(None), port.type):
-                continue
-            if not takes_values(port):
-                sentence = f"takes a variable, written ${name}, not {describe(value.value)}"
-                yield _wrong(node, name, value, "wrong-type", sentence)
-                continue
-            try:
-                convert(value.value, port.type)
-            except WrongType as problem:
-                hint = case.variable_hint(value.value)
-                yield _wrong(node, name, value, "wrong-type", str(problem), hint)
+            if sentence := input_fault(value.value, port):
+                yield _wrong(node, name, value, "wrong-type", sentence, case.variable_hint(value.value))
 
 
 def output_wiring(case: Case) -> Iterator[Finding]:

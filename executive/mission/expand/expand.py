@@ -92,25 +92,18 @@ class _Expander:
             if ("", name) not in self._looked_up and f"${name}" not in param.mark.source.text:
                 yield warning(param.mark, "unused-param", f'nothing uses the param "{name}"')
         for subtree in self.mission.trees.values():
+            if subtree.library or isinstance(subtree.do, UnknownNode) or not self._uses[subtree.name]:
+                continue
             for name, argument in subtree.args.items():
-                put_in = self._uses[subtree.name] > 0 and not subtree.library
-                if (
-                    put_in
-                    and not isinstance(subtree.do, UnknownNode)
-                    and (subtree.name, name) not in self._looked_up
-                ):
+                if (subtree.name, name) not in self._looked_up:
                     message = f'nothing in the subtree "{subtree.name}" uses its argument "{name}"'
                     yield warning(argument.mark, "unused-argument", message)
 
     def _node(self, node: Node, names: Names, inside: tuple[str, ...], depth: int) -> Node:
         self._count += 1
         if depth > _DEEPEST or self._count > _MOST_NODES:
-            size = (
-                f"is more than {_DEEPEST} levels deep"
-                if depth > _DEEPEST
-                else f"has more than {_MOST_NODES} nodes"
-            )
-            message = f"with its subtrees put in, the tree {size}"
+            deep, large = f"is more than {_DEEPEST} levels deep", f"has more than {_MOST_NODES} nodes"
+            message = f"with its subtrees put in, the tree {deep if depth > _DEEPEST else large}"
             self.findings.append(error(self._outermost or node.mark, "too-large", message))
             raise _TooLargeError
 

@@ -11,6 +11,7 @@ from typing import Any, Union, get_args, get_origin
 
 from pydantic import TypeAdapter, ValidationError
 
+from executive.mission.model.port_types import fits
 from executive.mission.words import describe, violation
 from executive.skill import Port
 
@@ -34,9 +35,18 @@ def is_plain(declared: Any) -> bool:
     return False
 
 
-def takes_values(port: Port) -> bool:
-    """Tell whether a value for this input can stand in a mission file: items exist only in a run."""
-    return is_plain(port.type) and port.refers != "item"
+def input_fault(value: Any, port: Port) -> str:
+    """Return what is wrong with a value in a mission file for an input, to follow its name, or ""."""
+    if value is None and fits(type(None), port.type):
+        return ""
+    # Items exist only in a run: no file can name one.
+    if not is_plain(port.type) or port.refers == "item":
+        return f"takes a variable, written ${port.name}, not {describe(value)}"
+    try:
+        convert(value, port.type)
+    except WrongType as problem:
+        return str(problem)
+    return ""
 
 
 def convert(value: Any, declared: Any) -> Any:

@@ -68,23 +68,27 @@ def _param(name: str, mark: Mark, node: Node, given: bool, findings: list[Findin
         None if choices is None else tuple(plain(item) for item in fields.items("choices")),
         fields.text("doc"),
     )
-    if param.minimum is not None and param.maximum is not None and param.minimum > param.maximum:
-        message = f"{name} can have no value: min {param.minimum:g} is above max {param.maximum:g}"
-        findings.append(error(fields.value_mark("min"), "out-of-range", message))
-        return replace(param, value=Literal(_any_value(param), mark))
-    if param.choices == ():
-        findings.append(
-            error(fields.value_mark("choices"), "empty-list", f"{name} can have no value: no choices")
-        )
-        return replace(param, value=Literal(_any_value(param), mark))
-    if default is None:
-        if not given:
-            message = f'the param "{name}" has no default and was not given'
-            findings.append(error(mark, "missing-param", message, f"Give it with --set {name}=..."))
-        return replace(param, value=Literal(_any_value(param), mark))
-    # What is wrong with the default is told here, not again wherever it is used.
+    # What is wrong is told here, not again wherever the param is used.
     fallback = replace(param, value=Literal(_any_value(param), mark))
-    return _checked(name, param, param.value, findings) or fallback
+    if sentence := _impossible(param):
+        code, key = ("empty-list", "choices") if param.choices == () else ("out-of-range", "min")
+        findings.append(error(fields.value_mark(key), code, f"{name} can have no value: {sentence}"))
+        return fallback
+    if default is not None:
+        return _checked(name, param, param.value, findings) or fallback
+    if not given:
+        message = f'the param "{name}" has no default and was not given'
+        findings.append(error(mark, "missing-param", message, f"Give it with --set {name}=..."))
+    return fallback
+
+
+def _impossible(param: Param) -> str:
+    """Return why no value fits the declaration, or ""."""
+    if param.choices == ():
+        return "no choices"
+    if param.minimum is not None and param.maximum is not None and param.minimum > param.maximum:
+        return f"min {param.minimum:g} is above max {param.maximum:g}"
+    return ""
 
 
 def _any_value(param: Param) -> Any:
