@@ -1,0 +1,34 @@
+"""The typed content of a cell file: where a mission happens and what stands there.
+
+The model is the file: every field below is a key of `missions/cells/*.yaml`, in SI units. Keys that
+end in `_deg` are in degrees, where the field says so.
+"""
+
+from __future__ import annotations
+
+from executive.cell_config.arm import ArmConfig, LimitsConfig, MotionConfig, ToolConfig
+from executive.cell_config.cameras import CameraConfig, NoiseConfig
+from executive.cell_config.cell import CellConfig, LedgerConfig
+from executive.cell_config.detectors import DetectorConfig
+from executive.cell_config.objects import BinConfig, ObjectConfig, TableConfig
+from executive.cell_config.section import Colour, Joints, Range, Section, Vector
+
+__all__ = [
+    "ArmConfig",
+    "BinConfig",
+    "CameraConfig",
+    "CellConfig",
+    "Colour",
+    "DetectorConfig",
+    "Joints",
+    "LedgerConfig",
+    "LimitsConfig",
+    "MotionConfig",
+    "NoiseConfig",
+    "ObjectConfig",
+    "Range",
+    "Section",
+    "TableConfig",
+    "ToolConfig",
+    "Vector",
+]

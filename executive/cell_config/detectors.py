@@ -1,0 +1,35 @@
+"""Detectors: what kind, and what is known of how they err."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import ConfigDict, Field, model_validator
+
+from executive.cell_config.section import Section
+
+
+class DetectorConfig(Section):
+    """A detector: what kind, and what it needs."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, use_attribute_docstrings=True)
+
+    kind: str
+    """Name of an installed detector (entry-point group `executive.detectors`)."""
+    threshold: float = Field(0.5, gt=0, lt=1)
+    """Confidence from which a detection counts."""
+    floor: float = Field(0.25, gt=0, lt=1)
+    """Confidence under which a box is ignored altogether."""
+    latency: float = Field(0.05, ge=0)
+    """Time from a frame to its answer on the run's clock [s]."""
+
+    @model_validator(mode="after")
+    def _is_floored(self) -> DetectorConfig:
+        if self.floor > self.threshold:
+            raise ValueError(f"needs a floor up to its threshold, {self.threshold:g}, not {self.floor:g}")
+        return self
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The keys that only this kind of detector knows."""
+        return dict(self.model_extra or {})
