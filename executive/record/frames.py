@@ -1,125 +1,157 @@
-"""The pictures behind the decisions: one file per choice, with every box that was on offer."""
+"""The pictures behind the decisions: one file per choice, failed attempt and look that led to nothing."""
 
 from __future__ import annotations
 
-import contextlib
-import pickle
-import queue
-import subprocess
-import sys
-import tempfile
-import threading
+import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from executive.events import Event
-from executive.record.overlay import Picture
+from executive.record.pictures.drawer import Drawer
+from executive.record.pictures.scene import Scene, Seen
+from executive.record.progress import Progress, is_skill, skill_name
 
-KEPT = 8
-"""Looks remembered: a decision may rest on an earlier one than the last."""
+KEPT = 24
+"""Looks remembered [1.2 MB each at 640 x 480]: a decision may rest on an earlier one than the last."""
 
-PATIENCE = 30.0
-"""Longest wait for the last picture at the end of a run [s]."""
+MOST = 200
+"""Pictures of a run, so that one that goes on for hours does not fill the disk."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """What a picture needs of a look; depth, which it does not need, is three times as large."""
+
+    image: NDArray[np.uint8]
+    visible: NDArray[np.bool_]
+    camera: str
+    detector: str
+    stamp: float
+    found: Sequence[Mapping[str, Any]]
 
 
 class Frames:
-    """Saves `<tick>_<item>.jpg` for every decision, drawn by a process of its own.
+    """Saves a picture for every decision and every failure that an image can explain.
 
-    Importing supervision takes 1.3 to 1.5 s and a picture 2 ms (two cores of an AMD EPYC); a run with
-    five objects has 8 s in all. In a process beside it, the pictures cost the tick thread 0.05 ms each
-    and are ready when the run ends.
+    `<tick>_<item>.jpg` shows what a decision was made from, `<tick>_<item>_<reason>.jpg` the same image
+    again after the attempt failed, `<tick>_<reason>.jpg` the last look when a skill that is about no item
+    fails and no other picture shows that look.
     """
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._looks: dict[int, tuple[Any, Sequence[Mapping[str, Any]]]] = {}
-        self._places: dict[str, Sequence[float]] = {}
-        self._pictures: queue.Queue[Picture | None] = queue.Queue()
-        self._sender: threading.Thread | None = None
-        self.problem = ""
-        """Why pictures are missing, or "" where none is."""
+        self._drawer = Drawer(folder)
+        self._progress = Progress()
+        self._looks: dict[int, _Look] = {}
+        self._choices: dict[str, Event] = {}
+        self._rests_on: int | None = None
+        self._unshown: int | None = None
+        self._drawn = 0
+        self._left_out: Counter[str] = Counter()
 
     def __call__(self, event: Event) -> None:
-        """Remember a look; at a decision, have the frame it rests on drawn."""
+        """Remember a look; at a decision or a failure, have the frame it rests on drawn."""
         if event.kind == "look" and event.data.get("frame_object") is not None:
-            frame = event.data["frame_object"]
-            self._looks[frame.id] = (frame, event.data.get("found", ()))
-            while len(self._looks) > KEPT:
-                del self._looks[next(iter(self._looks))]
-        elif event.kind == "item" and event.data.get("position") is not None:
-            self._places[event.data["item"]] = event.data["position"]
-        elif event.kind == "decision" and event.data.get("frame") in self._looks:
-            frame, found = self._looks[event.data["frame"]]
-            self._draw(self._picture(event, frame.image, found))
+            self._remember(event)
+        elif event.kind == "decision" and "frame" in event.data:
+            self._choices[event.data["item"]] = event
+            self._rests_on = event.data["frame"]
+            self._show(event, event.data["frame"], event.data)
+        elif event.kind == "status" and event.data["status"] == "FAILURE" and is_skill(event.data):
+            self._fail(event)
+        # Last: a skill that fails now is still what the robot was doing.
+        self._progress(event)
 
     def close(self) -> None:
         """Return once every picture is drawn; `problem` says if some are not."""
-        if self._sender is None:
-            return
-        self._pictures.put(None)
-        self._sender.join(PATIENCE)
-        if self._sender.is_alive():
-            self.problem = f"pictures are still being drawn {PATIENCE:.0f} s after the run"
-        self._sender = None
+        self._drawer.close()
 
-    def _picture(self, event: Event, image: Any, found: Sequence[Mapping[str, Any]]) -> Picture:
-        item = str(event.data.get("item", ""))
-        chosen = _chosen(event.data, found, event.data.get("position", self._places.get(item)))
-        captions = [f"{box['label']} {box['confidence']:.2f}" for box in found]
-        if chosen is not None and item:
-            captions[chosen] = f"{item} {found[chosen]['confidence']:.2f}"
-        path = self._folder / f"{event.tick:06d}_{item or 'none'}.jpg"
-        return Picture(path, image, [tuple(box["box"]) for box in found], captions, chosen)
+    @property
+    def problem(self) -> str:
+        """Why pictures are missing, or "" where none is."""
+        left_out = ", ".join(f"{count} {why}" for why, count in self._left_out.items())
+        return self._drawer.problem or (f"pictures left out: {left_out}" if left_out else "")
 
-    def _draw(self, picture: Picture) -> None:
-        if self._sender is None:
-            self._sender = threading.Thread(target=self._send, name="frames", daemon=True)
-            self._sender.start()
-        self._pictures.put(picture)
+    def _remember(self, event: Event) -> None:
+        frame = event.data["frame_object"]
+        self._looks[frame.id] = _Look(
+            frame.image, frame.visible, frame.camera, event.data.get("detector", ""), frame.stamp,
+            event.data.get("found", ()),
+        )  # fmt: skip
+        self._unshown = frame.id
+        if len(self._looks) > KEPT:
+            # What the last decision rests on is wanted again if the attempt fails, however many looks later.
+            del self._looks[next(number for number in self._looks if number != self._rests_on)]
 
-    def _send(self) -> None:
-        """Feed the drawing process until there is nothing more to draw; note what went wrong."""
-        try:
-            self._folder.mkdir(parents=True, exist_ok=True)
-            # A file takes what the process says: a pipe that nobody reads could fill up and stop it.
-            with tempfile.TemporaryFile() as said:
-                drawer = subprocess.Popen(
-                    [sys.executable, "-m", "executive.record.overlay"],
-                    stdin=subprocess.PIPE, stdout=said, stderr=said,
-                    # Out of reach of Ctrl-C: the pictures of a halted run are wanted all the more.
-                    start_new_session=True,
-                )  # fmt: skip
-                # If it ends early, its exit status and last words tell why, below.
-                with contextlib.suppress(BrokenPipeError):
-                    self._feed(drawer)
-                if drawer.wait() != 0:
-                    said.seek(0)
-                    words = said.read().decode(errors="replace").strip().splitlines()
-                    self.problem = f"not every picture was drawn: {words[-1] if words else 'the drawer died'}"
-        except OSError as error:
-            self.problem = f"no pictures were drawn: {(error.strerror or str(error)).lower()}"
+    def _fail(self, event: Event) -> None:
+        choice = self._choices.get(event.data["item"])
+        if choice is not None:
+            self._show(event, choice.data["frame"], choice.data)
+        elif self._unshown is not None:
+            self._show(event, self._unshown, {})
 
-    def _feed(self, drawer: subprocess.Popen[bytes]) -> None:
-        assert drawer.stdin is not None
-        with drawer.stdin as pipe:
-            while (picture := self._pictures.get()) is not None:
-                pickle.dump(picture, pipe, protocol=pickle.HIGHEST_PROTOCOL)
-                pipe.flush()
+    def _show(self, event: Event, frame: int, choice: Mapping[str, Any]) -> None:
+        """Have the look with that number drawn, with what was chosen in it and what is said now."""
+        if frame == self._unshown:
+            self._unshown = None
+        look = self._looks.get(frame)
+        if look is None:
+            self._left_out[f"of a look before the last {KEPT}"] += 1
+        elif self._drawn == MOST:
+            self._left_out[f"beyond the {MOST} that a run keeps"] += 1
+        elif not self._drawer.draw(_file(event, choice), self._scene(event, look, choice)):
+            self._left_out["that came faster than they can be drawn"] += 1
+        else:
+            self._drawn += 1
+
+    def _scene(self, event: Event, look: _Look, choice: Mapping[str, Any]) -> Scene:
+        item = choice.get("item", "")
+        known = self._progress.item(item)
+        reason = event.data.get("reason", "")
+        return Scene(
+            image=look.image,
+            visible=look.visible,
+            seen=[Seen(box["label"], box["confidence"], tuple(box["box"])) for box in look.found],
+            chosen=_chosen(choice, look.found, choice.get("position", known.get("position"))),
+            mission=self._progress.mission,
+            clock=event.clock,
+            camera=look.camera,
+            detector=look.detector,
+            age=event.clock - look.stamp,
+            phase=self._progress.phase,
+            item=item,
+            bin=choice.get("bin", ""),
+            attempts=known.get("attempts", 0),
+            failure=f"{skill_name(event.data['node'])}.{reason}" if reason else "",
+            message=event.data.get("message", ""),
+            fates=self._progress.fates(),
+            classes=self._progress.classes,
+        )
+
+
+def _file(event: Event, choice: Mapping[str, Any]) -> str:
+    """Return the name of the file that shows a choice at an event."""
+    parts = (f"{event.tick:06d}", choice.get("item"), event.data.get("reason"))
+    return "_".join(part for part in parts if part) + ".jpg"
 
 
 def _chosen(
-    decision: Mapping[str, Any], found: Sequence[Mapping[str, Any]], place: Sequence[float] | None
+    choice: Mapping[str, Any], found: Sequence[Mapping[str, Any]], place: Sequence[float] | None
 ) -> int | None:
     """Return the number of the detection that was decided for, or None if it cannot be told.
 
     It is the one where the item was seen; an item's class is a matter of many looks, so the label of
     this one does not have to agree.
     """
+    if not choice:
+        return None
     located = [number for number, box in enumerate(found) if box.get("position") is not None]
     if place is not None and located:
-        return min(located, key=lambda n: float(np.linalg.norm(np.subtract(found[n]["position"], place))))
-    alike = [number for number, box in enumerate(found) if box["label"] == decision.get("label")]
+        return min(located, key=lambda n: math.dist(found[n]["position"], place))
+    alike = [number for number, box in enumerate(found) if box["label"] == choice.get("label")]
     return alike[0] if len(alike) == 1 else None

@@ -1,4 +1,4 @@
-"""The pictures behind the decisions."""
+"""Which pictures a run leaves, and what they show."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import pytest
 from executive.events import Event
 from executive.geometry import Pose
 from executive.messages import Frame
+from executive.record import frames as module
 from executive.record.frames import KEPT, Frames
-from executive.record.overlay import Picture, draw
+from executive.record.pictures.drawer import Drawer
 
 CUBE = {"label": "cube", "confidence": 0.9, "box": (20, 40, 50, 70), "position": (0.5, 0.1, 0.02)}
 NEAR = {"label": "cube", "confidence": 0.8, "box": (90, 40, 120, 70), "position": (0.5, -0.1, 0.02)}
@@ -20,20 +21,37 @@ DUCK = {"label": "duck", "confidence": 0.7, "box": (20, 90, 50, 120), "position"
 def look(number: int, *found: dict) -> Event:
     image = np.full((160, 160, 3), 150, np.uint8)
     visible = np.ones((160, 160), bool)
-    frame = Frame(number, "overhead", image, None, np.eye(3), Pose.identity(), 0.0, visible, 0)
-    return Event("look", number, 0.0, {"frame": number, "frame_object": frame, "found": found})
+    frame = Frame(number, "overhead", image, None, np.eye(3), Pose.identity(), 0.5, visible, 0)
+    data = {"frame": number, "frame_object": frame, "detector": "embedded", "found": found}
+    return Event("look", number, 0.5, data)
 
 
 def decision(frame: int = 1, tick: int = 12, **chosen) -> Event:
-    return Event("decision", tick, 0.0, {"item": "cube-1", "label": "cube", "frame": frame, **chosen})
+    data = {"item": "cube-1", "label": "cube", "frame": frame, "bin": "red_bin", **chosen}
+    return Event("decision", tick, 0.75, data)
+
+
+def item(name: str, state: str, **more) -> Event:
+    return Event("item", 1, 0.0, {"item": name, "state": state, **more})
+
+
+def skill(name: str, status: str, item: str = "", reason: str = "", tick: int = 90) -> Event:
+    message = f"it was {reason}" if reason else ""
+    data = {"node": f"tree/do/{name}", "status": status, "item": item, "reason": reason, "message": message}
+    return Event("status", tick, 2.0, data)
 
 
 @pytest.fixture
 def drawn(monkeypatch):
-    """The pictures that would be drawn, without a process."""
-    pictures = []
-    monkeypatch.setattr(Frames, "_draw", lambda self, picture: pictures.append(picture))
-    return pictures
+    """The scenes that would be drawn, by file, without a process."""
+    scenes = {}
+
+    def draw(self, name, scene):
+        scenes[name] = scene
+        return True
+
+    monkeypatch.setattr(Drawer, "draw", draw)
+    return scenes
 
 
 def test_a_decision_is_drawn_on_the_frame_it_rests_on(tmp_path):
@@ -43,17 +61,29 @@ def test_a_decision_is_drawn_on_the_frame_it_rests_on(tmp_path):
     frames.close()
     assert frames.problem == ""
     image = cv2.imread(str(tmp_path / "frames" / "000012_cube-1.jpg"))
-    blue, green, red = (int(value) for value in image[55, 20])
-    assert green > 150 and green > red + 60 and green > blue + 60  # The chosen box's edge is green.
+    assert image.shape[1] == 640
+    # The chosen box's edge has the colour of the first class; the image is drawn four times as large.
+    blue, green, red = (int(value) for value in image[220, 80])
+    assert blue > green > red + 40
 
 
-def test_only_the_chosen_box_is_highlighted():
-    boxes = [CUBE["box"], DUCK["box"]]
-    picture = Picture("", np.zeros((160, 160, 3), np.uint8), boxes, ["cube-1 0.90", "duck 0.70"], 0)
-    image = draw(picture)
-    assert tuple(image[55, 20]) == (0, 200, 83)
-    assert tuple(image[105, 20]) == (176, 190, 197)
-    assert not picture.image.any()  # The record's own image is left alone.
+def test_a_picture_says_what_the_run_is_about(tmp_path, drawn):
+    frames = Frames(tmp_path)
+    for event in (
+        Event("run", 0, 0.0, {"mission": "sort"}), look(1, DUCK, CUBE), skill("SelectTarget", "RUNNING"),
+        item("duck-1", "placed", bin="yellow_bin"),
+        item("cube-1", "seen", position=(0.5, 0.1, 0.02), attempts=1),
+        decision(),
+    ):  # fmt: skip
+        frames(event)
+    scene = drawn["000012_cube-1.jpg"]
+    assert (scene.mission, scene.clock, scene.age) == ("sort", 0.75, 0.25)
+    assert (scene.camera, scene.detector) == ("overhead", "embedded")
+    assert (scene.phase, scene.item, scene.bin, scene.attempts) == ("SelectTarget", "cube-1", "red_bin", 1)
+    assert [(seen.label, seen.box) for seen in scene.seen] == [("duck", DUCK["box"]), ("cube", CUBE["box"])]
+    assert (scene.chosen, scene.failure, scene.message) == (1, "", "")
+    assert scene.fates == {"yellow_bin": ("duck-1",)}
+    assert scene.classes == ("cube", "duck")
 
 
 @pytest.mark.parametrize(
@@ -71,25 +101,96 @@ def test_the_chosen_box_is_the_nearest_else_the_only_one_of_its_class(
     frames = Frames(tmp_path)
     frames(look(1, *found))
     frames(decision(**chosen))
-    assert drawn[0].chosen == expected
+    assert drawn["000012_cube-1.jpg"].chosen == expected
 
 
 def test_an_item_is_where_the_ledger_last_said(tmp_path, drawn):
     frames = Frames(tmp_path)
-    frames(Event("item", 1, 0.0, {"item": "cube-1", "position": (0.5, -0.1, 0.02)}))
+    frames(item("cube-1", "seen", position=(0.5, -0.1, 0.02)))
     frames(look(1, CUBE, NEAR))
     frames(decision())
-    assert drawn[0].chosen == 1
-    assert drawn[0].captions == ["cube 0.90", "cube-1 0.80"]
+    assert drawn["000012_cube-1.jpg"].chosen == 1
+
+
+def test_a_failed_attempt_is_drawn_on_what_was_decided_from(tmp_path, drawn):
+    frames = Frames(tmp_path)
+    for event in (
+        look(1, CUBE), decision(), look(2), skill("Grasp", "RUNNING", "cube-1"),
+        item("cube-1", "seen", position=(0.5, 0.1, 0.02), attempts=1),
+        skill("Grasp", "FAILURE", "cube-1", "missed"),
+    ):  # fmt: skip
+        frames(event)
+    scene = drawn["000090_cube-1_missed.jpg"]
+    assert (scene.failure, scene.message) == ("Grasp.missed", "it was missed")
+    assert (scene.phase, scene.attempts, scene.age) == ("Grasp", 1, 1.5)
+    assert len(scene.seen) == 1
+    assert (scene.chosen, scene.item, scene.bin) == (0, "cube-1", "red_bin")
+
+
+def test_a_look_that_leads_to_nothing_is_drawn_once(tmp_path, drawn):
+    frames = Frames(tmp_path)
+    for event in (
+        look(1, DUCK), skill("SelectTarget", "FAILURE", reason="unseen", tick=20),
+        skill("MoveToScan", "FAILURE", reason="blocked", tick=30),
+    ):  # fmt: skip
+        frames(event)
+    assert list(drawn) == ["000020_unseen.jpg"]
+    scene = drawn["000020_unseen.jpg"]
+    assert (scene.failure, scene.item, scene.chosen) == ("SelectTarget.unseen", "", None)
+
+
+def test_a_look_that_a_decision_shows_is_not_drawn_for_a_later_failure(tmp_path, drawn):
+    frames = Frames(tmp_path)
+    for event in (look(1, CUBE), decision(), skill("Detect", "FAILURE", reason="unsure")):
+        frames(event)
+    assert list(drawn) == ["000012_cube-1.jpg"]
+
+
+def test_what_fails_because_a_skill_failed_is_not_drawn_again(tmp_path, drawn):
+    frames = Frames(tmp_path)
+    frames(look(1, CUBE))
+    frames(Event("status", 90, 2.0, {"node": "tree/do", "status": "FAILURE", "reason": "Grasp.missed"}))
+    assert not drawn
 
 
 def test_an_earlier_look_is_found_again_and_old_ones_are_forgotten(tmp_path, drawn):
     frames = Frames(tmp_path)
     for number in range(KEPT + 1):
         frames(look(number, CUBE))
-    frames(decision(frame=0))
     frames(decision(frame=1))
     assert len(drawn) == 1
+    frames(decision(frame=0))
+    assert len(drawn) == 1
+    assert frames.problem == f"pictures left out: 1 of a look before the last {KEPT}"
+
+
+def test_what_the_last_decision_rests_on_is_kept(tmp_path, drawn):
+    frames = Frames(tmp_path)
+    frames(look(0, CUBE))
+    frames(decision(frame=0))
+    for number in range(1, 2 * KEPT):
+        frames(look(number))
+    frames(skill("Grasp", "FAILURE", "cube-1", "missed"))
+    frames(decision(frame=KEPT))
+    assert list(drawn) == ["000012_cube-1.jpg", "000090_cube-1_missed.jpg"]
+
+
+def test_a_long_run_keeps_its_first_pictures_and_says_so(tmp_path, drawn, monkeypatch):
+    monkeypatch.setattr(module, "MOST", 3)
+    frames = Frames(tmp_path)
+    frames(look(1, CUBE))
+    for tick in range(5):
+        frames(decision(tick=tick))
+    assert list(drawn) == ["000000_cube-1.jpg", "000001_cube-1.jpg", "000002_cube-1.jpg"]
+    assert frames.problem == "pictures left out: 2 beyond the 3 that a run keeps"
+
+
+def test_pictures_that_come_too_fast_are_told(tmp_path, monkeypatch):
+    monkeypatch.setattr(Drawer, "draw", lambda self, name, scene: False)
+    frames = Frames(tmp_path)
+    frames(look(1, CUBE))
+    frames(decision())
+    assert frames.problem == "pictures left out: 1 that came faster than they can be drawn"
 
 
 def test_a_run_without_decisions_draws_nothing_and_starts_no_process(tmp_path):

@@ -18,7 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from executive.geometry import Pose
-from executive.messages import Detection, Detections, Frame, Target
+from executive.messages import Detection, Detections, Frame, Reliability, Target
 from executive.record.plain import DIGITS, plain
 
 
@@ -49,6 +49,7 @@ class Pair:
     right: tuple[int, ...]
 
 
+EYE = Reliability(threshold=0.5, misses=0.02, confused=0.0025, invented=0.02, jitter=0.6)
 FRAME = Frame(
     7, "overhead", np.zeros((4, 4, 3), np.uint8), None, np.eye(3), Pose.identity(), 1 / 3,
     np.ones((4, 4), bool), 0,
@@ -113,7 +114,7 @@ def straightforward(value: Any) -> Any:
 ODD = [
     *Colour, *Shade, *Level, *Share, Corner(1 / 3, -0.0), Path("a/b"), Pose.identity(), FRAME, object(),
     Colour, int, b"bytes", 1j, np.bool_(False), np.array([[True]]), np.array(["a"]), np.longdouble(1) / 3,
-    Detections(FRAME, (Detection("duck", 2 / 3, (1, 2.5, np.float64(3), 4)),), "table", (0, 0, 4, 4)),
+    Detections(FRAME, (Detection("duck", 0.6, (1, 2.5, np.float64(3), 4)),), "eye", EYE, "full", (0, 0, 4, 4)),
     Target("duck-1", "duck", np.array([1 / 3, np.nan, -0.0]), 0.9, 7, 0, 1e-9),
 ]  # fmt: skip
 SCALARS = (

@@ -36,7 +36,7 @@ def test_every_decision_has_a_picture_and_every_tool_action_an_intent(run, tmp_p
     entries = read_journal(tmp_path / "latest" / "journal.jsonl")
     decisions = [entry for entry in entries if entry["kind"] == "decision"]
     pictures = {path.name for path in (tmp_path / "latest" / "frames").iterdir()}
-    assert pictures == {f"{entry['tick']:06d}_{entry['item']}.jpg" for entry in decisions}
+    assert pictures >= {f"{entry['tick']:06d}_{entry['item']}.jpg" for entry in decisions}
     assert len(decisions) == result["items"]["placed"]
     assert entries[0]["kind"] == "run"
     assert entries[-1]["kind"] == "end"

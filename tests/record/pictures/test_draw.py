@@ -1,0 +1,106 @@
+"""What a picture looks like."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from executive.record.pictures.boxes import captions
+from executive.record.pictures.draw import WIDTH, draw
+from executive.record.pictures.palette import GROUND, PALETTE, bgr, class_colour
+from executive.record.pictures.scene import Scene, Seen
+from executive.record.pictures.strip import HEIGHT
+
+GREY = 150
+CUBE = Seen("cube", 0.9, (100.0, 200.0, 160.0, 260.0))
+DUCK = Seen("duck", 0.7, (300.0, 100.0, 340.0, 140.0))
+CLASSES = ("cube", "duck")
+
+
+def scene(*seen: Seen, height: int = 480, width: int = 640, **more) -> Scene:
+    image = np.full((height, width, 3), GREY, np.uint8)
+    return Scene(image, seen=seen, classes=CLASSES, **more)
+
+
+def rgb(colour: str) -> tuple[int, ...]:
+    return bgr(colour)[::-1]
+
+
+def edge(picture: np.ndarray, row: int, column: int) -> list[tuple[int, ...]]:
+    """Return the colours across the left edge of a box, from outside to inside."""
+    return [tuple(int(value) for value in picture[row, x]) for x in range(column - 5, column + 6)]
+
+
+def test_the_chosen_box_is_thick_and_rimmed_the_others_are_thin():
+    picture = draw(scene(CUBE, DUCK, chosen=0))
+    chosen, other = edge(picture, 230, 100), edge(picture, 120, 300)
+    assert chosen[5] == rgb(PALETTE[0]) and other[5] == rgb(PALETTE[1])
+    assert chosen.count(chosen[5]) > other.count(other[5])
+    assert chosen[:5].count((0, 0, 0)) == chosen[6:].count((0, 0, 0)) == 1
+    assert set(other) == {(GREY,) * 3, rgb(PALETTE[1])}
+
+
+def test_without_a_choice_every_box_is_thin():
+    assert set(edge(draw(scene(CUBE)), 230, 100)) == {(GREY,) * 3, rgb(PALETTE[0])}
+
+
+def test_the_strip_is_below_the_image_with_a_close_up_of_the_choice():
+    image = np.full((480, 640, 3), GREY, np.uint8)
+    image[200:260, 100:160] = (200, 30, 30)
+    picture = draw(replace(scene(CUBE, chosen=0), image=image))
+    assert picture.shape == (480 + HEIGHT, WIDTH, 3)
+    assert tuple(picture[480 + HEIGHT // 2, HEIGHT // 2]) == (200, 30, 30)
+    assert tuple(picture[480 + HEIGHT // 8, HEIGHT // 8]) == (GREY,) * 3
+    assert tuple(picture[480, 0]) == rgb(PALETTE[0])
+    assert tuple(picture[-1, -1]) == rgb(GROUND)
+
+
+def test_without_a_choice_there_is_no_close_up():
+    assert tuple(draw(scene(CUBE))[480 + HEIGHT // 2, 1]) == rgb(GROUND)
+
+
+def test_what_the_strip_says_is_written_on_it():
+    silent, told = (draw(scene(mission=mission))[480:] for mission in ("", "sort"))
+    assert np.any(silent != told)
+
+
+def test_hidden_parts_are_darker():
+    visible = np.ones((480, 640), bool)
+    visible[:, :320] = False
+    picture = draw(scene(visible=visible))
+    assert picture[100, 100].max() < GREY - 20
+    assert tuple(picture[100, 500]) == (GREY,) * 3
+
+
+@pytest.mark.parametrize("width", [160, 1280])
+def test_every_picture_is_as_wide_and_its_boxes_go_with_it(width):
+    scale = width / WIDTH
+    small = replace(CUBE, box=tuple(edge * scale for edge in CUBE.box))
+    picture = draw(scene(small, height=round(480 * scale), width=width))
+    assert picture.shape == (480 + HEIGHT, WIDTH, 3)
+    assert tuple(picture[230, 100]) == rgb(PALETTE[0])
+
+
+def test_a_choice_at_the_edge_of_the_image_can_be_drawn():
+    cut_off = replace(CUBE, box=(-10.0, 460.0, 20.0, 490.0))
+    assert draw(scene(cut_off, chosen=0)).shape == (480 + HEIGHT, WIDTH, 3)
+
+
+def test_the_image_itself_is_left_alone():
+    drawn = scene(CUBE, chosen=0, visible=np.zeros((480, 640), bool))
+    draw(drawn)
+    assert (drawn.image == GREY).all()
+
+
+def test_a_label_says_the_class_and_the_confidence_that_of_the_choice_the_item():
+    assert captions(scene(CUBE, DUCK, chosen=1, item="duck-3")) == ["cube 0.90", "duck-3 0.70"]
+    assert captions(scene(CUBE, chosen=0)) == ["cube 0.90"]
+
+
+def test_colours_of_classes_come_again_when_there_are_no_more():
+    classes = [f"class {number}" for number in range(len(PALETTE) + 1)]
+    colours = [class_colour(label, classes) for label in classes]
+    assert len(set(colours)) == len(PALETTE)
+    assert colours[-1] == colours[0]

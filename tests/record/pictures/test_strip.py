@@ -1,0 +1,79 @@
+"""What the strip below an image says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from executive.record.pictures.scene import Scene
+from executive.record.pictures.strip import HEIGHT, ROWS, draw_strip, fitted, listed, strip_text, wrapped
+
+IMAGE = np.zeros((48, 64, 3), np.uint8)
+
+
+def at_most(count: int):
+    return lambda text: len(text) <= count
+
+
+def test_a_decision_is_told_with_where_the_item_goes():
+    said = strip_text(Scene(IMAGE, item="cube-1", bin="red_bin", phase="SelectTarget"))
+    assert said.title == "cube-1 to red_bin"
+    assert said.lines == ("phase: SelectTarget",)
+
+
+def test_a_failure_is_told_with_its_reason_and_what_failed_before():
+    said = strip_text(
+        Scene(
+            IMAGE, item="cube-1", bin="red_bin", phase="Grasp", attempts=2,
+            failure="Grasp.missed", message="no seal on cube-1",
+        )
+    )  # fmt: skip
+    assert said.title == "Grasp.missed: cube-1"
+    assert said.lines == ("phase: Grasp, 2 failed attempts", "no seal on cube-1")
+
+
+def test_a_failure_about_no_item_is_told_by_its_reason():
+    assert strip_text(Scene(IMAGE, failure="SelectTarget.unseen")).title == "SelectTarget.unseen"
+
+
+def test_the_strip_says_where_and_when():
+    hidden = np.zeros((48, 64), bool)
+    look = {"camera": "overhead", "detector": "embedded", "age": 0.05}
+    said = strip_text(Scene(IMAGE, hidden, mission="sort", clock=3.4, **look))
+    assert said.notes == ("sort   3.40 s   shaded: behind the arm", "overhead by embedded, 0.05 s old")
+    assert strip_text(Scene(IMAGE, ~hidden, camera="wrist")).notes == ("0.00 s", "wrist, 0.00 s old")
+
+
+def test_the_strip_says_what_became_of_every_item():
+    fates = {"red_bin": ["cube-1", "cube-2"], "rejected": ["duck-1"]}
+    assert strip_text(Scene(IMAGE, fates=fates)).fates == (
+        ("red_bin", ("cube-1", "cube-2")), ("rejected", ("duck-1",)),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("room", "expected"),
+    [(30, "a-1, a-2, a-3, a-4"), (17, "a-2, a-3, a-4 +1"), (12, "a-3, a-4 +2"), (7, "a-4 +3"), (3, "4")],
+)
+def test_a_long_list_keeps_its_newest(room, expected):
+    assert listed(["a-1", "a-2", "a-3", "a-4"], at_most(room)) == expected
+
+
+def test_an_empty_list_says_nothing():
+    assert listed([], at_most(10)) == ""
+
+
+def test_a_text_is_wrapped_between_words_and_cut_where_it_must():
+    assert wrapped("no seal on cube-1", at_most(8)) == ["no seal", "on", "cube-1"]
+    assert wrapped("unreachable", at_most(8)) == ["unrea..."]
+    assert fitted("short", at_most(8)) == "short"
+
+
+@pytest.mark.parametrize("width", [640, 320])
+def test_whatever_is_said_there_is_room_for_it(width):
+    many = {f"bin_{number}_with_a_long_name": [f"cube-{number}"] * 40 for number in range(ROWS + 3)}
+    long = {"item": "cube-1" * 20, "bin": "red", "message": "word " * 100, "camera": "c" * 90}
+    strip = draw_strip(Scene(IMAGE, fates=many, **long), width)
+    assert strip.shape == (HEIGHT, width, 3)
+    edges = (strip[:3], strip[-3:], strip[:, -3:])
+    assert all(len(np.unique(edge.reshape(-1, 3), axis=0)) == 1 for edge in edges)  # Nothing is cut off.
