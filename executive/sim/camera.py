@@ -14,8 +14,9 @@ from executive.cell import Clock
 from executive.cell_config import CameraConfig, NoiseConfig
 from executive.geometry import Array, Pose
 from executive.messages import Box, Frame
+from executive.sim.depth import distances, sense
 from executive.sim.world import World
-from executive.vision.camera_model import camera_matrix, looking_at, projection_matrix, view_matrix
+from executive.vision.camera_model import calibrated, projection_matrix, view_matrix
 
 Image = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
@@ -42,6 +43,8 @@ class Light:
 
 CELL_LIGHT = Light()
 """The lamp of every simulated cell: white, a little in front and to the left, no shadows."""
+DEPTH_STREAM = 1
+"""Sets the random numbers of a frame's depth apart from those of its image; 0 would not."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,15 +54,22 @@ class Render:
     Attributes:
         image: `(h, w, 3)` uint8, RGB.
         bodies: `(h, w)` body seen at each pixel, -1 where there is none.
+        buffer: `(h, w)` OpenGL's depth buffer.
     """
 
     image: Image
     bodies: NDArray[np.int32]
+    buffer: NDArray[np.float32]
+
+    @property
+    def depth(self) -> Array:
+        """Distances along the optical axis `(h, w)` [m], inf where there is no body."""
+        return distances(self.buffer)
 
 
 def camera_pose(world: World, config: CameraConfig) -> Pose:
     """Return `X_WC` of a camera where it is mounted now."""
-    X_MC = looking_at(config.position, config.look_at, config.up)
+    _, X_MC = calibrated(config)
     return X_MC if config.mount == "fixed" else world.flange_pose() @ X_MC
 
 
@@ -69,7 +79,7 @@ def render(world: World, matrix: Array, X_WC: Pose, part: tuple[int, int, int, i
     width, height = right - left, bottom - top
     # TinyRenderer samples a pixel at its lower left corner; half a pixel further is its centre.
     sampled = (left + 0.5, top - 0.5, right + 0.5, bottom - 0.5)
-    _, _, rgba, _, segmentation = world.client.getCameraImage(
+    _, _, rgba, buffer, segmentation = world.client.getCameraImage(
         width,
         height,
         view_matrix(X_WC),
@@ -85,7 +95,9 @@ def render(world: World, matrix: Array, X_WC: Pose, part: tuple[int, int, int, i
     )
     image = np.asarray(rgba, dtype=np.uint8).reshape(height, width, 4)[..., :3]
     return Render(
-        np.ascontiguousarray(image), np.asarray(segmentation, dtype=np.int32).reshape(height, width)
+        np.ascontiguousarray(image),
+        np.asarray(segmentation, dtype=np.int32).reshape(height, width),
+        np.asarray(buffer, dtype=np.float32).reshape(height, width),
     )
 
 
@@ -109,7 +121,8 @@ class Shadow(Protocol):
 class SimCamera:
     """A camera of the simulated world; satisfies `executive.cell.Camera`.
 
-    Frames are numbered from 1. The noise of frame n depends on the seed and n alone.
+    Frames are numbered from 1. The noise of frame n depends on the seed and n alone, and that of its image
+    not on whether there is a depth sensor.
 
     Attributes:
         name: Its name in the cell file.
@@ -143,7 +156,7 @@ class SimCamera:
         """
         self.name = name
         self.config = config
-        self.matrix = camera_matrix(config.width, config.height, config.fov_deg)
+        self.matrix, _ = calibrated(config)
         self._world = world
         self._clock = clock
         self._seed = seed
@@ -178,11 +191,12 @@ class SimCamera:
         """Return a fresh frame of what the camera sees now."""
         self._frames += 1
         X_WC = self._pose()
+        image, depth = self._sense(X_WC)
         return Frame(
             id=self._frames,
             camera=self.name,
-            image=self._image(X_WC),
-            depth=None,
+            image=image,
+            depth=depth,
             matrix=self.matrix,
             X_WC=X_WC,
             stamp=self._clock.now,
@@ -197,9 +211,14 @@ class SimCamera:
     def _pose(self) -> Pose:
         return camera_pose(self._world, self.config)
 
-    def _image(self, X_WC: Pose) -> Image:
-        clean = render(self._world, self.matrix, X_WC, (0, 0, *self._size), self._light).image
-        return add_noise(clean, self.config.noise, np.random.default_rng([self._seed, self._frames]))
+    def _sense(self, X_WC: Pose) -> tuple[Image, Array | None]:
+        """Return the image and, with a depth sensor, the depth of the frame being taken."""
+        clean = render(self._world, self.matrix, X_WC, (0, 0, *self._size), self._light)
+        image = add_noise(clean.image, self.config.noise, np.random.default_rng([self._seed, self._frames]))
+        if self.config.depth is None:
+            return image, None
+        rng = np.random.default_rng([self._seed, self._frames, DEPTH_STREAM])
+        return image, sense(clean.depth, self.config.depth, rng)
 
     def _visible(self, X_WC: Pose) -> Mask:
         if self._shadow is None:

@@ -11,7 +11,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from executive.geometry import Array, Pose
+from executive.cell_config import CameraConfig
+from executive.geometry import Array, Pose, rotation_from_vector
 from executive.messages import Box
 
 NEAR, FAR = 0.02, 5.0
@@ -52,6 +53,33 @@ def looking_at(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> Pose:
     return Pose(np.column_stack([x, np.cross(z, x), z]), origin)
 
 
+def from_opencv(matrix: ArrayLike, rvec: ArrayLike, tvec: ArrayLike) -> tuple[Array, Pose]:
+    """Return camera matrix `(3, 3)` [pixel] and pose `X_WC` of a camera that OpenCV describes.
+
+    The way back from `Frame.opencv`. OpenCV's pixels have their centres at whole numbers, ours half a
+    pixel further; its rvec [rad] and tvec [m], as `cv2.solvePnP` returns them, lead from W to C.
+    """
+    ours = np.array(matrix, dtype=float)
+    ours[:2, 2] += 0.5
+    return ours, Pose(rotation_from_vector(rvec), np.asarray(tvec, dtype=float)).inverse()
+
+
+def calibrated(config: CameraConfig) -> tuple[Array, Pose]:
+    """Return the camera matrix `(3, 3)` [pixel] of a cell file's camera and its pose `X_MC`.
+
+    M is what it is mounted on: the world of a fixed camera, the flange of one on the wrist.
+    """
+    given = config.calibration
+    if given is None:
+        assert config.position and config.look_at and config.up and config.fov_deg, "CameraConfig sees to it"
+        matrix = camera_matrix(config.width, config.height, config.fov_deg)
+        return matrix, looking_at(config.position, config.look_at, config.up)
+    transform = given.mount_to_camera or given.camera_to_mount
+    assert transform is not None, "CalibrationConfig sees to it"
+    matrix, X_MC = from_opencv(given.matrix, transform.rotation, transform.translation)
+    return matrix, X_MC if given.mount_to_camera else X_MC.inverse()
+
+
 def project(matrix: Array, X_WC: Pose, points: ArrayLike) -> Array:
     """Return the image coordinates `(..., 2)` [pixel] of points `(..., 3)` [m] in the world.
 
@@ -74,14 +102,15 @@ def on_plane(matrix: Array, X_WC: Pose, pixel: ArrayLike, z: float) -> Array:
     Raises:
         ValueError: The camera does not look towards that height there.
     """
-    ray = pixel_ray(matrix, X_WC, pixel)
+    u, v = np.asarray(pixel, dtype=float)
+    direction = X_WC.rotation @ np.linalg.solve(matrix, np.array([u, v, 1.0]))
     drop = z - X_WC.position[2]
-    if ray[2] * drop <= 0:
+    if abs(direction[2]) < 1e-9 or drop / direction[2] <= 0:
         raise ValueError(
             f"pixel {np.asarray(pixel, dtype=float).tolist()} of a camera {X_WC.position[2]:.3f} m high "
             f"looks away from the plane z = {z:.3f} m; only pixels whose ray meets it can be placed on it"
         )
-    return np.asarray(X_WC.position + ray * (drop / ray[2]))
+    return np.asarray(X_WC.position + drop / direction[2] * direction)
 
 
 def view_matrix(X_WC: Pose) -> tuple[float, ...]:

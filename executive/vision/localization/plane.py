@@ -1,14 +1,12 @@
-"""From a detection to a point in the world."""
+"""Localization by known height."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
-from executive.errors import NoDepth
 from executive.geometry import Array
 from executive.messages import Detection, Frame, ObjectClass
+from executive.vision.localization.centre import centre_at
 
 
 class PlaneLocalizer:
@@ -26,13 +24,4 @@ class PlaneLocalizer:
         Raises:
             NoDepth: The ray does not meet the plane in front of the camera.
         """
-        height = self._classes[detection.label].height / 2
-        pixel = np.array([*detection.centre, 1.0])
-        direction = frame.X_WC.rotation @ np.linalg.solve(frame.matrix, pixel)
-        origin = frame.X_WC.position
-        if abs(direction[2]) < 1e-9 or (height - origin[2]) / direction[2] <= 0:
-            raise NoDepth(
-                f"the ray through pixel ({detection.centre[0]:.0f}, {detection.centre[1]:.0f}) of frame "
-                f"{frame.id} does not meet the plane {height * 1000:.0f} mm above the table"
-            )
-        return origin + (height - origin[2]) / direction[2] * direction
+        return centre_at(detection, frame, self._classes[detection.label].height / 2)
