@@ -12,7 +12,8 @@ from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell_config import CellConfig
 from executive.geometry import Pose
-from executive.sim.models import find_model, upright
+from executive.sim.bodies import add_body
+from executive.sim.models import upright
 from executive.sim.world import STEP, add_bin
 
 SETTLING = 360
@@ -32,14 +33,9 @@ def settle(config: CellConfig, objects: Sequence[tuple[str, Pose]]) -> list[Pose
             add_bin(client, bin)
         poses = []
         for label, X_WO in objects:
-            model = config.objects[label]
-            X_WL = X_WO @ upright(model)
-            body = client.loadURDF(
-                str(find_model(model.urdf)), X_WL.position, X_WL.quaternion, globalScaling=model.scale
-            )
-            client.changeDynamics(body, -1, rollingFriction=0.0005, spinningFriction=0.0005)
+            body = add_body(client, config.objects[label], X_WO)
             X_LI = Pose.of(*client.getDynamicsInfo(body, -1)[3:5])
-            poses.append((body, (upright(model) @ X_LI).inverse()))
+            poses.append((body, (upright(config.objects[label]) @ X_LI).inverse()))
         for _ in range(SETTLING):
             client.stepSimulation()
         return [Pose.of(*client.getBasePositionAndOrientation(body)) @ X_IO for body, X_IO in poses]

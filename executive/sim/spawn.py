@@ -10,16 +10,12 @@ from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.geometry import Array, Pose, about_z
 from executive.sim.models import load_mesh
+from executive.sim.settling import DROP, come_to_rest
+from executive.sim.stacking import stack
 from executive.sim.world import World
 
 TRIES = 2000
 """Places tried for one set of objects before the workspace counts as too small for it."""
-DROP = 0.002
-"""Height over the table at which objects are let go [m]."""
-STILL = 0.002
-"""Speed under which an object counts as still [m/s]."""
-LEAST, MOST = 60, 480
-"""Physics steps given to settle: at least, for nothing moves in the first ones, and at most."""
 
 
 def spawn(world: World, config: CellConfig, seed: int, count: int | None = None) -> tuple[int, ...]:
@@ -47,7 +43,9 @@ def spawn(world: World, config: CellConfig, seed: int, count: int | None = None)
         X_WO = Pose(about_z(rng.uniform(0, math.tau)), np.array([*place, height]))
         colour = model.colours[int(rng.integers(len(model.colours)))]
         bodies.append(world.add_object(label, X_WO, colour))
-    _settle(world, bodies)
+    come_to_rest(world, bodies)
+    if table.stacked:
+        stack(world, bodies, meshes, table.stacked, rng)
     return tuple(bodies)
 
 
@@ -70,12 +68,3 @@ def _places(config: CellConfig, labels: list[str], rng: np.random.Generator) -> 
         f"{high[0] - low[0]:.2f} m by {high[1] - low[1]:.2f} m, {config.table.gap * 1000:.0f} mm apart; "
         "ask for fewer or widen table.x and table.y"
     )
-
-
-def _settle(world: World, bodies: list[int]) -> None:
-    """Step until every body has come to rest, or for two seconds."""
-    for step in range(MOST):
-        world.step()
-        speeds = [np.linalg.norm(world.client.getBaseVelocity(body)[0]) for body in bodies]
-        if step >= LEAST and max(speeds, default=0.0) < STILL:
-            return
