@@ -39,5 +39,9 @@ class Unavailable(ExecutiveError):
     """A detector gave no usable answer; the text says why."""
 
 
+class DeadlinePassed(Unavailable):
+    """A detector's time for an answer was over before it came."""
+
+
 class NoDepth(ExecutiveError):
     """A detection could not be localized because the frame has no usable depth there."""

@@ -7,6 +7,7 @@ from typing import Any
 from pydantic import ConfigDict, Field, model_validator
 
 from executive.cell_config.section import Section
+from executive.messages import Reliability
 
 
 class DetectorConfig(Section):
@@ -22,12 +23,25 @@ class DetectorConfig(Section):
     """Confidence under which a box is ignored altogether."""
     latency: float = Field(0.05, ge=0)
     """Time from a frame to its answer on the run's clock [s]."""
+    misses: float = Field(0.03, gt=0, lt=1)
+    """Share of the objects in full view that one look overlooks, as `executive evaluate` measures it."""
+    confused: float = Field(0.004, gt=0, lt=1)
+    """Share of the objects it finds that it gives a wrong class."""
+    invented: float = Field(0.02, gt=0)
+    """Objects that are not there, per look."""
+    jitter: float = Field(1.0, gt=0)
+    """Standard deviation of the centre of a found box, along each axis [pixel]."""
 
     @model_validator(mode="after")
     def _is_floored(self) -> DetectorConfig:
         if self.floor > self.threshold:
             raise ValueError(f"needs a floor up to its threshold, {self.threshold:g}, not {self.floor:g}")
         return self
+
+    @property
+    def reliability(self) -> Reliability:
+        """How it errs."""
+        return Reliability(self.threshold, self.misses, self.confused, self.invented, self.jitter)
 
     @property
     def options(self) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import re
 import sys
@@ -21,7 +22,12 @@ OPENCV = (
 @click.pass_context
 def command(ctx: click.Context) -> None:
     """Check Python, the packages this project needs, and OpenCV; exit code 1 if something is wrong."""
+    from executive.vision.detectors.roboflow.key import VARIABLE
+
     problems = [*_python(), *_packages(), *_opencv()]
+    # Whether, never what: this is printed where others may read it.
+    is_set = bool(os.environ.get(VARIABLE))
+    click.echo(f"{VARIABLE} is {'set' if is_set else 'not set; models that Roboflow hosts want it'}")
     for problem in problems:
         click.echo(f"problem: {problem}")
     click.echo("all is well" if not problems else f"{len(problems)} problem(s)")

@@ -6,11 +6,13 @@ import threading
 
 import pytest
 
-from executive.errors import Unavailable
-from executive.messages import Detection
-from executive.vision.detectors.requests import Worker
+from executive.errors import DeadlinePassed, Unavailable
+from executive.messages import Answer, Detection, Reliability
+from executive.vision.detectors.requests import Pending, Worker
 
-ANSWER = [Detection("cube", 0.9, (0.0, 0.0, 1.0, 1.0))]
+FOUND = [Detection("cube", 0.9, (0.0, 0.0, 1.0, 1.0))]
+RELIABILITY = Reliability(threshold=0.5, misses=0.1, confused=0.1, invented=0.1, jitter=1.0)
+ANSWER = Answer("eye", tuple(FOUND), RELIABILITY)
 
 
 class Clock:
@@ -34,9 +36,13 @@ def worker():
     worker.close()
 
 
+def pending(worker, search, due, clock, **options):
+    return Pending(worker.submit(search), due, clock, detector="eye", reliability=RELIABILITY, **options)
+
+
 def test_an_answer_that_is_in_early_shows_only_when_it_is_due(worker, clock):
-    request = worker.submit(lambda: ANSWER, 0.05, clock)
-    worker.submit(list, 0.0, clock).result()
+    request = pending(worker, lambda: FOUND, 0.05, clock)
+    worker.submit(list).result()
     assert not request.ready
     clock.now = 0.05 - 1e-12
     assert request.ready
@@ -48,9 +54,9 @@ def test_the_clock_waits_for_an_answer_that_is_late(worker, clock):
 
     def search():
         release.wait()
-        return ANSWER
+        return FOUND
 
-    request = worker.submit(search, 0.05, clock)
+    request = pending(worker, search, 0.05, clock)
     clock.now = 0.05
     threading.Timer(0.08, release.set).start()
     assert request.ready
@@ -58,7 +64,7 @@ def test_the_clock_waits_for_an_answer_that_is_late(worker, clock):
 
 
 def test_asking_too_early_says_when_the_answer_is_due(worker, clock):
-    request = worker.submit(lambda: ANSWER, 0.05, clock)
+    request = pending(worker, lambda: FOUND, 0.05, clock)
     with pytest.raises(RuntimeError, match=r"due at 0\.050 s and it is 0\.000 s"):
         request.result()
 
@@ -68,15 +74,37 @@ def test_what_the_search_raises_comes_out_of_the_result_as_it_is(worker, clock, 
     def search():
         raise error
 
-    request = worker.submit(search, 0.0, clock)
+    request = pending(worker, search, 0.0, clock)
     assert request.ready
     with pytest.raises(type(error)) as raised:
         request.result()
     assert raised.value is error
 
 
+def test_that_a_deadline_has_passed_shows_when_it_has_passed_on_the_runs_clock_too(worker, clock):
+    def search():
+        raise DeadlinePassed("no answer within 1.0 s")
+
+    request = pending(worker, search, 0.05, clock, given_up=1.0)
+    clock.now = 0.9
+    assert not request.ready
+    clock.now = 1.0 - 1e-12
+    assert request.ready
+    with pytest.raises(DeadlinePassed, match=r"within 1\.0 s"):
+        request.result()
+
+
+def test_another_failure_shows_when_an_answer_would(worker, clock):
+    def search():
+        raise Unavailable("refused")
+
+    request = pending(worker, search, 0.05, clock, given_up=1.0)
+    clock.now = 0.05
+    assert request.ready
+
+
 def test_closing_ends_the_thread():
     worker = Worker("closing")
-    worker.submit(list, 0.0, Clock()).result()
+    worker.submit(list).result()
     worker.close()
     assert not any(thread.name.startswith("detector-closing") for thread in threading.enumerate())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib.metadata import EntryPoint
+from typing import ClassVar
 
 import pytest
 
@@ -11,9 +12,31 @@ from executive.errors import InputError
 from executive.vision.detectors import registry
 from executive.vision.detectors.registry import build_detectors, known_labels, wrong_detectors
 
+INSTALLED = ", ".join(sorted(registry.installed()))
+
 
 class Oracle:
-    """A kind of detector that says nothing about itself."""
+    """A kind of detector of somebody else's, that says nothing about itself."""
+
+    made: ClassVar = []
+
+    def __init__(self, config, setting):
+        self.config, self.setting, self.closed = config, setting, False
+        self.other = setting.other(config.options["beside"]) if "beside" in config.options else None
+        Oracle.made.append(self)
+        if config.options.get("broken"):
+            raise InputError("it is broken")
+
+    @classmethod
+    def from_config(cls, config, setting):
+        return cls(config, setting)
+
+    def close(self):
+        self.closed = True
+
+
+def around(base):
+    return {"camera": None, "clock": None, "base": base, "seed": 7}
 
 
 @pytest.fixture
@@ -22,14 +45,15 @@ def oracle_installed(monkeypatch):
     found = registry.installed()
     oracle = EntryPoint("oracle", f"{__name__}:Oracle", registry.GROUP)
     monkeypatch.setattr(registry, "installed", lambda: {**found, "oracle": oracle})
+    monkeypatch.setattr(Oracle, "made", [])
 
 
 def test_a_kind_that_is_not_installed_is_found_before_and_at_the_start(tmp_path):
     configs = {"first": DetectorConfig(kind="embedded"), "second": DetectorConfig(kind="yolo")}
-    sentence = 'detector "second" is of kind "yolo", which is not installed; installed: embedded, rfdetr'
+    sentence = f'detector "second" is of kind "yolo", which is not installed; installed: {INSTALLED}'
     assert list(wrong_detectors(configs, tmp_path)) == [(("detectors", "second", "kind"), sentence)]
     with pytest.raises(InputError) as caught:
-        build_detectors({"second": configs["second"]}, camera=None, clock=None, base=tmp_path)
+        build_detectors({"second": configs["second"]}, **around(tmp_path))
     assert str(caught.value) == sentence
 
 
@@ -48,3 +72,46 @@ def test_the_labels_of_a_kind_that_does_not_say_them_are_not_known(tmp_path, ora
     assert set(known["embedded"]) == {"cube", "sphere", "duck"}
     assert known["oracle"] is known["yolo"] is None
     assert [keys for keys, _ in wrong_detectors(configs, tmp_path)] == [("detectors", "yolo", "kind")]
+
+
+def test_a_kind_of_somebody_elses_is_found_by_its_entry_point(tmp_path, monkeypatch):
+    info = tmp_path / "theirs-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[{registry.GROUP}]\noracle = {__name__}:Oracle\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    built = build_detectors({"mine": DetectorConfig(kind="oracle", wish=3)}, **around(tmp_path))
+    setting = built["mine"].setting
+    assert built["mine"].config.options == {"wish": 3}
+    assert (setting.name, setting.base, setting.seed) == ("mine", tmp_path, 7)
+
+
+def test_detectors_are_built_once_in_the_files_order_whoever_needs_them(tmp_path, oracle_installed):
+    configs = {
+        "first": DetectorConfig(kind="oracle", beside="second"),
+        "second": DetectorConfig(kind="oracle"),
+    }
+    built = build_detectors(configs, **around(tmp_path))
+    assert list(built) == ["first", "second"]
+    assert built["first"].other is built["second"]
+    assert len(Oracle.made) == 2
+
+
+@pytest.mark.parametrize(
+    ("beside", "text"),
+    [("a", "the detectors a -> b -> a rest on each other"), ("c", 'no detector "c"; it has: a, b')],
+)
+def test_a_detector_cannot_rest_on_itself_or_on_nobody(tmp_path, oracle_installed, beside, text):
+    configs = {
+        "a": DetectorConfig(kind="oracle", beside="b"),
+        "b": DetectorConfig(kind="oracle", beside=beside),
+    }
+    with pytest.raises(InputError, match=text):
+        build_detectors(configs, **around(tmp_path))
+
+
+def test_where_one_cannot_be_built_the_others_are_closed(tmp_path, oracle_installed):
+    configs = {"a": DetectorConfig(kind="oracle"), "b": DetectorConfig(kind="oracle", broken=True)}
+    with pytest.raises(InputError, match="it is broken"):
+        build_detectors(configs, **around(tmp_path))
+    assert Oracle.made[0].closed

@@ -8,7 +8,8 @@ import pytest
 from executive.errors import InputError
 from executive.messages import Detection
 from executive.vision.detectors.embedded import LABELS, MODEL
-from executive.vision.detectors.onnx_model import OnnxModel, read_labels, without_duplicates
+from executive.vision.detectors.onnx_model import OnnxModel, read_labels
+from executive.vision.detectors.views import without_duplicates
 
 
 @pytest.fixture(scope="module")

@@ -11,13 +11,14 @@ from executive.geometry import Pose
 from executive.messages import Detection, Frame
 from executive.vision.detectors.embedded import LABELS, MODEL, EmbeddedDetector
 from executive.vision.detectors.rfdetr import RfdetrDetector
+from executive.vision.detectors.setting import Setting
 
 TABLE = (192, 100, 448, 356)
 ONNX = str(MODEL)
 
 
 class Clock:
-    now = 0.05
+    now = 0.0
     step = 1 / 240
 
     def sleep(self, duration):
@@ -50,15 +51,20 @@ def frame_with_spot(left, top, size=20):
 
 
 def detector_around(model, class_map=None):
-    config = DetectorConfig(kind="rfdetr")
-    return RfdetrDetector(model, config, table_view=TABLE, clock=Clock(), class_map=class_map)
+    return RfdetrDetector(model, DetectorConfig(kind="rfdetr"), setting(), class_map)
+
+
+def setting(base=None):
+    return Setting("eye", camera(), Clock(), base, seed=0, other=None)
 
 
 def search(detector, frame, view):
+    """Return what the detector finds, waited for on its clock."""
     request = detector.request(frame, view)
+    detector._setting.clock.now += 0.05
     assert request.ready
     try:
-        return request.result()
+        return request.result().found
     finally:
         detector.close()
 
@@ -76,7 +82,7 @@ def test_a_crop_larger_than_the_models_input_is_shrunk_before_the_model_sees_it(
 
 
 def test_the_table_view_does_not_show_what_lies_beside_it():
-    assert search(detector_around(BrightSpots(256)), frame_with_spot(20, 20), "table") == []
+    assert search(detector_around(BrightSpots(256)), frame_with_spot(20, 20), "table") == ()
 
 
 @pytest.mark.parametrize(("left", "top"), [(0, 0), (250, 100), (620, 460), (180, 240)])
@@ -103,21 +109,40 @@ def configured(kind, **options):
 
 
 def build(kind, base, **options):
-    return kind.from_config(configured(kind, **options), camera=camera(), clock=Clock(), base=base)
+    return kind.from_config(configured(kind, **options), setting(base))
 
 
 def test_any_exported_model_can_be_used_by_path(tmp_path):
     (tmp_path / "model.onnx").symlink_to(MODEL)
     (tmp_path / "names.txt").write_text("one\ntwo\nthree\n")
     detector = build(RfdetrDetector, tmp_path, model_path="model.onnx", labels="names.txt", threshold=0.6)
-    detector.close()
-    assert detector.threshold == 0.6
+    assert search(detector, frame_with_spot(300, 200), "table") == ()
 
 
 def test_the_embedded_detector_needs_no_options(tmp_path):
     detector = build(EmbeddedDetector, tmp_path, threshold=0.6)
+    assert search(detector, frame_with_spot(300, 200), "table") == ()
+
+
+def test_an_answer_says_whose_it_is_and_how_that_detector_errs():
+    config = DetectorConfig(kind="rfdetr", threshold=0.6, misses=0.2)
+    detector = RfdetrDetector(BrightSpots(256), config, setting())
+    request = detector.request(frame_with_spot(300, 200), "table")
+    detector._setting.clock.now = 0.05
+    answer = request.result()
     detector.close()
-    assert detector.threshold == 0.6
+    assert (answer.detector, answer.reliability) == ("eye", config.reliability)
+
+
+def test_an_answer_shows_a_latency_after_the_question_however_old_the_frame_is():
+    detector = detector_around(BrightSpots(256))
+    detector._setting.clock.now = 1.0
+    request = detector.request(frame_with_spot(300, 200), "table")
+    detector._setting.clock.now = 1.04
+    assert not request.ready
+    detector._setting.clock.now = 1.05
+    assert request.ready
+    detector.close()
 
 
 WRONG = [

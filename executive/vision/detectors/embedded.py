@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from executive.cell import Clock
-from executive.cell_config import CameraConfig, DetectorConfig, Section
+from executive.cell_config import DetectorConfig, Section
 from executive.vision.detectors.onnx_model import OnnxModel, read_labels
 from executive.vision.detectors.options import read_options, wrong_options
 from executive.vision.detectors.rfdetr import RfdetrDetector
+from executive.vision.detectors.setting import NO_OTHERS, Setting
 
 WEIGHTS = Path(__file__).parent.parent / "weights"
 MODEL = WEIGHTS / "embedded.onnx"
@@ -24,26 +24,27 @@ class EmbeddedDetector(RfdetrDetector):
     """Finds cubes, spheres and ducks with the shipped weights; see `weights/embedded.card.md`."""
 
     @classmethod
-    def from_config(
-        cls, config: DetectorConfig, *, camera: CameraConfig, clock: Clock, base: Path
-    ) -> EmbeddedDetector:
-        """Return the detector; `base` plays no part, its weights are the project's own.
+    def from_config(cls, config: DetectorConfig, setting: Setting) -> EmbeddedDetector:
+        """Return the detector; its weights are the project's own.
 
         Raises:
             InputError: An option was given: there are none.
         """
-        del base
         read_options(EmbeddedOptions, config)
-        return cls(OnnxModel(MODEL, read_labels(LABELS)), config, table_view=camera.table_view, clock=clock)
+        return cls(OnnxModel(MODEL, read_labels(LABELS)), config, setting)
 
     @staticmethod
-    def check(config: DetectorConfig, base: Path) -> Iterator[tuple[str, str]]:
+    def check(
+        config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig] = NO_OTHERS
+    ) -> Iterator[tuple[str, str]]:
         """Yield every option that was given, with a sentence: there are none."""
-        del base
+        del base, others
         yield from wrong_options(EmbeddedOptions, config)
 
     @staticmethod
-    def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
+    def labels(
+        config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig] = NO_OTHERS
+    ) -> tuple[str, ...] | None:
         """Return the classes that the shipped weights were trained on."""
-        del config, base
+        del config, base, others
         return read_labels(LABELS)

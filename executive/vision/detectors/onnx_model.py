@@ -17,12 +17,10 @@ from numpy.typing import NDArray
 from executive.errors import InputError, Unavailable
 from executive.geometry import Array
 from executive.messages import Box, Detection
-from executive.vision.detectors.views import iou
+from executive.vision.detectors.views import without_duplicates
 
 MEAN = np.array([0.485, 0.456, 0.406], dtype=np.float32)
 DEVIATION = np.array([0.229, 0.224, 0.225], dtype=np.float32)
-DUPLICATE = 0.7
-"""Overlap from which two boxes are one object seen twice; objects that touch stay below it."""
 
 
 class OnnxModel:
@@ -111,15 +109,6 @@ class OnnxModel:
                 f"{', '.join(self.labels)}; give one label per class, in the model's order"
             )
         return size
-
-
-def without_duplicates(found: Sequence[Detection]) -> list[Detection]:
-    """Return `found`, most confident first, without boxes that lie on a more confident one."""
-    kept: list[Detection] = []
-    for detection in found:
-        if all(iou(detection.box, other.box) < DUPLICATE for other in kept):
-            kept.append(detection)
-    return kept
 
 
 def no_model(path: Path) -> str:

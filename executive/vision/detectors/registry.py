@@ -5,21 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
-from executive.cell import Clock, Detector
+from executive.cell import Clock
 from executive.cell_config import CameraConfig, DetectorConfig
 from executive.errors import InputError
+from executive.vision.detectors.setting import ClosableDetector, Setting
 from executive.workcell import KeyPath
 
 GROUP = "executive.detectors"
-
-
-class ClosableDetector(Detector, Protocol):
-    """A detector that holds something (a thread, a session) until it is closed."""
-
-    def close(self) -> None:
-        """Give everything back; waits for the answer under way."""
 
 
 def installed() -> dict[str, EntryPoint]:
@@ -28,7 +22,7 @@ def installed() -> dict[str, EntryPoint]:
 
 
 def build_detectors(
-    configs: Mapping[str, DetectorConfig], *, camera: CameraConfig, clock: Clock, base: Path
+    configs: Mapping[str, DetectorConfig], *, camera: CameraConfig, clock: Clock, base: Path, seed: int
 ) -> dict[str, ClosableDetector]:
     """Return the detectors of a cell file by name, in its order.
 
@@ -37,24 +31,45 @@ def build_detectors(
         camera: The camera whose frames they search.
         clock: The run's clock, on which their answers become visible.
         base: Folder that paths in their options start from.
+        seed: Seed of whatever is random in them.
 
     Raises:
-        InputError: A kind is not installed, or an option is wrong.
+        InputError: A kind is not installed, an option is wrong, or one rests on itself.
     """
     kinds = installed()
     built: dict[str, ClosableDetector] = {}
-    for name, config in configs.items():
-        if config.kind not in kinds:
-            raise InputError(_not_installed(name, config.kind, kinds))
-        built[name] = kinds[config.kind].load().from_config(config, camera=camera, clock=clock, base=base)
-    return built
+    under_way: list[str] = []
+
+    def build(name: str) -> ClosableDetector:
+        if name in built:
+            return built[name]
+        if name not in configs:
+            raise InputError(f'the cell has no detector "{name}"; it has: {", ".join(configs)}')
+        if name in under_way:
+            raise InputError(f"the detectors {' -> '.join([*under_way, name])} rest on each other")
+        kind = configs[name].kind
+        if kind not in kinds:
+            raise InputError(_not_installed(name, kind, kinds))
+        under_way.append(name)
+        setting = Setting(name, camera, clock, base, seed, build)
+        built[name] = kinds[kind].load().from_config(configs[name], setting)
+        under_way.remove(name)
+        return built[name]
+
+    try:
+        return {name: build(name) for name in configs}
+    except BaseException:
+        for detector in built.values():
+            detector.close()
+        raise
 
 
 def wrong_detectors(configs: Mapping[str, DetectorConfig], base: Path) -> Iterator[tuple[KeyPath, str]]:
     """Yield the key of the cell file and a sentence for everything that keeps a detector from being built.
 
     A kind that is not installed, and whatever the kind itself finds: one may have, beside `from_config`,
-    a static method `check(config, base)` that yields options and sentences. No model is loaded.
+    a static method `check(config, base, others)` that yields options and sentences, `others` being all
+    detectors of the cell. No model is loaded.
     """
     kinds = installed()
     for name, config in configs.items():
@@ -62,26 +77,34 @@ def wrong_detectors(configs: Mapping[str, DetectorConfig], base: Path) -> Iterat
             yield ("detectors", name, "kind"), _not_installed(name, config.kind, kinds)
             continue
         check = _offered(kinds[config.kind], "check")
-        for option, sentence in check(config, base) if check else ():
+        for option, sentence in check(config, base, configs) if check else ():
             yield ("detectors", name, option), sentence
 
 
 def known_labels(configs: Mapping[str, DetectorConfig], base: Path) -> dict[str, tuple[str, ...] | None]:
     """Return the classes that each detector of a cell file finds, by the cell's names; loads no model.
 
-    None where that is not known: a kind says it in a static method `labels(config, base)`, if it can.
+    None where that is not known: a kind says it in a static method `labels(config, base, others)`, if it can.
     """
+    return {name: labels_of(name, configs, base) for name in configs}
+
+
+def labels_of(name: str, configs: Mapping[str, DetectorConfig], base: Path) -> tuple[str, ...] | None:
+    """Return the classes that one detector of a cell file finds, None where that is not known."""
     kinds = installed()
-    asked = {
-        name: _offered(kinds[config.kind], "labels") if config.kind in kinds else None
-        for name, config in configs.items()
-    }
-    return {name: labels(configs[name], base) if labels else None for name, labels in asked.items()}
+    config = configs[name]
+    labels = _offered(kinds[config.kind], "labels") if config.kind in kinds else None
+    found: tuple[str, ...] | None = labels(config, base, configs) if labels else None
+    return found
 
 
-def _offered(kind: EntryPoint, method: str) -> Callable[[DetectorConfig, Path], Any] | None:
+def _offered(
+    kind: EntryPoint, method: str
+) -> Callable[[DetectorConfig, Path, Mapping[str, DetectorConfig]], Any] | None:
     """Return a static method that a kind of detector may have, or None where it has not."""
-    found: Callable[[DetectorConfig, Path], Any] | None = getattr(kind.load(), method, None)
+    found: Callable[[DetectorConfig, Path, Mapping[str, DetectorConfig]], Any] | None = getattr(
+        kind.load(), method, None
+    )
     return found
 
 

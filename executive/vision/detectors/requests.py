@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, TimeoutError
 
 from executive.cell import Clock
-from executive.messages import Detection
+from executive.errors import DeadlinePassed
+from executive.messages import Answer, Detection, Reliability
 
 Search = Callable[[], Sequence[Detection]]
 
@@ -20,34 +22,51 @@ class Pending:
     """A detection under way; implements `executive.cell.Request`.
 
     Args:
-        answer: What the worker will leave.
+        work: What the worker will leave.
         due: Time on the run's clock from which the answer is visible [s].
         clock: The run's clock.
+        detector: Name of the detector.
+        reliability: How it errs.
+        given_up: Time on the run's clock at which it shows that a deadline has passed [s].
     """
 
-    def __init__(self, answer: Future[Sequence[Detection]], due: float, clock: Clock) -> None:
-        self._answer = answer
+    def __init__(
+        self,
+        work: Future[Sequence[Detection]],
+        due: float,
+        clock: Clock,
+        *,
+        detector: str,
+        reliability: Reliability,
+        given_up: float = -math.inf,
+    ) -> None:
+        self._work = work
         self._due = due
         self._clock = clock
+        self._detector = detector
+        self._reliability = reliability
+        self._given_up = given_up
 
     @property
     def ready(self) -> bool:
         """True from the tick at which the answer is due.
 
         At that tick the caller waits for a worker that is not done yet, so that the tick at which an
-        answer becomes visible does not depend on the computer's speed.
+        answer becomes visible does not depend on the computer's speed. That a deadline has passed shows
+        when it has passed on the run's clock too.
         """
         if self._clock.now < self._due - EARLY:
             return False
-        while not self._answer.done():
+        while not self._work.done():
             try:
-                self._answer.exception(SLICE)
+                self._work.exception(SLICE)
             except TimeoutError:
                 continue
-        return True
+        expired = isinstance(self._work.exception(), DeadlinePassed)
+        return not expired or self._clock.now >= self._given_up - EARLY
 
-    def result(self) -> Sequence[Detection]:
-        """Return everything found at or above the detector's floor, most confident first.
+    def result(self) -> Answer:
+        """Return what the detector says.
 
         Raises:
             Unavailable: The detector gave no usable answer.
@@ -57,7 +76,7 @@ class Pending:
                 f"the detection is due at {self._due:.3f} s and it is {self._clock.now:.3f} s; "
                 "wait until `ready` is true"
             )
-        return self._answer.result()
+        return Answer(self._detector, tuple(self._work.result()), self._reliability)
 
 
 class Worker:
@@ -66,9 +85,9 @@ class Worker:
     def __init__(self, name: str) -> None:
         self._pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix=f"detector-{name}")
 
-    def submit(self, search: Search, due: float, clock: Clock) -> Pending:
-        """Start `search` beside the tick loop; its answer is visible from `due` [s] on `clock`."""
-        return Pending(self._pool.submit(search), due, clock)
+    def submit(self, search: Search) -> Future[Sequence[Detection]]:
+        """Start `search` beside the tick loop and return where its result will be."""
+        return self._pool.submit(search)
 
     def close(self) -> None:
         """End the thread after the search under way; those not begun are dropped."""

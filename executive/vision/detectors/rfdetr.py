@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from executive.cell import Clock
-from executive.cell_config import CameraConfig, DetectorConfig, Section
+from executive.cell_config import DetectorConfig, Section
 from executive.errors import InputError
 from executive.messages import Detection, Frame
 from executive.vision.detectors.onnx_model import OnnxModel, no_model, read_labels
 from executive.vision.detectors.options import read_options, wrong_options
 from executive.vision.detectors.requests import Pending, Worker
+from executive.vision.detectors.setting import NO_OTHERS, Setting
 from executive.vision.detectors.views import Finding, Part, merge, parts_of
 
 
@@ -47,8 +47,7 @@ class RfdetrDetector:
     Args:
         model: What finds objects in an image.
         config: Threshold, floor and latency.
-        table_view: The square part of a frame that shows the workspace [pixel].
-        clock: The run's clock.
+        setting: What it is built into.
         class_map: From the model's class names to the cell's, where they differ.
     """
 
@@ -56,45 +55,37 @@ class RfdetrDetector:
         self,
         model: OnnxModel,
         config: DetectorConfig,
-        *,
-        table_view: Part,
-        clock: Clock,
+        setting: Setting,
         class_map: Mapping[str, str] | None = None,
     ) -> None:
         self._model = model
         self._config = config
-        self._table_view = table_view
-        self._clock = clock
+        self._setting = setting
         self._class_map = dict(class_map or {})
-        self._worker = Worker(config.kind)
+        self._worker = Worker(setting.name)
 
     @classmethod
-    def from_config(
-        cls, config: DetectorConfig, *, camera: CameraConfig, clock: Clock, base: Path
-    ) -> RfdetrDetector:
+    def from_config(cls, config: DetectorConfig, setting: Setting) -> RfdetrDetector:
         """Return the detector that a cell file describes.
-
-        Args:
-            config: Its section of the cell file.
-            camera: The camera whose frames it searches.
-            clock: The run's clock.
-            base: Folder that paths start from.
 
         Raises:
             InputError: An option is missing, unknown or wrong, or the model cannot be read.
         """
-        for _, sentence in cls.check(config, base):
+        for _, sentence in cls.check(config, setting.base):
             raise InputError(sentence)
         options = read_options(RfdetrOptions, config)
-        model = OnnxModel(base / options.model_path, options.names(base), options.threads)
-        return cls(model, config, table_view=camera.table_view, clock=clock, class_map=options.class_map)
+        model = OnnxModel(setting.base / options.model_path, options.names(setting.base), options.threads)
+        return cls(model, config, setting, options.class_map)
 
     @staticmethod
-    def check(config: DetectorConfig, base: Path) -> Iterator[tuple[str, str]]:
+    def check(
+        config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig] = NO_OTHERS
+    ) -> Iterator[tuple[str, str]]:
         """Yield every option because of which the detector could not be built, with a sentence.
 
         The model is not loaded.
         """
+        del others
         try:
             options = read_options(RfdetrOptions, config)
         except InputError:
@@ -116,28 +107,32 @@ class RfdetrDetector:
             )
 
     @staticmethod
-    def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
+    def labels(
+        config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig] = NO_OTHERS
+    ) -> tuple[str, ...] | None:
         """Return the classes it finds, by the cell's names; None where its options do not say."""
+        del others
         try:
             options = read_options(RfdetrOptions, config)
             return tuple(options.class_map.get(name, name) for name in options.names(base))
         except InputError:
             return None
 
-    @property
-    def threshold(self) -> float:
-        """Confidence from which a detection counts."""
-        return self._config.threshold
-
     def request(self, frame: Frame, view: str) -> Pending:
         """Start to search `frame`: the `table` part or the `full` image."""
         height, width = frame.image.shape[:2]
-        parts = parts_of(view, self._table_view, (width, height))
+        parts = parts_of(view, self._setting.camera.table_view, (width, height))
 
         def search() -> list[Detection]:
             return self._search(frame.image, parts)
 
-        return self._worker.submit(search, frame.stamp + self._config.latency, self._clock)
+        return Pending(
+            self._worker.submit(search),
+            self._setting.clock.now + self._config.latency,
+            self._setting.clock,
+            detector=self._setting.name,
+            reliability=self._config.reliability,
+        )
 
     def close(self) -> None:
         """End the thread and wait for the search under way."""

@@ -16,6 +16,8 @@ OVERLAP = 0.25
 """Share of its side that a tile shares with the next: more than an object, so each is whole in one tile."""
 CUT = 0.01
 """A box closer than this share of the tile's side to the next tile may be cut off there."""
+DUPLICATE = 0.7
+"""Overlap from which two boxes are one object seen twice; objects that touch stay below it."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,15 @@ def merge(findings: Sequence[Finding], size: tuple[int, int]) -> list[Detection]
         if not any(_same_object(finding, other) for other in kept):
             kept.append(finding)
     return sorted((finding.detection for finding in kept), key=lambda detection: -detection.confidence)
+
+
+def without_duplicates(found: Sequence[Detection]) -> list[Detection]:
+    """Return `found`, most confident first, without boxes that lie on a more confident one."""
+    kept: list[Detection] = []
+    for detection in found:
+        if all(iou(detection.box, other.box) < DUPLICATE for other in kept):
+            kept.append(detection)
+    return kept
 
 
 def intersection(one: Box, other: Box) -> float:

@@ -1,0 +1,197 @@
+"""A Roboflow inference server on the loopback: both of its interfaces, and every way to fail."""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import json
+import socket
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+
+import cv2
+import numpy as np
+
+MODEL = "shapes/1"
+DRIP = 0.05
+"""Time between two bytes of a slow answer [s]."""
+
+Finds = Callable[[np.ndarray], Sequence[Mapping[str, Any]]]
+"""From an RGB image to predictions as the server says them."""
+
+
+class StubServer:
+    """Answers as `finds` says, but for the looks that `faults` names.
+
+    Args:
+        finds: What an image shows.
+        faults: From the number of a look (from 1) to the name of a fault, "" for none.
+    """
+
+    def __init__(self, finds: Finds, faults: Callable[[int], str] = lambda look: "") -> None:
+        self.finds = finds
+        self.faults = faults
+        self.looks = 0
+        self.asked: list[tuple[str, dict[str, str], bytes]] = []
+        """Path, headers and body of every request."""
+        self.loaded: set[str] = set()
+        self._guard = threading.Lock()
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            self.port = free.getsockname()[1]
+        self.start()
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.port}"
+
+    def start(self) -> None:
+        """Listen, at the same address as before."""
+        self.over = threading.Event()
+        handler = type("Handler", (_Handler,), {"stub": self})
+        self._server = ThreadingHTTPServer(("127.0.0.1", self.port), handler)
+        self._server.daemon_threads = True
+        threading.Thread(target=self._server.serve_forever, args=(0.01,), daemon=True).start()
+
+    def stop(self) -> None:
+        """Refuse connections from now on; those that hang are dropped."""
+        self.over.set()
+        self._server.shutdown()
+        self._server.server_close()
+
+    def next_fault(self) -> str:
+        with self._guard:
+            self.looks += 1
+            return self.faults(self.looks)
+
+
+class _Handler(BaseHTTPRequestHandler):
+    stub: StubServer
+
+    def do_GET(self) -> None:
+        self._note(b"")
+        self._json({"models": [{"model_id": m, "task_type": "object-detection"} for m in self.stub.loaded]})
+
+    def do_POST(self) -> None:
+        body = self.rfile.read(int(self.headers["Content-Length"]))
+        self._note(body)
+        if self.path.startswith("/model/add"):
+            self.stub.loaded.add(json.loads(body)["model_id"])
+            self.do_GET()
+            return
+        data = json.loads(body)["image"]["value"] if self.path.startswith("/infer/") else body.decode()
+        bgr = cv2.imdecode(np.frombuffer(base64.b64decode(data), np.uint8), cv2.IMREAD_COLOR)
+        with contextlib.suppress(OSError):  # Nobody may be listening any more.
+            self._answer(np.ascontiguousarray(bgr[..., ::-1]))
+
+    def _answer(self, image: np.ndarray) -> None:
+        fault = self.stub.next_fault()
+        height, width = image.shape[:2]
+        found = [dict(prediction) for prediction in self.stub.finds(image)]
+        answer = {"inference_id": "1", "time": 0.01, "image": {"width": width, "height": height}}
+        if fault == "hang":
+            self.stub.over.wait()
+        elif fault == "stop":
+            threading.Thread(target=self.stub.stop).start()
+            self.stub.over.wait()
+        elif fault == "drip":
+            self._drip(json.dumps({**answer, "predictions": found}).encode())
+        elif fault.isdecimal():
+            self._json({"message": f"key {self._key()} is no good"}, int(fault))
+        elif fault in BODIES:
+            self._send(BODIES[fault].encode(), "text/html" if fault == "html" else "application/json")
+        else:
+            spoilt = SPOILT[fault](found, answer) if fault else found
+            self._json({**answer, "predictions": spoilt})
+
+    def _drip(self, body: bytes) -> None:
+        self.send_response(200)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        for byte in body:
+            self.wfile.write(bytes([byte]))
+            if self.stub.over.wait(DRIP):
+                return
+
+    def _json(self, answer: Any, status: int = 200) -> None:
+        self._send(json.dumps(answer).encode(), "application/json", status)
+
+    def _send(self, body: bytes, kind: str, status: int = 200) -> None:
+        self.send_response(status)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def _note(self, body: bytes) -> None:
+        self.stub.asked.append((self.path, dict(self.headers), body))
+
+    def _key(self) -> str:
+        """A server may say anything: this one tells the key that it was given."""
+        return self.headers.get("Authorization", "").removeprefix("Bearer ")
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Keep quiet."""
+
+
+def _all(**values: Any) -> Callable[[list[dict[str, Any]], dict[str, Any]], Any]:
+    """Return what puts other values into every prediction; into one where there are none."""
+    some = {"x": 9.0, "y": 9.0, "width": 6.0, "height": 6.0, "confidence": 0.9, "class": "cube"}
+    return lambda found, answer: [{**one, **values} for one in found or [some]]
+
+
+def _without(key: str) -> Callable[[list[dict[str, Any]], dict[str, Any]], Any]:
+    return lambda found, answer: [
+        {name: value for name, value in one.items() if name != key} for one in _all()(found, answer)
+    ]
+
+
+def _other_size(found: list[dict[str, Any]], answer: dict[str, Any]) -> Any:
+    answer["image"] = {"width": 1, "height": 1}
+    return found
+
+
+TURNS = {"cube": "sphere", "sphere": "duck", "duck": "cube"}
+
+BODIES = {
+    "broken json": '{"predictions": [{"x": 1',
+    "html": "<html><body>Please log in to the network.</body></html>",
+    "null": "null",
+    "list": "[1, 2]",
+    "text": '"hello"',
+    "foo": '{"foo": 1}',
+    "null predictions": '{"predictions": null}',
+    "deep": "[" * 100_000,
+}
+"""Bodies of answers that are none."""
+
+SPOILT: Mapping[str, Callable[[list[dict[str, Any]], dict[str, Any]], Any]] = {
+    "nan": _all(x=float("nan")),
+    "infinite": _all(width=float("inf")),
+    "negative": _all(width=-5.0),
+    "huge": _all(width=1e6, height=1e6),
+    "outside": _all(x=-300.0),
+    "overconfident": _all(confidence=1.5),
+    "text for number": _all(x="12"),
+    "null field": _all(y=None),
+    "number for class": _all(**{"class": 3}),
+    "missing field": _without("confidence"),
+    "endless": lambda found, answer: _all()(found, answer) * 400,
+    "other size": _other_size,
+    "doubtful": lambda found, answer: _all(confidence=0.2)(found, answer),
+    "swapped": lambda found, answer: [{**one, "class": TURNS.get(one["class"], "cube")} for one in found],
+    "strangers": lambda found, answer: [*found, *_all(**{"class": "banana"})(found, answer)],
+}
+"""From what is there to what it says instead."""
+
+
+def predictions(found: Sequence[Any]) -> Iterator[dict[str, Any]]:
+    """Yield `Detection`s in the server's form."""
+    for detection in found:
+        left, top, right, bottom = detection.box
+        yield {
+            "x": (left + right) / 2, "y": (top + bottom) / 2, "width": right - left, "height": bottom - top,
+            "confidence": detection.confidence, "class": detection.label, "class_id": 0, "detection_id": "1",
+        }  # fmt: skip

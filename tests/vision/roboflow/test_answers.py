@@ -1,0 +1,113 @@
+"""What a server said is checked before anybody believes it."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from stub_server import SPOILT
+
+from executive.messages import Detection
+from executive.vision.detectors.roboflow.answers import read_answer
+
+CUBE = {"x": 50.0, "y": 40.0, "width": 20, "height": 10.0, "confidence": 0.9, "class": "cube", "class_id": 0}
+
+
+def answer(*predictions, **further):
+    return {"time": 0.1, "image": {"width": 100, "height": 80}, "predictions": list(predictions), **further}
+
+
+def test_a_box_by_centre_and_size_becomes_one_by_its_corners():
+    (found,) = read_answer(answer(CUBE), (100, 80))
+    assert found == Detection("cube", 0.9, (40.0, 35.0, 60.0, 45.0))
+
+
+def test_nothing_found_is_an_answer():
+    assert read_answer({"predictions": []}, (100, 80)) == []
+
+
+def test_a_box_that_sticks_out_a_little_is_cut_off():
+    (found,) = read_answer(answer({**CUBE, "x": 2.0}), (100, 80))
+    assert found.box == (0.0, 35.0, 12.0, 45.0)
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "text"),
+    [
+        (None, "of type NoneType, not an object with predictions"),
+        ([1, 2], "of type list, not an object with predictions"),
+        ({"foo": 1}, "predictions: field required"),
+        ({"predictions": None}, "predictions: input should be a valid list"),
+        (answer(7), r"predictions\[0\]: input should be a valid dictionary$"),
+        (answer(CUBE, {**CUBE, "x": float("nan")}), r"predictions\[1\].x: input should be a finite number"),
+        (answer({**CUBE, "y": None}), r"predictions\[0\].y: input should be a valid number"),
+        (answer({**CUBE, "x": "12"}), r"predictions\[0\].x: input should be a valid number"),
+        (answer({**CUBE, "x": True}), r"predictions\[0\].x: input should be a valid number"),
+        (answer({**CUBE, "x": 10**400}), r"predictions\[0\].x: .*number"),
+        (answer({**CUBE, "width": -5.0}), r"predictions\[0\].width: input should be greater than 0"),
+        (answer({**CUBE, "width": 0.0}), r"predictions\[0\].width: input should be greater than 0"),
+        (answer({**CUBE, "height": float("inf")}), r"predictions\[0\].height: input should be a finite"),
+        (answer({**CUBE, "confidence": 1.1}), r"predictions\[0\].confidence: .* less than or equal to 1"),
+        (answer({**CUBE, "class": 3}), r"predictions\[0\].class: input should be a valid string"),
+        (answer({**CUBE, "class": ""}), r"predictions\[0\].class: string should have at least 1"),
+        (answer({**CUBE, "width": 150.0}), r"box from \(-25, 35\) to \(125, 45\) in an image of 100 x 80"),
+        (answer({**CUBE, "x": 4.0, "width": 30.0}), r"box from \(-11, 35\) to \(19, 45\)"),
+        (answer({**CUBE, "x": 96.0, "width": 30.0}), r"box from \(81, 35\) to \(111, 45\)"),
+        (answer({**CUBE, "y": 4.0, "height": 26.0}), r"box from \(40, -9\) to \(60, 17\)"),
+        (answer({**CUBE, "y": 76.0, "height": 26.0}), r"box from \(40, 63\) to \(60, 89\)"),
+        (answer({**CUBE, "x": -5.0, "width": 8.0}), r"box from \(-9, 35\) to \(-1, 45\)"),
+        (answer(*[CUBE] * 301), "predictions: list should have at most 300 items"),
+        (answer(CUBE, image={"width": 1, "height": 1}), "an image of 1 x 1 pixels, and 100 x 80 were sent"),
+        (answer(CUBE, image={"width": None, "height": 1}), "image.width: input should be a valid number"),
+    ],
+)
+def test_what_cannot_be_is_refused_with_its_place(spoilt, text):
+    with pytest.raises(ValueError, match=text):
+        read_answer(spoilt, (100, 80))
+
+
+def test_values_are_not_repeated_for_they_may_be_secret():
+    with pytest.raises(ValueError) as caught:
+        read_answer(answer({**CUBE, "x": "SECRET"}), (100, 80))
+    assert "SECRET" not in str(caught.value)
+
+
+@pytest.mark.parametrize("fault", sorted(set(SPOILT) - {"swapped", "strangers", "doubtful"}))
+def test_every_fault_of_the_stub_server_is_one(fault):
+    spoilt = answer()
+    spoilt["predictions"] = SPOILT[fault]([], spoilt)
+    with pytest.raises(ValueError):
+        read_answer(spoilt, (100, 80))
+
+
+NUMBERS = st.one_of(st.integers(), st.floats(), st.floats(-20, 120))
+SCALARS = st.one_of(st.none(), st.booleans(), st.text(max_size=3), NUMBERS)
+PREDICTIONS = st.fixed_dictionaries(
+    {key: st.one_of(NUMBERS, SCALARS) for key in ("x", "y", "width", "height")},
+    optional={"confidence": st.one_of(st.floats(0, 1), SCALARS), "class": st.one_of(st.text(), SCALARS)},
+)
+ANYTHING = st.recursive(
+    SCALARS, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner)
+)
+
+
+@given(
+    st.one_of(
+        ANYTHING,
+        st.fixed_dictionaries({"predictions": st.one_of(st.lists(PREDICTIONS, max_size=3), ANYTHING)}),
+    )
+)
+def test_whatever_a_server_says_only_sound_boxes_get_in(said):
+    try:
+        found = read_answer(said, (100, 80))
+    except ValueError:
+        return
+    for detection in found:
+        left, top, right, bottom = detection.box
+        assert all(map(math.isfinite, detection.box))
+        assert 0 <= left <= right <= 100
+        assert 0 <= top <= bottom <= 80
+        assert 0 <= detection.confidence <= 1
+        assert detection.label
