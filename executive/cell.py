@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from executive.geometry import Array, Pose
-from executive.messages import Bin, Box, Detection, Detections, Frame, Item, ObjectClass, Target
+from executive.messages import Answer, Bin, Box, Detection, Detections, Frame, Item, ObjectClass, Target
 
 Steps = Iterator[None]
 """What a generator hands the tick loop: one None per control step."""
@@ -144,8 +144,8 @@ class Request(Protocol):
     def ready(self) -> bool:
         """True from the tick at which the answer is due on the run's clock."""
 
-    def result(self) -> Sequence[Detection]:
-        """Return everything found at or above the detector's floor, most confident first.
+    def result(self) -> Answer:
+        """Return what the detector says.
 
         Raises:
             Unavailable: The detector gave no usable answer.
@@ -154,10 +154,6 @@ class Request(Protocol):
 
 class Detector(Protocol):
     """Finds objects in frames, beside the tick loop."""
-
-    @property
-    def threshold(self) -> float:
-        """Confidence from which a detection counts."""
 
     def request(self, frame: Frame, view: str) -> Request:
         """Start to search `frame`: the `table` part or the `full` image."""
@@ -185,9 +181,10 @@ class Ledger(Protocol):
         """Tell whether nothing has put the whole table in doubt since the frame was taken."""
 
     def observe(self, detections: Detections, positions: Sequence[Array]) -> Sequence[Target]:
-        """Record a look and return one target per detection that is not inside a bin.
+        """Record a look and return one target per open item on the table whose place is known now.
 
-        `positions` `(3,)` [m] belong to `detections.found` one to one.
+        `positions` `(3,)` [m] belong to `detections.found` one to one. What earlier looks have shown, and
+        nothing has disturbed since, is known too.
         """
 
     def is_fresh(self, target: Target) -> bool:
@@ -196,8 +193,14 @@ class Ledger(Protocol):
     def is_open(self, item: Item) -> bool:
         """Tell whether the item still waits to be sorted: neither placed, rejected, held nor lost."""
 
+    def is_sure(self, item: Item) -> bool:
+        """Tell whether enough looks agree that the item exists, of which class it is, and where."""
+
+    def in_doubt(self) -> Sequence[Item]:
+        """Return the open items in the workspace that a further look may make sure, or show to be gone."""
+
     def believes_empty(self) -> bool:
-        """Tell whether enough looks at the full frame agree that nothing with a route is left."""
+        """Tell whether it is as good as certain that nothing with a route is left where one can look."""
 
     def touched(self, item: Item) -> None:
         """Record that the tool met the item, which proves that it exists."""

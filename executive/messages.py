@@ -21,7 +21,8 @@ class Frame:
         id: Number of the frame in this run, unique over all cameras.
         camera: Name of the camera.
         image: `(H, W, 3)` uint8, RGB.
-        depth: `(H, W)` [m] along the optical axis, or None for a camera without depth.
+        depth: `(H, W)` [m] along the optical axis, NaN where the sensor gave none; None for a camera
+            without depth.
         matrix: Camera matrix `(3, 3)` [pixel].
         X_WC: Camera pose in the world at capture, OpenCV convention (z forward, y down).
         stamp: Capture time on the run's clock [s].
@@ -38,6 +39,26 @@ class Frame:
     stamp: float
     visible: NDArray[np.bool_]
     epoch: int
+
+    def shown(self, box: Box) -> float:
+        """Return the share of a box (0 to 1) in which the arm does not hide the scene."""
+        height, width = self.visible.shape
+        left, right = (min(max(round(x), 0), width) for x in box[::2])
+        top, bottom = (min(max(round(y), 0), height) for y in box[1::2])
+        part = self.visible[top:bottom, left:right]
+        return float(part.mean()) if part.size else 0.0
+
+    def opencv(self) -> tuple[Array, Array, Array]:
+        """Return the camera as OpenCV takes it: matrix `(3, 3)`, rvec `(3,)` [rad] and tvec `(3,)` [m].
+
+        `cv2.projectPoints(points, rvec, tvec, matrix, None)` then gives world points in OpenCV's pixels.
+        Those have their centres at whole numbers: add a half for the coordinates used here, where pixel
+        i covers [i, i + 1).
+        """
+        matrix = self.matrix.copy()
+        matrix[:2, 2] -= 0.5
+        X_CW = self.X_WC.inverse()
+        return matrix, X_CW.rotation_vector, X_CW.position
 
 
 @dataclass(frozen=True)
@@ -61,32 +82,88 @@ class Detection:
         return (left + right) / 2, (top + bottom) / 2
 
 
+@dataclass(frozen=True)
+class Reliability:
+    """How a detector errs, as measured (`executive evaluate`); what its looks are worth rests on it.
+
+    Attributes:
+        threshold: Confidence from which a detection counts.
+        misses: Share of the objects in full view that one look overlooks.
+        confused: Share of the objects it finds that it gives a wrong class.
+        invented: Objects that are not there, per look.
+        jitter: Standard deviation of the centre of a found box, along each axis [pixel].
+    """
+
+    threshold: float
+    misses: float
+    confused: float
+    invented: float
+    jitter: float
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a detector says about a frame; an empty answer is one too.
+
+    Attributes:
+        detector: Name of the detector that gave it, as in the cell file.
+        found: Everything at or above its floor, most confident first.
+        reliability: How that detector errs.
+    """
+
+    detector: str
+    found: tuple[Detection, ...]
+    reliability: Reliability
+
+
+REACH = 0.03
+"""How far an object extends around its centre [m], about."""
+SURROUNDINGS = REACH * np.array([(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)], dtype=float)
+"""Steps from the centre of an object to places on it that must be in view for it to be found."""
+
+
 @dataclass(frozen=True, eq=False)
 class Detections:
-    """A detector's answer about one frame; an empty one is an answer too.
+    """What one look found; an empty one is a look too.
 
     Attributes:
         frame: The image looked at.
         found: Detections at or above the threshold, most confident first.
+        detector: Name of the detector that answered.
+        reliability: How that detector errs.
         view: Name of the part of the frame that was searched: `table` or `full`.
         area: That part [pixel].
     """
 
     frame: Frame
     found: tuple[Detection, ...]
+    detector: str
+    reliability: Reliability
     view: str
     area: Box
 
-    def searched(self, position: Array) -> bool:
-        """Tell whether a point `(3,)` [m] of the world lay in the searched part, the arm not before it."""
-        x, y, z = self.frame.matrix @ self.frame.X_WC.inverse().apply(position)
-        if z <= 0:
-            return False
-        column, row = x / z, y / z
+    def shows(self, points: Array) -> NDArray[np.bool_]:
+        """Tell `(N,)` which points `(N, 3)` [m] of the world lie in the searched part of the image."""
+        pixels, ahead = self._pixels(points)
         left, top, right, bottom = self.area
-        if not (left <= column < right and top <= row < bottom):
-            return False
-        return bool(self.frame.visible[int(row), int(column)])
+        inside = (pixels >= (left, top)) & (pixels < (right, bottom))
+        return np.asarray(ahead & inside.all(axis=1))
+
+    def searched(self, points: Array) -> NDArray[np.bool_]:
+        """Tell `(N,)` which points `(N, 3)` [m] it shows with nothing of the arm before an object there."""
+        seen = self.shows(points)
+        height, width = self.frame.visible.shape
+        for step in SURROUNDINGS:
+            pixels, ahead = self._pixels(points + step)
+            columns, rows = pixels.astype(int).clip(0, (width - 1, height - 1)).T
+            seen &= ahead & self.frame.visible[rows, columns]
+        return seen
+
+    def _pixels(self, points: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Return where points appear `(N, 2)` [pixel], and which lie before the camera."""
+        in_camera = self.frame.X_WC.inverse().apply(points) @ self.frame.matrix.T
+        depth = in_camera[:, 2:]
+        return in_camera[:, :2] / np.where(depth > 0, depth, np.inf), depth[:, 0] > 0
 
 
 Item = str
@@ -132,9 +209,9 @@ class Bin:
     size: Array
     slots: Array
 
-    def contains(self, position: Array) -> bool:
-        """Tell whether a point `(3,)` [m] lies over the floor."""
-        return bool(np.all(np.abs(position[:2] - self.position[:2]) <= self.size[:2] / 2))
+    def contains(self, position: Array, margin: float = 0.0) -> bool:
+        """Tell whether a point `(3,)` [m] lies over the floor, or at most `margin` [m] beside it."""
+        return bool(np.all(np.abs(position[:2] - self.position[:2]) <= self.size[:2] / 2 + margin))
 
 
 @dataclass(frozen=True)
@@ -145,8 +222,10 @@ class ObjectClass:
         label: Class name, as the detector says it.
         height: Height of the object as it lies on the table [m].
         radius: Radius of the circle around its outline seen from above [m].
+        ring: Distance from its middle at which to touch it [m]; more than 0 for parts with a hole.
     """
 
     label: str
     height: float
     radius: float
+    ring: float = 0.0

@@ -8,14 +8,14 @@ import numpy as np
 
 from executive.cell import Cell, Steps
 from executive.messages import Item, Target
-from executive.skill import In, Out, Skill, param, port
+from executive.skill import In, Out, Skill, SkillFailed, param, port
 
 
 class SelectTarget(Skill):
     """Know which target to pick next and where it belongs.
 
-    Passes over targets that are rejected, done, of a class without a route, or put in doubt by what the
-    robot did since they were seen.
+    Passes over targets that are rejected, done, of a class without a route, put in doubt by what the
+    robot did since they were seen, or seen by too few looks for as good as the detector is.
     """
 
     targets: In[list[Target]] = port(doc="what the last look localized")
@@ -27,17 +27,14 @@ class SelectTarget(Skill):
     prefer: str = param(
         "nearest", choices=("nearest", "surest"), doc="`nearest` to the tool, or the `surest` detection"
     )
-    reasons: ClassVar = ("no_candidate", "unseen")
+    reasons: ClassVar = ("no_candidate", "unseen", "doubtful")
 
     def run(self, cell: Cell) -> Steps:
         """Filter, order, take the first."""
         yield from ()
         candidates = [target for target in self.targets if self._eligible(cell, target)]
         if not candidates:
-            sought = self.same or self.wanted or "object to sort"
-            if self.same is None and cell.ledger.believes_empty():
-                raise self.failed("no_candidate", f"no {sought} is left on the table but what was rejected")
-            raise self.failed("unseen", f"the last look shows no {sought} that can be trusted; look again")
+            raise self._none(cell)
         here = cell.arm.tool_pose.position[:2]
         if self.prefer == "nearest":
             best = min(candidates, key=lambda t: (float(np.linalg.norm(t.position[:2] - here)), t.item))
@@ -52,7 +49,25 @@ class SelectTarget(Skill):
         return (
             cell.ledger.is_open(target.item)
             and cell.ledger.is_fresh(target)
-            and target.label in cell.routes
-            and (self.same is None or target.item == self.same)
-            and (self.wanted is None or target.label == self.wanted)
+            and cell.ledger.is_sure(target.item)
+            and self._is_sought(cell, target.item)
         )
+
+    def _is_sought(self, cell: Cell, item: Item) -> bool:
+        label = cell.ledger.label(item)
+        return (
+            label in cell.routes
+            and (self.same is None or item == self.same)
+            and (self.wanted is None or label == self.wanted)
+        )
+
+    def _none(self, cell: Cell) -> SkillFailed:
+        """Return why there is nothing to choose."""
+        doubtful = [item for item in cell.ledger.in_doubt() if self._is_sought(cell, item)]
+        if doubtful:
+            names = ", ".join(doubtful)
+            return self.failed("doubtful", f"not enough looks agree on {names} yet; look again")
+        sought = self.same or self.wanted or "object to sort"
+        if self.same is None and cell.ledger.believes_empty():
+            return self.failed("no_candidate", f"no {sought} is left on the table but what was rejected")
+        return self.failed("unseen", f"no {sought} is in sight, and the table is not known to be empty")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator
 
 from executive.cell_config.arm import ArmConfig, MotionConfig, ToolConfig
 from executive.cell_config.cameras import CameraConfig
@@ -20,8 +20,12 @@ class LedgerConfig(Section):
     """Largest distance between a detection and the item it is bound to [m]."""
     neighbourhood: float = Field(0.07, ge=0)
     """Radius around a picked item in which others may have been moved [m]."""
-    looks_to_believe: int = Field(2, ge=1)
-    """Looks at the full frame that must agree before the table is believed empty."""
+    overlooked: float = Field(0.001, gt=0, lt=1)
+    """Chance of an overlooked object up to which a place is believed empty."""
+    misjudged: float = Field(0.005, gt=0, lt=1)
+    """Chance of a wrong class up to which an item is sorted."""
+    aim: float = Field(0.005, gt=0)
+    """Standard error of an item's place up to which it is approached [m]; two thirds after a failed grasp."""
 
 
 class CellConfig(Section):
@@ -41,9 +45,25 @@ class CellConfig(Section):
     table: TableConfig = TableConfig()
     bins: dict[str, BinConfig] = Field(min_length=1)
     cameras: dict[str, CameraConfig] = Field(min_length=1, max_length=1)
+    detector: str = ""
+    """The one of `detectors` that missions use unless they name another; "": the first."""
     detectors: dict[str, DetectorConfig] = Field(min_length=1)
     localization: Literal["plane", "depth", "ray"] = "plane"
     objects: dict[str, ObjectConfig] = Field(min_length=1)
     ledger: LedgerConfig = LedgerConfig()
     safe_place: Vector
     """Where something held may be put down on the table."""
+
+    @field_validator("detectors")
+    @classmethod
+    def _the_chosen_one_first(
+        cls, detectors: dict[str, DetectorConfig], others: ValidationInfo
+    ) -> dict[str, DetectorConfig]:
+        """Put the detector that is named before the others: whoever names none takes the first."""
+        chosen = others.data.get("detector", "")
+        if not chosen:
+            return detectors
+        if chosen not in detectors:
+            names = ", ".join(detectors)
+            raise ValueError(f'must have the detector "{chosen}", which is to be used; they are: {names}')
+        return {chosen: detectors[chosen], **detectors}

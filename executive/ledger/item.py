@@ -1,12 +1,27 @@
-"""One physical object as the ledger knows it."""
+"""One physical object as the ledger knows it, and what every look adds to that."""
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from dataclasses import dataclass, field
 from enum import Enum
 
+import numpy as np
+
 from executive.geometry import Array
+from executive.messages import Reliability
+
+NEARBY = 0.02
+"""Share of the searched area in which an invented box would be taken for a given item."""
+INSIDE = 0.04
+"""Share of the searched area in which an invented box would be taken for something in a given bin."""
+DOUBTFUL = math.log(0.1)
+"""Log odds of existence of something new that may as well be a known item, seen beside its place."""
+CERTAIN = 100.0
+"""Log odds beyond which more makes no difference."""
+CONFIRMED = math.log(1e4)
+"""Log odds of existence from which an item is known to exist: two looks of a good detector agree."""
 
 
 class State(Enum):
@@ -25,7 +40,7 @@ class State(Enum):
     LOST = "lost"
     """Known to exist, and nowhere to be found."""
     PHANTOM = "phantom"
-    """Believed for one look, contradicted by others: no object at all."""
+    """Believed for a look or two, contradicted by others: no object at all."""
 
 
 OPEN = (State.SEEN, State.DROPPED)
@@ -38,38 +53,119 @@ class Record:
 
     Attributes:
         item: Its name, unique in the run.
-        position: Where it was seen last `(3,)` [m].
-        first: Where it was seen first `(3,)` [m].
+        first: Where it was before it may have been moved for the first time `(3,)` [m].
+        position: Mean of where it was seen since it may last have been moved `(3,)` [m].
+        spread: Standard error of that along each axis [m].
+        entered: Change count of the table when it was seen first.
         epoch: Change count of the table when it was seen last.
+        existence: Log odds that it is an object and no invention of a detector.
+        overlooked: Chance that it is still where it was seen last, after all that has been searched since.
+        confidence: Of the last detection.
+        frame: Id of the frame it was seen in last.
+        stamp: When that was [s].
         state: What became of it.
         looks: In how many looks it was seen.
-        absent: In how many looks at its place since then it was not seen.
-        touched: True once the tool has met it.
+        moved: True once it has been seen again after something may have moved it.
+        exists: True once it is known to exist: enough looks agree, or the tool has touched it.
         attempts: Failed grasps so far.
         bin: Where it was placed, or "".
         why: Why it was rejected or is lost, or "".
-        votes: Sum of confidences by class.
+        votes: Log likelihood of each class, up to a constant.
+        fallen: For an item that was dropped, log odds that it fell into each bin.
     """
 
     item: str
-    position: Array
     first: Array
-    epoch: int
+    existence: float
+    position: Array = field(init=False)
+    spread: float = math.inf
+    entered: int = 0
+    epoch: int = 0
+    overlooked: float = 1.0
+    confidence: float = 0.0
+    frame: int = 0
+    stamp: float = 0.0
     state: State = State.SEEN
     looks: int = 0
-    absent: int = 0
-    touched: bool = False
+    moved: bool = False
+    exists: bool = False
     attempts: int = 0
     bin: str = ""
     why: str = ""
     votes: dict[str, float] = field(default_factory=lambda: defaultdict(float))
+    fallen: dict[str, float] = field(default_factory=lambda: defaultdict(float))
+
+    def __post_init__(self) -> None:
+        self.position = self.first
 
     @property
     def label(self) -> str:
-        """The class with the most votes; the first in the alphabet among equals."""
+        """The likeliest class; the first in the alphabet among equals."""
         return min(self.votes, key=lambda label: (-self.votes[label], label))
 
     @property
-    def exists(self) -> bool:
-        """True once two looks agree or the tool has touched it."""
-        return self.looks >= 2 or self.touched
+    def misjudged(self) -> float:
+        """Chance that it is of another class than `label`, 0 to 1.
+
+        By Bayes' rule over the classes it was taken for and, as one, all others.
+        """
+        best = self.label
+        rivals = [0.0, *(vote for label, vote in self.votes.items() if label != best)]
+        odds = sum(math.exp(vote - self.votes[best]) for vote in rivals)
+        return odds / (1.0 + odds)
+
+    @property
+    def probability(self) -> float:
+        """Chance that it is an object at all, 0 to 1."""
+        return 1.0 if self.exists else 1.0 / (1.0 + math.exp(-max(self.existence, -CERTAIN)))
+
+    def vote(self, label: str, by: Reliability, *, alone: bool = True) -> None:
+        """Count one detection as `label`: that much likelier than any other class, by a detector's errors.
+
+        That it was seen proves that it exists only if it is `alone`: nothing else may have been seen there.
+        """
+        self.votes[label] += math.log((1.0 - by.confused) / by.confused)
+        if not alone:
+            self.existence = min(self.existence, DOUBTFUL) if not self.looks else self.existence
+        elif self.looks:
+            self.existence += math.log((1.0 - by.misses) / (by.invented * NEARBY))
+        self.looks += 1
+        self.exists = self.exists or self.existence >= CONFIRMED
+
+    def locate(self, position: Array, spread: float, *, settled: bool) -> None:
+        """Take a position `(3,)` [m] measured with a standard deviation of `spread` [m].
+
+        It is averaged with those before where the item has `settled`, and replaces them where it may have
+        been moved since.
+        """
+        if settled and math.isfinite(self.spread):
+            mine, new = self.spread**-2, spread**-2
+            self.position = np.asarray((self.position * mine + position * new) / (mine + new))
+            self.spread = (mine + new) ** -0.5
+        else:
+            self.moved = math.isfinite(self.spread)
+            self.position, self.spread = position, spread
+        if not self.moved:
+            self.first = self.position
+        self.overlooked = 1.0
+
+    def miss(self, by: Reliability) -> None:
+        """Count one look that searched its place without seeing it."""
+        self.overlooked *= by.misses
+        self.existence += math.log(by.misses)
+
+    def fell(self, bin: str, shown: bool, by: Reliability) -> None:
+        """Count one look into a bin that showed, or did not, one object more than was let go there."""
+        evidence = (1.0 - by.misses) / (by.invented * INSIDE) if shown else by.misses
+        self.fallen[bin] = max(0.0, self.fallen[bin] + math.log(evidence))
+
+    def become(self, found: Record) -> None:
+        """Take over what is known of `found`, a new item that turned out to be this one."""
+        for label, vote in found.votes.items():
+            self.votes[label] += vote
+        self.position, self.spread, self.epoch = found.position, found.spread, found.epoch
+        self.frame, self.stamp, self.confidence = found.frame, found.stamp, found.confidence
+        self.overlooked = 1.0
+        self.looks += found.looks
+        if self.state is State.DROPPED:
+            self.state = State.SEEN

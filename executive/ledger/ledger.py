@@ -5,18 +5,29 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from executive.cell import Routes
-from executive.cell_config import LedgerConfig
+from executive.cell_config import LedgerConfig, TableConfig
 from executive.errors import Fault
 from executive.events import Emit
 from executive.geometry import Array
-from executive.ledger.binding import bind
+from executive.ledger.accounts import balance, fate_of, row_of, target_of
+from executive.ledger.binding import SURE
+from executive.ledger.coverage import Coverage
 from executive.ledger.freshness import Freshness
-from executive.ledger.item import ON_TABLE, OPEN, Record, State
-from executive.messages import Bin, Detections, Frame, Item, Target
+from executive.ledger.item import OPEN, Record, State
+from executive.ledger.looks import Looks, spread_of
+from executive.messages import Bin, Detections, Frame, Item, Reliability, Target
+
+LIKELY = 0.9
+"""Probability of its existence from which an item is worth a grasp."""
+SHARPER = 2 / 3
+"""How much smaller the standard error of its position must be for another attempt at an item."""
+PRESENT = 0.1
+"""Chance of having been overlooked by the looks that missed it, down to which it is taken to be there."""
 
 
 class ItemLedger:
@@ -25,16 +36,23 @@ class ItemLedger:
     Every change is emitted as an `item` event, so that the record can be rebuilt from the journal.
     """
 
-    def __init__(self, config: LedgerConfig, bins: Mapping[str, Bin], routes: Routes, emit: Emit) -> None:
+    def __init__(
+        self,
+        config: LedgerConfig,
+        table: TableConfig,
+        bins: Mapping[str, Bin],
+        routes: Routes,
+        emit: Emit,
+    ) -> None:
         self._config = config
         self._bins = bins
         self._routes = routes
         self._emit = emit
         self._records: dict[Item, Record] = {}
-        self._counts: Counter[str] = Counter()
         self._freshness = Freshness()
+        self._coverage = Coverage(table)
+        self._looks = Looks(config, self._coverage, self._freshness)
         self._frame = 0
-        self._empty_looks = 0
 
     @property
     def records(self) -> Sequence[Record]:
@@ -51,56 +69,22 @@ class ItemLedger:
         return self._freshness.anywhere_holds(frame.epoch)
 
     def observe(self, detections: Detections, positions: Sequence[Array]) -> Sequence[Target]:
-        """Record a look and return one target per detection outside the bins.
+        """Record a look and return one target per item that is open and whose place is known now.
 
-        A detection where the robot has changed the table since the frame was taken shows what is no
-        longer there, and gives none. The same frame a second time is no second look.
+        What lies in a bin is no target. A detection where the robot has changed the table since the frame
+        was taken shows what is no longer there, and counts for nothing. The same frame a second time is no
+        second look.
         """
         frame = detections.frame
-        inside = [i for i, position in enumerate(positions) if self._bin_at(position) is not None]
-        outside = [
-            i
-            for i, position in enumerate(positions)
-            if i not in inside and self._freshness.holds(position, frame.epoch)
-        ]
-        again, self._frame = frame.id == self._frame, frame.id
-        found = [detections.found[i] for i in outside]
-        places = [positions[i] for i in outside]
-        records = [record for record in self._records.values() if record.state in ON_TABLE]
-        bound = bind(
-            records, [detection.label for detection in found], places, gate=self._config.gate,
-            settled=lambda record: self._freshness.holds(record.position, record.epoch),
-        )  # fmt: skip
-        targets = []
-        for index, (detection, place) in enumerate(zip(found, places, strict=True)):
-            record = bound.get(index) or self._enter(detection.label, place)
-            if not again or not record.looks:
-                record.looks += 1
-                record.votes[detection.label] += detection.confidence
-            record.position, record.epoch, record.absent = place, frame.epoch, 0
-            if record.state is State.DROPPED:
-                record.state = State.SEEN
-            self._report(record)
-            targets.append(
-                Target(
-                    record.item, record.label, place, detection.confidence, frame.id, frame.epoch, frame.stamp
-                )
-            )
+        if frame.id != self._frame:
+            self._frame = frame.id
+            self._take(detections, positions)
         self._emit_look(detections, positions)
-        if detections.view == "full":
-            self._recognize_in_bins([(detections.found[i].label, positions[i]) for i in inside])
-        if again:
-            return targets
-        seen = {target.item for target in targets}
-        for record in records:
-            missing = record.item not in seen and self._freshness.holds(record.position, frame.epoch)
-            if missing and detections.searched(record.position):
-                record.absent += 1
-        if frame.epoch != self.epoch or any(self._waits(target.item) for target in targets):
-            self._empty_looks = 0
-        elif detections.view == "full":
-            self._empty_looks += 1
-        return targets
+        return [
+            target_of(record)
+            for record in self._records.values()
+            if record.state is State.SEEN and self._looks.settled(record)
+        ]
 
     def is_fresh(self, target: Target) -> bool:
         """Tell whether nothing the robot did since has put the target's position in doubt."""
@@ -110,13 +94,37 @@ class ItemLedger:
         """Tell whether the item still waits to be sorted."""
         return self._record(item).state in OPEN
 
+    def is_sure(self, item: Item) -> bool:
+        """Tell whether enough looks agree that the item exists, of which class it is, and where.
+
+        After a failed grasp they must agree better on where.
+        """
+        record = self._record(item)
+        return (
+            record.probability >= LIKELY
+            and record.overlooked >= PRESENT
+            and record.misjudged <= self._config.misjudged
+            and record.spread <= self._config.aim * (SHARPER if record.attempts else 1.0)
+        )
+
+    def in_doubt(self) -> Sequence[Item]:
+        """Return the open items in the workspace that a further look may make sure, or show to be gone."""
+        return [
+            record.item
+            for record in self._records.values()
+            if self._may_wait(record)
+            and self._coverage.in_workspace(record.position)
+            and not (self.is_sure(record.item) and self._looks.settled(record))
+        ]
+
     def believes_empty(self) -> bool:
-        """Tell whether enough looks at the full frame agree that nothing with a route is left."""
-        return self._empty_looks >= self._config.looks_to_believe
+        """Tell whether it is as good as certain that nothing with a route is left where one can look."""
+        waiting = any(r.label in self._routes and self._may_wait(r) for r in self._records.values())
+        return not waiting and self._coverage.worst <= self._config.overlooked
 
     def touched(self, item: Item) -> None:
         """Record that the tool met the item, which proves that it exists."""
-        self._record(item).touched = True
+        self._record(item).exists = True
 
     def missed(self, item: Item) -> None:
         """Record a grasp that did not hold: the cup may have pushed anything, so all is in doubt."""
@@ -128,7 +136,7 @@ class ItemLedger:
     def held(self, item: Item) -> None:
         """Record that the tool holds the item; its neighbours may have moved."""
         record = self._change(item, State.HELD)
-        record.touched = True
+        record.exists = True
         self._disturb(record.position, self._config.neighbourhood)
 
     def dropped(self, item: Item) -> None:
@@ -175,52 +183,45 @@ class ItemLedger:
         lost, given up or not, one that a single look believed in and another one did not is a phantom.
         """
         for record in self._records.values():
-            if record.state is State.HELD:
-                record.why = "still in the tool when the run ended"
-                self._change(record.item, State.REJECTED)
-            elif record.state not in ON_TABLE:
-                continue
-            elif not record.exists and record.absent:
-                self._change(record.item, State.PHANTOM)
-            elif record.state is State.REJECTED and record.absent < self._config.looks_to_believe:
-                continue
-            elif record.state is State.DROPPED or record.absent:
-                record.why = "known to exist, not found again"
-                self._change(record.item, State.LOST)
-            else:
-                routed = record.label in self._routes
-                record.why = "the run ended before its turn" if routed else "the mission has no route for it"
-                self._change(record.item, State.REJECTED)
+            fate = fate_of(record, gone=self._is_gone(record), routed=record.label in self._routes)
+            if fate is not None:
+                state, record.why = fate
+                self._change(record.item, state)
 
     def balance(self) -> dict[str, int]:
         """Return the counts `seen, placed, rejected, lost, phantom`.
 
         After `close`, seen = placed + rejected + lost.
         """
-        states = Counter(record.state for record in self._records.values())
-        real = len(self._records) - states[State.PHANTOM]
-        return {
-            "seen": real,
-            "placed": states[State.PLACED],
-            "rejected": states[State.REJECTED],
-            "lost": states[State.LOST],
-            "phantom": states[State.PHANTOM],
-        }
+        return balance(self._records.values())
 
     def rows(self) -> list[dict[str, object]]:
         """Return a plain row per item, in the order of first sight."""
-        return [_row(record) for record in self._records.values()]
+        return [row_of(record) for record in self._records.values()]
 
-    def _waits(self, item: Item) -> bool:
-        """Tell whether the mission still has to do something about the item."""
-        record = self._record(item)
-        return record.state in OPEN and record.label in self._routes
+    def _take(self, detections: Detections, positions: Sequence[Array]) -> None:
+        frame, jitter = detections.frame, detections.reliability.jitter
+        inside = [self._bin_at(position, spread_of(frame, position, jitter)) for position in positions]
+        outside = [number for number, bin in enumerate(inside) if bin is None]
+        found = tuple(detections.found[number] for number in outside)
+        places = [positions[number] for number in outside]
+        for record in self._looks.take(self._records, replace(detections, found=found), places):
+            self._report(record)
+        if detections.view == "full":
+            shown = Counter(
+                (detection.label, bin)
+                for detection, bin in zip(detections.found, inside, strict=True)
+                if bin is not None
+            )
+            self._find_fallen(shown, detections.reliability)
 
-    def _enter(self, label: str, position: Array) -> Record:
-        self._counts[label] += 1
-        record = Record(f"{label}-{self._counts[label]}", position, position, self.epoch)
-        self._records[record.item] = record
-        return record
+    def _may_wait(self, record: Record) -> bool:
+        """Tell whether an item may be an object that lies on the table to be sorted."""
+        likely = record.probability > self._config.overlooked
+        return record.state is State.SEEN and likely and not self._is_gone(record)
+
+    def _is_gone(self, record: Record) -> bool:
+        return record.overlooked <= self._config.overlooked
 
     def _record(self, item: Item) -> Record:
         try:
@@ -237,24 +238,32 @@ class ItemLedger:
 
     def _disturb(self, centre: Array, radius: float) -> None:
         self._freshness.disturb(np.asarray(centre, dtype=float), radius)
-        self._empty_looks = 0
+        self._coverage.disturb(centre, radius, self.epoch)
 
-    def _bin_at(self, position: Array) -> str | None:
-        return next((name for name, bin in self._bins.items() if bin.contains(position)), None)
+    def _bin_at(self, position: Array, spread: float) -> str | None:
+        """Return the bin that something measured with a standard deviation of `spread` [m] lies in, if any.
 
-    def _recognize_in_bins(self, inside: Sequence[tuple[str, Array]]) -> None:
+        What seems to lie just beside a bin is in it, if something was let go there.
+        """
+        for name, bin in self._bins.items():
+            if bin.contains(position, SURE * spread if self.objects_in(name) else 0.0):
+                return name
+        return None
+
+    def _find_fallen(self, shown: Mapping[tuple[str, str], int], by: Reliability) -> None:
         """Find dropped items again that fell into a bin that is right for them.
 
-        More objects of a class in one of its bins than were let go there can only be ones that fell.
+        More objects of a class in one of its bins than were let go there can only be ones that fell, once
+        it is as good as certain that the detector did not invent them.
         """
-        shown = Counter((label, self._bin_at(position)) for label, position in inside)
         for record in self._records.values():
             if record.state is not State.DROPPED:
                 continue
             label = record.label
             for bin in self._routes.get(label, ()):
                 there = sum(r.bin == bin and r.label == label for r in self._records.values())
-                if shown[label, bin] > there:
+                record.fell(bin, shown.get((label, bin), 0) > there, by)
+                if record.fallen[bin] >= -math.log(self._config.overlooked):
                     self.placed(record.item, bin)
                     break
 
@@ -270,21 +279,14 @@ class ItemLedger:
             for detection, position in zip(detections.found, positions, strict=True)
         ]
         self._emit(
-            "look", frame=frame.id, camera=frame.camera, view=detections.view, found=found, frame_object=frame
+            "look",
+            frame=frame.id,
+            camera=frame.camera,
+            detector=detections.detector,
+            view=detections.view,
+            found=found,
+            frame_object=frame,
         )
 
     def _report(self, record: Record) -> None:
-        self._emit("item", **_row(record))
-
-
-def _row(record: Record) -> dict[str, object]:
-    return {
-        "item": record.item,
-        "label": record.label,
-        "state": record.state.value,
-        "position": [round(float(value), 4) for value in record.position],
-        "looks": record.looks,
-        "attempts": record.attempts,
-        "bin": record.bin,
-        "why": record.why,
-    }
+        self._emit("item", **row_of(record))

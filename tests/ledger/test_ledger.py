@@ -5,11 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from executive.cell_config import LedgerConfig
+from executive.cell_config import LedgerConfig, TableConfig
 from executive.errors import Fault
 from executive.geometry import looking_down
 from executive.ledger.ledger import ItemLedger
-from executive.messages import Bin, Detection, Detections, Frame, Target
+from executive.messages import Bin, Detection, Detections, Frame, Reliability, Target
+
+EYE = Reliability(threshold=0.5, misses=0.03, confused=0.004, invented=0.02, jitter=1.0)
 
 Thing = tuple[str, float, float]
 
@@ -27,6 +29,7 @@ class Bench:
         }
         self.ledger = ItemLedger(
             LedgerConfig(),
+            TableConfig(),
             bins,
             {"cube": ("red_bin", "pink_bin")},
             lambda kind, **data: self.events.append((kind, data)),
@@ -49,7 +52,7 @@ class Bench:
         )
         found = tuple(Detection(label, 0.9, (0, 0, 1, 1)) for label, _, _ in things)
         return self.ledger.observe(
-            Detections(frame, found, view, area), [np.array([x, y, 0.025]) for _, x, y in things]
+            Detections(frame, found, "eye", EYE, view, area), [np.array([x, y, 0.025]) for _, x, y in things]
         )
 
 
@@ -66,7 +69,9 @@ def test_an_object_seen_twice_is_one_item(bench: Bench) -> None:
 
 def test_two_close_objects_stay_two_items_whatever_the_order_of_detections(bench: Bench) -> None:
     bench.look(("cube", 0.50, 0.0), ("cube", 0.55, 0.0))
-    assert [t.item for t in bench.look(("cube", 0.551, 0.0), ("cube", 0.501, 0.0))] == ["cube-2", "cube-1"]
+    first, second = bench.look(("cube", 0.551, 0.0), ("cube", 0.501, 0.0))
+    assert (first.item, second.item) == ("cube-1", "cube-2")
+    assert first.position[0] == pytest.approx(0.5005), "the mean of both looks"
 
 
 def test_the_class_is_evidence_and_not_identity(bench: Bench) -> None:
@@ -94,11 +99,14 @@ def test_an_object_pushed_away_by_a_missed_grasp_is_still_the_same_item(bench: B
     bench.look(("cube", 0.50, 0.0), ("duck", 0.6, 0.1))
     bench.ledger.missed("cube-1")
     assert [t.item for t in bench.look(("cube", 0.60, -0.1), ("duck", 0.6, 0.1))] == ["cube-1", "duck-1"]
+    assert [row["item"] for row in bench.ledger.rows()] == ["cube-1", "duck-1"]
 
 
 def test_an_object_that_jumps_without_the_robots_doing_is_another_item(bench: Bench) -> None:
     bench.look(("cube", 0.50, 0.0))
-    assert bench.look(("cube", 0.60, -0.1))[0].item == "cube-2"
+    items = [t.item for t in bench.look(("cube", 0.60, -0.1))]
+    assert items == ["cube-1", "cube-2"], "one look may have overlooked the first"
+    assert not bench.ledger.is_sure("cube-1")
 
 
 def test_an_object_under_a_missed_grasp_stays_itself_when_its_class_reads_differently(bench: Bench) -> None:
@@ -112,8 +120,8 @@ def test_a_dropped_item_is_recognized_where_it_lies(bench: Bench) -> None:
     bench.look(("cube", 0.50, 0.0), ("cube", 0.6, 0.1))
     bench.ledger.held("cube-1")
     bench.ledger.dropped("cube-1")
-    items = [t.item for t in bench.look(("cube", 0.6, 0.1), ("cube", 0.30, -0.3), view="full")]
-    assert items == ["cube-2", "cube-1"]
+    found = bench.look(("cube", 0.6, 0.1), ("cube", 0.30, -0.3), view="full")
+    assert [(t.item, t.position[0]) for t in found] == [("cube-1", 0.30), ("cube-2", pytest.approx(0.6))]
 
 
 def test_a_dropped_item_that_fell_into_its_bin_is_placed(bench: Bench) -> None:
@@ -208,6 +216,7 @@ def test_a_frame_from_before_a_pick_brings_nothing_back(bench: Bench) -> None:
 def test_what_one_look_believed_and_no_other_is_a_phantom(bench: Bench) -> None:
     bench.look(("cube", 0.50, 0.0))
     bench.look(view="full")
+    bench.look(view="full")
     bench.ledger.close()
     assert bench.ledger.balance() == {"seen": 0, "placed": 0, "rejected": 0, "lost": 0, "phantom": 1}
 
@@ -221,6 +230,7 @@ def test_what_the_only_look_showed_is_left_and_no_phantom(bench: Bench) -> None:
 def test_what_two_looks_agreed_on_and_then_vanished_is_lost(bench: Bench) -> None:
     bench.look(("cube", 0.50, 0.0))
     bench.look(("cube", 0.50, 0.0))
+    bench.look(view="full")
     bench.look(view="full")
     bench.ledger.close()
     assert bench.ledger.balance() == {"seen": 1, "placed": 0, "rejected": 0, "lost": 1, "phantom": 0}

@@ -49,3 +49,22 @@ def test_doubtful_boxes_pass_as_nothing_found_where_the_mission_says_so(fake: Fa
     fake.detector.answers = lambda look, true: [Detection("duck", 0.4, (0, 0, 9, 9))]
     result = run_skill(Detect(doubtful="pass"), fake)
     assert (result.status, result.outputs["detections"].found) == ("SUCCESS", ())
+
+
+def test_an_arm_in_the_way_may_be_looked_past(fake: FakeCell) -> None:
+    fake.world.put("cube", 0.5, 0.0)
+    fake.camera.sees = lambda: False
+    result = run_skill(Detect(hidden="pass"), fake)
+    assert [found.label for found in result.outputs["detections"].found] == ["cube"]
+
+
+def test_what_is_seen_of_things_behind_the_arm_is_not_believed(fake: FakeCell) -> None:
+    behind, beside = (Detection("cube", 0.9, (x, 200, x + 20, 220)) for x in (300, 400))
+    fake.detector.answers = lambda look, true: [behind, beside]
+    fake.camera.hides.append((290, 190, 310, 230))
+    assert run_skill(Detect(hidden="pass"), fake).outputs["detections"].found == (beside,)
+
+
+def test_it_says_which_detector_answered_and_how_far_it_can_be_trusted(fake: FakeCell) -> None:
+    detections = run_skill(Detect(), fake).outputs["detections"]
+    assert (detections.detector, detections.reliability.misses) == ("embedded", 0.02)

@@ -1,0 +1,72 @@
+"""What the books say: to skills while they are open, to people, and in the end."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+
+from executive.ledger.item import ON_TABLE, Record, State
+from executive.messages import Target
+
+
+def target_of(record: Record) -> Target:
+    """Return what skills are told of an item on the table."""
+    return Target(
+        record.item,
+        record.label,
+        record.position,
+        record.confidence,
+        record.frame,
+        record.epoch,
+        record.stamp,
+    )
+
+
+def row_of(record: Record) -> dict[str, object]:
+    """Return what is told of an item, as plain values."""
+    return {
+        "item": record.item,
+        "label": record.label,
+        "state": record.state.value,
+        "position": [round(float(value), 4) for value in record.position],
+        "looks": record.looks,
+        "attempts": record.attempts,
+        "bin": record.bin,
+        "why": record.why,
+    }
+
+
+def fate_of(record: Record, *, gone: bool, routed: bool) -> tuple[State, str] | None:
+    """Return what became of an item and why, now that the run is over; None where it is settled already.
+
+    An item seen where it was left is rejected, one that is known to exist and was not found again is lost,
+    given up or not, and one that is likelier an invention than an object is a phantom.
+
+    Args:
+        record: The item.
+        gone: Whether its place was searched in vain, as far as one can be sure.
+        routed: Whether the mission has a bin for its class.
+    """
+    if record.state is State.HELD:
+        return State.REJECTED, "still in the tool when the run ended"
+    if record.state not in ON_TABLE:
+        return None
+    if record.probability < 0.5:
+        return State.PHANTOM, "seen once, and then no more"
+    if record.state is State.DROPPED or gone:
+        return State.LOST, "known to exist, not found again"
+    if record.state is State.REJECTED:
+        return None
+    return State.REJECTED, "the run ended before its turn" if routed else "the mission has no route for it"
+
+
+def balance(records: Iterable[Record]) -> dict[str, int]:
+    """Return the counts `seen, placed, rejected, lost, phantom`; without the phantoms they are `seen`."""
+    states = Counter(record.state for record in records)
+    return {
+        "seen": sum(states.values()) - states[State.PHANTOM],
+        "placed": states[State.PLACED],
+        "rejected": states[State.REJECTED],
+        "lost": states[State.LOST],
+        "phantom": states[State.PHANTOM],
+    }

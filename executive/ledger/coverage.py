@@ -1,0 +1,87 @@
+"""Where on the table an object may still be overlooked, and how likely that is."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from executive.cell_config import TableConfig
+from executive.geometry import Array
+from executive.messages import Detections
+
+PITCH = 0.02
+"""Distance between the points that stand for the table [m]: less than the smallest object is wide."""
+MARGIN = 0.4
+"""How far around the workspace is watched [m]: as far as what is dropped or pushed gets."""
+ASTRAY = 0.02
+"""Chance that something lies beside the workspace before the robot has dropped or pushed anything."""
+LEAST = 1e-4
+"""Chance that remains however often a place is searched: looks are not wholly independent of each other."""
+NEAR = 0.03
+"""How far beside the workspace the middle of what lies at its edge may be [m]."""
+HEIGHT = 0.025
+"""Height of the points over the table [m]: the middle of a usual object."""
+
+
+class Coverage:
+    """The chance, at every point of the table, that an object lies there which no look has shown.
+
+    It starts at one in the workspace, and low beside it. A look that searches a point multiplies it by the
+    share of objects that its detector misses; whatever may have brought an object there sets it back to
+    one. What a look does not show, because the arm hides it, it lies outside the image or has been
+    disturbed since, stays as it was.
+
+    Args:
+        table: Says where objects lie.
+    """
+
+    def __init__(self, table: TableConfig) -> None:
+        (left, right), (low, high) = table.x, table.y
+        xs = np.arange(left - MARGIN, right + MARGIN + PITCH / 2, PITCH)
+        ys = np.arange(low - MARGIN, high + MARGIN + PITCH / 2, PITCH)
+        self._points = np.array([(x, y, HEIGHT) for x in xs for y in ys])
+        self._low, self._high = np.array([left, low]), np.array([right, high])
+        self._workspace = self._within(self._points, 0.0)
+        self._overlooked = np.where(self._within(self._points, NEAR), 1.0, ASTRAY)
+        self._changed = np.zeros(len(self._points), dtype=int)
+        self._beside = np.zeros(len(self._points), dtype=bool)
+
+    def look(self, detections: Detections) -> None:
+        """Take account of a look: what it did find is known, and no longer overlooked, either."""
+        searched = detections.searched(self._points)
+        current = self._changed <= detections.frame.epoch
+        self._overlooked[current & searched] *= detections.reliability.misses
+        self._overlooked = self._overlooked.clip(LEAST)
+        if detections.view == "full":
+            self._beside = self._beside | searched
+
+    def disturb(self, centre: Array, radius: float, epoch: int) -> None:
+        """Take account of change `epoch`, which may have put an object within `radius` [m] of `centre`."""
+        near = np.hypot(*(self._points - centre)[:, :2].T) <= radius
+        self._overlooked[near], self._changed[near] = 1.0, epoch
+
+    def overlooked(self, position: Array) -> float:
+        """Return the chance, 0 to 1, that an object at a place `(3,)` [m] has not been seen yet."""
+        distances = np.hypot(*(self._points - position)[:, :2].T)
+        nearest = int(np.argmin(distances))
+        return float(self._overlooked[nearest]) if distances[nearest] <= PITCH else ASTRAY
+
+    def in_workspace(self, position: Array) -> bool:
+        """Tell whether a place `(3,)` [m] is where objects are put to be sorted."""
+        return bool(self._within(position[None], NEAR)[0])
+
+    @property
+    def worst(self) -> float:
+        """The largest chance, 0 to 1, that an object lies anywhere and has been overlooked.
+
+        Counted are the workspace and whatever else full images have shown; 1 before there was one.
+        """
+        if not self._beside.any():
+            return 1.0
+        return float(self._overlooked[self._workspace | self._beside].max())
+
+    def _within(self, points: Array, margin: float) -> NDArray[np.bool_]:
+        """Tell `(N,)` which points lie in the workspace or at most `margin` [m] beside it."""
+        places = points[:, :2]
+        inside = (self._low - margin <= places) & (places <= self._high + margin)
+        return np.asarray(inside.all(axis=1))

@@ -1,0 +1,164 @@
+"""What a look adds to the books: who was seen, who was not, and who turned up elsewhere."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+
+from executive.cell_config import LedgerConfig
+from executive.geometry import Array
+from executive.ledger.binding import bind, reach
+from executive.ledger.coverage import Coverage
+from executive.ledger.freshness import Freshness
+from executive.ledger.item import ON_TABLE, Record, State
+from executive.messages import Detections, Frame, Item
+
+EXPECTED = 3.0
+"""Objects on a table before anybody has looked: the order of magnitude is what counts."""
+PLAUSIBLE = 0.99
+"""Probability from which something new may be an item that is missed elsewhere."""
+FAR_OFF = 1.5
+"""How many times as far as it may be for certain an item may still be off, now and then."""
+GONE = 0.05
+"""Chance of having been overlooked under which an item that may have been pushed is sought elsewhere."""
+
+
+class Looks:
+    """Binds detections to items and weighs what they and their absence say.
+
+    Args:
+        config: When what is believed.
+        coverage: Where something may still be overlooked.
+        freshness: Where something may have moved.
+    """
+
+    def __init__(self, config: LedgerConfig, coverage: Coverage, freshness: Freshness) -> None:
+        self._config = config
+        self._coverage = coverage
+        self._freshness = freshness
+        self._counts: Counter[str] = Counter()
+
+    def settled(self, record: Record) -> bool:
+        """Tell whether nothing has put an item's place in doubt since it was seen."""
+        return self._freshness.holds(record.position, record.epoch)
+
+    def take(
+        self, records: dict[Item, Record], detections: Detections, positions: Sequence[Array]
+    ) -> list[Record]:
+        """Take a look into the books and return the items that changed by it.
+
+        Args:
+            records: All items by name; new ones are entered.
+            detections: The look.
+            positions: Where `detections.found` are `(3,)` [m], one to one.
+        """
+        frame, by = detections.frame, detections.reliability
+        current = [i for i, p in enumerate(positions) if self._freshness.holds(p, frame.epoch)]
+        found = [detections.found[i] for i in current]
+        places = [positions[i] for i in current]
+        spreads = [spread_of(frame, place, by.jitter) for place in places]
+        known = [r for r in records.values() if r.state in ON_TABLE and r.state is not State.DROPPED]
+        bound = bind(
+            known, [detection.label for detection in found], places, spreads,
+            gate=self._config.gate, settled=self.settled,
+        )  # fmt: skip
+        absent = [record for record in known if record not in bound.values()]
+        seen: list[Record] = []
+        for index, (detection, place) in enumerate(zip(found, places, strict=True)):
+            record = bound.get(index)
+            if record is None:
+                record = self._enter(records, detection.label, place, by.invented)
+                record.entered = frame.epoch
+            record.vote(detection.label, by, alone=not self._explained(place, spreads[index], absent))
+            record.locate(place, spreads[index], settled=self.settled(record))
+            record.epoch, record.frame, record.stamp = frame.epoch, frame.id, frame.stamp
+            record.confidence = detection.confidence
+            seen.append(record)
+        missed = self._missed(known, seen, detections)
+        self._coverage.look(detections)
+        self._recognize(records, seen)
+        return [*seen, *missed, *self._one_of_two(records, seen)]
+
+    def _explained(self, place: Array, spread: float, absent: Sequence[Record]) -> bool:
+        """Tell whether what was seen at a place may as well be an item that was not seen nearby."""
+        return any(
+            float(np.linalg.norm(record.position - place))
+            <= FAR_OFF * reach(record, spread, self._config.gate)
+            for record in absent
+        )
+
+    def _enter(self, records: dict[Item, Record], label: str, place: Array, invented: float) -> Record:
+        """Enter something new: the less likely an object was overlooked there, the likelier an invention."""
+        self._counts[label] += 1
+        odds = EXPECTED * self._coverage.overlooked(place) / invented
+        record = Record(f"{label}-{self._counts[label]}", place, math.log(odds))
+        records[record.item] = record
+        return record
+
+    def _missed(self, known: Sequence[Record], seen: Sequence[Record], look: Detections) -> list[Record]:
+        """Weigh that items were not seen where the look searched, and return those that proved phantoms."""
+        unseen = [
+            record
+            for record in known
+            if record not in seen and self._freshness.holds(record.position, look.frame.epoch)
+        ]
+        if not unseen:
+            return []
+        phantoms = []
+        searched = look.searched(np.array([record.position for record in unseen]))
+        for record, there in zip(unseen, searched, strict=True):
+            if there:
+                record.miss(look.reliability)
+            if there and not record.exists and record.probability <= self._config.overlooked:
+                record.state, record.why = State.PHANTOM, "seen once, and then no more"
+                phantoms.append(record)
+        return phantoms
+
+    def _recognize(self, records: dict[Item, Record], seen: list[Record]) -> None:
+        """Recognize items that were dropped or pushed away in new ones of their class, the nearest first."""
+        for place, new in enumerate(seen):
+            if new.state is not State.SEEN or new.attempts or new.probability < PLAUSIBLE:
+                continue
+            missing = [old for old in records.values() if self._may_be(old, new)]
+            if missing:
+                old = min(missing, key=lambda r: float(np.linalg.norm((r.position - new.position)[:2])))
+                old.become(new)
+                seen[place] = old
+                if new.looks == 1:
+                    del records[new.item]
+                    self._counts[new.label] -= 1
+                else:
+                    new.state, new.why = State.PHANTOM, f"it is {old.item}"
+
+    def _one_of_two(self, records: dict[Item, Record], seen: list[Record]) -> list[Record]:
+        """Make one of every two items closer than two objects can be; return those that were none."""
+        doubles = []
+        for record in list(seen):
+            if record.state is not State.SEEN:
+                continue
+            for other in records.values():
+                near = float(np.linalg.norm(other.position - record.position)) < self._config.gate
+                if other is record or other.state is not State.SEEN or not near:
+                    continue
+                less, more = sorted((record, other), key=lambda r: (r.exists, r.looks))
+                less.state, less.why = State.PHANTOM, f"it is {more.item}"
+                doubles.append(less)
+                break
+        return doubles
+
+    def _may_be(self, old: Record, new: Record) -> bool:
+        """Tell whether a new item may be one that is not where it was before the robot changed the table."""
+        after = new.entered >= self._freshness.disturbed(old.position) > old.epoch
+        if old is new or old.label != new.label or not after:
+            return False
+        pushed = old.state in (State.SEEN, State.REJECTED) and old.probability >= 0.5
+        return old.state is State.DROPPED or (pushed and old.overlooked <= GONE)
+
+
+def spread_of(frame: Frame, position: Array, jitter: float) -> float:
+    """Return how far [m] an object at `position` is off for `jitter` [pixel] in the image."""
+    depth = float(frame.X_WC.inverse().apply(position)[2])
+    return jitter * depth / float(frame.matrix[0, 0])

@@ -1,0 +1,92 @@
+"""Where something may still be overlooked."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from executive.cell_config import TableConfig
+from executive.geometry import looking_down
+from executive.ledger.coverage import ASTRAY, LEAST, Coverage
+from executive.messages import Detections, Frame, Reliability
+
+TABLE = TableConfig()
+MIDDLE, CORNER = np.array([0.53, 0.0, 0.025]), np.array([0.43, 0.21, 0.025])
+EYE = Reliability(threshold=0.5, misses=0.2, confused=0.1, invented=0.5, jitter=1.0)
+
+
+def look(*, view: str = "full", epoch: int = 0, hidden: slice = slice(0, 0)) -> Detections:
+    """An empty look from above; the columns `hidden` of the image are behind the arm."""
+    visible = np.ones((480, 640), bool)
+    visible[:, hidden] = False
+    matrix = np.array([[461.0, 0, 320.0], [0, 461.0, 240.0], [0, 0, 1.0]])
+    image = np.zeros((480, 640, 3), np.uint8)
+    frame = Frame(1, "eye", image, None, matrix, looking_down((0.5, 0.0, 1.2)), 0.0, visible, epoch)
+    area = (0.0, 0.0, 640.0, 480.0) if view == "full" else (192.0, 100.0, 448.0, 356.0)
+    return Detections(frame, (), "eye", EYE, view, area)
+
+
+@pytest.fixture
+def coverage() -> Coverage:
+    return Coverage(TABLE)
+
+
+def test_every_look_leaves_as_much_doubt_as_its_detector_misses(coverage: Coverage) -> None:
+    for looks in range(1, 5):
+        coverage.look(look())
+        assert coverage.overlooked(MIDDLE) == pytest.approx(0.2**looks)
+        assert coverage.worst == pytest.approx(0.2**looks)
+
+
+def test_before_anything_was_dropped_hardly_anything_lies_beside_the_workspace(coverage: Coverage) -> None:
+    beside = np.array([0.53, 0.40, 0.025])
+    assert coverage.overlooked(beside) == ASTRAY
+    coverage.disturb(MIDDLE, math.inf, epoch=1)
+    assert coverage.overlooked(beside) == 1.0
+
+
+def test_looks_at_the_workspace_alone_never_show_that_nothing_lies_beside_it(coverage: Coverage) -> None:
+    for _ in range(20):
+        coverage.look(look(view="table"))
+    assert coverage.overlooked(MIDDLE) == LEAST, "looks are not wholly independent"
+    assert coverage.worst == 1.0
+
+
+def test_what_the_arm_hides_is_not_believed_empty(coverage: Coverage) -> None:
+    # Columns run against the world's y here: the right half of the image shows one side of the table.
+    for _ in range(5):
+        coverage.look(look(hidden=slice(320, 640)))
+    sides = [coverage.overlooked(np.array([0.53, y, 0.025])) for y in (-0.15, 0.15)]
+    assert sorted(sides) == [pytest.approx(0.2**5), 1.0]
+    assert coverage.worst == 1.0
+
+
+def test_a_place_is_searched_only_if_all_of_an_object_there_would_show(coverage: Coverage) -> None:
+    coverage.look(look(hidden=slice(323, 640)))
+    assert coverage.overlooked(np.array([0.5, 0.0, 0.025])) == 1.0
+
+
+def test_a_change_brings_the_doubt_back_where_it_may_have_put_something(coverage: Coverage) -> None:
+    coverage.look(look())
+    coverage.disturb(CORNER, 0.07, epoch=1)
+    assert coverage.overlooked(CORNER) == 1.0
+    assert coverage.overlooked(MIDDLE) == pytest.approx(0.2)
+
+
+def test_a_frame_from_before_a_change_says_nothing_about_what_it_changed(coverage: Coverage) -> None:
+    coverage.disturb(CORNER, 0.07, epoch=1)
+    coverage.look(look(epoch=0))
+    assert coverage.overlooked(CORNER) == 1.0
+    assert coverage.overlooked(MIDDLE) == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(
+    ("place", "inside"),
+    [((0.53, 0.0), True), ((0.41, 0.24), True), ((0.38, 0.0), False), ((0.53, 0.26), False)],
+)
+def test_the_workspace_reaches_as_far_as_half_an_object_over_its_edge(
+    coverage: Coverage, place: tuple[float, float], inside: bool
+) -> None:
+    assert coverage.in_workspace(np.array([*place, 0.03])) is inside

@@ -1,0 +1,98 @@
+"""What many looks of a bad detector add up to."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from executive.ledger.binding import reach
+from executive.ledger.item import Record
+from executive.messages import Reliability
+
+GOOD = Reliability(threshold=0.5, misses=0.02, confused=0.0025, invented=0.02, jitter=0.7)
+BAD = Reliability(threshold=0.5, misses=0.2, confused=0.1, invented=0.5, jitter=5.0)
+HERE = np.array([0.5, 0.0, 0.025])
+
+
+def record(existence: float = 0.0) -> Record:
+    return Record("cube-1", HERE, existence)
+
+
+def test_one_vote_of_a_good_detector_is_enough_for_a_class_and_three_of_a_bad_one() -> None:
+    one = record()
+    one.vote("cube", GOOD)
+    assert one.misjudged == pytest.approx(0.0025, rel=0.01)
+    other = record()
+    doubts = []
+    for _ in range(3):
+        other.vote("cube", BAD)
+        doubts.append(other.misjudged)
+    assert doubts == [pytest.approx(0.1), pytest.approx(1 / 82), pytest.approx(1 / 730)]
+
+
+def test_votes_against_each_other_leave_nothing_certain() -> None:
+    mixed = record()
+    mixed.vote("cube", BAD)
+    mixed.vote("duck", BAD)
+    assert mixed.label == "cube", "the first in the alphabet"
+    assert mixed.misjudged > 0.5
+
+
+@given(st.lists(st.sampled_from(["cube", "duck", "sphere"]), min_size=1, max_size=12))
+def test_the_chance_of_a_wrong_class_is_one_and_the_label_is_the_likeliest(votes: list[str]) -> None:
+    item = record()
+    for label in votes:
+        item.vote(label, BAD)
+    assert 0.0 < item.misjudged < 1.0
+    assert votes.count(item.label) == max(votes.count(label) for label in votes)
+
+
+@given(st.floats(-5, 5), st.integers(0, 200))
+def test_an_item_that_is_searched_in_vain_becomes_ever_less_likely(existence: float, looks: int) -> None:
+    item = record(existence)
+    before = item.probability
+    for _ in range(looks):
+        item.miss(BAD)
+    assert item.probability <= before
+    assert item.overlooked == pytest.approx(0.2**looks, abs=1e-12)
+
+
+def test_what_the_tool_has_met_exists_however_often_it_is_overlooked() -> None:
+    item = record()
+    item.exists = True
+    for _ in range(50):
+        item.miss(BAD)
+    assert item.probability == 1.0
+
+
+def test_looks_that_agree_sharpen_a_place_and_a_push_starts_anew() -> None:
+    item = record()
+    for offset in (-0.01, 0.01, -0.01, 0.01):
+        item.locate(HERE + np.array([offset, 0, 0]), 0.013, settled=True)
+    assert item.position == pytest.approx(HERE)
+    assert item.spread == pytest.approx(0.013 / 2)
+    item.locate(HERE + np.array([0.05, 0, 0]), 0.013, settled=False)
+    assert item.position[0] == pytest.approx(0.55)
+    assert item.spread == 0.013
+    assert item.first == pytest.approx(HERE), "where it was before it was moved"
+
+
+def test_measurements_count_by_how_good_they_are() -> None:
+    item = record()
+    item.locate(HERE, 0.001, settled=True)
+    item.locate(HERE + np.array([0.011, 0, 0]), 0.0031623, settled=True)
+    assert item.position[0] - HERE[0] == pytest.approx(0.001, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("spread", "new", "allowed"),
+    [(0.001, 0.001, 0.025), (0.006, 0.008, 0.035), (0.013, 0.013, 0.05), (math.inf, 0.013, 0.05)],
+)
+def test_the_gate_is_as_wide_as_the_measurements_scatter(spread: float, new: float, allowed: float) -> None:
+    item = record()
+    item.spread = spread
+    assert reach(item, new, 0.025) == pytest.approx(allowed)

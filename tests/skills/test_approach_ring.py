@@ -1,0 +1,63 @@
+"""Parts with a hole are touched on their ring, thin ones not felt for below their middle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from executive.messages import Target
+from executive.mission.parse.cell_file import load_cell
+from executive.testing.fake_cell import FakeCell
+from executive.testing.run_skill import run_skill
+from skills.approach import Approach
+
+RING = 0.01
+
+
+@pytest.fixture
+def fake(missions: Path) -> FakeCell:
+    """A fake cell with an empty table, whose cubes have a hole and whose ducks are thin."""
+    changes = {"kind": "fake", "table.objects": "[0, 0]"}
+    changes |= {"objects.cube.ring": str(RING), "objects.duck.height": "0.008"}
+    return FakeCell(
+        load_cell(missions / "cells" / "overhead.yaml", {f"cell.{k}": v for k, v in changes.items()})
+    )
+
+
+@pytest.fixture
+def target(fake: FakeCell, look: Callable[..., list[Target]]) -> Target:
+    fake.world.put("cube", 0.5, 0.0)
+    return look()[0]
+
+
+def test_a_part_with_a_hole_is_touched_beside_it(fake: FakeCell, target: Target) -> None:
+    assert run_skill(Approach(target=target), fake).status == "SUCCESS"
+    assert np.linalg.norm(fake.arm.tool_pose.position[:2] - target.position[:2]) == pytest.approx(RING)
+
+
+def test_further_attempts_go_round_the_ring(fake: FakeCell, target: Target) -> None:
+    steps = []
+    for _ in range(5):
+        run_skill(Approach(target=target), fake)
+        steps.append(fake.arm.tool_pose.position[:2] - target.position[:2])
+        fake.ledger.missed(target.item)
+    assert np.linalg.norm(steps, axis=1) == pytest.approx([RING] * 5)
+    angles = sorted(math.atan2(y, x) for x, y in steps)
+    gaps = np.diff([*angles, angles[0] + math.tau])
+    assert gaps.min() > math.radians(30)
+    assert gaps.max() < math.radians(150)
+
+
+def test_nothing_is_felt_for_below_the_middle_of_a_thin_part(
+    fake: FakeCell, look: Callable[..., list[Target]]
+) -> None:
+    fake.world.put("duck", 0.5, 0.0)
+    (target,) = look()
+    fake.world.objects.clear()
+    result = run_skill(Approach(target=target), fake)
+    assert result.reason == "no_contact"
+    assert result.message == "nothing felt down to 4 mm, duck-1 was expected at 8 mm"
