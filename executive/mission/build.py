@@ -10,6 +10,7 @@ from typing import Any
 from executive.cell import Cell
 from executive.control.attempt import Try
 from executive.control.backoff import Backoff
+from executive.control.beside import Beside
 from executive.control.fallback import Fallback
 from executive.control.for_each import ForEach
 from executive.control.invert import Invert
@@ -68,6 +69,8 @@ class Builder:
         return Fallback(self._site(node), self._all(node.choices))
 
     def _parallel(self, node: Any) -> TreeNode:
+        if node.wait_for.value == "lead":
+            return Beside(self._site(node), self._all(node.branches))
         count = {"all": None, "any": 1}.get(node.wait_for.value, node.wait_for.value)
         return Parallel(self._site(node), self._all(node.branches), count, convert(node.halt.value, bool))
 

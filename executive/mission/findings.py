@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -11,6 +12,7 @@ from executive.mission.source import Mark
 
 _WINDOW = 140
 _MOST_LISTED = 24
+_SECRET = re.compile(r"(?i)(\b\w*(?:api_?key|token|secret|password|authorization)\w*[\"']?\s*:\s*)[^\s,}]+")
 _OF_A_VALUE = frozenset({
     "wrong-type", "wrong-value", "out-of-range", "port-type", "unwritten",
     "unknown-bin", "unknown-class", "unknown-detector", "unknown-pose", "unseen-class",
@@ -86,7 +88,8 @@ def warning(mark: Mark, code: str, message: str, hint: str = "") -> Finding:
 
 def _finding(severity: str, mark: Mark, code: str, message: str, hint: str) -> Finding:
     source = mark.source
-    excerpt = source.line(mark.line)
+    # Whoever wrote a key into a file is told so, without the key.
+    excerpt = _SECRET.sub(r"\1***", source.line(mark.line))
     return Finding(source.path, mark.line, mark.col, severity, code, message, mark.length, hint, excerpt)
 
 

@@ -14,6 +14,7 @@ from scripted_leaf import Leaf
 
 from executive.control.attempt import Try
 from executive.control.backoff import Backoff
+from executive.control.beside import Beside
 from executive.control.fallback import Fallback
 from executive.control.for_each import ForEach
 from executive.control.invert import Invert
@@ -101,6 +102,7 @@ _NODES: Mapping[str, _Make] = {
     "sequence": lambda site, nodes, options, world: Sequence(site, nodes),
     "fallback": lambda site, nodes, options, world: Fallback(site, nodes),
     "parallel": lambda site, nodes, options, world: Parallel(site, nodes, *options),
+    "beside": lambda site, nodes, options, world: Beside(site, nodes),
     "retry": lambda site, nodes, options, world: Retry(
         site, nodes[0], *options[:2], (*nodes, None)[1], options[2], world.clock
     ),
@@ -136,6 +138,7 @@ def _above(child: Any) -> Any:
         _planned("sequence", child, 0, 3),
         _planned("fallback", child, 1, 3),
         # More often than the others: only below it does more than one branch run.
+        _planned("beside", child, 1, 3),
         _parallel(child),
         _parallel(child),
         _parallel(child),

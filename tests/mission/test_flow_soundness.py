@@ -157,7 +157,7 @@ def bodies(node: st.SearchStrategy[Tree]) -> st.SearchStrategy[Tree]:
         st.builds(lambda nodes: {"fallback": nodes}, lists),
         st.builds(
             lambda nodes, wait, halts: {"parallel": {"do": nodes, "wait_for": wait, "halt": halts}},
-            lists, st.sampled_from(["all", "any"]), st.booleans(),
+            lists, st.sampled_from(["all", "any", "lead"]), st.booleans(),
         ),
         st.builds(
             lambda n, on, recover, do: {"retry": {"attempts": n, **on, **recover, "do": do}},

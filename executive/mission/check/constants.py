@@ -61,9 +61,9 @@ def _problem(case: Case, name: str, key: Key, value: Value, node: Node) -> Findi
 
 def _count_problem(name: str, value: Literal, node: Node, origin: str) -> Finding | None:
     total, count = len(node.children), value.value
-    if count == "all" or count == "any" or (type(count) is int and 1 <= count <= total):
+    if count in ("all", "any", "lead") or (type(count) is int and 1 <= count <= total):
         return None
-    message = f"{name} must be all, any or a number from 1 to {total}, not {describe(count)}{origin}"
+    message = f"{name} must be all, any, lead or a number from 1 to {total}, not {describe(count)}{origin}"
     return error(value.mark, "out-of-range" if type(count) is int else "wrong-type", message)
 
 

@@ -39,16 +39,25 @@ def shadowed_catches(case: Case) -> Iterator[Finding]:
 
 
 def endless_loops(case: Case) -> Iterator[Finding]:
-    """Find every loop that cannot end but by a failure."""
+    """Find every loop that cannot end but by a failure, nor is stopped when another branch has ended."""
     if case.flow is None:
         return
+    stopped = {node.path for node in _beside_a_lead(case)}
     for node in case.flow.nodes.values():
-        if not isinstance(node, nodes.WhileNode):
+        if not isinstance(node, nodes.WhileNode) or node.path in stopped:
             continue
         condition = case.flow.flows.get(node.condition.path)
         if condition is not None and not condition.failures:
             message = f"this loop never ends: its condition, {name_of(node.condition)}, cannot fail"
             yield error(node.mark, "endless", message, "Use repeat with times or until.")
+
+
+def _beside_a_lead(case: Case) -> Iterator[Node]:
+    """Yield every node that is halted, whatever it does, once the first branch of a parallel has ended."""
+    for node in case.nodes():
+        if isinstance(node, nodes.ParallelNode) and getattr(node.wait_for, "value", None) == "lead":
+            for branch in node.branches[1:]:
+                yield from branch.walk()
 
 
 def unchanging_retries(case: Case) -> Iterator[Finding]:

@@ -123,8 +123,10 @@ def _try(case: Case, node: Any) -> float:
 
 
 def _parallel(case: Case, node: Any) -> float:
-    times = sorted(least_time(case, branch) for branch in node.branches)
     wait_for = node.wait_for.value if isinstance(node.wait_for, Literal) else "any"
+    if wait_for == "lead":
+        return least_time(case, node.branches[0])
+    times = sorted(least_time(case, branch) for branch in node.branches)
     count = len(times) if wait_for == "all" else 1 if wait_for == "any" else wait_for
     return times[count - 1] if isinstance(count, int) and 0 < count <= len(times) else 0.0
 

@@ -15,9 +15,12 @@ def at_once(flows: Sequence[Flow], state: State, wait_for: Any, halt: bool) -> F
     Args:
         flows: How each branch may end.
         state: What is true where they begin.
-        wait_for: How many must succeed, `all` or `any`; whatever else it is counts as all.
+        wait_for: How many must succeed, `all` or `any`, or `lead` where the first decides alone; whatever
+            else it is counts as all.
         halt: Whether a failure halts the others.
     """
+    if wait_for == "lead":
+        return _led(flows, state)
     needed = _needed(wait_for, len(flows))
     ends = [grips_at_end(flow, state, halt or needed < len(flows)) for flow in flows]
     failures = {}
@@ -29,6 +32,23 @@ def at_once(flows: Sequence[Flow], state: State, wait_for: Any, halt: bool) -> F
     halted = joined(flow.halted for flow in flows)
     everything = together(state.grips, [grips_at_end(flow, state, halts=True) for flow in flows])
     return Flow(_success(flows, state, needed), failures, halted and halted.gripping(everything))
+
+
+def _led(flows: Sequence[Flow], state: State) -> Flow:
+    """Return how branches may end that are halted when the first one ends."""
+    lead, *others = flows
+    beside = [grips_at_end(flow, state, halts=True) for flow in others]
+
+    def after(end: State) -> State:
+        return end.gripping(together(state.grips, [end.grips, *beside]))
+
+    halted = joined(flow.halted for flow in flows)
+    everything = together(state.grips, [grips_at_end(flow, state, halts=True) for flow in flows])
+    return Flow(
+        lead.success and after(lead.success),
+        {failure: after(end) for failure, end in lead.failures.items()},
+        halted and halted.gripping(everything),
+    )
 
 
 def _success(flows: Sequence[Flow], state: State, needed: int) -> State | None:

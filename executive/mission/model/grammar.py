@@ -86,7 +86,11 @@ CONTROL: Mapping[str, Form] = {
     "parallel": Form(
         "All at the same time. Running ones may finish before it fails.",
         {
-            "wait_for": Key("count", "How many must succeed: `all`, `any` or a number.", minimum=1),
+            "wait_for": Key(
+                "count",
+                "How many must succeed: `all`, `any` or a number; `lead`: the first branch alone.",
+                minimum=1,
+            ),
             "halt": Key("boolean", "After a failure halt the others at once instead of letting them finish."),
             "do": Key("nodes", "What is done at the same time.", required=True),
         },

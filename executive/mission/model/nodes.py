@@ -96,7 +96,7 @@ class ParallelNode(Node):
     """All at the same time.
 
     Attributes:
-        wait_for: How many must succeed, or `all` or `any`.
+        wait_for: How many must succeed, or `all` or `any`, or `lead`.
         halt: Whether a failure halts the others at once.
     """
 

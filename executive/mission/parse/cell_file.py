@@ -157,20 +157,24 @@ def _models(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield the keys and the path, as written, of every model file that a cell names."""
     yield ("arm", "urdf"), config.arm.urdf
     for label, kind in config.objects.items():
-        yield ("objects", label, "urdf"), kind.urdf
+        if kind.urdf:
+            yield ("objects", label, "urdf"), kind.urdf
+        if kind.mesh:
+            yield ("objects", label, "mesh"), kind.mesh
 
 
 def _models_found(file: CellFile, config: CellConfig, folders: Mapped[Source, Path]) -> CellConfig:
     """Return the cell with the models beside the file that names them by full path; others stay as named."""
     assert file.root is not None
     found = {}
-    for keys, urdf in _models(config):
+    for keys, model in _models(config):
         folder = folders.get(mark_of(file.root, keys).source, folders[file.source])
-        path = folder / urdf
-        found[keys] = str(path.resolve()) if os.path.isfile(path) else urdf
+        path = folder / model
+        found[keys] = str(path.resolve()) if os.path.isfile(path) else model
     objects = {
-        label: kind.model_copy(update={"urdf": found["objects", label, "urdf"]})
+        label: kind.model_copy(update={key: found["objects", label, key]})
         for label, kind in config.objects.items()
+        for key in ("mesh" if kind.mesh else "urdf",)
     }
     arm = config.arm.model_copy(update={"urdf": found["arm", "urdf"]})
     return config.model_copy(update={"arm": arm, "objects": objects})
@@ -178,8 +182,8 @@ def _models_found(file: CellFile, config: CellConfig, folders: Mapped[Source, Pa
 
 def _assets(file: CellFile, config: CellConfig) -> Iterator[Finding]:
     """Yield every model file that cannot lie below the cell's own folder or pybullet_data."""
-    for keys, urdf in _models(config):
-        written = PurePosixPath(urdf)
+    for keys, model in _models(config):
+        written = PurePosixPath(model)
         if written.is_absolute() or ".." in written.parts:
-            message = f'"{urdf}" must be a relative path without ".."'
+            message = f'"{model}" must be a relative path without ".."'
             yield file.finding(keys, "outside", message)

@@ -129,7 +129,7 @@ def _value(key: Key) -> Json:
     if key.kind in ("integer", "number", "boolean"):
         return or_reference({"type": key.kind, **bounds})
     if key.kind == "count":
-        return or_reference({"enum": ["all", "any"]}, {"type": "integer", **bounds})
+        return or_reference({"enum": ["all", "any", "lead"]}, {"type": "integer", **bounds})
     if key.kind == "catches":
         return {**_mapping(grammar.CATCH), "type": ["array", "object"], "items": _ref("catch")}
     if key.kind == "backoff":

@@ -1,0 +1,67 @@
+# ruff: noqa: E501 - findings are quoted as they are printed
+"""Objects of a cell file: a URDF or a mesh, looked for beside the file that names it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from executive.mission.findings import MissionError
+from executive.mission.parse.cell_file import load_cell
+
+WASHER = "objects: {washer: {mesh: parts/washer.obj, height: 0.006, radius: 0.025, ring: 0.017}}\n"
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_with_a_cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, small_cell: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("cells/parts").mkdir(parents=True)
+    Path("cells/parts/washer.obj").write_text("v 0 0 0\n")
+    Path("cells/base.yaml").write_text(small_cell)
+
+
+def load(text: str, folder: str = "cells", base: str = "base.yaml"):
+    path = Path(folder, "c.yaml")
+    path.write_text(f"base: {base}\n{text}")
+    return load_cell(path)
+
+
+def complaint(text: str) -> str:
+    with pytest.raises(MissionError) as caught:
+        load(text)
+    return str(caught.value)
+
+
+def test_a_mesh_is_found_beside_the_cell_file_wherever_the_command_is_given() -> None:
+    washer = load(WASHER).objects["washer"]
+    assert washer.mesh == str(Path("cells/parts/washer.obj").resolve())
+    assert (washer.urdf, washer.mass, washer.ring) == ("", 0.05, 0.017)
+
+
+def test_a_mesh_is_found_beside_the_base_that_names_it() -> None:
+    load(WASHER)
+    Path("mine/cells").mkdir(parents=True)
+    Path("mine/cells/base.yaml").write_text(Path("cells/base.yaml").read_text())
+    Path("mine/cells/named.yaml").write_text(f"base: base.yaml\n{WASHER}")
+    Path("mine/cells/parts").mkdir()
+    Path("mine/cells/parts/washer.obj").write_text("v 0 0 0\n")
+    washer = load("cell: c\n", "mine", "cells/named.yaml").objects["washer"]
+    assert washer.mesh == str(Path("mine/cells/parts/washer.obj").resolve())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("mesh: parts/washer.obj, ", "", "objects.washer needs either a urdf or a mesh\n"),
+        ("mesh:", "urdf: cube_small.urdf, mesh:", "objects.washer needs either a urdf or a mesh, not both\n"),
+        ("mesh: parts/washer.obj", "urdf: cube_small.urdf, mass: 0.1", "objects.washer has a mass, which only a mesh can be given; a URDF says its own\n"),
+        ("ring: 0.017", "ring: 0.03", "objects.washer is to be touched 0.03 m from its middle, but its radius is 0.025 m; ring must be smaller\n"),
+        ("ring: 0.017", "ring: -0.01", "objects.washer.ring must be at least 0, not -0.01\n"),
+        ("ring: 0.017", "mass: 0", "objects.washer.mass must be more than 0, not 0\n"),
+        ("parts/washer.obj", "../washer.obj", 'error[outside]: "../washer.obj" must be a relative path without ".."\n'),
+        ("parts/washer.obj", "/washer.obj", 'error[outside]: "/washer.obj" must be a relative path without ".."\n'),
+    ],
+)  # fmt: skip
+def test_findings_say_what_an_object_needs(old: str, new: str, expected: str) -> None:
+    assert expected in complaint(WASHER.replace(old, new, 1))
