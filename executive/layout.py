@@ -20,11 +20,17 @@ def as_bin(name: str, config: BinConfig) -> Bin:
 
 def as_class(label: str, config: ObjectConfig) -> ObjectClass:
     """Return what skills know of a class of objects of a cell file."""
-    return ObjectClass(label, config.height, config.radius)
+    return ObjectClass(label, config.height, config.radius, config.ring)
 
 
 def travel_height(config: CellConfig) -> float:
-    """Return the tool height [m] at which the highest load clears the highest wall and object."""
+    """Return the tool height [m] at which the highest load clears the highest wall and the highest pile."""
     tallest = max(kind.height for kind in config.objects.values())
     wall = max(bin.position[2] + bin.size[2] for bin in config.bins.values())
-    return max(wall, tallest) + tallest + config.motion.clearance
+    return max(wall, pile_height(config)) + tallest + config.motion.clearance
+
+
+def pile_height(config: CellConfig) -> float:
+    """Return how high [m] things on the table may be: the tallest object, or two where some are stacked."""
+    tallest = max(kind.height for kind in config.objects.values())
+    return 2 * tallest if config.table.stacked else tallest

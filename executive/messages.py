@@ -142,11 +142,14 @@ class Detections:
     view: str
     area: Box
 
-    def shows(self, points: Array) -> NDArray[np.bool_]:
-        """Tell `(N,)` which points `(N, 3)` [m] of the world lie in the searched part of the image."""
+    def shows(self, points: Array, inset: float = 0.0) -> NDArray[np.bool_]:
+        """Tell `(N,)` which points `(N, 3)` [m] of the world lie in the searched part of the image.
+
+        `inset` is how far from its border they must lie [pixel].
+        """
         pixels, ahead = self._pixels(points)
         left, top, right, bottom = self.area
-        inside = (pixels >= (left, top)) & (pixels < (right, bottom))
+        inside = (pixels >= (left + inset, top + inset)) & (pixels < (right - inset, bottom - inset))
         return np.asarray(ahead & inside.all(axis=1))
 
     def searched(self, points: Array) -> NDArray[np.bool_]:

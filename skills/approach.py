@@ -21,8 +21,9 @@ class Approach(Skill):
     """Touch the target with the cup from above.
 
     Travels above it, comes down fast and feels its way through the last part, since the surface may be
-    higher or lower than a camera can tell. Succeeds on contact near the expected height. Every attempt
-    after a failed one comes down a little beside the last, on a spiral.
+    higher or lower than a camera can tell, but not below the target's middle: what is felt there is the
+    table. Succeeds on contact near the expected height. Every attempt after a failed one comes down a
+    little beside the last: on a spiral, or further round the ring of a part with a hole.
     """
 
     target: In[Target] = port(doc="where to go")
@@ -44,8 +45,8 @@ class Approach(Skill):
         yield from settle(cell.arm)
         kind = cell.classes[self.target.label]
         surface = float(self.target.position[2]) + kind.height / 2
-        place = self.target.position[:2] + self._aside(cell)
-        lowest = max(surface - self.overtravel, kind.height / 4)
+        place = self.target.position[:2] + self._aside(cell, kind.ring)
+        lowest = max(surface - self.overtravel, kind.height / 2)
         above = Via(np.array([*place, surface + cell.descent]))
         down = Via(np.array([*place, lowest]), speed=cell.descent_speed)
         yield from follow(cell.arm, planned(self, lambda: cell.arm.plan([*travel(cell, place), above])))
@@ -61,8 +62,13 @@ class Approach(Skill):
             )
         cell.ledger.touched(self.target.item)
 
-    def _aside(self, cell: Cell) -> Array:
-        """Return the sideways step `(2,)` [m] of this attempt: none at first, then Vogel's spiral."""
+    def _aside(self, cell: Cell, ring: float) -> Array:
+        """Return the sideways step `(2,)` [m] of this attempt: a point of the ring, or of Vogel's spiral.
+
+        The turn of a part is not known, and any point of its ring is as good as another. The spiral begins
+        in the middle.
+        """
         attempt = cell.ledger.attempts(self.target.item)
         angle = attempt * GOLDEN_ANGLE
-        return self.offset * math.sqrt(attempt) * np.array([math.cos(angle), math.sin(angle)])
+        distance = ring or self.offset * math.sqrt(attempt)
+        return distance * np.array([math.cos(angle), math.sin(angle)])

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from executive.cell import Cell, LeastTimes, Steps
 from executive.errors import Unavailable
-from executive.messages import Detections
+from executive.messages import Detection, Detections
 from executive.skill import Out, Skill, param, port
+
+IN_VIEW = 0.7
+"""Share of a box that the arm must leave in view for the box to be believed."""
 
 
 class Detect(Skill):
     """Know which objects a fresh image shows, beside the running tick loop.
 
     Succeeds with everything at or above the detector's threshold; an empty list is a result, not a failure.
+    What the arm hides is not believed: neither that nothing is there, nor what is seen of it.
     """
 
     detections: Out[Detections] = port(doc="what was found, with the frame it was found in")
@@ -27,6 +32,11 @@ class Detect(Skill):
         choices=("fail", "pass"),
         doc="boxes only below the threshold: `fail` as unsure, or `pass` as nothing found",
     )
+    hidden: str = param(
+        "fail",
+        choices=("fail", "pass"),
+        doc="where the arm hides part of the workspace: `fail` as hidden, or `pass` with a look at the rest",
+    )
     reasons: ClassVar = ("unsure", "hidden", "unavailable")
     uses: ClassVar = ("camera",)
     senses: ClassVar = True
@@ -38,7 +48,7 @@ class Detect(Skill):
 
     def run(self, cell: Cell) -> Steps:
         """Take a frame, ask the detector, wait for its answer."""
-        if not cell.camera.sees_table():
+        if self.hidden == "fail" and not cell.camera.sees_table():
             raise self.failed("hidden", f"the arm hides part of the workspace from camera {cell.camera.name}")
         name = self.detector or next(iter(cell.detectors))
         detector = cell.detectors[name]
@@ -50,14 +60,34 @@ class Detect(Skill):
             answer = request.result()
         except Unavailable as error:
             raise self.failed("unavailable", f"detector {name}: {error}") from error
+        if wrong := next((one for one in answer.found if not _can_be(one)), None):
+            raise self.failed(
+                "unavailable",
+                f"detector {answer.detector} gave a box that cannot be: {wrong.label} {wrong.confidence:g} "
+                f"at {wrong.box}",
+            )
         # A model may know more classes than the cell: what the cell does not handle is no object of its.
-        answer = [detection for detection in answer if detection.label in cell.classes]
-        found = tuple(detection for detection in answer if detection.confidence >= detector.threshold)
-        if not found and answer and self.doubtful == "fail":
-            best = answer[0]
+        known = [
+            detection
+            for detection in answer.found
+            if detection.label in cell.classes and frame.shown(detection.box) >= IN_VIEW
+        ]
+        threshold = answer.reliability.threshold
+        found = tuple(detection for detection in known if detection.confidence >= threshold)
+        if not found and known and self.doubtful == "fail":
+            best = known[0]
             raise self.failed(
                 "unsure",
-                f"detector {name} saw nothing it is sure of: at best a {best.label} "
-                f"at {best.confidence:.2f} < {detector.threshold:.2f}",
+                f"detector {answer.detector} saw nothing it is sure of: at best a {best.label} "
+                f"at {best.confidence:.2f} < {threshold:.2f}",
             )
-        self.detections = Detections(frame, found, self.view, cell.camera.area(self.view))
+        self.detections = Detections(
+            frame, found, answer.detector, answer.reliability, self.view, cell.camera.area(self.view)
+        )
+
+
+def _can_be(detection: Detection) -> bool:
+    """Tell whether a detection has a box and a confidence that make sense."""
+    left, top, right, bottom = detection.box
+    finite = all(math.isfinite(edge) for edge in detection.box)
+    return finite and left <= right and top <= bottom and 0.0 <= detection.confidence <= 1.0

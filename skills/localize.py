@@ -18,7 +18,9 @@ class Localize(Skill):
     """
 
     detections: In[Detections] = port(doc="what was found, with its frame")
-    targets: Out[list[Target]] = port(doc="one target per detection outside the bins")
+    targets: Out[list[Target]] = port(
+        doc="one target per open item whose place is known, from this look or an earlier one"
+    )
     reasons: ClassVar = ("stale", "no_depth")
 
     def run(self, cell: Cell) -> Steps:

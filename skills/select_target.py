@@ -18,7 +18,7 @@ class SelectTarget(Skill):
     robot did since they were seen, or seen by too few looks for as good as the detector is.
     """
 
-    targets: In[list[Target]] = port(doc="what the last look localized")
+    targets: In[list[Target]] = port(doc="where things are, as far as is known")
     same: In[Item | None] = port(default=None, refers="item", doc="only this item")
     wanted: In[str | None] = port(default=None, refers="class", doc="only this class")
     target: Out[Target] = port(doc="the chosen target")
@@ -42,7 +42,7 @@ class SelectTarget(Skill):
             best = min(candidates, key=lambda t: (-t.confidence, t.item))
         self.target, self.item = best, best.item
         # The number of a bin's next slot is the number of objects let go in it.
-        self.bin = min(cell.routes[best.label], key=cell.ledger.objects_in)
+        self.bin = min(cell.routes[cell.ledger.label(best.item)], key=cell.ledger.objects_in)
         cell.decided(best, self.bin)
 
     def _eligible(self, cell: Cell, target: Target) -> bool:

@@ -7,7 +7,13 @@ end in `_deg` are in degrees, where the field says so.
 from __future__ import annotations
 
 from executive.cell_config.arm import ArmConfig, LimitsConfig, MotionConfig, ToolConfig
-from executive.cell_config.cameras import CameraConfig, NoiseConfig
+from executive.cell_config.cameras import (
+    CalibrationConfig,
+    CameraConfig,
+    DepthConfig,
+    NoiseConfig,
+    TransformConfig,
+)
 from executive.cell_config.cell import CellConfig, LedgerConfig
 from executive.cell_config.detectors import DetectorConfig
 from executive.cell_config.objects import BinConfig, ObjectConfig, TableConfig
@@ -16,9 +22,11 @@ from executive.cell_config.section import Colour, Joints, Range, Section, Vector
 __all__ = [
     "ArmConfig",
     "BinConfig",
+    "CalibrationConfig",
     "CameraConfig",
     "CellConfig",
     "Colour",
+    "DepthConfig",
     "DetectorConfig",
     "Joints",
     "LedgerConfig",
@@ -30,5 +38,6 @@ __all__ = [
     "Section",
     "TableConfig",
     "ToolConfig",
+    "TransformConfig",
     "Vector",
 ]

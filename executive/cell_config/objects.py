@@ -4,26 +4,46 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from executive.cell_config.section import Colour, Count, Length, Natural, Range, Section, Vector, rising
 
 
 class ObjectConfig(Section):
-    """A class of objects and the model that stands for it in simulation."""
+    """A class of objects and the model that stands for it in simulation: a URDF or a mesh."""
 
-    urdf: str
-    """Path of the URDF, looked for beside the cell file and in pybullet_data."""
+    urdf: str = ""
+    """Path of a URDF, looked for beside the cell file and in pybullet_data."""
+    mesh: str = ""
+    """Path of a Wavefront mesh (`.obj`, z up or `upright_deg`), looked for in the same places. Each of its
+    groups (`o`) collides as its convex hull: a part with a hole is made of convex groups around it."""
+    mass: float = Field(0.05, gt=0)
+    """Mass of a mesh [kg]; a URDF says its own."""
     scale: float = Field(1.0, gt=0)
-    """Factor on the URDF's size."""
+    """Factor on the model's size; a mesh at scale 1 is in metres."""
     upright_deg: Vector = (0.0, 0.0, 0.0)
     """Roll, pitch, yaw [degree] that set the model upright, where its own z axis does not point up."""
     height: float = Field(gt=0)
     """Height of the object as it lies [m]."""
     radius: float = Field(gt=0)
     """Radius of the circle around its outline seen from above [m]."""
+    ring: float = Field(0.0, ge=0)
+    """Distance from its middle at which to touch it [m]; for parts with a hole."""
     colours: tuple[Colour, ...] = ((1.0, 1.0, 1.0),)
     """Colours (r, g, b in 0..1) that spawning picks from."""
+
+    @model_validator(mode="after")
+    def _has_one_model(self) -> ObjectConfig:
+        if bool(self.urdf) == bool(self.mesh):
+            raise ValueError("needs either a urdf or a mesh" + (", not both" if self.urdf else ""))
+        if self.urdf and "mass" in self.model_fields_set:
+            raise ValueError("has a mass, which only a mesh can be given; a URDF says its own")
+        if self.ring >= self.radius:
+            raise ValueError(
+                f"is to be touched {self.ring:g} m from its middle, but its radius is {self.radius:g} m; "
+                "ring must be smaller"
+            )
+        return self
 
 
 class BinConfig(Section):
@@ -50,3 +70,5 @@ class TableConfig(Section):
     """Fewest and most objects that spawning puts there."""
     gap: float = Field(0.012, ge=0)
     """Smallest distance between the outlines of two objects when spawned [m]."""
+    stacked: float = Field(0.0, ge=0, le=1)
+    """Share of the objects that spawning puts on top of another one, as far as they stay up there."""

@@ -17,8 +17,7 @@ SURE = 3.5
 def reach(record: Record, spread: float, gate: float) -> float:
     """Return how far from an item [m] a detection of it may be localized.
 
-    At least `gate`, more where the measurements scatter more, and never twice that: two objects cannot be
-    closer.
+    At least `gate`, more where the measurements scatter more, and at most twice that.
 
     Args:
         record: The item.

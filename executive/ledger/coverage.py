@@ -17,6 +17,8 @@ ASTRAY = 0.02
 """Chance that something lies beside the workspace before the robot has dropped or pushed anything."""
 LEAST = 1e-4
 """Chance that remains however often a place is searched: looks are not wholly independent of each other."""
+BORDER = 12.0
+"""Width of the image's border in which a point does not count as shown [pixel]."""
 NEAR = 0.03
 """How far beside the workspace the middle of what lies at its edge may be [m]."""
 HEIGHT = 0.025
@@ -53,7 +55,8 @@ class Coverage:
         self._overlooked[current & searched] *= detections.reliability.misses
         self._overlooked = self._overlooked.clip(LEAST)
         if detections.view == "full":
-            self._beside = self._beside | searched
+            # What only just shows may not show again: nothing would ever be said about it.
+            self._beside = self._beside | (searched & detections.shows(self._points, BORDER))
 
     def disturb(self, centre: Array, radius: float, epoch: int) -> None:
         """Take account of change `epoch`, which may have put an object within `radius` [m] of `centre`."""

@@ -36,14 +36,14 @@ class Freshness:
 
     def holds(self, position: Array, epoch: int) -> bool:
         """Tell whether something seen at `position` when the count was `epoch` is still there for sure."""
-        return self.disturbed(position) <= epoch
+        return self.disturbed(position, epoch) is None
 
-    def disturbed(self, position: Array) -> int:
-        """Return the count at the last change that may have moved what is at `position` `(3,)` [m], or 0."""
-        for change in reversed(self._changes):
+    def disturbed(self, position: Array, epoch: int) -> int | None:
+        """Return the count at the first change after `epoch` that may have moved what was there, or None."""
+        for change in self._changes[epoch:]:
             if float(np.linalg.norm(change.centre[:2] - position[:2])) <= change.radius:
                 return change.epoch
-        return 0
+        return None
 
     def anywhere_holds(self, epoch: int) -> bool:
         """Tell whether there is any place that nothing has put in doubt since the count was `epoch`."""

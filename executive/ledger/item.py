@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -12,6 +12,10 @@ import numpy as np
 from executive.geometry import Array
 from executive.messages import Reliability
 
+LIKELY = 0.9
+"""Probability of its existence from which an item is worth a grasp, and may be one missed elsewhere."""
+NOTHING = "more looks missed it than saw it"
+"""Why an item is a phantom."""
 NEARBY = 0.02
 """Share of the searched area in which an invented box would be taken for a given item."""
 INSIDE = 0.04
@@ -71,6 +75,8 @@ class Record:
         bin: Where it was placed, or "".
         why: Why it was rejected or is lost, or "".
         votes: Log likelihood of each class, up to a constant.
+        tally: In how many looks it was taken for each class.
+        expected: Share of them in which a detector as it says of itself is wrong.
         fallen: For an item that was dropped, log odds that it fell into each bin.
     """
 
@@ -87,12 +93,14 @@ class Record:
     stamp: float = 0.0
     state: State = State.SEEN
     looks: int = 0
+    expected: float = 0.0
     moved: bool = False
     exists: bool = False
     attempts: int = 0
     bin: str = ""
     why: str = ""
     votes: dict[str, float] = field(default_factory=lambda: defaultdict(float))
+    tally: Counter[str] = field(default_factory=Counter)
     fallen: dict[str, float] = field(default_factory=lambda: defaultdict(float))
 
     def __post_init__(self) -> None:
@@ -115,6 +123,16 @@ class Record:
         return odds / (1.0 + odds)
 
     @property
+    def consistency(self) -> float:
+        """Chance, 0 to 1, that looks disagree as much about its class as they do, by the errors stated.
+
+        The upper tail of the binomial distribution: small where the detector errs more than it says.
+        """
+        looks, p = sum(self.tally.values()), self.expected
+        wrong = looks - self.tally[self.label]
+        return 1.0 - sum(math.comb(looks, k) * p**k * (1.0 - p) ** (looks - k) for k in range(wrong))
+
+    @property
     def probability(self) -> float:
         """Chance that it is an object at all, 0 to 1."""
         return 1.0 if self.exists else 1.0 / (1.0 + math.exp(-max(self.existence, -CERTAIN)))
@@ -125,6 +143,8 @@ class Record:
         That it was seen proves that it exists only if it is `alone`: nothing else may have been seen there.
         """
         self.votes[label] += math.log((1.0 - by.confused) / by.confused)
+        self.tally[label] += 1
+        self.expected = max(self.expected, by.confused)
         if not alone:
             self.existence = min(self.existence, DOUBTFUL) if not self.looks else self.existence
         elif self.looks:
@@ -163,6 +183,7 @@ class Record:
         """Take over what is known of `found`, a new item that turned out to be this one."""
         for label, vote in found.votes.items():
             self.votes[label] += vote
+        self.tally += found.tally
         self.position, self.spread, self.epoch = found.position, found.spread, found.epoch
         self.frame, self.stamp, self.confidence = found.frame, found.stamp, found.confidence
         self.overlooked = 1.0

@@ -18,12 +18,14 @@ from executive.ledger.accounts import balance, fate_of, row_of, target_of
 from executive.ledger.binding import SURE
 from executive.ledger.coverage import Coverage
 from executive.ledger.freshness import Freshness
-from executive.ledger.item import OPEN, Record, State
+from executive.ledger.item import LIKELY, OPEN, Record, State
 from executive.ledger.looks import Looks, spread_of
 from executive.messages import Bin, Detections, Frame, Item, Reliability, Target
 
-LIKELY = 0.9
-"""Probability of its existence from which an item is worth a grasp."""
+CREDIBLE, CONTRADICTED = 0.01, 0.001
+"""Chance of as much disagreement about its class, above which an item is sorted, and under which given up."""
+ENOUGH = 40
+"""Looks after which an item whose class they contradict each other about is given up."""
 SHARPER = 2 / 3
 """How much smaller the standard error of its position must be for another attempt at an item."""
 PRESENT = 0.1
@@ -104,6 +106,7 @@ class ItemLedger:
             record.probability >= LIKELY
             and record.overlooked >= PRESENT
             and record.misjudged <= self._config.misjudged
+            and record.consistency >= CREDIBLE
             and record.spread <= self._config.aim * (SHARPER if record.attempts else 1.0)
         )
 
@@ -143,6 +146,7 @@ class ItemLedger:
         """Record that the tool lost the item on the way; the whole table is in doubt now."""
         record = self._change(item, State.DROPPED)
         record.attempts += 1
+        record.epoch = self.epoch
         self._disturb(record.position, math.inf)
 
     def placed(self, item: Item, bin: str) -> None:
@@ -153,6 +157,7 @@ class ItemLedger:
     def returned(self, item: Item) -> None:
         """Record that the item was put back on the table, where the next look will find it."""
         record = self._change(item, State.DROPPED)
+        record.epoch = self.epoch
         self._disturb(record.position, math.inf)
 
     def rejected(self, item: Item, why: str) -> None:
@@ -206,12 +211,15 @@ class ItemLedger:
         found = tuple(detections.found[number] for number in outside)
         places = [positions[number] for number in outside]
         for record in self._looks.take(self._records, replace(detections, found=found), places):
+            if record.state is State.SEEN and record.looks >= ENOUGH and record.consistency < CONTRADICTED:
+                told = ", ".join(f"{count} {label}" for label, count in record.tally.most_common())
+                record.state, record.why = State.REJECTED, f"its class is in doubt: {told}"
             self._report(record)
         if detections.view == "full":
             shown = Counter(
                 (detection.label, bin)
-                for detection, bin in zip(detections.found, inside, strict=True)
-                if bin is not None
+                for detection, bin, position in zip(detections.found, inside, positions, strict=True)
+                if bin is not None and self._bins[bin].contains(position)
             )
             self._find_fallen(shown, detections.reliability)
 

@@ -13,13 +13,11 @@ from executive.geometry import Array
 from executive.ledger.binding import bind, reach
 from executive.ledger.coverage import Coverage
 from executive.ledger.freshness import Freshness
-from executive.ledger.item import ON_TABLE, Record, State
+from executive.ledger.item import LIKELY, NOTHING, ON_TABLE, Record, State
 from executive.messages import Detections, Frame, Item
 
 EXPECTED = 3.0
 """Objects on a table before anybody has looked: the order of magnitude is what counts."""
-PLAUSIBLE = 0.99
-"""Probability from which something new may be an item that is missed elsewhere."""
 FAR_OFF = 1.5
 """How many times as far as it may be for certain an item may still be off, now and then."""
 GONE = 0.05
@@ -80,7 +78,8 @@ class Looks:
         missed = self._missed(known, seen, detections)
         self._coverage.look(detections)
         self._recognize(records, seen)
-        return [*seen, *missed, *self._one_of_two(records, seen)]
+        changed = [*seen, *missed, *self._one_of_two(records, seen)]
+        return list({id(record): record for record in changed}.values())
 
     def _explained(self, place: Array, spread: float, absent: Sequence[Record]) -> bool:
         """Tell whether what was seen at a place may as well be an item that was not seen nearby."""
@@ -113,14 +112,14 @@ class Looks:
             if there:
                 record.miss(look.reliability)
             if there and not record.exists and record.probability <= self._config.overlooked:
-                record.state, record.why = State.PHANTOM, "seen once, and then no more"
+                record.state, record.why = State.PHANTOM, NOTHING
                 phantoms.append(record)
         return phantoms
 
     def _recognize(self, records: dict[Item, Record], seen: list[Record]) -> None:
         """Recognize items that were dropped or pushed away in new ones of their class, the nearest first."""
         for place, new in enumerate(seen):
-            if new.state is not State.SEEN or new.attempts or new.probability < PLAUSIBLE:
+            if new.state is not State.SEEN or new.attempts or new.probability < LIKELY:
                 continue
             missing = [old for old in records.values() if self._may_be(old, new)]
             if missing:
@@ -129,7 +128,6 @@ class Looks:
                 seen[place] = old
                 if new.looks == 1:
                     del records[new.item]
-                    self._counts[new.label] -= 1
                 else:
                     new.state, new.why = State.PHANTOM, f"it is {old.item}"
 
@@ -151,11 +149,13 @@ class Looks:
 
     def _may_be(self, old: Record, new: Record) -> bool:
         """Tell whether a new item may be one that is not where it was before the robot changed the table."""
-        after = new.entered >= self._freshness.disturbed(old.position) > old.epoch
-        if old is new or old.label != new.label or not after:
+        if old is new or old.label != new.label:
             return False
-        pushed = old.state in (State.SEEN, State.REJECTED) and old.probability >= 0.5
-        return old.state is State.DROPPED or (pushed and old.overlooked <= GONE)
+        if old.state is State.DROPPED:
+            return new.entered > old.epoch
+        pushed = self._freshness.disturbed(old.position, old.epoch)
+        missing = old.state in (State.SEEN, State.REJECTED) and old.overlooked <= GONE
+        return missing and old.probability >= 0.5 and pushed is not None and new.entered >= pushed
 
 
 def spread_of(frame: Frame, position: Array, jitter: float) -> float:

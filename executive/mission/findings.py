@@ -12,7 +12,10 @@ from executive.mission.source import Mark
 
 _WINDOW = 140
 _MOST_LISTED = 24
-_SECRET = re.compile(r"(?i)(\b\w*(?:api_?key|token|secret|password|authorization)\w*[\"']?\s*:\s*)[^\s,}]+")
+_SECRET = re.compile(
+    r"(?i)(\b\w*(?:api_?key|token|secret|password|authorization)\w*[\"']?\s*[:=]\s*|://(?=\S+@)).*"
+)
+"""A key, or a user's name, and the rest of its line."""
 _OF_A_VALUE = frozenset({
     "wrong-type", "wrong-value", "out-of-range", "port-type", "unwritten",
     "unknown-bin", "unknown-class", "unknown-detector", "unknown-pose", "unseen-class",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -25,18 +26,15 @@ from executive.sim.clock import SimClock
 from executive.sim.least_times import SimLeastTimes
 from executive.sim.models import missing_models
 from executive.sim.poses import unfit_poses
+from executive.sim.ray import cast
 from executive.sim.reach import out_of_reach
 from executive.sim.spawn import spawn
 from executive.sim.tool import SuctionTool
 from executive.sim.view import ArmShadow
 from executive.sim.world import STEP, World
-from executive.vision.detectors.registry import (
-    ClosableDetector,
-    build_detectors,
-    known_labels,
-    wrong_detectors,
-)
-from executive.vision.localize import PlaneLocalizer
+from executive.vision.detectors.registry import build_detectors, known_labels, wrong_detectors
+from executive.vision.detectors.setting import ClosableDetector
+from executive.vision.localization.build import build_localizer
 from executive.workcell import Accounts, CellOptions, KeyPath
 
 
@@ -67,9 +65,11 @@ class SimCell:
         camera: Callable[..., SimCamera] = SimCamera,
         detectors: Callable[..., Mapping[str, ClosableDetector]] = build_detectors,
     ) -> None:
-        for _, sentence in _unknown_localization(config):
+        for _, sentence in _lacking_depth(config):
             raise InputError(f"cell {config.cell}: {sentence}")
-        spawn_seed, camera_seed = (int(s.generate_state(1)[0]) for s in np.random.SeedSequence(seed).spawn(2))
+        spawn_seed, camera_seed, detector_seed = (
+            int(s.generate_state(1)[0]) for s in np.random.SeedSequence(seed).spawn(3)
+        )
         self._config = config
         self._routes = dict(routes)
         self._world = World(config, gui=options.gui)
@@ -84,7 +84,7 @@ class SimCell:
         planner = Planner(kinematics, limits, self._clearance.check)
         self._arm = SimArm(self._world, planner, limits, config.arm, travel_height(config))
         self._tool = SuctionTool(self._world, config.tool, emit)
-        self._ledger = ItemLedger(config.ledger, self._bins, routes, emit)
+        self._ledger = ItemLedger(config.ledger, config.table, self._bins, routes, emit)
         name, camera_config = next(iter(config.cameras.items()))
         self._camera = camera(
             self._world,
@@ -92,15 +92,19 @@ class SimCell:
             camera_config,
             clock,
             camera_seed,
-            shadow=ArmShadow(self._arm, kinematics, config),
+            shadow=ArmShadow(self._arm, kinematics, config, lambda: self._tool.holding),
             epoch=lambda: self._ledger.epoch,
         )
-        self._detectors = detectors(config.detectors, camera=camera_config, clock=clock, base=options.base)
         classes = {label: as_class(label, kind) for label, kind in config.objects.items()}
 
         def decided(target: Target, bin: str) -> None:
             emit("decision", item=target.item, label=target.label, frame=target.frame, bin=bin)
 
+        localizer = build_localizer(config.localization, classes, partial(cast, self._world))
+        # Last of all: some of them start processes, which nobody would end if something after them failed.
+        self._detectors = detectors(
+            config.detectors, camera=camera_config, clock=clock, base=options.base, seed=detector_seed
+        )
         self._cell = Cell(
             clock=clock,
             arm=self._arm,
@@ -112,7 +116,7 @@ class SimCell:
             bins=self._bins,
             classes=classes,
             routes=self._routes,
-            localizer=PlaneLocalizer(classes),
+            localizer=localizer,
             safe_place=np.array(config.safe_place),
             travel_height=travel_height(config),
             descent=config.motion.descent,
@@ -129,7 +133,7 @@ class SimCell:
         missing = tuple(missing_models(config))
         return (
             *missing,
-            *_unknown_localization(config),
+            *_lacking_depth(config),
             *wrong_detectors(config.detectors, base),
             *out_of_reach(config),
             # A world cannot be made without its models.
@@ -182,7 +186,14 @@ class SimCell:
         self._world.close()
 
 
-def _unknown_localization(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield its key and a sentence if a cell file wants objects localized in a way that is not there yet."""
-    if config.localization != "plane":
-        yield ("localization",), f'localization "{config.localization}" is not available; use "plane"'
+def _lacking_depth(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Yield the key and a sentence for every camera without the depth that the cell file localizes by."""
+    if config.localization != "depth":
+        return
+    for name, camera in config.cameras.items():
+        if camera.depth is None:
+            yield (
+                ("localization",),
+                f'localization "depth" needs a camera with depth, and {name} has none; give it a section '
+                '"depth: {}", or use "plane"',
+            )

@@ -14,6 +14,7 @@ from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.geometry import Array
 from executive.messages import Box
+from executive.sim.models import missing_models
 from executive.sim.scenes import SIZE, Sample, SceneRenderer
 from executive.vision.dataset import Entry, image_path, save_image, write_annotations
 
@@ -47,7 +48,8 @@ def generate(
         randomized: Vary everything, for training; else scenes as a run begins with.
 
     Raises:
-        InputError: The layout is unknown, the cells differ in their classes, or a file cannot be written.
+        InputError: The layout is unknown, the cells differ in their classes, a model is missing or not as
+            large as its cell says, or a file cannot be written.
     """
     cells = list(configs.values())
     classes = list(cells[0].objects)
@@ -56,6 +58,9 @@ def generate(
             "the cells of one dataset must have the same classes in the same order; "
             + "; ".join(f"{name} has {', '.join(cell.objects)}" for name, cell in configs.items())
         )
+    for name, cell in configs.items():
+        for key, sentence in missing_models(cell):
+            raise InputError(f"{name}: {'.'.join(map(str, key))}: {sentence}")
     first_valid = images - round(images * valid)
     splits = ["train" if number < first_valid else "valid" for number in range(images)]
     write_annotations(out, layout, [], classes)

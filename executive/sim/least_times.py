@@ -7,7 +7,7 @@ import numpy as np
 from executive.cell_config import CellConfig
 from executive.errors import Unreachable
 from executive.geometry import Array, tool_down
-from executive.layout import as_bin, travel_height
+from executive.layout import as_bin, pile_height, travel_height
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.timing import rest_to_rest
@@ -39,7 +39,7 @@ class SimLeastTimes:
         self._config = config
         self._limits = JointLimits.of(config.arm.limits)
         self._kinematics = Kinematics(config.tool.length, self._limits.position)
-        self._highest = max(kind.height for kind in config.objects.values())
+        self._highest = pile_height(config)
         self._carries: dict[str, float] = {}
 
     @property

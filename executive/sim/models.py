@@ -1,11 +1,11 @@
-"""The visible shape of a model: its mesh, read from the URDF that the simulator loads too."""
+"""The visible shape of a model: its mesh, read from the file that the simulator loads too."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
@@ -19,10 +19,13 @@ from executive.errors import InputError
 from executive.geometry import Array, Pose
 from executive.workcell import KeyPath
 
+TOLERANCE = 0.003
+"""Difference between a cell file's figure and the model's own from which it counts as wrong [m]."""
+
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A triangle mesh in the object's frame O: z up as the object stands, origin as in the URDF.
+    """A triangle mesh in the object's frame O: z up as the object stands, origin as `upright` says.
 
     Attributes:
         vertices: `(N, 3)` [m].
@@ -42,6 +45,21 @@ class Mesh:
         """Height of the highest vertex over the origin [m]."""
         return float(self.vertices[:, 2].max())
 
+    @property
+    def radius(self) -> float:
+        """Radius [m] of the circle around the outline seen from above, about the middle of its extents."""
+        outline = self.vertices[:, :2]
+        return float(np.linalg.norm(outline - (outline.min(axis=0) + outline.max(axis=0)) / 2, axis=1).max())
+
+    @cached_property
+    def centroid(self) -> Array:
+        """Centre of the enclosed volume `(3,)` [m]; the middle of the extents where it encloses none."""
+        a, b, c = (self.vertices[self.triangles[:, i]] for i in range(3))
+        volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+        if abs(volumes.sum()) < 1e-12:
+            return (self.vertices.min(axis=0) + self.vertices.max(axis=0)) / 2
+        return np.asarray(volumes @ (a + b + c) / 4 / volumes.sum())
+
     @cached_property
     def convex(self) -> bool:
         """True where no vertex lies more than 0.1 mm outside of any triangle's plane."""
@@ -53,40 +71,79 @@ class Mesh:
         return bool(outside.max() < 1e-4)
 
 
-def find_model(urdf: str) -> Path:
-    """Return the path of a URDF: a full path as it is, any other name as one of pybullet_data's.
+def find_model(name: str) -> Path:
+    """Return the path of a model: a full path as it is, any other name as one of pybullet_data's.
 
     Raises:
         InputError: There is no such file.
     """
-    path = Path(pybullet_data.getDataPath()) / urdf
+    path = Path(pybullet_data.getDataPath()) / name
     if path.is_file():
         return path.resolve()
-    raise InputError(f"there is no model {urdf}, neither beside the cell file nor in pybullet_data")
+    raise InputError(f"there is no model {name}, neither beside the cell file nor in pybullet_data")
 
 
 def missing_models(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield the key of every model of a cell file that does not exist, and a sentence."""
-    named: list[tuple[KeyPath, str]] = [(("arm", "urdf"), config.arm.urdf)]
-    named += [(("objects", label, "urdf"), kind.urdf) for label, kind in config.objects.items()]
-    for key, urdf in named:
+    """Yield the key of every model of a cell file that is missing or not as the file says, and a sentence."""
+    try:
+        find_model(config.arm.urdf)
+    except InputError as error:
+        yield ("arm", "urdf"), str(error)
+    for label, kind in config.objects.items():
+        key: KeyPath = ("objects", label)
         try:
-            find_model(urdf)
+            find_model(kind.mesh or kind.urdf)
+            if kind.mesh:
+                load_mesh(kind)
         except InputError as error:
-            yield key, str(error)
+            yield (*key, "mesh" if kind.mesh else "urdf"), str(error)
+        else:
+            yield from (((*key, name), sentence) for name, sentence in _wrong_sizes(label, kind))
 
 
+def _wrong_sizes(label: str, kind: ObjectConfig) -> Iterator[tuple[str, str]]:
+    """Yield height and radius where they are not the model's, with a sentence.
+
+    Everything that is known of an object's place hangs on them: where its middle is, where its surface,
+    what is free beside it. A model without a mesh cannot be measured.
+    """
+    try:
+        mesh = load_mesh(kind)
+    except InputError:
+        return
+    for name, actual in (("height", mesh.top - mesh.bottom), ("radius", mesh.radius)):
+        stated = getattr(kind, name)
+        if abs(stated - actual) > TOLERANCE:
+            yield (
+                name,
+                f"the model of {label} has a {name} of {actual:.4f} m, not {stated:g} m; "
+                "correct the figure, scale or upright_deg",
+            )
+
+
+@lru_cache(maxsize=64)
 def upright(config: ObjectConfig) -> Pose:
-    """Return `X_OL`: how the URDF's link frame L is turned in the object's frame O."""
-    return Pose(_rotation(*(math.radians(angle) for angle in config.upright_deg)), np.zeros(3))
+    """Return `X_OL`: how the model's own frame L lies in the object's frame O.
+
+    A URDF keeps its origin. A mesh has it anywhere; there O stands in the middle of the extents.
+    """
+    turned = Pose(_rotation(*(math.radians(angle) for angle in config.upright_deg)), np.zeros(3))
+    if not config.mesh:
+        return turned
+    corners = turned.apply(read_obj(find_model(config.mesh))[0] * config.scale)
+    return Pose(turned.rotation, -(corners.min(axis=0) + corners.max(axis=0)) / 2)
 
 
+@lru_cache(maxsize=64)
 def load_mesh(config: ObjectConfig) -> Mesh:
     """Return the visual mesh of a class of objects, scaled and upright.
 
     Raises:
         InputError: The model has no mesh in Wavefront format to look at.
     """
+    if config.mesh:
+        corners, faces = read_obj(find_model(config.mesh))
+        return Mesh(upright(config).apply(corners * config.scale), faces)
     path = find_model(config.urdf)
     vertices: list[Array] = []
     triangles: list[NDArray[np.intp]] = []
@@ -94,7 +151,7 @@ def load_mesh(config: ObjectConfig) -> Mesh:
         mesh = visual.find("geometry/mesh")
         if mesh is None or not mesh.get("filename", "").endswith(".obj"):
             raise InputError(f"{path}: only visuals made of .obj meshes can be labelled")
-        corners, faces = _read_obj(path.parent / mesh.get("filename", ""))
+        corners, faces = read_obj(path.parent / mesh.get("filename", ""))
         scale = np.array(_numbers(mesh.get("scale"), (1.0, 1.0, 1.0)))
         origin = visual.find("origin")
         rpy = _numbers(None if origin is None else origin.get("rpy"), (0.0, 0.0, 0.0))
@@ -103,6 +160,40 @@ def load_mesh(config: ObjectConfig) -> Mesh:
         triangles.append(faces + sum(map(len, vertices)))
         vertices.append((upright(config) @ X_LV).apply(corners * scale * config.scale))
     return Mesh(np.concatenate(vertices), np.concatenate(triangles))
+
+
+def read_obj(path: Path) -> tuple[Array, NDArray[np.intp]]:
+    """Return vertices `(N, 3)` and triangles `(M, 3)` of a Wavefront file; polygons are cut into fans.
+
+    Raises:
+        InputError: It holds no mesh.
+    """
+    vertices: list[list[float]] = []
+    triangles: list[tuple[int, int, int]] = []
+    try:
+        for line in path.read_text(encoding="utf-8").splitlines():
+            key, *values = line.split() or [""]
+            if key == "v":
+                vertices.append([float(value) for value in values[:3]])
+            elif key == "f":
+                corners = [int(value.split("/")[0]) for value in values]
+                corners = [i - 1 if i > 0 else len(vertices) + i for i in corners]
+                triangles += [(corners[0], a, b) for a, b in pairwise(corners[1:])]
+        faces = np.array(triangles, dtype=np.intp).reshape(-1, 3)
+        return _checked(np.array(vertices, dtype=float), faces)
+    except ValueError as error:
+        raise InputError(f"the model {path.name} is no Wavefront mesh: {error}") from None
+
+
+def _checked(vertices: Array, triangles: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
+    """Return what it is given if that is a mesh; raises ValueError."""
+    if not triangles.size:
+        raise ValueError("it has no faces (lines beginning with f)")
+    if vertices.shape != (len(vertices), 3) or not np.isfinite(vertices).all():
+        raise ValueError("a vertex (lines beginning with v) needs three finite numbers")
+    if triangles.min() < 0 or triangles.max() >= len(vertices):
+        raise ValueError(f"a face names a vertex that is not there; there are {len(vertices)}")
+    return vertices, triangles
 
 
 def _numbers(text: str | None, default: tuple[float, ...]) -> tuple[float, ...]:
@@ -116,18 +207,3 @@ def _rotation(roll: float, pitch: float, yaw: float) -> Array:
     about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
     about_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
     return np.asarray(about_z @ about_y @ about_x)
-
-
-def _read_obj(path: Path) -> tuple[Array, NDArray[np.intp]]:
-    """Return vertices and triangles of a Wavefront file; polygons are cut into fans."""
-    vertices: list[list[float]] = []
-    triangles: list[tuple[int, int, int]] = []
-    for line in path.read_text().splitlines():
-        key, *values = line.split() or [""]
-        if key == "v":
-            vertices.append([float(value) for value in values[:3]])
-        elif key == "f":
-            corners = [int(value.split("/")[0]) for value in values]
-            corners = [i - 1 if i > 0 else len(vertices) + i for i in corners]
-            triangles += [(corners[0], a, b) for a, b in pairwise(corners[1:])]
-    return np.array(vertices), np.array(triangles, dtype=np.intp)

@@ -17,7 +17,7 @@ from executive.sim.camera import camera_pose
 from executive.sim.clearance import PathClearance
 from executive.sim.view import ArmShadow
 from executive.sim.world import World
-from executive.vision.camera_model import camera_matrix
+from executive.vision.camera_model import calibrated
 from executive.workcell import KeyPath
 
 
@@ -49,7 +49,7 @@ def _blind_poses(config: CellConfig, world: World) -> Iterator[tuple[KeyPath, st
     kinematics = Kinematics(config.tool.length, limits.position)
     shadow = ArmShadow(SimArm(world, Planner(kinematics, limits), limits, config.arm), kinematics, config)
     for name, camera in config.cameras.items():
-        matrix = camera_matrix(camera.width, camera.height, camera.fov_deg)
+        matrix, _ = calibrated(camera)
         for index, pose in enumerate(camera.scan_poses):
             if pose not in config.arm.poses_deg:
                 continue

@@ -6,7 +6,7 @@ of an object's whole silhouette, computed from its mesh, also where something hi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -17,11 +17,12 @@ from executive.geometry import Array, Pose
 from executive.messages import Box
 from executive.sim.arrangements import Arrangement, arrange, random_light, random_part, random_tint, reach
 from executive.sim.camera import CELL_LIGHT, Image, add_noise, camera_pose, render
+from executive.sim.depth import sense
 from executive.sim.models import load_mesh
 from executive.sim.silhouette import outline_box, visible_share
 from executive.sim.spawn import spawn
 from executive.sim.world import World
-from executive.vision.camera_model import camera_matrix, on_plane, project
+from executive.vision.camera_model import calibrated, on_plane, project
 
 SIZE = 256
 """Side of a sample's image [pixel]: what a detector is given."""
@@ -49,6 +50,8 @@ class Sample:
         part: Part of the camera's image shown (left, top, right, bottom [pixel]).
         matrix: Camera matrix of the whole image.
         X_WC: Where the camera was.
+        frame: The camera's whole image `(H, W, 3)`, of a scene as a run begins with.
+        depth: What its depth sensor gives `(H, W)` [m], likewise; None without one.
     """
 
     image: Image
@@ -61,6 +64,8 @@ class Sample:
     part: tuple[int, int, int, int]
     matrix: Array
     X_WC: Pose
+    frame: Image | None = None
+    depth: Array | None = None
 
 
 class SceneRenderer:
@@ -76,7 +81,7 @@ class SceneRenderer:
         self._camera = config.cameras[camera]
         self._meshes = {label: load_mesh(model) for label, model in config.objects.items()}
         self._world = World(config)
-        self._matrix = camera_matrix(self._camera.width, self._camera.height, self._camera.fov_deg)
+        self._matrix, _ = calibrated(self._camera)
 
     def sample(self, seed: int) -> Sample:
         """Return the sample of `seed`: the first of its random scenes with few half-hidden objects."""
@@ -114,20 +119,24 @@ class SceneRenderer:
         return self._label(image, shot.bodies, bodies, arrangement, X_WC, part)
 
     def _draw_as_run(self, rng: np.random.Generator) -> Sample | None:
-        world, part = self._world, self._camera.table_view
-        pose = np.radians(self._config.arm.poses_deg[str(rng.choice(self._camera.scan_poses))])
+        world, camera = self._world, self._camera
+        pose = np.radians(self._config.arm.poses_deg[str(rng.choice(camera.scan_poses))])
         world.set_arm(pose)
         bodies = spawn(world, self._config, int(rng.integers(2**32)))
         world.set_arm(pose)  # settling may have let it sag
         try:
-            X_WC = camera_pose(world, self._camera)
+            X_WC = camera_pose(world, camera)
             items = [(world.bodies[body], world.object_pose(body), (0.0, 0.0, 0.0)) for body in bodies]
-            shot = render(world, self._matrix, X_WC, part, CELL_LIGHT)
+            shot = render(world, self._matrix, X_WC, (0, 0, camera.width, camera.height), CELL_LIGHT)
         finally:
             for body in bodies:
                 world.remove_object(body)
-        image = add_noise(shot.image, self._camera.noise, rng)
-        return self._label(image, shot.bodies, list(bodies), Arrangement(tuple(items)), X_WC, part)
+        frame = add_noise(shot.image, camera.noise, rng)
+        depth = None if camera.depth is None else sense(shot.depth, camera.depth, rng)
+        left, top, right, bottom = part = camera.table_view
+        image, seen = frame[top:bottom, left:right], shot.bodies[top:bottom, left:right]
+        sample = self._label(image, seen, list(bodies), Arrangement(tuple(items)), X_WC, part)
+        return None if sample is None else replace(sample, frame=frame, depth=depth)
 
     def _label(
         self,

@@ -17,6 +17,7 @@ from pybullet_utils.bullet_client import BulletClient
 from executive.cell_config import BinConfig, CellConfig
 from executive.geometry import Array, Pose
 from executive.motion.kinematics import FLANGE_OFFSET
+from executive.sim.bodies import add_body
 from executive.sim.models import find_model, upright
 
 STEP = 1 / 240
@@ -82,16 +83,10 @@ class World:
 
     def add_object(self, label: str, X_WO: Pose, colour: Sequence[float]) -> int:
         """Put an object of class `label` at `X_WO` (z up as it stands) and return its body."""
-        model = self.config.objects[label]
-        X_WL = X_WO @ upright(model)
-        body = self.client.loadURDF(
-            str(find_model(model.urdf)), X_WL.position, X_WL.quaternion, globalScaling=model.scale
-        )
+        body = add_body(self.client, self.config.objects[label], X_WO)
         self.client.changeVisualShape(body, -1, rgbaColor=[*colour, 1])
-        # Without these a ball set down at rest creeps, and a released one never stops.
-        self.client.changeDynamics(body, -1, rollingFriction=0.0005, spinningFriction=0.0005)
         self.bodies[body] = label
-        return int(body)
+        return body
 
     def remove_object(self, body: int) -> None:
         """Take a loose object out of the world."""

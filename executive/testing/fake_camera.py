@@ -6,14 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from executive.cell import Request
 from executive.cell_config import CameraConfig, DetectorConfig, TableConfig
 from executive.errors import Unavailable
 from executive.geometry import Pose
-from executive.messages import Box, Detection, Frame
+from executive.messages import Answer, Box, Detection, Frame, Reliability
 from executive.testing.fake_world import FakeClock, FakeWorld
-from executive.vision.camera_model import camera_matrix, looking_at
+from executive.vision.camera_model import calibrated
 
 CONFIDENCE = 0.9
 """What a fake detector says of what it sees, or its threshold where that is more."""
@@ -25,6 +26,7 @@ class FakeCamera:
     Attributes:
         name: Its name in the cell file.
         sees: Tells whether the whole workspace is in view; the fake arm hides nothing.
+        hides: Parts of the image [pixel] that a test wants hidden.
     """
 
     def __init__(
@@ -39,9 +41,10 @@ class FakeCamera:
     ) -> None:
         self.name = name
         self.sees: Callable[[], bool] = self._whole_table
+        self.hides: list[Box] = []
         self._config = config
         self._corners = np.array([(x, y, 0.0) for x in table.x for y in table.y])
-        self._matrix = camera_matrix(config.width, config.height, config.fov_deg)
+        self._matrix, self._X_MC = calibrated(config)
         self._world = world
         self._flange = flange
         self._epoch = epoch
@@ -80,13 +83,18 @@ class FakeCamera:
             matrix=self._matrix,
             X_WC=self._pose(),
             stamp=self._world.now,
-            visible=np.ones(size, dtype=bool),
+            visible=self._visible(size),
             epoch=self._epoch(),
         )
 
+    def _visible(self, size: tuple[int, int]) -> NDArray[np.bool_]:
+        visible = np.ones(size, dtype=bool)
+        for left, top, right, bottom in self.hides:
+            visible[int(top) : int(bottom), int(left) : int(right)] = False
+        return visible
+
     def _pose(self) -> Pose:
-        X_MC = looking_at(self._config.position, self._config.look_at, self._config.up)
-        return X_MC if self._config.mount == "fixed" else self._flange() @ X_MC
+        return self._X_MC if self._config.mount == "fixed" else self._flange() @ self._X_MC
 
     def _whole_table(self) -> bool:
         corners = self._pose().inverse().apply(self._corners) @ self._matrix.T
@@ -102,17 +110,19 @@ class FakeRequest:
     due: float
     clock: FakeClock
     answer: Sequence[Detection] | str
+    detector: str
+    reliability: Reliability
 
     @property
     def ready(self) -> bool:
         """True once the time has come."""
         return self.clock.now >= self.due
 
-    def result(self) -> Sequence[Detection]:
+    def result(self) -> Answer:
         """Return the detections, or raise Unavailable with the sentence scripted."""
         if isinstance(self.answer, str):
             raise Unavailable(self.answer)
-        return self.answer
+        return Answer(self.detector, tuple(self.answer), self.reliability)
 
 
 class FakeDetector:
@@ -123,19 +133,20 @@ class FakeDetector:
     """
 
     def __init__(
-        self, config: DetectorConfig, world: FakeWorld, clock: FakeClock, area: Callable[[str], Box]
+        self,
+        name: str,
+        config: DetectorConfig,
+        world: FakeWorld,
+        clock: FakeClock,
+        area: Callable[[str], Box],
     ) -> None:
+        self._name = name
         self._config = config
         self._world = world
         self._clock = clock
         self._area = area
         self._looks = 0
         self.answers: Callable[[int, Sequence[Detection]], Sequence[Detection] | str] = _truthful
-
-    @property
-    def threshold(self) -> float:
-        """Confidence from which a detection counts."""
-        return self._config.threshold
 
     def request(self, frame: Frame, view: str) -> Request:
         """Answer with what the searched part of the frame would show, as late as the cell file says."""
@@ -149,7 +160,13 @@ class FakeDetector:
             column, row = x / depth, y / depth
             if left <= column < right and top <= row < bottom:
                 true.append(self._detection(thing.label, column, row, frame.matrix[0, 0] / depth))
-        return FakeRequest(frame.stamp + self._config.latency, self._clock, self.answers(self._looks, true))
+        return FakeRequest(
+            self._clock.now + self._config.latency,
+            self._clock,
+            self.answers(self._looks, true),
+            self._name,
+            self._config.reliability,
+        )
 
     def close(self) -> None:
         """Have nothing to give back."""
@@ -158,7 +175,7 @@ class FakeDetector:
         """Return the box around an object whose centre is at a pixel, at a `scale` [pixel/m]."""
         size = scale * self._world.classes[label].radius
         box = (column - size, row - size, column + size, row + size)
-        return Detection(label, max(CONFIDENCE, self.threshold), box)
+        return Detection(label, max(CONFIDENCE, self._config.threshold), box)
 
 
 def _truthful(look: int, true: Sequence[Detection]) -> Sequence[Detection]:

@@ -22,7 +22,7 @@ from executive.testing.fake_arm import FakeArm, FakeTool, named_poses, out_of_re
 from executive.testing.fake_camera import FakeCamera, FakeDetector
 from executive.testing.fake_times import FakeTimes
 from executive.testing.fake_world import FakeClock, FakeWorld
-from executive.vision.localize import PlaneLocalizer
+from executive.vision.localization.plane import PlaneLocalizer
 from executive.workcell import CellOptions, KeyPath
 
 ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
@@ -85,7 +85,7 @@ class FakeCell:
         self.arm = FakeArm(self.world, named_poses(config))
         self.tool = FakeTool(self.world, lambda: self.arm.tool_pose.position)
         bins = {name: as_bin(name, bin) for name, bin in config.bins.items()}
-        self.ledger = ItemLedger(config.ledger, bins, self.routes, emit)
+        self.ledger = ItemLedger(config.ledger, config.table, bins, self.routes, emit)
         name, camera = next(iter(config.cameras.items()))
         X_TF = Pose.of((0.0, 0.0, -config.tool.length))
         self.camera = FakeCamera(
@@ -97,7 +97,7 @@ class FakeCell:
             epoch=lambda: self.ledger.epoch,
         )
         self.detectors = {
-            name: FakeDetector(detector, self.world, clock, self.camera.area)
+            name: FakeDetector(name, detector, self.world, clock, self.camera.area)
             for name, detector in config.detectors.items()
         }
         self.detector = next(iter(self.detectors.values()))

@@ -64,7 +64,9 @@ class FakeWorld:
         """Return the object whose upper side the cup at `tip` `(3,)` [m] is on, if any."""
         for thing in self.objects:
             beside = float(np.linalg.norm(thing.position[:2] - tip[:2]))
-            if thing is not self.held and beside <= CUP and abs(self.top(thing) - tip[2]) <= TOUCH:
+            off = abs(beside - self.classes[thing.label].ring)
+            near = off <= CUP and abs(self.top(thing) - tip[2]) <= TOUCH
+            if near and thing is not self.held:
                 return thing
         return None
 

@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
 from executive.cell import Clock
@@ -36,14 +37,30 @@ class TrueFrame(Frame):
     """A frame that says what it shows.
 
     Attributes:
-        truth: The box around the outline of every loose object before the lens, hidden or not.
+        truth: The box around the outline of every loose object before the lens whose middle no other hides.
     """
 
     truth: tuple[Detection, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class _Outline:
+    """An object in an image: its vertices `(N, 2)` [pixel] and how far it is from the camera [m]."""
+
+    label: str
+    pixels: Array
+    distance: float
+
+    def hides(self, other: _Outline) -> bool:
+        """Tell whether this one is before the middle of the other."""
+        left, top, right, bottom = outline_box(other.pixels)
+        hull = cv2.convexHull(self.pixels.astype(np.float32))
+        middle = ((left + right) / 2, (top + bottom) / 2)
+        return self.distance < other.distance and cv2.pointPolygonTest(hull, middle, False) > 0
+
+
 class TruthCamera(SimCamera):
-    """A simulated camera whose frames carry the truth; they are black unless `rendered`."""
+    """A simulated camera whose frames carry the truth; without depth they are black unless `rendered`."""
 
     def __init__(self, world: World, *args: Any, rendered: bool = False, **options: Any) -> None:
         super().__init__(world, *args, **options)
@@ -55,19 +72,24 @@ class TruthCamera(SimCamera):
         frame = super().capture()
         return TrueFrame(**vars(frame), truth=self._truth(frame))
 
-    def _image(self, X_WC: Pose) -> Image:
-        if self._rendered:
-            return super()._image(X_WC)
-        return np.zeros((self.config.height, self.config.width, 3), np.uint8)
+    def _sense(self, X_WC: Pose) -> tuple[Image, Array | None]:
+        if self._rendered or self.config.depth:
+            return super()._sense(X_WC)
+        return np.zeros((self.config.height, self.config.width, 3), np.uint8), None
 
     def _truth(self, frame: Frame) -> tuple[Detection, ...]:
-        found = []
+        outlines = []
         for body, label in self._world.bodies.items():
             outline = self._world.object_pose(body).apply(self._mesh(label).vertices)
-            if np.all(frame.X_WC.inverse().apply(outline)[:, 2] > NEAR):
-                box = outline_box(project(frame.matrix, frame.X_WC, outline))
-                found.append(Detection(label, CONFIDENCE, box))
-        return tuple(found)
+            distances = frame.X_WC.inverse().apply(outline)[:, 2]
+            if np.all(distances > NEAR):
+                pixels = project(frame.matrix, frame.X_WC, outline)
+                outlines.append(_Outline(label, pixels, float(distances.mean())))
+        return tuple(
+            Detection(outline.label, CONFIDENCE, outline_box(outline.pixels))
+            for outline in outlines
+            if not any(other.hides(outline) for other in outlines)
+        )
 
     def _mesh(self, label: str) -> Mesh:
         if label not in self._meshes:
@@ -81,6 +103,7 @@ class Oracle:
     It reports what has the centre of its box in the searched part of the image and not behind the arm.
 
     Args:
+        name: Its name in the cell file.
         config: Its threshold and latency count; its kind does not.
         camera: The camera whose frames it searches.
         clock: The run's clock.
@@ -89,18 +112,21 @@ class Oracle:
     """
 
     def __init__(
-        self, config: DetectorConfig, camera: CameraConfig, clock: Clock, *, jitter: float, seed: int
+        self,
+        name: str,
+        config: DetectorConfig,
+        camera: CameraConfig,
+        clock: Clock,
+        *,
+        jitter: float,
+        seed: int,
     ) -> None:
+        self._name = name
         self._config = config
         self._camera = camera
         self._clock = clock
         self._jitter = jitter
         self._seed = seed
-
-    @property
-    def threshold(self) -> float:
-        """Confidence from which a detection counts."""
-        return self._config.threshold
 
     def request(self, frame: Frame, view: str) -> Pending:
         """Return the truth about `frame`, visible as late as a real detector's answer."""
@@ -114,7 +140,13 @@ class Oracle:
                 found.append(seen)
         answer: Future[Sequence[Detection]] = Future()
         answer.set_result(found)
-        return Pending(answer, frame.stamp + self._config.latency, self._clock)
+        return Pending(
+            answer,
+            self._clock.now + self._config.latency,
+            self._clock,
+            detector=self._name,
+            reliability=self._config.reliability,
+        )
 
     def close(self) -> None:
         """Have nothing to give back."""
@@ -128,16 +160,15 @@ class Oracle:
         return bool(frame.visible[row, column])
 
 
-def oracle_cell(*, jitter: float = 0.7, seed: int = 0, rendered: bool = False) -> Callable[..., SimCell]:
+def oracle_cell(*, jitter: float = 0.7, rendered: bool = False) -> Callable[..., SimCell]:
     """Return a kind of cell, for `Run(kind=...)`: the simulated one with oracles for detectors.
 
     Args:
         jitter: Standard deviation of each side of a box [pixel].
-        seed: Decides the jitter.
         rendered: Draw the camera's images, for whoever looks at them.
     """
     camera = partial(TruthCamera, rendered=rendered)
-    return partial(SimCell, camera=camera, detectors=partial(_oracles, jitter=jitter, seed=seed))
+    return partial(SimCell, camera=camera, detectors=partial(_oracles, jitter=jitter))
 
 
 def _oracles(
@@ -150,4 +181,4 @@ def _oracles(
     seed: int,
 ) -> dict[str, Oracle]:
     del base
-    return {name: Oracle(c, camera, clock, jitter=jitter, seed=seed) for name, c in configs.items()}
+    return {name: Oracle(name, c, camera, clock, jitter=jitter, seed=seed) for name, c in configs.items()}

@@ -40,9 +40,17 @@ class ItemTable:
         return tuple(self._rows.values())
 
     def by_fate(self) -> dict[str, list[str]]:
-        """Return the items by bin; those not placed by state, with the reason where there is one."""
+        """Return the items by bin; those not placed by state, with the reason where there is one.
+
+        Of phantoms only the number is told: they are nothing anybody could go and fetch.
+        """
         fates: dict[str, list[str]] = defaultdict(list)
+        phantoms = sum(row.state == "phantom" for row in self._rows.values())
+        if phantoms:
+            fates["phantom"].append(f"{phantoms} seen, and then no more")
         for row in self._rows.values():
+            if row.state == "phantom":
+                continue
             if row.state == "placed":
                 fates[row.bin].append(row.item)
             else:

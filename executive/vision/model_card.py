@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from executive.vision.evaluate import Evaluation, Spread
+from executive.vision.evaluation.figures import Evaluation, Spread
 
 EPOCH_COLUMNS = {
     "train/loss": "loss",

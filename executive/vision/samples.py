@@ -14,6 +14,7 @@ import yaml
 from numpy.typing import NDArray
 
 from executive.errors import InputError
+from executive.geometry import Array
 from executive.messages import Box
 
 ANNOTATIONS = "_annotations.coco.json"
@@ -33,6 +34,8 @@ class LabelledImage:
         boxes: Their boxes [pixel], one to one.
         ignored: Boxes of objects that a detector may find or not.
         truth: What the renderer knows beyond that: `camera`, `part`, `matrix`, `X_WC`, `positions`, …
+        area: Part of the image [pixel] that is searched and labelled; None: all of it.
+        depth: `(H, W)` [m], as in a `Frame`; None without a depth sensor.
     """
 
     file: str
@@ -41,6 +44,8 @@ class LabelledImage:
     boxes: tuple[Box, ...]
     ignored: tuple[Box, ...] = ()
     truth: Mapping[str, Any] = field(default_factory=dict)
+    area: Box | None = None
+    depth: Array | None = None
 
 
 def read_samples(folder: Path) -> Iterator[LabelledImage]:

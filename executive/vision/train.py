@@ -7,7 +7,7 @@ from pathlib import Path
 
 from executive.errors import InputError
 from executive.vision.detectors.onnx_model import read_labels
-from executive.vision.evaluate import evaluate_folder
+from executive.vision.evaluation.model_file import evaluate_folder
 from executive.vision.model_card import ModelCard, read_epochs
 
 Progress = Callable[[int, dict[str, float]], None]
@@ -35,13 +35,15 @@ def train(
         dataset: Folder as Roboflow exports it: `train/` and `valid/`, each with `_annotations.coco.json`, or
             a `data.yaml` for YOLO.
         out: Folder to fill; made if missing.
-        start: Checkpoint to fine-tune; None trains from random weights.
+        start: Checkpoint (`.pth`) or exported model (`.onnx`, its `labels.txt` or `NAME.labels.txt` beside
+            it) to fine-tune, whatever its classes; None trains from random weights.
         epochs: Number of passes over the data.
         seed: Seed of weights, order and augmentation.
         progress: Called after every epoch with its number, from 1, and its figures.
 
     Raises:
-        InputError: The folder is no data set, or the training packages are not installed.
+        InputError: The folder is no data set, `start` is missing or of another architecture, or the training
+            packages are not installed.
     """
     _check(dataset, start)
     try:

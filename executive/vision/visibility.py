@@ -18,20 +18,21 @@ TOOL_SHADOW = 0.02
 """Radius of the spheres that stand for the tool: its tube with fittings [m]."""
 
 
-def hidden(
-    joints: Sequence[Array], tool: Sequence[Array], matrix: Array, X_WC: Pose, size: tuple[int, int]
-) -> NDArray[np.bool_]:
+Bone = tuple[Sequence[Array], float]
+"""Points `(3,)` [m] along a part of the arm, and the radius of the spheres that stand for it [m]."""
+
+
+def hidden(bones: Sequence[Bone], matrix: Array, X_WC: Pose, size: tuple[int, int]) -> NDArray[np.bool_]:
     """Return which pixels `(H, W)` the arm may cover, as the shadow of spheres along its bones.
 
     Args:
-        joints: Joint centres from the base to the flange `(3,)` [m] each.
-        tool: Points from the flange to the tool's tip `(3,)` [m] each.
+        bones: The links, the tool, and what it holds.
         matrix: Camera matrix `(3, 3)` [pixel].
         X_WC: Camera pose.
         size: Image width and height [pixel].
     """
     mask = np.zeros((size[1], size[0]), dtype=np.uint8)
-    for points, radius in ((joints, LINK_SHADOW), (tool, TOOL_SHADOW)):
+    for points, radius in bones:
         for start, end in itertools.pairwise(points):
             for share in np.linspace(0.0, 1.0, 9):
                 x, y, z = X_WC.inverse().apply(start + share * (end - start))

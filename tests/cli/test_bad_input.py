@@ -134,7 +134,7 @@ CASES = {
     ),
     "a cell file that is not there": Case(
         """
-        m.yaml:3:7: error[no-cell]: there is no file "cells/overhed.yaml" beside this one, and none is shipped. Did you mean "cells/overhead.yaml"? There are: cells/cascade.yaml, cells/fruit.yaml, cells/instruments.yaml, cells/kitting.yaml, cells/overhead.yaml, cells/recycling.yaml, cells/wrist.yaml.
+        m.yaml:3:7: error[no-cell]: there is no file "cells/overhed.yaml" beside this one, and none is shipped. Did you mean "cells/overhead.yaml"? There are: cells/cascade.yaml, cells/depth.yaml, cells/fasteners.yaml, cells/fruit.yaml, cells/instruments.yaml, cells/kitting.yaml, cells/noisy.yaml, cells/overhead.yaml, cells/recycling.yaml, cells/roboflow.yaml, cells/wrist.yaml.
            3 | cell: cells/overhed.yaml
              |       ^^^^^^^^^^^^^^^^^^
         """,
@@ -145,7 +145,7 @@ CASES = {
         cells/overhead.yaml:LINE:1: error[unknown-key]: the file has no key "ledgre"
         LINE | ledgre: {gate: 0.03}
              | ^^^^^^
-          Did you mean "ledger"? the file takes: base, cell, description, kind, arm, tool, motion, table, bins, cameras, detectors, localization, objects, ledger, safe_place.
+          Did you mean "ledger"? the file takes: base, cell, description, kind, arm, tool, motion, table, bins, cameras, detector, detectors, localization, objects, ledger, safe_place.
         """,
         cell=("safe_place:", "ledgre: {gate: 0.03}\nsafe_place:"),
     ),
@@ -205,8 +205,8 @@ def test_a_mistake_in_a_file_is_told_once_and_nothing_moves(write: Callable[...,
 @pytest.mark.parametrize(
     ("name", "expected"),
     [
-        ("sort_overhed", 'there is no mission file "sort_overhed", and no shipped mission of that name. Did you mean "sort_overhead"? Shipped missions: detector_cascade, inspect_then_sort, kit_fasteners, pick_on_request, recycle, sort_by_priority, sort_fruit, sort_overhead, sort_wrist, tray_instruments.\n'),
-        ("nowhere.yaml", 'there is no mission file "nowhere.yaml", and no shipped mission of that name. Shipped missions: detector_cascade, inspect_then_sort, kit_fasteners, pick_on_request, recycle, sort_by_priority, sort_fruit, sort_overhead, sort_wrist, tray_instruments.\n'),
+        ("sort_overhed", 'there is no mission file "sort_overhed", and no shipped mission of that name. Did you mean "sort_overhead"? Shipped missions: detector_cascade, inspect_then_sort, kit_fasteners, pick_on_request, recycle, sort_by_priority, sort_fasteners, sort_fruit, sort_overhead, sort_stacked, sort_wrist, tray_instruments.\n'),
+        ("nowhere.yaml", 'there is no mission file "nowhere.yaml", and no shipped mission of that name. Shipped missions: detector_cascade, inspect_then_sort, kit_fasteners, pick_on_request, recycle, sort_by_priority, sort_fasteners, sort_fruit, sort_overhead, sort_stacked, sort_wrist, tray_instruments.\n'),
         ("cells", '"cells" is a folder; name one of its files\n'),
     ],
 )  # fmt: skip
@@ -254,7 +254,7 @@ def test_a_mission_that_is_not_there_is_told_with_those_that_are(
             --set:1:22: error[unknown-key]: the cell has no key "tols"
                1 | cell.tols.cup_radius=0.01
                  |                      ^^^^
-              Did you mean "tool"? It has: base, cell, description, kind, arm, tool, motion, table, bins, cameras, detectors, localization, objects, ledger, safe_place.
+              Did you mean "tool"? It has: base, cell, description, kind, arm, tool, motion, table, bins, cameras, detector, detectors, localization, objects, ledger, safe_place.
             """,
         ),
     ],

@@ -250,7 +250,13 @@ def _wrapped(draft: Draft, node: Any) -> Any:
         {"fallback": pair},
         {"parallel": pair},
         {"parallel": rng.choice(([loop, other], [node, loop], [other, loop, {"Wait": {"seconds": 0.1}}]))},
-        {"parallel": {"wait_for": rng.choice(("any", "all", "lead")), "halt": rng.random() < 0.5, "do": pair}},
+        {
+            "parallel": {
+                "wait_for": rng.choice(("any", "all", "lead")),
+                "halt": rng.random() < 0.5,
+                "do": pair,
+            }
+        },
         {"retry": {"attempts": some, **rng.choice(({}, {"on": on})), **backoff, "do": node}},
         {"retry": {"attempts": some, "on": on, **backoff, "recover": other, "do": node}},
         {"repeat": {"times": some, "do": node}},

@@ -114,7 +114,7 @@ def straightforward(value: Any) -> Any:
 ODD = [
     *Colour, *Shade, *Level, *Share, Corner(1 / 3, -0.0), Path("a/b"), Pose.identity(), FRAME, object(),
     Colour, int, b"bytes", 1j, np.bool_(False), np.array([[True]]), np.array(["a"]), np.longdouble(1) / 3,
-    Detections(FRAME, (Detection("duck", 0.6, (1, 2.5, np.float64(3), 4)),), "eye", EYE, "full", (0, 0, 4, 4)),
+    Detections(FRAME, (Detection("duck", 0.6, (1, 2.5, np.float64(3), 4)),), "e", EYE, "full", (0, 0, 4, 4)),
     Target("duck-1", "duck", np.array([1 / 3, np.nan, -0.0]), 0.9, 7, 0, 1e-9),
 ]  # fmt: skip
 SCALARS = (

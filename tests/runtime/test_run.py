@@ -71,7 +71,7 @@ def test_an_object_that_cannot_be_had_is_rejected_and_the_others_go_on(missions:
     assert (items["rejected"], audit["left"]) == (1, 1)
     assert items["placed"] == audit["right"] == items["seen"] - 1
     rejected = next(row for row in items["rows"] if row["state"] == "rejected")
-    assert rejected["why"] == "could not be picked (4 failed attempts)"
+    assert rejected["why"] == "could not be picked (6 failed attempts)"
 
 
 def test_an_object_dropped_outside_the_workspace_is_found_by_the_full_look(missions: Path) -> None:
@@ -194,4 +194,4 @@ def test_an_object_that_slips_out_of_the_cup_every_time_is_given_up_in_the_end(m
     assert outcome.status == "SUCCESS", outcome
     assert (items["rejected"], audit["left"]) == (1, 1)
     assert items["placed"] == audit["right"] == items["seen"] - 1
-    assert next(row for row in items["rows"] if row["state"] == "rejected")["attempts"] == 8
+    assert next(row for row in items["rows"] if row["state"] == "rejected")["attempts"] == 12

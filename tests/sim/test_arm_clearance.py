@@ -115,6 +115,8 @@ def test_no_sorting_motion_is_blocked(clearance: PathClearance, config, kinemati
 def test_the_arm_at_home_hides_nothing_of_the_workspace_from_the_fixed_camera(config) -> None:
     world = World(config)
     camera = config.cameras["overhead"]
+    assert camera.position is not None
+    assert camera.fov_deg is not None
     width, height = camera.width // 4, camera.height // 4
     view = world.client.computeViewMatrix(camera.position, camera.look_at, camera.up)
     projection = world.client.computeProjectionMatrixFOV(camera.fov_deg, width / height, 0.05, 3)

@@ -18,7 +18,7 @@ def overhead(missions: Path) -> CellConfig:
     return load_cell(missions / "cells" / "overhead.yaml")
 
 
-@pytest.mark.parametrize("name", ["overhead", "wrist"])
+@pytest.mark.parametrize("name", ["overhead", "wrist", "depth"])
 def test_nothing_is_wrong_with_a_shipped_cell(missions: Path, name: str) -> None:
     path = missions / "cells" / f"{name}.yaml"
     assert list(SimCell.check(load_cell(path), path.parent)) == []
@@ -33,7 +33,7 @@ def test_all_that_is_wrong_is_said_at_once(overhead: CellConfig, tmp_path: Path)
             "arm": overhead.arm.model_copy(update={"poses_deg": poses}),
             "bins": {"red_bin": far},
             "detectors": {"yolo": yolo},
-            "localization": "ray",
+            "localization": "depth",
         }
     )
     found = dict(SimCell.check(config, tmp_path))
@@ -44,7 +44,10 @@ def test_all_that_is_wrong_is_said_at_once(overhead: CellConfig, tmp_path: Path)
         ("bins", "red_bin", "position"),
         ("arm", "poses_deg", "down"),
     ]
-    assert found["localization",] == 'localization "ray" is not available; use "plane"'
+    assert found["localization",] == (
+        'localization "depth" needs a camera with depth, and overhead has none; give it a section '
+        '"depth: {}", or use "plane"'
+    )
 
 
 def test_the_labels_are_those_of_its_detectors(overhead: CellConfig, tmp_path: Path) -> None:

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from executive.cell_config import CellConfig, NoiseConfig
+from executive.cell_config import CalibrationConfig, CameraConfig, CellConfig, DepthConfig, NoiseConfig
 from executive.geometry import Pose, about_z
 from executive.sim.camera import CELL_LIGHT, SimCamera, camera_pose, render
 from executive.sim.models import load_mesh
 from executive.sim.world import World
-from executive.vision.camera_model import camera_matrix, project
+from executive.vision.camera_model import calibrated, project
 
 Build = Callable[[CellConfig], World]
 
@@ -32,19 +32,36 @@ def at_scan_pose(build: Build, config: CellConfig) -> tuple[World, str]:
     return world, name
 
 
-@pytest.mark.parametrize("cell", ["overhead", "wrist"])
+OBLONG = CalibrationConfig.model_validate(
+    {
+        "matrix": [[430, 0, 300], [0, 480, 255], [0, 0, 1]],
+        "mount_to_camera": {"rotation": [2.221441, -2.221441, 0], "translation": [0, 0.5, 1.2]},
+    }
+)
+"""A camera over the table whose pixels are not square and whose principal point is not in the middle."""
+
+
+def calibrated_by(camera: CameraConfig, calibration: CalibrationConfig) -> CameraConfig:
+    """Return the camera set up by a calibration instead of by hand."""
+    by_hand = dict.fromkeys(("position", "look_at", "up", "fov_deg"))
+    return camera.model_copy(update={**by_hand, "calibration": calibration})
+
+
+@pytest.mark.parametrize(("cell", "calibration"), [("overhead", None), ("wrist", None), ("overhead", OBLONG)])
 def test_projected_meshes_agree_with_the_rendered_silhouettes(
-    build: Build, cell: str, request: pytest.FixtureRequest
+    build: Build, cell: str, calibration: CalibrationConfig | None, request: pytest.FixtureRequest
 ) -> None:
     config: CellConfig = request.getfixturevalue(cell)
     world, name = at_scan_pose(build, config)
     camera = config.cameras[name]
+    if calibration is not None:
+        camera = calibrated_by(camera, calibration)
     for i in range(9):
         label = list(config.objects)[i % 3]
         mesh = load_mesh(config.objects[label])
         place = np.array([0.44 + 0.09 * (i % 3), -0.18 + 0.18 * (i // 3), -mesh.bottom])
         world.add_object(label, Pose(about_z(0.7 * i), place), (1, 0, 0))
-    matrix, X_WC = camera_matrix(camera.width, camera.height, camera.fov_deg), camera_pose(world, camera)
+    matrix, X_WC = calibrated(camera)[0], camera_pose(world, camera)
     left, top, _, _ = camera.table_view
     bodies = render(world, matrix, X_WC, camera.table_view, CELL_LIGHT).bodies
     for body, label in world.bodies.items():
@@ -71,7 +88,7 @@ def test_the_workspace_lies_inside_the_table_view_from_every_scan_pose(
     assert right - left == bottom - top
     for pose in camera.scan_poses:
         world.set_arm(np.radians(config.arm.poses_deg[pose]))
-        matrix = camera_matrix(camera.width, camera.height, camera.fov_deg)
+        matrix, _ = calibrated(camera)
         pixels = project(matrix, camera_pose(world, camera), corners)
         assert (pixels > (left, top)).all()
         assert (pixels < (right, bottom)).all()
@@ -84,7 +101,7 @@ def test_the_wrist_camera_shows_the_side_away_from_the_robot_at_the_top(
     X_WC = camera_pose(world, wrist.cameras[name])
     assert X_WC.position == pytest.approx([0.53, 0.0, 0.55], abs=1e-3)
     assert X_WC.rotation[:, 1] == pytest.approx([-1, 0, 0], abs=1e-4)
-    matrix = camera_matrix(640, 480, wrist.cameras[name].fov_deg)
+    matrix, _ = calibrated(wrist.cameras[name])
     bodies = render(world, matrix, X_WC, (0, 0, 640, 480), CELL_LIGHT).bodies
     assert not (bodies == world.arm).any(), "the camera sees its own tool"
 
@@ -99,6 +116,30 @@ def test_two_frames_of_one_scene_differ_and_a_seed_repeats_them(build: Build, ov
     assert np.abs(first.image.astype(int) - second.image).mean() > 0.5
     assert (same.capture().image == first.image).all()
     assert (other.capture().image != first.image).any()
+
+
+def test_a_depth_sensor_measures_what_the_camera_sees_and_changes_no_image(
+    build: Build, overhead: CellConfig
+) -> None:
+    world, name = at_scan_pose(build, overhead)
+    cube = world.add_object("cube", Pose.of([0.5, 0.0, 0.025]), (1, 0, 0))
+    plain = overhead.cameras[name]
+    deep = plain.model_copy(update={"depth": DepthConfig()})
+    without, one, same, other = (
+        SimCamera(world, name, config, StoppedClock(), seed)
+        for config, seed in ((plain, 7), (deep, 7), (deep, 7), (deep, 8))
+    )
+    frame = one.capture()
+    assert frame.depth is not None
+    assert frame.depth.shape == (480, 640)
+    assert (frame.image == without.capture().image).all()
+    bodies = render(world, frame.matrix, frame.X_WC, (0, 0, 640, 480), CELL_LIGHT).bodies
+    assert np.nanmedian(frame.depth[bodies == cube]) == pytest.approx(1.15, abs=0.003)
+    assert np.nanmedian(frame.depth[bodies == world.table]) == pytest.approx(1.2, abs=0.001)
+    again, second, others = same.capture().depth, one.capture().depth, other.capture().depth
+    assert np.array_equal(frame.depth, again, equal_nan=True)
+    assert not np.array_equal(frame.depth, second, equal_nan=True)
+    assert not np.array_equal(frame.depth, others, equal_nan=True)
 
 
 def test_a_frame_carries_what_is_needed_to_use_it_later(build: Build, overhead: CellConfig) -> None:

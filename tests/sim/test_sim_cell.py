@@ -17,7 +17,7 @@ from executive.messages import Detections
 from executive.mission.parse.cell_file import load_cell
 from executive.sim.cell import SimCell
 from executive.testing.fake_cell import ROUTES, SilentOperator
-from executive.testing.oracle import oracle_cell
+from executive.testing.oracle import TrueFrame, oracle_cell
 from executive.workcell import CellOptions
 
 Build = Callable[..., SimCell]
@@ -51,9 +51,13 @@ def look(made: SimCell) -> None:
     request = cell.detectors["embedded"].request(frame, "full")
     while not request.ready:
         made.advance()
-    found = tuple(request.result())
+    answer = request.result()
+    found = answer.found
     positions = [cell.localizer.locate(detection, frame) for detection in found]
-    cell.ledger.observe(Detections(frame, found, "full", cell.camera.area("full")), positions)
+    detections = Detections(
+        frame, found, answer.detector, answer.reliability, "full", cell.camera.area("full")
+    )
+    cell.ledger.observe(detections, positions)
 
 
 def put(made: SimCell, body: int, place: tuple[float, float, float]) -> None:
@@ -168,7 +172,26 @@ def test_time_passes_by_physics_steps_alone(build_cell: Build) -> None:
     assert made.cell.clock.now == pytest.approx(0.1)
 
 
-def test_a_way_of_localizing_that_it_lacks_is_named_with_one_that_it_has(build_cell: Build) -> None:
+def test_depth_without_a_depth_camera_is_refused_with_what_to_add(build_cell: Build) -> None:
     with pytest.raises(InputError) as caught:
         build_cell(localization="depth")
-    assert str(caught.value) == 'cell overhead: localization "depth" is not available; use "plane"'
+    assert str(caught.value) == (
+        'cell overhead: localization "depth" needs a camera with depth, and overhead has none; give it a '
+        'section "depth: {}", or use "plane"'
+    )
+
+
+@pytest.mark.parametrize(("way", "raised"), [("depth", 0.05), ("ray", 0.05), ("plane", 0.0)])
+def test_only_depth_and_ray_find_what_does_not_stand_on_the_table(
+    build_cell: Build, way: str, raised: float
+) -> None:
+    made = build_cell("depth", localization=way)
+    body = next(body for body, label in made._world.bodies.items() if label == "cube")
+    put(made, body, (0.6, 0.15, 0.075))
+    frame = made.cell.camera.capture()
+    assert isinstance(frame, TrueFrame)
+    found = [made.cell.localizer.locate(true, frame) for true in frame.truth if true.label == "cube"]
+    error = min(float(np.linalg.norm(place[:2] - (0.6, 0.15))) for place in found)
+    assert (error < 0.003) == (way != "plane")
+    height = min(found, key=lambda place: float(np.linalg.norm(place[:2] - (0.6, 0.15))))[2]
+    assert height - 0.025 == pytest.approx(raised, abs=0.006)

@@ -38,7 +38,7 @@ def look(made: SimCell, view: str) -> tuple[TrueFrame, list[Detection]]:
     request = cell.detectors["embedded"].request(frame, view)
     while not request.ready:
         made.advance()
-    return frame, list(request.result())
+    return frame, list(request.result().found)
 
 
 def test_without_jitter_every_object_is_located_where_it_lies(build) -> None:
@@ -75,6 +75,17 @@ def test_what_lies_elsewhere_is_in_the_full_view_only_and_what_the_arm_hides_in_
     assert len(look(made, "full")[1]) == count
     made._world.place_object(body, Pose.of([0.0, 0.0, 0.03]))
     assert len(look(made, "full")[1]) == count - 1
+
+
+def test_what_another_object_lies_on_is_found_when_that_is_gone(build) -> None:
+    made = build(jitter=0.0)
+    lower, upper, *_ = made._world.bodies
+    made._world.place_object(lower, Pose.of([0.5, 0.0, 0.03]))
+    made._world.place_object(upper, Pose.of([0.5, 0.0, 0.08]))
+    labels = list(made._world.bodies.values())
+    assert [detection.label for detection in look(made, "table")[1]] == labels[1:]
+    made._world.remove_object(upper)
+    assert [detection.label for detection in look(made, "table")[1]] == [labels[0], *labels[2:]]
 
 
 def test_it_needs_no_image_but_can_have_one(build) -> None:

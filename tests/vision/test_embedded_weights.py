@@ -7,8 +7,8 @@ import pytest
 from executive.mission.parse.cell_file import load_cell
 from executive.sim.scenes import SceneRenderer
 from executive.vision.detectors.embedded import LABELS, MODEL, WEIGHTS
-from executive.vision.detectors.onnx_model import OnnxModel, read_labels
-from executive.vision.evaluate import evaluate
+from executive.vision.evaluation.asking import CellDetector
+from executive.vision.evaluation.evaluate import evaluate
 from executive.vision.samples import LabelledImage
 
 SCENES = range(1000, 1020)
@@ -37,7 +37,9 @@ def test_fresh_scenes_of_a_shipped_cell_are_read_almost_without_error(missions, 
         }
         samples.append(LabelledImage(str(seed), drawn.image, drawn.labels, boxes, ignored, truth))
     renderer.close()
-    measured = evaluate(OnnxModel(MODEL, read_labels(LABELS)), samples, 0.5)
+    detector = CellDetector(config.detectors, "embedded", base=missions)
+    measured = evaluate(detector, samples)
+    detector.close()
     assert measured.objects > 20
     # Of about fifty objects: the card's figures, less two mistakes.
     assert measured.precision >= 0.95

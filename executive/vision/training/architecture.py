@@ -42,7 +42,8 @@ def create(classes: int, start: Path | None = None, device: str = "cpu") -> Any:
         # It warns that training from random weights needs more data than fine-tuning. We bring it.
         warnings.simplefilter("ignore")
         return RFDETRNano(
-            pretrain_weights=None if start is None else str(start),
+            # Bare names would be looked for among rfdetr's own downloads.
+            pretrain_weights=None if start is None else str(start.resolve()),
             num_classes=classes,
             device=device,
             **ARCHITECTURE,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import onnx
 
@@ -20,11 +21,15 @@ def export_onnx(checkpoint: Path, classes: int, out: Path, storage: Storage | No
 
     None keeps them in float32.
     """
-    detector = create(classes, checkpoint)
     with tempfile.TemporaryDirectory() as folder:
-        path = detector.export(
-            output_dir=folder, format="onnx", opset_version=OPSET, dynamic_batch=False, verbose=False
-        )
-        model = onnx.load(str(path))
+        model = export(create(classes, checkpoint), Path(folder))
     out.parent.mkdir(parents=True, exist_ok=True)
     onnx.save(model if storage is None else compress(model, storage), str(out))
+
+
+def export(detector: Any, folder: Path) -> onnx.ModelProto:
+    """Return the ONNX model of an `rfdetr.RFDETRNano`; files are left in `folder`."""
+    path = detector.export(
+        output_dir=str(folder), format="onnx", opset_version=OPSET, dynamic_batch=False, verbose=False
+    )
+    return onnx.load(str(path))

@@ -10,11 +10,9 @@ from rfdetr.training import build_trainer
 
 from executive.vision.training.architecture import create
 from executive.vision.training.lightning import Model, Progress, Report, SymmetricData
+from executive.vision.training.start import checkpoint, learning_rate
 
 BATCH = 16
-LEARNING_RATE = 3e-4
-FINE_TUNING_RATE = 1e-4
-"""From weights that are good already, larger steps would first undo them."""
 THREADS = 2
 
 
@@ -25,8 +23,8 @@ def fit(dataset: Path, out: Path, *, start: Path | None, epochs: int, seed: int,
         torch.set_num_threads(THREADS)
     pytorch_lightning.seed_everything(seed, workers=True, verbose=False)
     labels = class_names(dataset)
-    detector = create(len(labels), start, "cuda" if cuda else "cpu")
-    rate = LEARNING_RATE if start is None else FINE_TUNING_RATE
+    rate = learning_rate(start, labels)
+    detector = create(len(labels), checkpoint(start, out), "cuda" if cuda else "cpu")
     config = detector.get_train_config(
         dataset_dir=str(dataset),
         output_dir=str(out),

@@ -53,6 +53,9 @@ def wrong_roboflow(config: DetectorConfig) -> Iterator[tuple[str, str]]:
         return
     options = RoboflowOptions.model_validate(config.options)
     yield from _wrong_url(options.url)
+    if any(mark in options.model_id for mark in "?&#= "):
+        yield "model_id", "model_id must be a name or project/version alone, without ?, &, #, = or a space"
+        return
     parts = options.model_id.split("/")
     if options.api == "v0" and (len(parts) > 2 or not all(parts)):
         yield (

@@ -1,0 +1,128 @@
+"""A detector that errs on purpose: what a mission does about errors is tried out with it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from executive.cell import Detector, Request
+from executive.cell_config import DetectorConfig, Section
+from executive.messages import Answer, Detection, Frame
+from executive.vision.detectors.options import read_options, wrong_options
+from executive.vision.detectors.setting import Setting
+
+LOW = 0.75
+"""Highest confidence of a detection that is given a wrong class."""
+SIDES = (15.0, 40.0)
+"""Shortest and longest side of an invented box [pixel]."""
+
+
+class NoisyOptions(Section):
+    """What a noisy detector needs beside the errors it makes."""
+
+    of: str
+    """The detector of the cell whose answers it spoils."""
+    classes: tuple[str, ...]
+    """The classes it confuses and invents."""
+
+
+class NoisyDetector:
+    """Spoils another detector's answers; implements `executive.cell.Detector`.
+
+    Every look anew, and the same for the same seed, it leaves out a share `misses` of what the other found,
+    gives a share `confused` a wrong class with low confidence, moves every box by a normal deviate of
+    `jitter` along each axis, and adds `invented` boxes in the mean: the very figures of its section of the
+    cell file, which say how far its looks can be trusted.
+    """
+
+    def __init__(self, config: DetectorConfig, options: NoisyOptions, setting: Setting) -> None:
+        self._config = config
+        self._options = options
+        self._setting = setting
+        self._other: Detector = setting.other(options.of)
+
+    @classmethod
+    def from_config(cls, config: DetectorConfig, setting: Setting) -> NoisyDetector:
+        """Return the detector that a cell file describes.
+
+        Raises:
+            InputError: An option is missing, unknown or wrong.
+        """
+        return cls(config, read_options(NoisyOptions, config), setting)
+
+    @staticmethod
+    def check(
+        config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]
+    ) -> Iterator[tuple[str, str]]:
+        """Yield every option because of which it could not be built, with a sentence."""
+        del base
+        wrong = list(wrong_options(NoisyOptions, config))
+        yield from wrong
+        if not wrong and config.options["of"] not in others:
+            yield "of", f'the cell has no detector "{config.options["of"]}"; it has: {", ".join(others)}'
+
+    def request(self, frame: Frame, view: str) -> NoisyRequest:
+        """Ask the other detector about `frame`."""
+        return NoisyRequest(self, self._other.request(frame, view), frame, view)
+
+    def close(self) -> None:
+        """Have nothing to give back."""
+
+    def spoil(self, answer: Answer, frame: Frame, view: str) -> Answer:
+        """Return an answer with errors, drawn from the seed and the number of the frame."""
+        random = np.random.default_rng([self._setting.seed, frame.id, len(view)])
+        kept = [one for one in answer.found if random.random() >= self._config.misses]
+        found = [self._moved(self._confused(one, random), random) for one in kept]
+        found += [self._invented(frame, view, random) for _ in range(random.poisson(self._config.invented))]
+        found.sort(key=lambda detection: -detection.confidence)
+        return Answer(self._setting.name, tuple(found), self._config.reliability)
+
+    def _confused(self, detection: Detection, random: np.random.Generator) -> Detection:
+        if random.random() >= self._config.confused:
+            return detection
+        wrong = [label for label in self._options.classes if label != detection.label]
+        return replace(detection, label=str(random.choice(wrong)), confidence=self._confidence(LOW, random))
+
+    def _moved(self, detection: Detection, random: np.random.Generator) -> Detection:
+        right, down = random.normal(0.0, self._config.jitter, 2)
+        x0, y0, x1, y1 = detection.box
+        return replace(detection, box=(x0 + right, y0 + down, x1 + right, y1 + down))
+
+    def _invented(self, frame: Frame, view: str, random: np.random.Generator) -> Detection:
+        height, width = frame.image.shape[:2]
+        left, top, right, bottom = (
+            self._setting.camera.table_view if view == "table" else (0, 0, width, height)
+        )
+        x, y = random.uniform((left, top), (right, bottom))
+        half_width, half_height = random.uniform(*SIDES, 2) / 2
+        box = (x - half_width, y - half_height, x + half_width, y + half_height)
+        return Detection(str(random.choice(self._options.classes)), self._confidence(1.0, random), box)
+
+    def _confidence(self, most: float, random: np.random.Generator) -> float:
+        return float(random.uniform(self._config.floor, most))
+
+
+class NoisyRequest:
+    """A request to the other detector whose answer will be spoilt; implements `executive.cell.Request`."""
+
+    def __init__(self, detector: NoisyDetector, request: Request, frame: Frame, view: str) -> None:
+        self._detector = detector
+        self._request = request
+        self._frame = frame
+        self._view = view
+
+    @property
+    def ready(self) -> bool:
+        """True once the other detector's answer is due."""
+        return self._request.ready
+
+    def result(self) -> Answer:
+        """Return the spoilt answer.
+
+        Raises:
+            Unavailable: The other detector gave no usable answer.
+        """
+        return self._detector.spoil(self._request.result(), self._frame, self._view)

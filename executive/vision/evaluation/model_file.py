@@ -1,0 +1,48 @@
+"""Measuring a model file that no cell names yet."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+from pathlib import Path
+
+from executive.cell_config import DetectorConfig
+from executive.vision.evaluation.asking import CellDetector
+from executive.vision.evaluation.evaluate import evaluate
+from executive.vision.evaluation.figures import Evaluation
+from executive.vision.samples import read_samples
+
+FLOOR = 0.01
+"""Confidence from which boxes of a model file count for the mean average precision."""
+NAME = "model"
+"""What such a detector is called."""
+
+
+def model_detector(model: Path, labels: Path | Sequence[str]) -> DetectorConfig:
+    """Return the section of a cell file for an exported RF-DETR.
+
+    Args:
+        model: The ONNX file.
+        labels: Its class names, or the text file that lists them.
+    """
+    names = str(labels.absolute()) if isinstance(labels, Path) else tuple(labels)
+    return DetectorConfig.model_validate(
+        {"kind": "rfdetr", "model_path": str(model.absolute()), "labels": names, "floor": FLOOR}
+    )
+
+
+def evaluate_folder(model: Path, labels: Path | Sequence[str], folder: Path, threshold: float) -> Evaluation:
+    """Return how good an exported RF-DETR is on a folder of labelled images.
+
+    Args:
+        model: The ONNX file.
+        labels: Its class names, or the text file that lists them.
+        folder: A split, or a data set whose `test` or else `valid` split is used.
+        threshold: Confidence from which a detection counts.
+
+    Raises:
+        InputError: Model, labels or images cannot be read.
+    """
+    detector = CellDetector({NAME: model_detector(model, labels)}, NAME, base=Path())
+    with contextlib.closing(detector):
+        return evaluate(detector, read_samples(folder), threshold=threshold)

@@ -1,0 +1,63 @@
+"""What is printed of a detector's figures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from executive.view.detector_figures import print_figures
+from executive.vision.evaluation.figures import ClassFigures, Evaluation, Spread
+from executive.vision.evaluation.reliability import MeasuredReliability
+
+MEASURED = Evaluation(
+    threshold=0.5, images=300, objects=900, precision=0.991, recall=0.98, map50=0.995, map50_95=0.8,
+    latency=Spread(15, 16, 17, 18),
+    by_class={"cube": ClassFigures(900, 0.991, 0.98)},
+    confusion={"cube": {"cube": 882, "nothing": 18}, "nothing": {"cube": 8, "nothing": 0}},
+    answered_by={"eye": 300},
+    reliability=MeasuredReliability.of(
+        whole=800, overlooked=2, confused=0, invented=8, looks=300, jitter=0.5
+    ),
+)  # fmt: skip
+
+
+@pytest.fixture
+def printed(capsys):
+    """A function that prints figures and returns the lines, their inner space collapsed."""
+
+    def lines(evaluation):
+        print_figures("overhead", "eye", evaluation)
+        captured = capsys.readouterr()
+        assert captured.out == ""
+        return [" ".join(line.split()) for line in captured.err.splitlines()]
+
+    return lines
+
+
+def test_rates_classes_confusions_and_the_lines_for_the_cell_file_are_told(printed):
+    lines = printed(MEASURED)
+    assert lines[0] == "overhead, detector eye"
+    assert "900 objects on 300 images, threshold 0.5" in lines
+    assert "precision 99.10%, recall 98.00%, mAP50 0.9950, mAP50-95 0.8000" in lines
+    assert "cube 900 99.10% 98.00%" in lines
+    assert "taken for cube nothing" in lines
+    assert "cube 882 18" in lines
+    assert "nothing 8" in lines
+    assert "frame to detections [ms] 15.00 16.00 17.00 18.00" in lines
+    assert "invented: 0.049 # 8 in 300 looks; upper 95 % bound" in lines
+    assert not any("unavailable" in line or "answered" in line for line in lines)
+
+
+def test_who_answered_is_told_where_it_was_not_the_one_asked(printed):
+    assert "answered by server (290), embedded (10)" in printed(
+        replace(MEASURED, answered_by={"server": 290, "embedded": 10})
+    )
+
+
+def test_a_detector_that_never_answered_has_nothing_but_its_excuse(printed):
+    silent = Evaluation(
+        threshold=0.5, images=4, objects=0, precision=0, recall=0, map50=0, map50_95=0,
+        unavailable=4, why="the server is gone",
+    )  # fmt: skip
+    assert printed(silent)[-1] == "unavailable for 4 of 4 images (100.0%), at last: the server is gone"

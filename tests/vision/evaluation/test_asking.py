@@ -1,0 +1,117 @@
+"""Asking a detector of a cell file outside of any run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from executive.cell_config import DetectorConfig
+from executive.errors import Unavailable
+from executive.messages import Answer, Detection
+from executive.vision.evaluation import asking
+from executive.vision.evaluation.asking import PATIENCE, CellDetector, whole_image
+from executive.vision.evaluation.truth import as_frame
+
+CONFIGS = {"eye": DetectorConfig(kind="embedded", threshold=0.6)}
+BOX = (1.0, 2.0, 3.0, 4.0)
+
+
+class Delayed:
+    """Answers after a time on the clock; one without an answer never does."""
+
+    def __init__(self, clock, answer, delay=0.3):
+        self.clock, self.answer, self.delay = clock, answer, delay
+        self.stamps, self.views, self.closed = [], [], False
+
+    def request(self, frame, view):
+        self.stamps.append(frame.stamp)
+        self.views.append(view)
+        self.due = self.clock.now + self.delay
+        return self
+
+    @property
+    def ready(self):
+        return self.answer is not None and self.clock.now >= self.due
+
+    def result(self):
+        if isinstance(self.answer, Exception):
+            raise self.answer
+        return self.answer
+
+    def close(self):
+        self.closed = True
+
+
+@pytest.fixture
+def built(monkeypatch):
+    """Has detectors of a cell answer what `built.answer` is, and keeps what was built."""
+
+    class Built:
+        def __init__(self):
+            found = Detection("cube", 0.9, BOX), Detection("boat", 0.8, BOX)
+            self.answer = Answer("eye", found, CONFIGS["eye"].reliability)
+            self.detectors, self.cameras = [], []
+
+        def build(self, configs, *, camera, clock, base, seed):
+            self.cameras.append(camera)
+            self.detectors.append(Delayed(clock, self.answer))
+            return {"eye": self.detectors[-1]}
+
+    built = Built()
+    monkeypatch.setattr(asking, "build_detectors", built.build)
+    return built
+
+
+@pytest.fixture
+def frame(sample):
+    return as_frame(sample, 1)
+
+
+def test_an_answer_is_waited_for_on_the_clock(built, frame):
+    detector = CellDetector(CONFIGS, "eye", base=Path())
+    look = detector.ask(frame)
+    assert [one.label for one in look.found] == ["cube", "boat"]
+    assert (look.threshold, look.answered_by, look.why) == (0.6, "eye", "")
+    assert look.latency >= 0
+    detector.ask(frame)
+    first, second = built.detectors[0].stamps
+    assert second - first == pytest.approx(1.3, abs=0.01)
+
+
+def test_what_the_cell_does_not_handle_is_no_object_of_its(built, frame):
+    look = CellDetector(CONFIGS, "eye", base=Path(), classes=("cube",)).ask(frame)
+    assert [one.label for one in look.found] == ["cube"]
+
+
+def test_an_unavailable_detector_says_why(built, frame):
+    built.answer = Unavailable("the server is gone")
+    look = CellDetector(CONFIGS, "eye", base=Path()).ask(frame)
+    assert (look.found, look.why, look.answered_by) == ((), "the server is gone", "")
+
+
+def test_a_detector_that_never_answers_is_given_up(built, frame):
+    built.answer = None
+    look = CellDetector(CONFIGS, "eye", base=Path()).ask(frame)
+    assert look.why == f"no answer within {PATIENCE:g} s of the clock"
+
+
+def test_frames_of_a_camera_are_searched_as_in_a_run(built, frame):
+    camera = whole_image((640, 480))
+    detector = CellDetector(CONFIGS, "eye", base=Path(), camera=camera, view="full")
+    detector.ask(frame)
+    assert built.cameras == [camera]
+    assert built.detectors[0].views == ["full"]
+
+
+def test_images_of_any_size_are_searched_as_a_whole(built, frame):
+    detector = CellDetector(CONFIGS, "eye", base=Path())
+    wide = replace(frame, image=np.zeros((100, 300, 3), np.uint8))
+    for one in (frame, frame, wide):
+        detector.ask(one)
+    assert [camera.table_view for camera in built.cameras] == [(0, 0, 256, 256), (0, 0, 300, 100)]
+    assert [one.closed for one in built.detectors] == [True, False]
+    detector.close()
+    assert built.detectors[1].closed
