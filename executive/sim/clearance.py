@@ -128,7 +128,7 @@ class PathClearance:
         if carrying not in self._held:
             client = self.world.client
             shape = client.createCollisionShape(
-                pybullet.GEOM_CYLINDER, radius=carrying.radius, height=carrying.height
+                pybullet.GEOM_CYLINDER, radius=carrying.radius + carrying.ring, height=carrying.height
             )
             self._held[carrying] = int(client.createMultiBody(0, shape, basePosition=FAR_AWAY))
         return self._held[carrying]

@@ -32,7 +32,6 @@ def generate(
     workers: int,
     valid: float,
     progress: Callable[[int, int], None],
-    randomized: bool = True,
 ) -> None:
     """Write a dataset of random scenes, the cells taking turns; the last share of it is for validation.
 
@@ -45,7 +44,6 @@ def generate(
         workers: Processes that render.
         valid: Share of the images that goes into the split `valid`, 0 to 1.
         progress: Told (images made, images in all) now and then.
-        randomized: Vary everything, for training; else scenes as a run begins with.
 
     Raises:
         InputError: The layout is unknown, the cells differ in their classes, a model is missing or not as
@@ -67,9 +65,7 @@ def generate(
     entries: dict[int, Entry] = {}
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         blocks = [
-            pool.submit(
-                _render_block, cells, out, layout, seed, first, splits[first : first + BLOCK], randomized
-            )
+            pool.submit(_render_block, cells, out, layout, seed, first, splits[first : first + BLOCK])
             for first in range(0, images, BLOCK)
         ]
         for block in as_completed(blocks):
@@ -85,15 +81,11 @@ def _render_block(
     seed: int,
     first: int,
     splits: Sequence[str],
-    randomized: bool,
 ) -> dict[int, Entry]:
     """Render and save the images from number `first` on, one per split; runs in a process of its own."""
     cv2.setNumThreads(1)
     cameras = [next(iter(cell.cameras)) for cell in cells]
-    renderers = [
-        SceneRenderer(cell, camera, randomized=randomized)
-        for cell, camera in zip(cells, cameras, strict=True)
-    ]
+    renderers = [SceneRenderer(cell, camera) for cell, camera in zip(cells, cameras, strict=True)]
     entries = {}
     for number, split in enumerate(splits, first):
         turn = number % len(cells)

@@ -115,14 +115,18 @@ def _spawn(config: CellConfig, label: str) -> Pose:
 
 
 def _places(config: CellConfig, label: str, offset: float) -> Iterable[Array]:
-    """Yield cup positions `(2,)` [m] in the object's frame: turning the object is turning the aim."""
+    """Yield cup positions `(2,)` [m] in the object's frame: turning the object is turning the aim.
+
+    What has a ring to be touched on is aimed at there, in the direction of the offset.
+    """
     outline = load_mesh(config.objects[label]).vertices[:, :2]
+    reach = config.objects[label].ring + offset
     for yaw in 2 * np.pi * np.arange(YAWS) / YAWS:
         R_WO = about_z(yaw)[:2, :2]
         turned = outline @ R_WO.T
         aim_W = (turned.min(axis=0) + turned.max(axis=0)) / 2
         for angle in 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS:
-            yield R_WO.T @ (aim_W + offset * np.array([math.cos(angle), math.sin(angle)]))
+            yield R_WO.T @ (aim_W + reach * np.array([math.cos(angle), math.sin(angle)]))
 
 
 def _resized(tool: ToolConfig, cup_radius: float) -> ToolConfig:

@@ -290,3 +290,51 @@ def test_a_rejected_item_that_one_look_misses_stays_rejected(bench: Bench) -> No
     bench.look(view="full")
     bench.ledger.close()
     assert (bench.ledger.balance()["lost"], bench.ledger.balance()["rejected"]) == (0, 1)
+
+
+def test_no_name_is_given_out_twice(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0))
+    bench.ledger.held("cube-1")
+    bench.ledger.dropped("cube-1")
+    bench.look(("cube", 0.45, 0.1), ("cube", 0.60, 0.1))
+    bench.look(("cube", 0.45, 0.1), ("cube", 0.60, 0.1), ("cube", 0.55, -0.2))
+    rows = bench.ledger.rows()
+    assert len({row["item"] for row in rows}) == len(rows) == 3
+    assert sorted(row["position"][0] for row in rows) == [0.45, 0.55, 0.60]  # type: ignore[index]
+
+
+def test_an_item_dropped_twice_is_recognized_after_further_changes(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0), ("cube", 0.60, 0.1))
+    bench.ledger.held("cube-1")
+    bench.ledger.dropped("cube-1")
+    bench.look(("cube", 0.60, 0.1), ("duck", 0.45, 0.15))
+    bench.ledger.missed("cube-2")
+    found = bench.look(("cube", 0.60, 0.1), ("cube", 0.45, -0.15), ("duck", 0.45, 0.15))
+    assert {t.item for t in found} == {"cube-1", "cube-2", "duck-1"}
+
+
+def test_what_seems_to_lie_just_beside_a_bin_is_neither_a_target_nor_fallen_into_it(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0), ("cube", 0.6, 0.1))
+    bench.ledger.held("cube-1")
+    bench.ledger.placed("cube-1", "red_bin")
+    bench.ledger.held("cube-2")
+    bench.ledger.dropped("cube-2")
+    edge = -0.44 + 0.12 + 0.005
+    assert bench.look(("cube", 0.2, edge), ("cube", 0.2, -0.44), view="full") == []
+    assert bench.ledger.balance()["placed"] == 1
+
+
+def test_an_item_whose_class_looks_keep_contradicting_is_given_up_in_the_end(bench: Bench) -> None:
+    for look in range(60):
+        bench.look(("cube" if look % 2 else "duck", 0.50, 0.0))
+        assert look <= 2 or not bench.ledger.is_sure("duck-1")
+    (row,) = bench.ledger.rows()
+    assert (row["state"], row["why"]) == ("rejected", "its class is in doubt: 20 duck, 20 cube")
+
+
+def test_one_slip_about_the_class_costs_some_looks_and_no_more(bench: Bench) -> None:
+    bench.look(("duck", 0.50, 0.0))
+    for _ in range(6):
+        bench.look(("cube", 0.50, 0.0))
+    assert bench.ledger.label("duck-1") == "cube"
+    assert bench.ledger.is_sure("duck-1")

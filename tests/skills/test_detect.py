@@ -1,5 +1,9 @@
 from __future__ import annotations
 
+import math
+
+import pytest
+
 from executive.messages import Detection
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
@@ -68,3 +72,13 @@ def test_what_is_seen_of_things_behind_the_arm_is_not_believed(fake: FakeCell) -
 def test_it_says_which_detector_answered_and_how_far_it_can_be_trusted(fake: FakeCell) -> None:
     detections = run_skill(Detect(), fake).outputs["detections"]
     assert (detections.detector, detections.reliability.misses) == ("embedded", 0.02)
+
+
+@pytest.mark.parametrize(
+    "box", [(math.nan, 0, 9, 9), (0, 0, math.inf, 9), (9, 0, 0, 9)], ids=["nan", "infinite", "inside out"]
+)
+def test_a_box_that_cannot_be_is_no_answer(fake: FakeCell, box: tuple[float, ...]) -> None:
+    fake.detector.answers = lambda look, true: [Detection("duck", 0.9, box)]
+    result = run_skill(Detect(), fake)
+    assert result.reason == "unavailable"
+    assert result.message.startswith("detector embedded gave a box that cannot be: duck 0.9 at (")

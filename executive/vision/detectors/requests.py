@@ -13,7 +13,7 @@ from executive.messages import Answer, Detection, Reliability
 Search = Callable[[], Sequence[Detection]]
 
 SLICE = 0.05
-"""Longest time the caller is held at once while an answer is overdue [s]; a second Ctrl-C works in between."""
+"""Longest time the caller is held at once while an answer is overdue [s]; a second Ctrl-C ends it."""
 EARLY = 1e-9
 """Rounding allowed when two times on the clock are compared [s]."""
 
