@@ -15,8 +15,12 @@ MARGIN = 0.4
 """How far around the workspace is watched [m]: as far as what is dropped or pushed gets."""
 ASTRAY = 0.02
 """Chance that something lies beside the workspace before the robot has dropped or pushed anything."""
+STRAYED = 0.1
+"""Chance that something lies at a place beside the workspace after the robot has."""
 LEAST = 1e-4
 """Chance that remains however often a place is searched: looks are not wholly independent of each other."""
+RECENT = 4
+"""Full images, from as many poses as a camera has, of which one must show a place that can be seen."""
 BORDER = 12.0
 """Width of the image's border in which a point does not count as shown [pixel]."""
 NEAR = 0.03
@@ -45,8 +49,10 @@ class Coverage:
         self._low, self._high = np.array([left, low]), np.array([right, high])
         self._workspace = self._within(self._points, 0.0)
         self._overlooked = np.where(self._within(self._points, NEAR), 1.0, ASTRAY)
+        self._after_a_change = np.where(self._within(self._points, NEAR), 1.0, STRAYED)
         self._changed = np.zeros(len(self._points), dtype=int)
-        self._beside = np.zeros(len(self._points), dtype=bool)
+        self._full_looks = 0
+        self._shown = np.full(len(self._points), -RECENT)
 
     def look(self, detections: Detections) -> None:
         """Take account of a look: what it did find is known, and no longer overlooked, either."""
@@ -55,13 +61,14 @@ class Coverage:
         self._overlooked[current & searched] *= detections.reliability.misses
         self._overlooked = self._overlooked.clip(LEAST)
         if detections.view == "full":
+            self._full_looks += 1
             # What only just shows may not show again: nothing would ever be said about it.
-            self._beside = self._beside | (searched & detections.shows(self._points, BORDER))
+            self._shown[searched & detections.shows(self._points, BORDER)] = self._full_looks
 
     def disturb(self, centre: Array, radius: float, epoch: int) -> None:
         """Take account of change `epoch`, which may have put an object within `radius` [m] of `centre`."""
         near = np.hypot(*(self._points - centre)[:, :2].T) <= radius
-        self._overlooked[near], self._changed[near] = 1.0, epoch
+        self._overlooked[near], self._changed[near] = self._after_a_change[near], epoch
 
     def overlooked(self, position: Array) -> float:
         """Return the chance, 0 to 1, that an object at a place `(3,)` [m] has not been seen yet."""
@@ -77,11 +84,22 @@ class Coverage:
     def worst(self) -> float:
         """The largest chance, 0 to 1, that an object lies anywhere and has been overlooked.
 
-        Counted are the workspace and whatever else full images have shown; 1 before there was one.
+        Counted are the workspace and what else one of the last full images has shown: a place that none of
+        them does, though they were taken from several poses, cannot be seen. It is 1 before there was one.
         """
-        if not self._beside.any():
+        if not self._full_looks:
             return 1.0
-        return float(self._overlooked[self._workspace | self._beside].max())
+        return float(self._overlooked[self._in_sight].max())
+
+    def in_sight(self, position: Array) -> bool:
+        """Tell whether a place `(3,)` [m] is one that `worst` counts."""
+        distances = np.hypot(*(self._points - position)[:, :2].T)
+        nearest = int(np.argmin(distances))
+        return bool(distances[nearest] <= PITCH and self._in_sight[nearest])
+
+    @property
+    def _in_sight(self) -> NDArray[np.bool_]:
+        return self._workspace | (self._shown > self._full_looks - RECENT)
 
     def _within(self, points: Array, margin: float) -> NDArray[np.bool_]:
         """Tell `(N,)` which points lie in the workspace or at most `margin` [m] beside it."""

@@ -122,7 +122,12 @@ class ItemLedger:
 
     def believes_empty(self) -> bool:
         """Tell whether it is as good as certain that nothing with a route is left where one can look."""
-        waiting = any(r.label in self._routes and self._may_wait(r) for r in self._records.values())
+        waiting = any(
+            record.label in self._routes
+            and self._may_wait(record)
+            and self._coverage.in_sight(record.position)
+            for record in self._records.values()
+        )
         return not waiting and self._coverage.worst <= self._config.overlooked
 
     def touched(self, item: Item) -> None:
@@ -182,11 +187,7 @@ class ItemLedger:
         return next((r.item for r in self._records.values() if r.state is State.HELD), None)
 
     def close(self) -> None:
-        """Decide what became of everything still open: the run is over.
-
-        An item seen where it was left is rejected, one that is known to exist and was not found again is
-        lost, given up or not, one that a single look believed in and another one did not is a phantom.
-        """
+        """Decide what became of everything still open (`fate_of`): the run is over."""
         for record in self._records.values():
             fate = fate_of(record, gone=self._is_gone(record), routed=record.label in self._routes)
             if fate is not None:
@@ -194,10 +195,7 @@ class ItemLedger:
                 self._change(record.item, state)
 
     def balance(self) -> dict[str, int]:
-        """Return the counts `seen, placed, rejected, lost, phantom`.
-
-        After `close`, seen = placed + rejected + lost.
-        """
+        """Return the counts `seen, placed, rejected, lost, phantom`; seen is the sum of the next three."""
         return balance(self._records.values())
 
     def rows(self) -> list[dict[str, object]]:

@@ -9,7 +9,7 @@ import pytest
 
 from executive.cell_config import TableConfig
 from executive.geometry import looking_down
-from executive.ledger.coverage import ASTRAY, LEAST, Coverage
+from executive.ledger.coverage import ASTRAY, LEAST, STRAYED, Coverage
 from executive.messages import Detections, Frame, Reliability
 
 TABLE = TableConfig()
@@ -44,7 +44,7 @@ def test_before_anything_was_dropped_hardly_anything_lies_beside_the_workspace(c
     beside = np.array([0.53, 0.40, 0.025])
     assert coverage.overlooked(beside) == ASTRAY
     coverage.disturb(MIDDLE, math.inf, epoch=1)
-    assert coverage.overlooked(beside) == 1.0
+    assert coverage.overlooked(beside) == STRAYED
 
 
 def test_looks_at_the_workspace_alone_never_show_that_nothing_lies_beside_it(coverage: Coverage) -> None:
@@ -90,3 +90,17 @@ def test_the_workspace_reaches_as_far_as_half_an_object_over_its_edge(
     coverage: Coverage, place: tuple[float, float], inside: bool
 ) -> None:
     assert coverage.in_workspace(np.array([*place, 0.03])) is inside
+
+
+def test_a_place_beside_the_workspace_that_no_pose_shows_any_more_is_not_waited_for(
+    coverage: Coverage,
+) -> None:
+    coverage.look(look())
+    coverage.disturb(MIDDLE, math.inf, epoch=1)
+    # The workspace is in the middle columns; on the left the arm stays in the way from now on.
+    worst = []
+    for _ in range(8):
+        coverage.look(look(epoch=1, hidden=slice(0, 180)))
+        worst.append(coverage.worst)
+    assert worst[2] == STRAYED, "hidden on the left"
+    assert worst[4] <= 0.2**5 * 1.01
