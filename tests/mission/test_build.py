@@ -165,6 +165,6 @@ def test_shipped_missions_load_and_build(name: str) -> None:
         pytest.skip("the project is not installed, so it has no entry points")
     loaded = load_mission(name, installed)
     assert loaded.warnings == ()
-    cell: Any = SimpleNamespace(clock=None)
+    cell: Any = SimpleNamespace(clock=SimpleNamespace(now=0.0))
     paths = [node.path for node in outline(build(loaded, installed, cell, Scope(), ignore))]
     assert len(paths) == len(set(paths))
