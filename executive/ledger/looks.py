@@ -121,6 +121,9 @@ class Looks:
         for place, new in enumerate(seen):
             if new.state is not State.SEEN or new.attempts or new.probability < LIKELY:
                 continue
+            # Whose class is not sure yet may be another one: what fell near by, misread.
+            if new.misjudged > self._config.misjudged:
+                continue
             missing = [old for old in records.values() if self._may_be(old, new)]
             if missing:
                 old = min(missing, key=lambda r: float(np.linalg.norm((r.position - new.position)[:2])))

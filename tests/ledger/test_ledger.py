@@ -36,7 +36,9 @@ class Bench:
         )
         self.frames = 0
 
-    def look(self, *things: Thing, view: str = "table", epoch: int | None = None) -> Sequence[Target]:
+    def look(
+        self, *things: Thing, view: str = "table", epoch: int | None = None, by: Reliability = EYE
+    ) -> Sequence[Target]:
         self.frames += 1
         area = (192.0, 100.0, 448.0, 356.0) if view == "table" else (0.0, 0.0, 640.0, 480.0)
         frame = Frame(
@@ -52,7 +54,7 @@ class Bench:
         )
         found = tuple(Detection(label, 0.9, (0, 0, 1, 1)) for label, _, _ in things)
         return self.ledger.observe(
-            Detections(frame, found, "eye", EYE, view, area), [np.array([x, y, 0.025]) for _, x, y in things]
+            Detections(frame, found, "eye", by, view, area), [np.array([x, y, 0.025]) for _, x, y in things]
         )
 
 
@@ -338,3 +340,18 @@ def test_one_slip_about_the_class_costs_some_looks_and_no_more(bench: Bench) -> 
         bench.look(("cube", 0.50, 0.0))
     assert bench.ledger.label("duck-1") == "cube"
     assert bench.ledger.is_sure("duck-1")
+
+
+def test_a_misread_object_is_nobody_who_is_missed_before_its_class_is_sure(bench: Bench) -> None:
+    bad = Reliability(threshold=0.5, misses=0.2, confused=0.1, invented=0.5, jitter=1.0)
+    for _ in range(4):
+        bench.look(("cube", 0.50, 0.0), ("duck", 0.60, 0.15), by=bad)
+    bench.ledger.held("duck-1")
+    bench.ledger.dropped("duck-1")
+    # The fallen duck is read as a cube at first, and the cube is overlooked meanwhile.
+    for label in ("cube", "cube", "duck", "duck", "duck", "duck", "duck"):
+        bench.look((label, 0.60, 0.10), by=bad)
+    bench.look(("duck", 0.60, 0.10), ("cube", 0.50, 0.0), by=bad)
+    rows = {row["item"]: row for row in bench.ledger.rows() if row["state"] == "seen"}
+    assert rows["duck-1"]["position"] == pytest.approx([0.60, 0.10, 0.025])
+    assert rows["cube-1"]["position"] == pytest.approx([0.50, 0.0, 0.025])
