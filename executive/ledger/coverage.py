@@ -92,10 +92,12 @@ class Coverage:
         return float(self._overlooked[self._in_sight].max())
 
     def in_sight(self, position: Array) -> bool:
-        """Tell whether a place `(3,)` [m] is one that `worst` counts."""
-        distances = np.hypot(*(self._points - position)[:, :2].T)
-        nearest = int(np.argmin(distances))
-        return bool(distances[nearest] <= PITCH and self._in_sight[nearest])
+        """Tell whether a place `(3,)` [m] is one that `worst` counts, like all the points around it.
+
+        At the edge of what the arm hides, a point may be shown and a place beside it never be.
+        """
+        around = np.hypot(*(self._points - position)[:, :2].T) <= PITCH
+        return bool(around.any() and self._in_sight[around].all())
 
     @property
     def _in_sight(self) -> NDArray[np.bool_]:

@@ -182,6 +182,20 @@ class ItemLedger:
         """Return how many objects were let go in `bin` so far: the number of its next free slot."""
         return sum(record.bin == bin for record in self._records.values())
 
+    def standing(self) -> Sequence[Target]:
+        """Return where everything is that is believed to stand on the table, to be sorted or not."""
+        return [
+            target_of(record)
+            for record in self._records.values()
+            if record.state in (State.SEEN, State.REJECTED)
+            and record.probability >= 0.5
+            and not self._is_gone(record)
+        ]
+
+    def bumped(self) -> None:
+        """Record that the arm ran into something: the whole table is in doubt now."""
+        self._disturb(np.zeros(3), math.inf)
+
     def in_tool(self) -> Item | None:
         """Return the item that the tool is believed to hold, or None."""
         return next((r.item for r in self._records.values() if r.state is State.HELD), None)
