@@ -7,12 +7,25 @@ blocks: a skill asks, yields, and looks again at the next tick.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from executive.geometry import Array, Pose
-from executive.messages import Answer, Bin, Box, Detection, Detections, Frame, Item, ObjectClass, Target
+from executive.messages import (
+    Answer,
+    Bin,
+    Box,
+    Detection,
+    Detections,
+    Frame,
+    Item,
+    Load,
+    ObjectClass,
+    Obstacle,
+    Target,
+)
 
 Steps = Iterator[None]
 """What a generator hands the tick loop: one None per control step."""
@@ -44,19 +57,52 @@ class Motion(Protocol):
         """Time it takes from start to rest [s]."""
 
 
-@dataclass(frozen=True, eq=False)
-class Via:
-    """A tool position to pass, tool pointing down.
+@dataclass(frozen=True)
+class Goal:
+    """Where the tool is to come to rest, pointing down.
 
     Attributes:
-        position: Where the tool centre point goes `(3,)` [m].
+        position: Of the tool centre point `(x, y, z)` [m].
         yaw: Rotation about the vertical [rad], or None where it is free.
-        speed: Longest tool speed on the way to it [m/s], or None for as fast as the limits allow.
+        guarded: Length of the last part, straight down and no faster than `speed` [m]; 0 for none.
+        speed: Tool speed of that part [m/s].
     """
 
-    position: Array
+    position: tuple[float, float, float]
     yaw: float | None = None
-    speed: float | None = None
+    guarded: float = 0.0
+    speed: float = math.inf
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a motion has to heed on its way.
+
+    Attributes:
+        load: What the tool holds, or None.
+        around: What stands in the cell beyond what its file says.
+        target: What the tool is to touch on the guarded part, and stays away from before that, or None.
+    """
+
+    load: Load | None = None
+    around: tuple[Obstacle, ...] = ()
+    target: Obstacle | None = None
+
+
+class Planning(Protocol):
+    """A motion being planned."""
+
+    @property
+    def ready(self) -> bool:
+        """True from the tick at which it is known, on the run's clock."""
+
+    def result(self) -> Motion:
+        """Return the motion.
+
+        Raises:
+            Unreachable: The goal has no joint solution inside the limits.
+            Blocked: Every way comes too close to something.
+        """
 
 
 class Arm(Protocol):
@@ -71,22 +117,25 @@ class Arm(Protocol):
         """Pose of the tool centre point in the world, from the joint positions."""
 
     @property
+    def destination(self) -> Array:
+        """Where the tool will be when the running motion is over, or is now `(3,)` [m]."""
+
+    @property
     def at_rest(self) -> bool:
         """True while no motion runs and no braking is under way."""
 
-    def plan(self, vias: Sequence[Via], carrying: ObjectClass | None = None) -> Motion:
-        """Return a motion from where the arm rests through every via.
+    @property
+    def met(self) -> str | None:
+        """What the arm ran into in its last motion, which it then broke off, or None."""
 
-        Raises:
-            Unreachable: A via has no joint solution inside the limits.
-            Blocked: The way comes too close to something.
+    def plan(self, goal: Goal | str, task: Task = Task()) -> Planning:
+        """Begin to plan a motion from where the arm rests to a goal, or to a named pose of the cell file.
+
+        What `plan_ahead` was asked before, in the same words and for the same start, is known at once.
         """
 
-    def plan_to_pose(self, name: str) -> Motion:
-        """Return a motion straight up to travel height, then to the named joint pose of the cell file.
-
-        Raises as `plan` does.
-        """
+    def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
+        """Plan a motion, from where the running one will end, before anybody asks for it."""
 
     def start(self, motion: Motion) -> None:
         """Begin to follow `motion`; the arm must be at rest where it starts."""
@@ -105,6 +154,10 @@ class Tool(Protocol):
     @property
     def holding(self) -> bool:
         """True while the vacuum says that something is sealed to the cup."""
+
+    @property
+    def bears(self) -> float:
+        """The pull that the seal bears, as the vacuum gauge tells [N]; 0 while nothing is held."""
 
     def close(self) -> None:
         """Switch the vacuum on: what the cup touches now is sealed to it if the seal is good enough."""
@@ -232,6 +285,12 @@ class Ledger(Protocol):
     def objects_in(self, bin: str) -> int:
         """Return how many objects were let go in `bin` so far: the number of its next free slot."""
 
+    def standing(self) -> Sequence[Target]:
+        """Return where everything is that is believed to stand on the table, to be sorted or not."""
+
+    def bumped(self) -> None:
+        """Record that the arm ran into something: the whole table is in doubt now."""
+
     def in_tool(self) -> Item | None:
         """Return the item that the tool is believed to hold, or None."""
 
@@ -278,7 +337,6 @@ class Cell:
         routes: Class label to the names of the bins that are right for it, as the mission says.
         localizer: How detections become positions in this cell.
         safe_place: Where something held may be put down `(3,)` [m].
-        travel_height: Height of the tool centre point at which tool and load clear everything [m].
         descent: Length of an approach's guarded last part above the expected surface [m].
         descent_speed: Tool speed of that part [m/s].
         decided: Tells the record which target was chosen and for which bin.
@@ -296,7 +354,6 @@ class Cell:
     routes: Routes
     localizer: Localizer
     safe_place: Array
-    travel_height: float
     descent: float
     descent_speed: float
     decided: Callable[[Target, str], None]

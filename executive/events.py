@@ -13,7 +13,7 @@ class Event:
 
     Attributes:
         kind: What sort of thing, from a small set: `run`, `status`, `intent`, `item`, `look`,
-            `asking`, `request`, `decision`, `choice`, `fault`, `end`.
+            `asking`, `request`, `decision`, `choice`, `plan`, `fault`, `end`.
         tick: Control step at which it happened.
         clock: Time on the run's clock [s].
         data: Plain values (numbers, texts, lists, mappings) that describe it.

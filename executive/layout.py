@@ -7,6 +7,11 @@ import numpy as np
 from executive.cell_config import BinConfig, CellConfig, ObjectConfig
 from executive.messages import Bin, ObjectClass
 
+TOOL_RADIUS = 0.012
+"""Radius of the tool's body [m]."""
+LIP_LENGTH = 0.015
+"""Length of the thin part at the tool's end, as wide as the cup [m]."""
+
 
 def as_bin(name: str, config: BinConfig) -> Bin:
     """Return the bin of a cell file with its drop slots spread evenly over the floor."""

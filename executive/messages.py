@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -196,6 +197,10 @@ class Target:
     stamp: float
 
 
+BIN_THICKNESS = 0.005
+"""Thickness of a bin's floor and walls [m]."""
+
+
 @dataclass(frozen=True, eq=False)
 class Bin:
     """A container objects are sorted into.
@@ -226,9 +231,42 @@ class ObjectClass:
         height: Height of the object as it lies on the table [m].
         radius: Radius of the circle around its outline seen from above [m].
         ring: Distance from its middle at which to touch it [m]; more than 0 for parts with a hole.
+        mass: [kg]
     """
 
     label: str
     height: float
     radius: float
     ring: float = 0.0
+    mass: float = 0.1
+
+
+@dataclass(frozen=True)
+class Load:
+    """What the tool holds.
+
+    Attributes:
+        kind: Its class.
+        bears: The pull that its seal bears [N].
+    """
+
+    kind: ObjectClass
+    bears: float = math.inf
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """Something that stands upright in the cell, taken as a cylinder from the table to its top.
+
+    Attributes:
+        x, y: Where its axis is [m].
+        radius: [m]
+        top: Height of its top [m].
+        name: What it is, for the text of an error.
+    """
+
+    x: float
+    y: float
+    radius: float
+    top: float
+    name: str

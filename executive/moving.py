@@ -1,15 +1,24 @@
-"""How skills use the arm: one user after another, one safe way across the cell."""
+"""How skills use the arm: one user after another, each motion planned, checked and watched."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Generator, Iterator
 
-import numpy as np
-
-from executive.cell import Arm, Cell, Motion, Steps, Via
+from executive.cell import Arm, Cell, Goal, Motion, Steps, Task
 from executive.errors import Blocked, Unreachable
-from executive.geometry import Array
+from executive.messages import BIN_THICKNESS, Item, Load, Obstacle, Target
 from executive.skill import Skill
+
+ROLLED = 0.002
+"""How far an object in a bin may lie from where it was let go [m]."""
+DROP = 0.015
+"""Height above the floor at which the underside of an item is let go, unless a mission says otherwise [m]."""
+OVERTRAVEL = 0.015
+"""How far below the expected surface an approach feels, unless a mission says otherwise [m]."""
+SPACING = 0.0025
+"""Spacing of the spiral on which further attempts come down, unless a mission says otherwise [m]."""
+GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 
 
 def settle(arm: Arm) -> Steps:
@@ -18,12 +27,34 @@ def settle(arm: Arm) -> Steps:
         yield
 
 
-def follow(arm: Arm, motion: Motion, until: Callable[[], bool] = lambda: False) -> Steps:
-    """Yield while the arm follows `motion`, until it is at rest again.
+def planned(skill: Skill, arm: Arm, goal: Goal | str, task: Task) -> Generator[None, None, Motion]:
+    """Yield until the arm rests and a motion to `goal` is planned, and return it.
 
-    The arm brakes along its path as soon as `until` holds, and on any early end of the skill.
+    Raises:
+        SkillFailed: There is none; the reason is the skill's `unreachable` or `blocked`.
     """
     yield from settle(arm)
+    planning = arm.plan(goal, task)
+    while not planning.ready:
+        yield
+    try:
+        return planning.result()
+    except Unreachable as error:
+        raise skill.failed("unreachable", str(error)) from error
+    except Blocked as error:
+        raise skill.failed("blocked", str(error)) from error
+
+
+def follow(skill: Skill, cell: Cell, motion: Motion, until: Callable[[], bool] = lambda: False) -> Steps:
+    """Yield while the arm follows `motion`, until it is at rest again.
+
+    The arm brakes along its path as soon as `until` holds, when it runs into something, and on any early
+    end of the skill.
+
+    Raises:
+        SkillFailed: It ran into something; the reason is the skill's `blocked`.
+    """
+    arm = cell.arm
     arm.start(motion)
     try:
         while not arm.at_rest and not until():
@@ -31,32 +62,106 @@ def follow(arm: Arm, motion: Motion, until: Callable[[], bool] = lambda: False) 
     finally:
         arm.stop()
     yield from settle(arm)
+    if arm.met is not None:
+        cell.ledger.bumped()
+        raise skill.failed("blocked", arm.met)
 
 
-def planned(skill: Skill, plan: Callable[[], Motion]) -> Motion:
-    """Return the motion that `plan` returns.
+def around(cell: Cell, but: Item | None = None) -> tuple[Obstacle, ...]:
+    """Return what stands in the cell beyond what its file says, the item `but` left out.
 
-    Raises:
-        SkillFailed: There is none; the reason is the skill's `unreachable` or `blocked`.
+    That is what the ledger believes on the table, and what lies in the bins (`slots_taken`).
     """
-    try:
-        return plan()
-    except Unreachable as error:
-        raise skill.failed("unreachable", str(error)) from error
-    except Blocked as error:
-        raise skill.failed("blocked", str(error)) from error
+    return (
+        *(_standing(cell, target) for target in cell.ledger.standing() if target.item != but),
+        *_filled(cell, but),
+    )
 
 
-def travel(cell: Cell, over: Array) -> list[Via]:
-    """Return the way from where the tool is to a place: straight up, across at travel height.
+def slots_taken(cell: Cell, bin: str, but: Item | None = None) -> int:
+    """Return how many objects lie in `bin`, the item `but` not counted: the number of its next free slot.
+
+    What the tool carries into the bin counts, so that a plan made meanwhile still holds when it was let go.
+    """
+    held = cell.ledger.in_tool()
+    coming = held not in (None, but) and cell.bins[bin].contains(cell.arm.destination)
+    return cell.ledger.objects_in(bin) + coming
+
+
+def heeding(cell: Cell) -> Task:
+    """Return the task of going somewhere with whatever the tool holds."""
+    held = cell.ledger.in_tool()
+    return Task(around=around(cell)) if held is None else carrying(cell, held)
+
+
+def carrying(cell: Cell, item: Item) -> Task:
+    """Return the task of carrying `item`, which the tool holds."""
+    kind = cell.classes[cell.ledger.label(item)]
+    return Task(Load(kind, cell.tool.bears), around(cell, item))
+
+
+def approach(
+    cell: Cell,
+    target: Target,
+    overtravel: float = OVERTRAVEL,
+    spacing: float = SPACING,
+) -> tuple[Goal, Task]:
+    """Return goal and task of an approach: through the surface of `target`, felt for on the last part.
+
+    Every attempt after a failed one comes down a little beside the last.
 
     Args:
         cell: The work cell.
-        over: Point `(2,)` or `(3,)` [m] above which the tool is to arrive; its height is not used.
+        target: What to touch.
+        overtravel: How far below the expected surface to feel [m], but not below the target's middle: what
+            is felt there is the table.
+        spacing: Of the spiral of further attempts [m].
     """
-    here = cell.arm.tool_pose.position
-    vias = []
-    if here[2] < cell.travel_height - 1e-3:
-        vias.append(Via(np.array([here[0], here[1], cell.travel_height])))
-    vias.append(Via(np.array([over[0], over[1], cell.travel_height])))
-    return vias
+    kind = cell.classes[target.label]
+    x, y, middle = (float(value) for value in target.position)
+    dx, dy = _aside(cell.ledger.attempts(target.item), kind.ring, spacing)
+    surface = middle + kind.height / 2
+    lowest = max(surface - overtravel, kind.height / 2)
+    guarded = surface + cell.descent - lowest
+    goal = Goal((x + dx, y + dy, lowest), guarded=guarded, speed=cell.descent_speed)
+    return goal, Task(around=around(cell, target.item), target=_standing(cell, target))
+
+
+def into(cell: Cell, bin: str, item: Item, drop: float = DROP) -> Goal:
+    """Return the goal of a transit: `item`, `drop` [m] high, over the next free slot of a bin."""
+    box, height = cell.bins[bin], cell.classes[cell.ledger.label(item)].height
+    layer, place = divmod(slots_taken(cell, bin, item), len(box.slots))
+    x, y = (float(value) for value in box.slots[place])
+    return Goal((x, y, float(box.position[2]) + height * (1 + layer) + drop))
+
+
+def _aside(attempt: int, ring: float, spacing: float) -> tuple[float, float]:
+    """Return the sideways step (x, y) [m] of an attempt: a point of the ring, or of Vogel's spiral.
+
+    The turn of a part is not known, and any point of its ring is as good as another. The spiral begins in
+    the middle.
+    """
+    angle = attempt * GOLDEN_ANGLE
+    distance = ring or spacing * math.sqrt(attempt)
+    return distance * math.cos(angle), distance * math.sin(angle)
+
+
+def _standing(cell: Cell, target: Target) -> Obstacle:
+    x, y, middle = (float(value) for value in target.position)
+    kind = cell.classes[target.label]
+    return Obstacle(x, y, kind.radius, middle + kind.height / 2, target.item)
+
+
+def _filled(cell: Cell, but: Item | None) -> Iterator[Obstacle]:
+    """Yield what stands on the slots of bins that were used, the item `but` left out."""
+    for name, box in cell.bins.items():
+        kinds = [cell.classes[label] for label, bins in cell.routes.items() if name in bins]
+        kinds = kinds or list(cell.classes.values())
+        tallest, widest = max(kind.height for kind in kinds), max(kind.radius for kind in kinds)
+        count, slots = slots_taken(cell, name, but), len(box.slots)
+        for number, (x, y) in enumerate(box.slots[:count]):
+            layers = (count - 1 - number) // slots + 1
+            top = float(box.position[2]) + BIN_THICKNESS + layers * tallest
+            yield Obstacle(
+                float(x), float(y), widest + ROLLED, top, f"what lies in slot {number + 1} of {name}"
+            )

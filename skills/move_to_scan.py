@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from executive.cell import Cell, Steps
-from executive.moving import follow, planned, settle
+from executive.moving import follow, heeding, planned, settle
 from executive.skill import Skill, param
 
 
@@ -31,8 +31,8 @@ class MoveToScan(Skill):
         yield from settle(cell.arm)
         if self.pose == "auto" and cell.camera.sees_table():
             return
-        name = self._name(cell)
-        yield from follow(cell.arm, planned(self, lambda: cell.arm.plan_to_pose(name)))
+        motion = yield from planned(self, cell.arm, self._name(cell), heeding(cell))
+        yield from follow(self, cell, motion)
 
     def _name(self, cell: Cell) -> str:
         if self.pose == "auto":

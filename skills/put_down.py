@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-import numpy as np
-
-from executive.cell import Cell, LeastTimes, Steps, Via
+from executive.cell import Cell, Goal, LeastTimes, Steps
 from executive.messages import Item
-from executive.moving import follow, planned, settle, travel
+from executive.moving import carrying, follow, planned
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, param, port
 
 
@@ -33,12 +31,11 @@ class PutDown(Skill):
 
     def run(self, cell: Cell) -> Steps:
         """Carry it there, come down, let go."""
-        yield from settle(cell.arm)
+        x, y, floor = (float(value) for value in cell.safe_place)
         kind = cell.classes[cell.ledger.label(self.held)]
-        low = float(cell.safe_place[2]) + kind.height + self.drop
-        way = [*travel(cell, cell.safe_place), Via(np.array([*cell.safe_place[:2], low]))]
-        motion = planned(self, lambda: cell.arm.plan(way, carrying=kind))
-        yield from follow(cell.arm, motion)
+        goal = Goal((x, y, floor + kind.height + self.drop))
+        motion = yield from planned(self, cell.arm, goal, carrying(cell, self.held))
+        yield from follow(self, cell, motion)
         cell.tool.open()
         yield from cell.clock.sleep(self.settle)
         if cell.tool.holding:

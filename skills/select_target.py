@@ -8,6 +8,7 @@ import numpy as np
 
 from executive.cell import Cell, Steps
 from executive.messages import Item, Target
+from executive.moving import slots_taken
 from executive.skill import In, Out, Skill, SkillFailed, param, port
 
 
@@ -15,7 +16,8 @@ class SelectTarget(Skill):
     """Know which target to pick next and where it belongs.
 
     Passes over targets that are rejected, done, of a class without a route, put in doubt by what the
-    robot did since they were seen, or seen by too few looks for as good as the detector is.
+    robot did since they were seen, or seen by too few looks for as good as the detector is. While the arm
+    moves, the choice is the one that it would be when it stands still again.
     """
 
     targets: In[list[Target]] = port(doc="where things are, as far as is known")
@@ -27,6 +29,7 @@ class SelectTarget(Skill):
     prefer: str = param(
         "nearest", choices=("nearest", "surest"), doc="`nearest` to the tool, or the `surest` detection"
     )
+    tentative: bool = param(False, doc="only think ahead: the record does not take it for a decision")
     reasons: ClassVar = ("no_candidate", "unseen", "doubtful")
 
     def run(self, cell: Cell) -> Steps:
@@ -35,15 +38,16 @@ class SelectTarget(Skill):
         candidates = [target for target in self.targets if self._eligible(cell, target)]
         if not candidates:
             raise self._none(cell)
-        here = cell.arm.tool_pose.position[:2]
+        here = cell.arm.destination[:2]
         if self.prefer == "nearest":
             best = min(candidates, key=lambda t: (float(np.linalg.norm(t.position[:2] - here)), t.item))
         else:
             best = min(candidates, key=lambda t: (-t.confidence, t.item))
         self.target, self.item = best, best.item
-        # The number of a bin's next slot is the number of objects let go in it.
-        self.bin = min(cell.routes[cell.ledger.label(best.item)], key=cell.ledger.objects_in)
-        cell.decided(best, self.bin)
+        bins = cell.routes[cell.ledger.label(best.item)]
+        self.bin = min(bins, key=lambda bin: slots_taken(cell, bin))
+        if not self.tentative:
+            cell.decided(best, self.bin)
 
     def _eligible(self, cell: Cell, target: Target) -> bool:
         return (

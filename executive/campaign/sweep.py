@@ -119,6 +119,13 @@ def summarize(results: Sequence[Result]) -> dict[str, Any]:
             if not ledger_agrees(result)
         ],
         "robot_time_s": spread([result["robot_time_s"] for result in results]),
+        "robot_time_per_object_s": (
+            round(sum(result["robot_time_s"] for result in results) / right, 3) if right else None
+        ),
+        "planning": {
+            key: round(sum(result["planning"][key] for result in results), 3)
+            for key in ("motions", "ahead", "waited_s")
+        },
         "wall_time_s": spread([result["wall_time_s"] for result in results]),
         "failures": [
             {key: result[key] for key in ("seed", "status", "reason", "message", "node", "run")}
@@ -139,6 +146,7 @@ def _broken(job: Job, error: BaseException) -> Result:
         "seed": job.seed,
         "items": dict.fromkeys(FATES, 0),
         "audit": dict.fromkeys(PLACES, 0),
+        "planning": {"motions": 0, "ahead": 0, "waited_s": 0.0},
         "ticks": 0,
         "robot_time_s": 0.0,
         "wall_time_s": 0.0,

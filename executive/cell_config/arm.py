@@ -67,11 +67,15 @@ class ToolConfig(Section):
 class MotionConfig(Section):
     """How the arm moves about the cell."""
 
-    clearance: float = Field(0.04, gt=0)
-    """Height that tool and load keep above walls and objects while travelling [m]."""
-    descent_speed: float = Field(0.03, gt=0)
-    """Tool speed of the guarded last part of an approach [m/s]."""
-    descent: float = Field(0.02, gt=0)
-    """Length of the guarded last part above the expected surface [m]."""
     margin: float = Field(0.005, ge=0)
-    """Smallest distance of arm and tool to the cell along a checked path [m]."""
+    """Smallest distance of arm, tool and load to anything on the way [m]."""
+    clearance: float = Field(0.04, gt=0)
+    """Height above walls and objects of a motion that stops at every corner, where no other is clear [m]."""
+    descent: float = Field(0.005, gt=0)
+    """Length of the guarded last part of an approach above the expected surface [m]."""
+    descent_speed: float = Field(0.035, gt=0)
+    """Tool speed of the guarded last part of an approach [m/s]."""
+    straight: float = Field(0.0, ge=0, le=0.2)
+    """Length of the last part of a way down and the first part of a way up that are straight [m]; 0: none."""
+    planning: float = Field(0.05, ge=0)
+    """Time that planning a motion takes on the run's clock, unless it was planned ahead [s]."""

@@ -83,6 +83,7 @@ def _text(figures: dict[str, Any]) -> str:
         f"(95 % interval {low:.2%} to {high:.2%})",
         f"robot time {robot['median']:.1f} s (median; {robot['least']:.1f} to {robot['most']:.1f}), "
         f"wall time {wall['median']:.1f} s ({wall['least']:.1f} to {wall['most']:.1f})",
+        *_pace(figures),
         f"ledger and audit disagree in {len(figures['disagreements'])} runs",
     ]
     lines += [
@@ -94,6 +95,17 @@ def _text(figures: dict[str, Any]) -> str:
         lines.append(f"{len(figures['failures'])} runs did not succeed:")
     lines += [f"  seed {entry['seed']}: {verdict(entry)}; {entry['run']}" for entry in figures["failures"]]
     return "\n".join(lines)
+
+
+def _pace(figures: dict[str, Any]) -> list[str]:
+    """Return a line about time per object and plans, if anything was sorted."""
+    planning, pace = figures["planning"], figures["robot_time_per_object_s"]
+    if not pace or not planning["motions"]:
+        return []
+    return [
+        f"robot time per object {pace:.2f} s; {planning['ahead'] / planning['motions']:.0%} of "
+        f"{planning['motions']} motions planned ahead, {planning['waited_s']:.1f} s waited for the others"
+    ]
 
 
 def _counts(counts: dict[str, int]) -> str:

@@ -78,9 +78,26 @@ class Kinematics:
         R, _, p = self._chain(np.asarray(q, dtype=float)[None])
         return tuple(Pose(R[0, i], p[0, i]) for i in range(7))
 
-    def positions(self, qs: Array) -> Array:
-        """Return the tool centre points `(N, 3)` [m] of many joint positions `(N, 7)` [rad]."""
-        return self._chain(qs)[2][:, -1]
+    def tips(self, qs: Array) -> tuple[Array, Array]:
+        """Return tool centre points `(N, 3)` [m] and tool axes `(N, 3)` at many `qs` `(N, 7)` [rad].
+
+        Two vectors are turned from joint to joint, from the wrist to the base: a fifth of the work of
+        whole frames. Joint 7 turns the tool about its axis and counts for nothing.
+        """
+        cosines, sines = np.cos(qs.T), np.sin(qs.T)
+        zero = np.zeros(len(qs))
+        axis = np.array([sines[5], zero, cosines[5]])
+        axis = np.array([cosines[4] * axis[0], sines[4] * axis[0], axis[2]])
+        tip = self.reach * axis
+        tip[2] += FOREARM
+        both = np.stack([tip, axis], axis=1)  # (3, 2, N)
+        both = _about_y(both, cosines[3], -sines[3])
+        both[2, 0] += UPPER_ARM
+        for joint in (2, 1, 0):
+            turn = _about_y if joint == 1 else _about_z
+            both = turn(both, cosines[joint], sines[joint])
+        both[2, 0] += SHOULDER_HEIGHT
+        return both[:, 0].T, both[:, 1].T
 
     def velocities(self, qs: Array, qds: Array) -> Array:
         """Return the tool centre point's velocities `(N, 3)` [m/s] at `qs`, moving with `qds` `(N, 7)`."""
@@ -194,6 +211,16 @@ class Kinematics:
             rotations[:, i], positions[:, i] = R, p
         rotations[:, 7], positions[:, 7] = R, p + self.reach * R[:, :, 2]
         return rotations, axes, positions
+
+
+def _about_z(v: Array, c: Array, s: Array) -> Array:
+    """Return vectors `(3, ...)` turned about z."""
+    return np.array([c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]])
+
+
+def _about_y(v: Array, c: Array, s: Array) -> Array:
+    """Return vectors `(3, ...)` turned about y."""
+    return np.array([c * v[0] + s * v[2], v[1], c * v[2] - s * v[0]])
 
 
 def _turned(R: Array, c: Array, s: Array, is_z: bool) -> Array:

@@ -28,8 +28,8 @@ def brake(trajectory: Trajectory, s: float, limits: JointLimits, step: float) ->
     """Return the path times `(N,)` [s] of the control steps after path time `s`; the last is at rest.
 
     The shortest stop is taken that keeps joint accelerations and jerks inside the stop limits, at
-    control steps of `step` [s]. Running on to the next point where the motion rests anyway is one of
-    the choices. If none is inside, the one that exceeds the limits least: braking comes first.
+    control steps of `step` [s]. Running on to the end of the motion is one of the choices. If none is
+    inside, the one that exceeds the limits least: braking comes first.
     """
     best, least = np.array([s]), math.inf
     for times, rates, slopes in _candidates(trajectory, s, step):
@@ -43,7 +43,7 @@ def brake(trajectory: Trajectory, s: float, limits: JointLimits, step: float) ->
 
 def _candidates(trajectory: Trajectory, s: float, step: float) -> Iterator[tuple[Array, Array, Array]]:
     """Yield path times, rates and their slopes `(N,)` of possible stops, shortest first."""
-    remaining = next((rest - s for rest in trajectory.rests if rest >= s), 0.0)
+    remaining = max(0.0, trajectory.duration - s)
     coasted = remaining > LONGEST
     for duration in _DURATIONS:
         if not coasted and remaining <= duration:

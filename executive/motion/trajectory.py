@@ -1,155 +1,157 @@
-"""Time-optimal, jerk-limited arm trajectories: straight joint moves from rest to rest."""
+"""A planned motion of the arm: pieces joined where position, velocity and acceleration agree."""
 
 from __future__ import annotations
 
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import accumulate, pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike
-from ruckig import InputParameter, Result, Ruckig, RuckigError, Synchronization
-from ruckig import Trajectory as Profile
 
 from executive.errors import Fault, Unreachable
 from executive.geometry import Array
 from executive.motion.limits import JointLimits
-from executive.motion.timing import path_limits
+from executive.motion.state import JOINTS, Piece, State
 
-JOINTS = 7
-_STILL = 1e-9  # [rad] a smaller change is no move
+_ROUNDING = 1e-6
+"""Difference of joint states that is rounding [rad, rad/s, rad/s²]."""
+STEP = 1 / 240
+"""Time between the states that a motion is checked at [s]: no joint moves by 0.6 degrees in it."""
 
 
 class Trajectory:
-    """A motion of all joints through waypoints, at rest at each, implementing `cell.Motion`.
-
-    Each segment is a straight line in joint space: every joint follows the same profile, scaled.
+    """A motion of all joints, at rest where it begins and where it ends; implements `cell.Motion`.
 
     Attributes:
-        waypoints: Joint positions passed `(N, 7)` [rad], the first where it starts, the last where it ends.
-        rests: Path times at which it is at rest, one per waypoint [s].
+        duration: Time from start to rest [s].
+        guarded: Whether the tool is meant to touch something on its last part.
     """
 
-    def __init__(
-        self, waypoints: ArrayLike, limits: JointLimits, rates: Sequence[float] | None = None
-    ) -> None:
-        """Compute the profiles.
-
-        Args:
-            waypoints: `(N, 7)` [rad], `N` > 1.
-            limits: Velocity, acceleration and jerk that no joint exceeds.
-            rates: Largest rate of each segment's path parameter (0 to 1 over it) [1/s], inf for none.
+    def __init__(self, pieces: Sequence[Piece], guarded: bool = False) -> None:
+        """Join `pieces`, one or more, each beginning in the state in which the one before it ends.
 
         Raises:
-            Fault: The waypoints have the wrong shape or are not numbers, or ruckig finds no profile.
+            Fault: Two of them do not fit together, or it does not begin and end at rest.
         """
-        self.waypoints = _checked(waypoints)
-        rates = [math.inf] * (len(self.waypoints) - 1) if rates is None else rates
-        self._profiles: list[Profile | None] = []
-        times = [0.0]
-        for start, end, rate in zip(self.waypoints[:-1], self.waypoints[1:], rates, strict=True):
-            profile = _straight(start, end, limits, rate)
-            self._profiles.append(profile)
-            times.append(times[-1] + (profile.duration if profile else 0.0))
-        self.rests = tuple(times)
+        self.guarded = guarded
+        self._pieces = tuple(pieces)
+        self._ends = tuple(accumulate(piece.duration for piece in pieces))
+        self.duration = self._ends[-1]
+        self._first, self._last = pieces[0].at(0.0), pieces[-1].at(pieces[-1].duration)
+        for number, (before, after) in enumerate(pairwise(pieces), start=1):
+            _require_same(before.at(before.duration), after.at(0.0), f"pieces {number} and {number + 1}")
+        for state, where in ((self._first, "begins"), (self._last, "ends")):
+            _require_same(state, State.rest(state.q), f"rest and how a trajectory {where}")
 
-    @property
-    def duration(self) -> float:
-        """Time from start to rest [s]."""
-        return self.rests[-1]
+    def slowed(self, rate: float) -> Trajectory:
+        """Return the same motion on the same path at `rate` times its speed, 0 to 1."""
+        return Trajectory([_Slowed(piece, rate) for piece in self._pieces], self.guarded)
 
     @property
     def start(self) -> Array:
         """Joint positions where it begins `(7,)` [rad]."""
-        return self.waypoints[0]
+        return self._first.q
 
     @property
     def end(self) -> Array:
         """Joint positions where it ends `(7,)` [rad]."""
-        return self.waypoints[-1]
+        return self._last.q
 
-    def at(self, s: float) -> tuple[Array, Array, Array]:
-        """Return position, velocity and acceleration `(7,)` of the joints at path time `s` [s].
+    def at(self, s: float) -> State:
+        """Return position, velocity and acceleration of the joints at path time `s` [s].
 
         Before the start and after the end it rests.
         """
         if not math.isfinite(s):  # ruckig would end the process
             raise Fault(f"a trajectory was asked for the time {s}; its times are 0 to {self.duration:.3f} s")
-        segment = min(bisect_right(self.rests, s), len(self._profiles)) - 1
-        profile = self._profiles[max(segment, 0)]
-        if profile is None or s <= 0 or s >= self.duration:
-            return (self.start if s <= 0 else self.end).copy(), np.zeros(JOINTS), np.zeros(JOINTS)
-        q, qd, qdd = profile.at_time(s - self.rests[segment])
-        return np.array(q), np.array(qd), np.array(qdd)
+        if s <= 0 or s >= self.duration:
+            return State.rest((self.start if s <= 0 else self.end).copy())
+        number = min(bisect_right(self._ends, s), len(self._pieces) - 1)
+        before = self._ends[number - 1] if number else 0.0
+        return self._pieces[number].at(s - before)
 
-    def path(self, spacing: float) -> Array:
-        """Return joint positions along the path `(N, 7)` [rad], at most `spacing` apart in any joint."""
-        parts = [self.start[None]]
-        for start, end in zip(self.waypoints[:-1], self.waypoints[1:], strict=True):
-            count = max(1, math.ceil(float(np.max(np.abs(end - start))) / spacing))
-            parts.append(start + np.linspace(0, 1, count + 1)[1:, None] * (end - start))
-        return np.concatenate(parts)
+    def sampled(self) -> State:
+        """Return its states every 1/240 s, the last one included: each array of shape `(N, 7)`."""
+        states = over(self._pieces, np.asarray(np.arange(0.0, self.duration, STEP), dtype=np.float64))
+        return State(*(np.concatenate([a, b[None]]) for a, b in zip(states, self._last, strict=True)))
 
-    def check(self, limits: JointLimits) -> None:
-        """Make sure that no joint leaves its range anywhere on the way: ruckig does not look at that.
+    def check(self, limits: JointLimits) -> State:
+        """Make sure that every joint keeps its limits on the way, and return the states it was seen in.
 
         Raises:
-            Unreachable: One would; the text names it.
+            Unreachable: One would leave its range; the text names it.
+            Fault: One would be too fast, or accelerated too much or too suddenly: a planner's mistake.
         """
-        for profile in filter(None, self._profiles):
-            bounds = profile.position_extrema
-            extremes = np.array([max(abs(bound.min), abs(bound.max)) for bound in bounds])
-            _require_inside(extremes, limits)
-        _require_inside(np.abs(self.waypoints).max(axis=0), limits)
+        states = self.sampled()
+        # Ruckig's `position_extrema` are too small where a joint turns back (pantor/ruckig issue 215).
+        q, qd, qdd = states
+        _require_inside(np.abs(q).max(axis=0), limits)
+        jerk = np.diff(qdd, axis=0) / STEP
+        peaks = {"velocity": qd, "acceleration": qdd, "jerk": jerk[:-1]}
+        for name, values in peaks.items():
+            share = np.abs(values).max(axis=0, initial=0.0) / getattr(limits, name)
+            joint = int(np.argmax(share))
+            if share[joint] > 1 + _ROUNDING:
+                raise Fault(f"the {name} of joint {joint + 1} would be {share[joint]:.3f} times its limit")
+        return states
+
+
+@dataclass(frozen=True, eq=False)
+class _Slowed:
+    """A piece flown at a lower rate: the chain rule gives its velocities and accelerations."""
+
+    piece: Piece
+    rate: float
+
+    @property
+    def duration(self) -> float:
+        return self.piece.duration / self.rate
+
+    def at(self, s: float) -> State:
+        return self._slower(self.piece.at(s * self.rate))
+
+    def over(self, times: Array) -> State:
+        return self._slower(self.piece.over(times * self.rate))
+
+    def _slower(self, state: State) -> State:
+        return State(state.q, self.rate * state.qd, self.rate**2 * state.qdd)
+
+
+def thinned(qs: Array, spacing: float) -> Array:
+    """Return so few positions of a path `(N, 7)` [rad] that no joint moves farther than `spacing`."""
+    kept = [0]
+    for number in range(1, len(qs) - 1):
+        if np.max(np.abs(qs[number + 1] - qs[kept[-1]])) > spacing:
+            kept.append(number)
+    return qs[[*kept, len(qs) - 1]]
+
+
+def over(pieces: Sequence[Piece], times: Array) -> State:
+    """Return the states that `pieces`, one after the other, pass at rising `times` `(N,)` [s]."""
+    parts, before = [State(*np.empty((3, 0, JOINTS)))], 0.0
+    for number, piece in enumerate(pieces, start=1):
+        end = before + piece.duration if number < len(pieces) else np.inf
+        here = times[(before <= times) & (times < end)]
+        if len(here):
+            parts.append(piece.over(np.asarray(here - before)))
+        before = end
+    return State(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+def _require_same(one: State, other: State, what: str) -> None:
+    for name, a, b in zip(State._fields, one, other, strict=True):
+        apart = float(np.max(np.abs(a - b)))
+        if apart > _ROUNDING:
+            raise Fault(f"{what} do not fit together: their {name} differ by {apart:.2g}")
 
 
 def _require_inside(extremes: Array, limits: JointLimits) -> None:
     excess = extremes - limits.position
     joint = int(np.argmax(excess))
-    if excess[joint] > _STILL:
+    if excess[joint] > _ROUNDING:
         raise Unreachable(
             f"the motion would take joint {joint + 1} to {math.degrees(extremes[joint]):.1f}°; "
             f"its limit is ±{math.degrees(limits.position[joint]):.0f}°"
         )
-
-
-def _checked(waypoints: ArrayLike) -> Array:
-    """Return the waypoints as `(N, 7)` finite numbers: ruckig reads out of bounds on anything else."""
-    array = np.array(waypoints, dtype=float)
-    if array.ndim != 2 or array.shape[0] < 2 or array.shape[1] != JOINTS:
-        raise Fault(
-            f"a trajectory needs two waypoints or more of {JOINTS} joints, not the shape {array.shape}"
-        )
-    if not np.all(np.isfinite(array)):
-        row, joint = np.argwhere(~np.isfinite(array))[0]
-        raise Fault(f"waypoint {row} of a trajectory has {array[row, joint]} for joint {joint + 1}")
-    return array
-
-
-def _straight(start: Array, end: Array, limits: JointLimits, rate: float) -> Profile | None:
-    """Return the profile of one straight joint move, or None where nothing moves."""
-    change = end - start
-    if np.max(np.abs(change)) < _STILL:
-        return None
-    if not rate > 0:
-        raise Fault(f"the rate of a segment is {rate}; it must be positive")
-    inverse = path_limits(change, limits, rate)
-    # All joints' limits in proportion to their way: then phase synchronization is always possible and
-    # never falls back to a curved path.
-    share = np.maximum(np.abs(change), _STILL)
-    inputs = InputParameter(JOINTS)
-    inputs.synchronization = Synchronization.Phase
-    inputs.current_position = start.tolist()
-    inputs.target_position = end.tolist()
-    inputs.max_velocity = (share / inverse.slowness).tolist()
-    inputs.max_acceleration = (share / inverse.sluggishness).tolist()
-    inputs.max_jerk = (share / inverse.softness).tolist()
-    profile = Profile(JOINTS)
-    where = f"from {start.round(4)} to {end.round(4)} rad"
-    try:
-        result = Ruckig(JOINTS).calculate(inputs, profile)
-    except (RuckigError, ValueError) as error:
-        raise Fault(f"ruckig finds no profile {where}: {error}") from error
-    if result not in (Result.Working, Result.Finished):
-        raise Fault(f"ruckig finds no profile {where}: {result}")
-    return profile

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from executive.events import Event
+from executive.record.planning import PlanningTally
 from executive.record.recorder import Recorder
 from executive.record.result import result_of, write_result
 from executive.record.run_directory import RunDirectory
@@ -68,6 +69,8 @@ def recorded_run(
         )
         recorder = Recorder(directory, frames=frames)
         run.observe(recorder)
+        planning = PlanningTally()
+        run.observe(planning)
         completed = False
         try:
             if view is not None:
@@ -83,6 +86,7 @@ def recorded_run(
             recorder.close(wait=completed)
     result = result_of(
         mission=loaded.mission.name, seed=seed, outcome=outcome, items=items, audit=audit,
+        planning=planning.figures(),
         wall_time=time.perf_counter() - began, trace=recorder.trace, run=directory.path,
     )  # fmt: skip
     write_result(directory.result, result)

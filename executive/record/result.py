@@ -31,13 +31,14 @@ def result_of(
     outcome: Outcome,
     items: Mapping[str, Any],
     audit: Mapping[str, int] | None,
+    planning: Mapping[str, float],
     wall_time: float,
     trace: str,
     run: Path,
 ) -> dict[str, Any]:
     """Return the result as a plain mapping; `wall_time` in seconds, `run` the run directory.
 
-    `audit` is None in a cell that has no ground truth.
+    `audit` is None in a cell that has no ground truth; `planning` as `PlanningTally.figures` gives it.
     """
     return {
         "mission": mission,
@@ -48,6 +49,7 @@ def result_of(
         "seed": seed,
         "items": {fate: int(items.get(fate, 0)) for fate in FATES},
         "audit": None if audit is None else {place: int(audit[place]) for place in PLACES},
+        "planning": dict(planning),
         "ticks": outcome.ticks,
         "robot_time_s": plain(outcome.robot_time),
         "wall_time_s": round(wall_time, 3),

@@ -2,31 +2,29 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
-from collections.abc import Sequence
+from collections.abc import Callable
 
 import numpy as np
 import pybullet
 
-from executive.cell import Motion, Via
-from executive.cell_config import ArmConfig
-from executive.errors import Blocked, Fault, Unreachable
+from executive.cell import Clock, Goal, Motion, Task
+from executive.cell_config import CellConfig
+from executive.errors import Fault
+from executive.events import Emit, ignore
 from executive.geometry import Array, Pose
-from executive.messages import ObjectClass
-from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
+from executive.motion.plans import Plan, Plans
+from executive.motion.state import JOINTS
 from executive.motion.stop import brake
-from executive.motion.strokes import UPRIGHT
-from executive.motion.trajectory import JOINTS, Trajectory
+from executive.motion.trajectory import Trajectory
+from executive.sim.contacts import Contacts
 from executive.sim.world import STEP, World
 
 TORQUES = (320.0, 320.0, 176.0, 176.0, 110.0, 40.0, 40.0)
 """Largest joint torques of the iiwa 14 [Nm], data sheet as in RobotLocomotion/models iiwa_description."""
 START_TOLERANCE = math.radians(0.2)
 """Largest joint difference between the arm and the start of a motion [rad]."""
-LIFTS = (0.0, 0.05, 0.10)
-"""Heights above travel height that are tried before leaving for a named pose, in order [m]."""
 TRACKING_TOLERANCE = math.radians(0.5)
 """Largest joint difference between command and arm [rad]; undisturbed it is under 0.001°."""
 
@@ -38,6 +36,16 @@ class SimArm:
     with full position gain and no velocity, which follows the path to 0.0005°; PyBullet's default gain
     without feed-forward lags by 3°.
 
+    It brakes by itself where it is pushed off its path, or runs into something.
+
+    Args:
+        world: Its arm is taken over where it is.
+        planner: Plans its motions.
+        config: The cell file.
+        clock: The run's.
+        held: Returns the body that hangs at the tool, or None: its weight and what it hits are felt.
+        emit: Tells the run what happens.
+
     Attributes:
         planner: Plans its motions.
     """
@@ -46,23 +54,21 @@ class SimArm:
         self,
         world: World,
         planner: Planner,
-        limits: JointLimits,
-        config: ArmConfig,
-        travel_height: float = 0.0,
+        config: CellConfig,
+        clock: Clock,
+        held: Callable[[], int | None] = lambda: None,
+        emit: Emit = ignore,
     ) -> None:
-        """Take over the arm of `world` where it is.
-
-        `travel_height` [m]: the tool goes straight up to it before it leaves for a named pose.
-        """
         self.planner = planner
         self._world = world
-        self._limits = limits
-        self._poses = {name: np.radians(pose) for name, pose in config.poses_deg.items()}
-        self._travel_height = travel_height
+        self._poses = {name: np.radians(pose) for name, pose in config.arm.poses_deg.items()}
+        self._plans = Plans(self._solve, clock, config.motion.planning, emit)
+        self._contacts = Contacts(world, held)
         self._motion: Trajectory | None = None
         self._time = 0.0
         self._braking: list[float] | None = None
         self._fault: str | None = None
+        self._met: str | None = None
         self._command = self.q
         self._send()
 
@@ -78,6 +84,11 @@ class SimArm:
         return self.planner.kinematics.forward(self.q)
 
     @property
+    def destination(self) -> Array:
+        """Where the tool will be when the running motion is over, or is now `(3,)` [m]."""
+        return self.planner.kinematics.forward(self._goal).position
+
+    @property
     def at_rest(self) -> bool:
         """True while no motion runs and no braking is under way.
 
@@ -87,34 +98,30 @@ class SimArm:
         self._raise_fault()
         return self._motion is None
 
-    def plan(self, vias: Sequence[Via], carrying: ObjectClass | None = None) -> Trajectory:
-        """Return a motion from where the arm rests through every via.
+    @property
+    def met(self) -> str | None:
+        """What the arm ran into in its last motion, which it then broke off, or None."""
+        return self._met
+
+    def plan(self, goal: Goal | str, task: Task = Task()) -> Plan[Trajectory]:
+        """Begin to plan a motion from where the arm rests to a goal, or to a named pose of the cell file.
 
         Raises:
-            Unreachable: A via has no joint solution inside the limits.
-            Blocked: The way comes too close to something.
-            Fault: The arm is moving.
+            Fault: The arm is moving, or the cell file has no such pose.
         """
         self._require_rest("plan a motion")
-        return self.planner.plan(self._command, vias, carrying)
+        self._require_pose(goal)
+        return self._plans.now(self._command, goal, task)
 
-    def plan_to_pose(self, name: str) -> Trajectory:
-        """Return a motion to the named joint pose of the cell file; raises as `plan` does."""
-        self._require_rest("plan a motion")
-        if name not in self._poses:
-            raise Fault(f'the cell file has no arm pose "{name}"; it has {", ".join(sorted(self._poses))}')
-        goal = self._poses[name]
-        X_WT = self.planner.kinematics.forward(self._command)
-        x, y, z = X_WT.position
-        if z < self._travel_height and -X_WT.rotation[2, 2] > UPRIGHT:
-            there = self.planner.kinematics.forward(goal).position
-            lifts = [Via(np.array([x, y, self._travel_height + higher])) for higher in LIFTS]
-            # Straight from above to the pose, or from a contorted posture first to where its tool is: there
-            # the planner may choose the posture.
-            for first in (*([lift] for lift in lifts), *([lift, Via(there)] for lift in lifts)):
-                with contextlib.suppress(Unreachable, Blocked):
-                    return self.planner.plan_joints(self._command, goal, first=first)
-        return self.planner.plan_joints(self._command, goal)
+    def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
+        """Plan a motion, from where the running one will end, before anybody asks for it.
+
+        Raises:
+            Fault: The cell file has no such pose.
+        """
+        self._require_pose(goal)
+        if self._braking is None:  # else nobody knows yet where it will end
+            self._plans.ahead(self._goal, goal, task)
 
     def start(self, motion: Motion) -> None:
         """Begin to follow `motion`; the arm must be at rest where it starts.
@@ -127,12 +134,13 @@ class SimArm:
             raise Fault(f"the simulated arm follows its own planned motions, not a {type(motion).__name__}")
         self._require_near(motion.start, START_TOLERANCE, "the motion starts")
         self._raise_fault()
-        self._motion, self._time = motion, 0.0
+        self._motion, self._time, self._met = motion, 0.0, None
+        self._contacts.begin(motion.guarded)
 
     def stop(self) -> None:
         """Brake along the running motion's path; returns at once, also when nothing runs."""
         if self._motion is not None and self._braking is None:
-            self._braking = list(brake(self._motion, self._time, self._limits, STEP))
+            self._braking = list(brake(self._motion, self._time, self.planner.limits, STEP))
 
     def advance(self) -> None:
         """Send the command for the coming physics step; called once before each."""
@@ -143,6 +151,10 @@ class SimArm:
         if self._motion is None:
             return
         if self._braking is None:
+            self._met = self._contacts.new()
+            if self._met is not None:
+                self.stop()
+        if self._braking is None:
             self._time += STEP
             done = self._time >= self._motion.duration
         else:
@@ -152,6 +164,18 @@ class SimArm:
         if done:
             self._motion, self._braking = None, None
         self._send()
+
+    @property
+    def _goal(self) -> Array:
+        """Joint positions `(7,)` [rad] at which the running motion ends, or that are commanded."""
+        return self._command if self._motion is None else self._motion.end
+
+    def _solve(self, start: Array, goal: Goal | str, task: Task) -> Trajectory:
+        return self.planner.plan(start, self._poses[goal] if isinstance(goal, str) else goal, task)
+
+    def _require_pose(self, goal: Goal | str) -> None:
+        if isinstance(goal, str) and goal not in self._poses:
+            raise Fault(f'the cell file has no arm pose "{goal}"; it has {", ".join(sorted(self._poses))}')
 
     def _send(self) -> None:
         self._world.client.setJointMotorControlArray(

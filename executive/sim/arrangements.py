@@ -14,11 +14,12 @@ import numpy as np
 
 from executive.cell_config import BinConfig, CameraConfig, CellConfig, Colour
 from executive.geometry import Array, Pose, about_z, rotation_from_quaternion, tool_down
+from executive.messages import BIN_THICKNESS
 from executive.motion.kinematics import FLANGE_OFFSET
 from executive.sim.camera import CELL_LIGHT, Light
 from executive.sim.models import Mesh
 from executive.sim.piles import settle
-from executive.sim.world import BIN_THICKNESS, World
+from executive.sim.world import World
 
 COUNTS = (0.08, 0.14, 0.17, 0.17, 0.15, 0.13, 0.10, 0.06)
 """Probability of 0, 1, … 7 objects."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -12,11 +13,9 @@ from executive.cell import Cell, Routes
 from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.events import Emit
-from executive.layout import as_bin, as_class, travel_height
+from executive.layout import as_bin, as_class
 from executive.ledger.ledger import ItemLedger
 from executive.messages import Target
-from executive.motion.kinematics import Kinematics
-from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
 from executive.sim.arm import SimArm
 from executive.sim.audit import audit
@@ -24,7 +23,7 @@ from executive.sim.camera import SimCamera
 from executive.sim.clearance import PathClearance
 from executive.sim.clock import SimClock
 from executive.sim.least_times import SimLeastTimes
-from executive.sim.models import missing_models
+from executive.sim.models import mass_of, missing_models
 from executive.sim.poses import unfit_poses
 from executive.sim.ray import cast
 from executive.sim.reach import out_of_reach
@@ -78,12 +77,10 @@ class SimCell:
         self._initial = {body: self._world.object_pose(body).position for body in self._world.bodies}
         self._bins = {name: as_bin(name, bin) for name, bin in config.bins.items()}
         clock = SimClock(self._world, STEP)
-        limits = JointLimits.of(config.arm.limits)
-        kinematics = Kinematics(config.tool.length, limits.position)
         self._clearance = PathClearance(config)
-        planner = Planner(kinematics, limits, self._clearance.check)
-        self._arm = SimArm(self._world, planner, limits, config.arm, travel_height(config))
+        planner = Planner(config, self._clearance.check)
         self._tool = SuctionTool(self._world, config.tool, emit)
+        self._arm = SimArm(self._world, planner, config, clock, lambda: self._tool.held_body, emit)
         self._ledger = ItemLedger(config.ledger, config.table, self._bins, routes, emit)
         name, camera_config = next(iter(config.cameras.items()))
         self._camera = camera(
@@ -92,10 +89,13 @@ class SimCell:
             camera_config,
             clock,
             camera_seed,
-            shadow=ArmShadow(self._arm, kinematics, config, lambda: self._tool.holding),
+            shadow=ArmShadow(self._arm, planner.kinematics, config, lambda: self._tool.holding),
             epoch=lambda: self._ledger.epoch,
         )
-        classes = {label: as_class(label, kind) for label, kind in config.objects.items()}
+        classes = {
+            label: replace(as_class(label, kind), mass=mass_of(kind))
+            for label, kind in config.objects.items()
+        }
 
         def decided(target: Target, bin: str) -> None:
             emit("decision", item=target.item, label=target.label, frame=target.frame, bin=bin)
@@ -118,7 +118,6 @@ class SimCell:
             routes=self._routes,
             localizer=localizer,
             safe_place=np.array(config.safe_place),
-            travel_height=travel_height(config),
             descent=config.motion.descent,
             descent_speed=config.motion.descent_speed,
             decided=decided,

@@ -7,7 +7,7 @@ import numpy as np
 from executive.cell_config import CellConfig
 from executive.errors import Unreachable
 from executive.geometry import Array, tool_down
-from executive.layout import as_bin, pile_height, travel_height
+from executive.layout import as_bin, pile_height
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.timing import rest_to_rest
@@ -16,20 +16,15 @@ from executive.sim.tool import TOUCH
 SWIVELS = np.radians(np.arange(-180.0, 180.0, 20.0))
 """Swivels of the elbow that are tried [rad]."""
 SAFETY = 0.8
-"""Share of the time found for a carry that is surely needed.
-
-With swivels every 5 degrees, from all over the workspace to every slot, at three heights over it and with
-every joint on its own, the fastest carries of the shipped cells take 0.85 to 0.94 of it.
-"""
+"""Share of the time found for a carry that is surely needed: other swivels and heights may take less."""
 
 
 class SimLeastTimes:
     """Bounds that hold however a motion is planned; implements `executive.cell.LeastTimes`.
 
-    A carry begins at rest on an object, passes travel height above it, and ends at rest over the bin, no
-    matter how deep inside. It may pass at any speed, therefore each of the two parts counts as half of a
-    rest-to-rest move of twice the length. The least over all postures counts; joint 7 need not turn, since
-    any yaw will do.
+    A carry begins at rest on an object and ends at rest over the bin: no joint makes its part of that sooner
+    than from rest to rest, whatever the way between. The least over all postures counts; joint 7 need not
+    turn, since any yaw will do.
 
     Args:
         config: The cell file.
@@ -77,10 +72,8 @@ class SimLeastTimes:
     def _shortest(self, places: Array, slots: Array) -> float:
         """Return the time of the shortest of the ways from `places` `(N, 2)` to `slots` `(N, 2)` [m]."""
         nearest = np.argmin(np.linalg.norm(places - slots, axis=1))
-        high = travel_height(self._config)
-        above = self._postures(places[nearest], high)
-        rise = self._half_moves(self._postures(places[nearest], self._highest), above).min(axis=0)
-        return float((rise + self._half_moves(self._postures(slots[nearest], high), above)).min())
+        starts, ends = (self._postures(ways[nearest], self._highest) for ways in (places, slots))
+        return float(rest_to_rest(ends - starts[:, None], self._limits).min())
 
     def _postures(self, place: Array, height: float) -> Array:
         """Return joint positions `(N, 7)` [rad] with the tool at a place `(2,)` [m], joint 7 at 0.
@@ -95,7 +88,3 @@ class SimLeastTimes:
         if not len(inside):
             raise self._kinematics.outside_limits(pose, found)
         return inside
-
-    def _half_moves(self, starts: Array, goals: Array) -> Array:
-        """Return times `(N, M)` [s] between rest at `(N, 7)` and passing `(M, 7)` at any speed."""
-        return rest_to_rest(2 * (goals - starts[:, None]), self._limits) / 2

@@ -83,6 +83,14 @@ def find_model(name: str) -> Path:
     raise InputError(f"there is no model {name}, neither beside the cell file nor in pybullet_data")
 
 
+def mass_of(config: ObjectConfig) -> float:
+    """Return what an object weighs in simulation [kg]: as the cell file or its URDF says."""
+    if config.mesh:
+        return config.mass
+    masses = ElementTree.parse(find_model(config.urdf)).getroot().iterfind(".//inertial/mass")
+    return sum(float(mass.get("value", "0")) for mass in masses)
+
+
 def missing_models(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield the key of every model of a cell file that is missing or not as the file says, and a sentence."""
     try:

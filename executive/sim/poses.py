@@ -9,14 +9,13 @@ import numpy as np
 import pybullet
 
 from executive.cell_config import CellConfig
-from executive.motion.kinematics import Kinematics
-from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
 from executive.sim.arm import SimArm
 from executive.sim.camera import camera_pose
 from executive.sim.clearance import PathClearance
+from executive.sim.clock import SimClock
 from executive.sim.view import ArmShadow
-from executive.sim.world import World
+from executive.sim.world import STEP, World
 from executive.vision.camera_model import calibrated
 from executive.workcell import KeyPath
 
@@ -45,9 +44,8 @@ def unfit_poses(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
 
 def _blind_poses(config: CellConfig, world: World) -> Iterator[tuple[KeyPath, str]]:
     """Yield the scan poses from which a camera does not see the whole workspace."""
-    limits = JointLimits.of(config.arm.limits)
-    kinematics = Kinematics(config.tool.length, limits.position)
-    shadow = ArmShadow(SimArm(world, Planner(kinematics, limits), limits, config.arm), kinematics, config)
+    planner = Planner(config)
+    shadow = ArmShadow(SimArm(world, planner, config, SimClock(world, STEP)), planner.kinematics, config)
     for name, camera in config.cameras.items():
         matrix, _ = calibrated(camera)
         for index, pose in enumerate(camera.scan_poses):

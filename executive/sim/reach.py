@@ -6,13 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from executive.cell import Via
+from executive.cell import Goal
 from executive.cell_config import CellConfig
 from executive.errors import Unreachable
 from executive.geometry import Array
-from executive.layout import as_bin, travel_height
-from executive.motion.kinematics import Kinematics
-from executive.motion.limits import JointLimits
+from executive.layout import as_bin
 from executive.motion.planner import Planner
 from executive.workcell import KeyPath
 
@@ -23,13 +21,12 @@ def out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     Asked for are every drop slot of every bin and the safe place, from travel height down to where a load is
     let go in one posture, and every named pose within the joint limits.
     """
-    limits = JointLimits.of(config.arm.limits)
-    planner = Planner(Kinematics(config.tool.length, limits.position), limits)
-    high, load = travel_height(config), max(kind.height for kind in config.objects.values())
+    planner = Planner(config)
+    load = max(kind.height for kind in config.objects.values())
 
     def problem(place: Array, floor: float) -> str | None:
         try:
-            planner.require_reachable([Via(np.array([*place, height])) for height in (high, floor + load)])
+            planner.require_reachable(Goal((float(place[0]), float(place[1]), floor + load)))
         except Unreachable as error:
             return str(error)
         return None

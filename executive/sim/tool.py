@@ -69,6 +69,11 @@ class SuctionTool:
         return self._grip is not None
 
     @property
+    def bears(self) -> float:
+        """The pull that the seal bears, as the vacuum gauge tells [N]; 0 while nothing is held."""
+        return 0.0 if self._grip is None else self._grip.bears
+
+    @property
     def held_body(self) -> int | None:
         """The simulator's id of what is held: the truth, for tests and the audit, never for skills."""
         return None if self._grip is None else self._grip.body

@@ -16,6 +16,8 @@ from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell_config import BinConfig, CellConfig
 from executive.geometry import Array, Pose
+from executive.layout import LIP_LENGTH, TOOL_RADIUS
+from executive.messages import BIN_THICKNESS
 from executive.motion.kinematics import FLANGE_OFFSET
 from executive.sim.bodies import add_body
 from executive.sim.models import find_model, upright
@@ -26,16 +28,10 @@ TABLE_HEIGHT = 0.625
 """Height of the top of pybullet_data's table over its feet [m]."""
 TABLE_CENTRE = (0.40, 0.0)
 """Centre of the table top [m]; it is 1.0 m long along x and 1.5 m along y."""
-TOOL_RADIUS = 0.012
-"""Radius of the tool's body [m]."""
-LIP_LENGTH = 0.015
-"""Length of the thin part at the tool's end [m]."""
 CYLINDER_MARGIN = 0.001
 """What Bullet adds all around a URDF's cylinder when it collides [m]."""
 TOOL_MASS = 0.1
 """Mass of the tool [kg]."""
-BIN_THICKNESS = 0.005
-"""Thickness of a bin's floor and walls [m]."""
 
 
 class World:
@@ -92,6 +88,13 @@ class World:
         """Take a loose object out of the world."""
         del self.bodies[body]
         self.client.removeBody(body)
+
+    def name_of(self, body: int) -> str:
+        """Return what a body is, for the text of an error."""
+        for name, bodies in {"the table": (self.table,), "the floor": (self.plane,), **self.bins}.items():
+            if body in bodies:
+                return name
+        return f"a {self.bodies[body]}" if body in self.bodies else "the arm"
 
     def object_pose(self, body: int) -> Pose:
         """Return `X_WO` of a loose object, the frame that `add_object` takes."""

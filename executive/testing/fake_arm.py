@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from executive.cell import Motion, Via
+from executive.cell import Clock, Goal, Motion, Task
 from executive.cell_config import CellConfig
 from executive.errors import Fault, Unreachable
+from executive.events import Emit, ignore
 from executive.geometry import Array, Pose, tool_down
 from executive.layout import as_bin, travel_height
-from executive.messages import ObjectClass
 from executive.motion.kinematics import Kinematics
+from executive.motion.plans import Plan, Plans
 from executive.testing.fake_world import STEP, FakeWorld
 from executive.workcell import KeyPath
 
@@ -21,7 +24,10 @@ REACH = 0.85
 """Largest distance of the fake tool from the base [m]."""
 
 SPEED = 1.0
-"""Tool speed of the fake arm where a via does not say otherwise [m/s]."""
+"""Tool speed of the fake arm where a goal does not say otherwise [m/s]."""
+
+BEARS = 7.9
+"""The pull that a fake seal bears, unless a test says otherwise [N]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,19 +43,33 @@ class FakeMotion:
 
 
 class FakeArm:
-    """An arm that is its tool: it goes in straight lines at constant speed and stops dead.
+    """An arm that is its tool: straight up, across and down at constant speed; it stops dead.
+
+    Nothing is in its way: it heeds the limits of its reach, and no task.
+
+    Args:
+        world: Where it moves what it holds.
+        config: The cell file: named poses, travel height and the time that planning takes.
+        clock: The run's.
+        emit: Tells the run what happens.
 
     Attributes:
         poses: Tool pose of each named pose; a run begins at `home`.
+        runs_into: What the arm runs into half way through its next motion, or None; for a test to say.
         commanded: Every call that moves it, in order, for a test to look at.
     """
 
-    def __init__(self, world: FakeWorld, poses: Mapping[str, Pose]) -> None:
+    def __init__(self, world: FakeWorld, config: CellConfig, clock: Clock, emit: Emit = ignore) -> None:
+        self.poses = named_poses(config)
+        self.runs_into: str | None = None
+        self.commanded: list[str] = []
         self._world = world
-        self.poses = dict(poses)
+        self._height = travel_height(config)
+        self._plans = Plans(self._solve, clock, config.motion.planning, emit)
         self._tool = self.poses["home"]
         self._path: list[Pose] = []
-        self.commanded: list[str] = []
+        self._half = 0
+        self._met: str | None = None
 
     @property
     def q(self) -> Array:
@@ -62,29 +82,30 @@ class FakeArm:
         return self._tool
 
     @property
+    def destination(self) -> Array:
+        """Where the tool will be when the running motion is over, or is now `(3,)` [m]."""
+        return (self._path[-1] if self._path else self._tool).position
+
+    @property
     def at_rest(self) -> bool:
         """True while no motion runs."""
         return not self._path
 
-    def plan(self, vias: Sequence[Via], carrying: ObjectClass | None = None) -> FakeMotion:
-        """Return straight lines through every via.
+    @property
+    def met(self) -> str | None:
+        """What the arm ran into in its last motion, or None."""
+        return self._met
 
-        Raises:
-            Unreachable: A via is farther than `REACH` from the base.
+    def plan(self, goal: Goal | str, task: Task = Task()) -> Plan[FakeMotion]:
+        """Begin to plan a motion to a goal or a named pose; what was planned ahead is known at once.
+
+        The result raises Unreachable for what is farther than `REACH` from the base.
         """
-        del carrying
-        path: list[Pose] = []
-        here = self._tool.position
-        for via in vias:
-            require_reachable(via.position)
-            path += _line(here, via.position, via.speed or SPEED)
-            here = via.position
-        return FakeMotion(path)
+        return self._plans.now(self.destination, goal, task)
 
-    def plan_to_pose(self, name: str) -> FakeMotion:
-        """Return a straight line to the named pose."""
-        end = self.poses[name]
-        return FakeMotion([*_line(self._tool.position, end.position, SPEED)[:-1], end])
+    def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
+        """Plan a motion, from where the running one will end, before anybody asks for it."""
+        self._plans.ahead(self.destination, goal, task)
 
     def start(self, motion: Motion) -> None:
         """Begin to follow `motion`."""
@@ -93,6 +114,8 @@ class FakeArm:
         assert isinstance(motion, FakeMotion), "the fake arm follows the motions it planned"
         self.commanded.append("start")
         self._path = list(motion.path)
+        self._half = len(self._path) // 2
+        self._met = None
 
     def stop(self) -> None:
         """Stand still at once."""
@@ -104,19 +127,44 @@ class FakeArm:
         """Go one step along the path, with what the tool holds."""
         if self._path:
             self._tool = self._path.pop(0)
+            if self.runs_into is not None and len(self._path) <= self._half:
+                self._met, self.runs_into = self.runs_into, None
+                self.stop()
         if self._world.held is not None:
             thing = self._world.held
             height = self._world.classes[thing.label].height
             thing.position = self._tool.position - np.array([0.0, 0.0, height / 2])
 
+    def _solve(self, start: Array, goal: Goal | str, task: Task) -> FakeMotion:
+        del task
+        if isinstance(goal, str):
+            end = self.poses[goal]
+            return FakeMotion([*_line(start, end.position, end.rotation, SPEED)[:-1], end])
+        place = np.array(goal.position)
+        require_reachable(place)
+        above = np.array([*place[:2], place[2] + goal.guarded])
+        raised = np.array([*start[:2], max(start[2], self._height)])
+        over = np.array([*place[:2], max(above[2], self._height)])
+        rotation = tool_down(place, goal.yaw or 0.0).rotation
+        fast = [
+            pose for a, b in pairwise([start, raised, over, above]) for pose in _line(a, b, rotation, SPEED)
+        ]
+        return FakeMotion([*fast, *_line(above, place, rotation, min(goal.speed, SPEED))])
+
 
 class FakeTool:
-    """A cup that seals whatever it is on, unless `seals` says no; what it lets go stands on the floor."""
+    """A cup that seals whatever it is on, unless `seals` says no; what it lets go stands on the floor.
+
+    Attributes:
+        seals: Tells whether the cup seals what it is on.
+        strength: The pull that its seals bear [N].
+    """
 
     def __init__(self, world: FakeWorld, tip: Callable[[], Array]) -> None:
         self._world = world
         self._tip = tip
         self.seals: Callable[[], bool] = lambda: True
+        self.strength = BEARS
 
     @property
     def touching(self) -> bool:
@@ -127,6 +175,11 @@ class FakeTool:
     def holding(self) -> bool:
         """True while something is sealed to the cup."""
         return self._world.held is not None
+
+    @property
+    def bears(self) -> float:
+        """The pull that the seal bears [N]; 0 while nothing is held."""
+        return self.strength if self.holding else 0.0
 
     def close(self) -> None:
         """Seal what the cup is on."""
@@ -177,8 +230,7 @@ def out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
         yield ("safe_place",), f"the safe place is out of reach: {problem}"
 
 
-def _line(start: Array, end: Array, speed: float) -> list[Pose]:
-    """Return the poses, tool down, of a straight way from `start` (left out) to `end` `(3,)` [m]."""
-    rotation = tool_down(end).rotation
-    count = max(1, int(np.ceil(float(np.linalg.norm(end - start)) / speed / STEP)))
+def _line(start: Array, end: Array, rotation: Array, speed: float) -> list[Pose]:
+    """Return the poses of a straight way from `start` (left out) to `end` `(3,)` [m]."""
+    count = math.ceil(float(np.linalg.norm(end - start)) / speed / STEP)
     return [Pose(rotation, start + (end - start) * (i + 1) / count) for i in range(count)]

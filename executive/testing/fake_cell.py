@@ -13,12 +13,12 @@ from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.events import Emit, ignore
 from executive.geometry import Pose
-from executive.layout import as_bin, as_class, travel_height
+from executive.layout import as_bin, as_class
 from executive.ledger.ledger import ItemLedger
 from executive.messages import Target
 from executive.mission.parse.cell_file import load_cell
 from executive.mission.text.files import shipped_folder
-from executive.testing.fake_arm import FakeArm, FakeTool, named_poses, out_of_reach
+from executive.testing.fake_arm import FakeArm, FakeTool, out_of_reach
 from executive.testing.fake_camera import FakeCamera, FakeDetector
 from executive.testing.fake_times import FakeTimes
 from executive.testing.fake_world import FakeClock, FakeWorld
@@ -82,7 +82,7 @@ class FakeCell:
         self.world = FakeWorld(classes)
         scatter(self.world, config, seed)
         clock = FakeClock(self.world)
-        self.arm = FakeArm(self.world, named_poses(config))
+        self.arm = FakeArm(self.world, config, clock, emit)
         self.tool = FakeTool(self.world, lambda: self.arm.tool_pose.position)
         bins = {name: as_bin(name, bin) for name, bin in config.bins.items()}
         self.ledger = ItemLedger(config.ledger, config.table, bins, self.routes, emit)
@@ -115,7 +115,6 @@ class FakeCell:
             routes=self.routes,
             localizer=PlaneLocalizer(classes),
             safe_place=np.array(config.safe_place),
-            travel_height=travel_height(config),
             descent=config.motion.descent,
             descent_speed=config.motion.descent_speed,
             decided=self._decided,

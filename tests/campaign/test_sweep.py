@@ -26,6 +26,7 @@ def result(seed: int, status: str = "SUCCESS", right: int = 4, left: int = 0, **
         "node": "",
         "items": {"seen": right + left, "placed": right, "rejected": left, "lost": 0, "phantom": 0},
         "audit": {"right": right, "wrong_bin": 0, "left": left, "elsewhere": 0, "unseen": 0},
+        "planning": {"motions": 10, "ahead": 8, "waited_s": 0.1},
         "robot_time_s": 30.0 + seed,
         "wall_time_s": 6.0,
         "run": f"runs/{seed}",
@@ -51,6 +52,7 @@ def test_every_seed_is_run_once_in_another_process():
     assert results[0]["overrides"] == {"a": "1"}
     assert results[2]["status"] == "FAULT"
     assert results[2]["message"] == "ValueError: seed three"
+    assert results[2]["planning"] == {"motions": 0, "ahead": 0, "waited_s": 0.0}
     assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 
@@ -122,12 +124,15 @@ def test_the_summary_counts_objects_and_lists_what_went_wrong():
     assert [entry["seed"] for entry in figures["disagreements"]] == [2]
     assert [(entry["seed"], entry["reason"]) for entry in figures["failures"]] == [(1, "Grasp.missed")]
     assert figures["robot_time_s"] == {"least": 30.0, "median": 31.0, "mean": 31.0, "most": 32.0}
+    assert figures["robot_time_per_object_s"] == round(93.0 / 9, 3)
+    assert figures["planning"] == {"motions": 30, "ahead": 24, "waited_s": 0.3}
 
 
 def test_a_run_without_an_audit_counts_no_objects():
     figures = summarize([result(0, audit=None)])
     assert figures["objects"]["total"] == 0
     assert figures["disagreements"] == []
+    assert figures["robot_time_per_object_s"] is None
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from click.testing import CliRunner, Result
 
 from executive.campaign.tick_cost import ChangeCost, SteadyCost
 from executive.cli.main import main
+from executive.view.motion_figures import ExecutionFigures, MethodFigures, MotionFigures, PlanningFigures
 
 
 def invoke(*words: str) -> Result:
@@ -36,8 +37,9 @@ def blocks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 def test_help_names_every_measurement():
     shown = invoke("bench", "--help").stdout
-    assert "seal  Measure how suction cups" in shown
-    assert "tick  Measure what ticks and status changes cost" in shown
+    assert "seal    Measure how suction cups" in shown
+    assert "tick    Measure what ticks and status changes cost" in shown
+    assert "motion  Measure how fast the arm of CELL moves" in shown
 
 
 def test_tick_is_a_table_on_standard_output(blocks):
@@ -81,3 +83,53 @@ def test_seal_says_what_it_wrote_and_where(monkeypatch, tmp_path):
     shown = invoke("bench", "seal", "--out", str(tmp_path / "map.csv"))
     assert (shown.exit_code, shown.stdout) == (0, "")
     assert shown.stderr == f"3 rows in {tmp_path / 'map.csv'}\n"
+
+
+@pytest.fixture
+def motions(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str, int, int]]:
+    """Stands for the bench of motion: what was asked for, of which cell, how many pairs, of which seed."""
+    asked = []
+
+    def method(name: str, time: float) -> MethodFigures:
+        return MethodFigures(name, time, (1.0, 1.0, 1.0))
+
+    def measure(config, pairs, seed, progress):
+        asked.append(("measure", config.cell, pairs, seed))
+        return MotionFigures(
+            cell=config.cell, pairs=pairs, seed=seed, margin=0.005, article=method("article", 6.5),
+            article_cycle=7.25, stopping=method("stops at vias", 3.0), toppra=method("TOPP-RA", 2.0),
+            floor=method("floor", 1.5), free_floor=1.4, ours=method("ours", 1.8), nearest="the tool - a cube",
+            planning=PlanningFigures(2 * pairs, 20.0, 60.0, 0.9, 1.0, ()),
+        )  # fmt: skip
+
+    def execute(config, pairs, seed, progress):
+        asked.append(("execute", config.cell, pairs, seed))
+        return ExecutionFigures(pairs, 0.006, "the tool - a cube", (), 0.0002, 0, 0, 1e-6, 1.9, ())
+
+    monkeypatch.setattr("executive.campaign.motion_trial.measure", measure)
+    monkeypatch.setattr("executive.campaign.motion_execution.execute", execute)
+    return asked
+
+
+def test_motion_is_a_table_on_standard_output(motions):
+    shown = invoke("bench", "motion")
+    assert shown.exit_code == 0
+    assert motions == [("measure", "overhead", 200, 0)]
+    assert "overhead: 200 random pairs, seed 0" in shown.stdout
+    assert ["ours", "1.800", "0.28", "1.20", "1.00", "1.00", "1.00"] in [
+        line.split() for line in shown.stdout.splitlines()
+    ]
+
+
+def test_motion_executes_pairs_where_asked_to(motions):
+    shown = invoke("bench", "motion", "wrist", "--pairs", "3", "--execute", "2", "--seed", "7", "--json")
+    assert motions == [("measure", "wrist", 3, 7), ("execute", "wrist", 2, 7)]
+    figures = json.loads(shown.stdout)
+    assert (figures["pairs"], figures["execution"]["pairs"]) == (3, 2)
+
+
+def test_motion_of_a_cell_that_is_not_there_names_those_that_are():
+    shown = invoke("bench", "motion", "overhad")
+    assert shown.exit_code == 2
+    assert 'there is no cell file "overhad"' in shown.stderr
+    assert "overhead" in shown.stderr

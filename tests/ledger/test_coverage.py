@@ -104,3 +104,18 @@ def test_a_place_beside_the_workspace_that_no_pose_shows_any_more_is_not_waited_
         worst.append(coverage.worst)
     assert worst[2] == STRAYED, "hidden on the left"
     assert worst[4] <= 0.2**5 * 1.01
+
+
+@pytest.mark.parametrize(
+    ("y", "counts"),
+    [(0.0, True), (0.24, True), (0.33, True), (0.345, False), (0.40, False)],
+    ids=["workspace", "its rim", "beside it", "at the edge of what the arm hides", "hidden"],
+)
+def test_a_place_counts_if_all_places_around_it_do(coverage: Coverage, y: float, counts: bool) -> None:
+    coverage.look(look(hidden=slice(0, 174)))
+    assert coverage.in_sight(np.array([0.53, y, 0.025])) is counts
+
+
+def test_a_place_beyond_the_table_does_not_count(coverage: Coverage) -> None:
+    coverage.look(look())
+    assert not coverage.in_sight(np.array([0.53, 2.0, 0.025]))

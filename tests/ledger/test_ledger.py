@@ -37,9 +37,17 @@ class Bench:
         self.frames = 0
 
     def look(
-        self, *things: Thing, view: str = "table", epoch: int | None = None, by: Reliability = EYE
+        self,
+        *things: Thing,
+        view: str = "table",
+        epoch: int | None = None,
+        by: Reliability = EYE,
+        hidden: slice = slice(0, 0),
     ) -> Sequence[Target]:
+        """Look; the columns `hidden` of the image are behind the arm."""
         self.frames += 1
+        visible = np.ones((480, 640), bool)
+        visible[:, hidden] = False
         area = (192.0, 100.0, 448.0, 356.0) if view == "table" else (0.0, 0.0, 640.0, 480.0)
         frame = Frame(
             self.frames,
@@ -49,7 +57,7 @@ class Bench:
             np.array([[461.0, 0, 320.0], [0, 461.0, 240.0], [0, 0, 1.0]]),
             looking_down((0.5, 0.0, 1.2)),
             0.0,
-            np.ones((480, 640), bool),
+            visible,
             self.ledger.epoch if epoch is None else epoch,
         )
         found = tuple(Detection(label, 0.9, (0, 0, 1, 1)) for label, _, _ in things)
@@ -355,3 +363,67 @@ def test_a_misread_object_is_nobody_who_is_missed_before_its_class_is_sure(bench
     rows = {row["item"]: row for row in bench.ledger.rows() if row["state"] == "seen"}
     assert rows["duck-1"]["position"] == pytest.approx([0.60, 0.10, 0.025])
     assert rows["cube-1"]["position"] == pytest.approx([0.50, 0.0, 0.025])
+
+
+def test_what_is_believed_on_the_table_stands_there_given_up_or_not(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0), ("cube", 0.60, 0.1), ("duck", 0.6, -0.1))
+    bench.look(("cube", 0.50, 0.0), ("cube", 0.60, 0.1), ("duck", 0.6, -0.1))
+    bench.ledger.rejected("cube-2", "slippery")
+    assert [target.item for target in bench.ledger.standing()] == ["cube-1", "cube-2", "duck-1"]
+    assert bench.ledger.standing()[2].position[:2] == pytest.approx([0.6, -0.1])
+
+
+def test_what_is_held_placed_dropped_or_put_down_stands_nowhere_one_knows(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0))
+    bench.ledger.held("cube-1")
+    assert bench.ledger.standing() == []
+    bench.ledger.dropped("cube-1")
+    assert bench.ledger.standing() == []
+    bench.look(("cube", 0.55, 0.1))
+    assert [target.item for target in bench.ledger.standing()] == ["cube-1"]
+    bench.ledger.held("cube-1")
+    bench.ledger.returned("cube-1")
+    assert bench.ledger.standing() == []
+    bench.ledger.placed("cube-1", "red_bin")
+    assert bench.ledger.standing() == []
+
+
+def test_what_is_likelier_an_invention_or_gone_stands_nowhere(bench: Bench) -> None:
+    wild = Reliability(threshold=0.5, misses=0.5, confused=0.004, invented=3.0, jitter=1.0)
+    bench.look(("cube", 0.50, 0.0), by=wild)
+    bench.look(by=wild)
+    assert bench.ledger.standing() == []
+    bench.look(("duck", 0.60, 0.1))
+    bench.look(("duck", 0.60, 0.1))
+    assert [target.item for target in bench.ledger.standing()] == ["duck-1"]
+    for _ in range(6):
+        bench.look()
+    assert bench.ledger.standing() == []
+
+
+def test_running_into_something_puts_the_whole_table_in_doubt_and_nobody_away(bench: Bench) -> None:
+    near, far = bench.look(("cube", 0.50, 0.0), ("cube", 0.60, 0.2))
+    bench.ledger.bumped()
+    assert not bench.ledger.is_fresh(near)
+    assert not bench.ledger.is_fresh(far)
+    assert bench.ledger.attempts("cube-1") == 0
+    assert [t.item for t in bench.look(("cube", 0.52, 0.01), ("cube", 0.60, 0.2))] == ["cube-1", "cube-2"]
+
+
+def test_what_lies_at_the_edge_of_what_the_arm_always_hides_is_not_looked_for_for_ever(bench: Bench) -> None:
+    bench.look(("cube", 0.53, 0.345), view="full")
+    bench.ledger.bumped()
+    # The nearest point that stands for the table shows beside the arm, but not what lies a little farther.
+    for _ in range(12):
+        bench.look(view="full", hidden=slice(0, 174))
+    assert bench.ledger.believes_empty()
+
+
+def test_what_lies_at_the_rim_of_the_workspace_is_looked_for_though_the_arm_hides_what_is_beside_it(
+    bench: Bench,
+) -> None:
+    bench.look(("cube", 0.53, 0.235))
+    bench.ledger.bumped()
+    for _ in range(12):
+        bench.look(view="full", hidden=slice(0, 230))
+    assert bench.ledger.in_doubt() == ["cube-1"]

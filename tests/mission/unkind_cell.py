@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import signal
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from executive.cell_config import CellConfig
@@ -17,7 +18,7 @@ LONGEST = 4000
 
 
 class UnkindCell(FakeCell):
-    """A fake cell in which now and then a grasp misses, a look is of no use, or something is dropped."""
+    """A fake cell in which now and then a grasp misses, a look is of no use, or something is in the way."""
 
     def __init__(self, config: CellConfig, *, seed: int, **more: Any) -> None:
         super().__init__(config, seed=seed, **more)
@@ -43,9 +44,10 @@ class UnkindCell(FakeCell):
         return self._unkindness.random() < share
 
     def _plan_or_not(self, *args: Any, **more: Any) -> Any:
-        if self._happens(0.03):
-            raise Unreachable("the arm does not like it")
-        return self._plan(*args, **more)
+        if self._happens(0.02):
+            self.arm.runs_into = "the arm ran into something"
+        plan = self._plan(*args, **more)
+        return replace(plan, outcome=Unreachable("the arm does not like it")) if self._happens(0.03) else plan
 
     def _open_or_not(self) -> None:
         # A grasp that is taken back lets go for sure: no skill looks whether it did.

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from executive.events import Event
 from executive.mission.load import LoadedMission, load_mission
 from executive.record.result import ledger_agrees
 from executive.runtime.cells import cell_kind
@@ -68,6 +69,23 @@ def test_it_loads_without_a_finding_and_says_what_it_teaches(loaded: LoadedMissi
 @pytest.mark.parametrize("seed", [0, 1, 2, 3])
 def test_it_does_its_work_on_the_fake_cell(loaded: LoadedMission, seed: int) -> None:
     assert_done(loaded, *execute(loaded, seed, FakeCell))
+
+
+@pytest.mark.parametrize("name", ["sort_overhead", "sort_wrist"])
+def test_nothing_is_waited_for_between_one_object_and_the_next(name: str) -> None:
+    path = next(path for path in MISSIONS if path.stem == name)
+    plans: list[bool] = []
+
+    def observe(event: Event) -> None:
+        if event.kind == "plan":
+            plans.append(event.data["ahead"])
+
+    run = Run(load_mission(path, discover()), discover(), seed=1, kind=FakeCell, observers=[observe])
+    run.execute()
+    placed = run.items()["placed"]
+    assert placed >= 3
+    # To the first object, and to look around before and after, nobody could think ahead.
+    assert sum(plans) == 2 * placed - 1
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
 from executive.cell_config import CellConfig
+from executive.geometry import Array
+from executive.motion.free import Connector
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
@@ -29,5 +32,15 @@ def kinematics(config: CellConfig, limits: JointLimits) -> Kinematics:
 
 
 @pytest.fixture(scope="session")
-def planner(kinematics: Kinematics, limits: JointLimits) -> Planner:
-    return Planner(kinematics, limits)
+def connector(limits: JointLimits) -> Connector:
+    return Connector(limits)
+
+
+@pytest.fixture(scope="session")
+def planner(config: CellConfig) -> Planner:
+    return Planner(config)
+
+
+@pytest.fixture(scope="session")
+def home(config: CellConfig) -> Array:
+    return np.radians(config.arm.poses_deg["home"])

@@ -80,11 +80,20 @@ def test_every_reachable_tool_down_pose_is_reached() -> None:
         reached += 1
 
 
-def test_velocities_are_the_derivative_of_positions() -> None:
+def test_tips_are_where_the_tool_is_and_where_it_points() -> None:
+    qs = np.random.default_rng(4).uniform(-LIMIT, LIMIT, (200, 7))
+    tips, axes = ARM.tips(qs)
+    for q, tip, axis in zip(qs, tips, axes, strict=True):
+        X_WT = ARM.forward(q)
+        assert np.allclose(tip, X_WT.position, atol=1e-12)
+        assert np.allclose(axis, X_WT.rotation[:, 2], atol=1e-12)
+
+
+def test_velocities_are_the_derivative_of_tips() -> None:
     rng = np.random.default_rng(3)
     qs, qds = rng.uniform(-LIMIT, LIMIT, (20, 7)), rng.normal(size=(20, 7))
     h = 1e-6
-    measured = (ARM.positions(qs + h * qds) - ARM.positions(qs - h * qds)) / (2 * h)
+    measured = (ARM.tips(qs + h * qds)[0] - ARM.tips(qs - h * qds)[0]) / (2 * h)
     assert np.abs(measured - ARM.velocities(qs, qds)).max() < 1e-6
 
 

@@ -5,128 +5,344 @@ import re
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from joint_states import SOONER, passed, peaks
 
-from executive.cell import Via
-from executive.errors import Blocked, Fault, Unreachable
-from executive.geometry import tool_down
-from executive.motion.planner import Planner
+from executive.cell import Goal, Task
+from executive.cell_config import CellConfig
+from executive.errors import Blocked, Unreachable
+from executive.geometry import Array
+from executive.layout import LIP_LENGTH, TOOL_RADIUS
+from executive.messages import Load, ObjectClass, Obstacle
+from executive.motion.free import Free
+from executive.motion.line import Line
+from executive.motion.planner import SPACING, Planner
+from executive.motion.seal import GENTLEST, GRAVITY
 from executive.motion.trajectory import Trajectory
 
-
-@pytest.fixture
-def home(config):
-    return np.radians(config.arm.poses_deg["home"])
-
-
-def pick(x: float, y: float, yaw: float | None = None) -> list[Via]:
-    return [
-        Via(np.array([x, y, 0.11]), yaw),
-        Via(np.array([x, y, 0.07])),
-        Via(np.array([x, y, 0.045]), speed=0.03),
-    ]
+CUBE = ObjectClass("cube", 0.05, 0.0354)
+CARRYING = Task(Load(CUBE))
+BIN = Goal((0.24, -0.44, 0.08))
+on_the_table = st.tuples(st.floats(0.42, 0.64), st.floats(-0.22, 0.22), st.floats(0.045, 0.06))
 
 
-def tool(planner: Planner, trajectory: Trajectory, since: float = 0.0):
-    qs = np.array([trajectory.at(s)[0] for s in np.arange(since, trajectory.duration, 1 / 240)])
-    return planner.kinematics.positions(qs)
+def pick(x: float, y: float, z: float = 0.053) -> Goal:
+    return Goal((x, y, z), guarded=0.015, speed=0.04)
 
 
-def test_the_tool_passes_every_via_pointing_down(planner, home) -> None:
-    vias = pick(0.6, -0.2, yaw=0.4)
-    trajectory = planner.plan(home, vias)
-    for via, q in zip(vias, trajectory.waypoints[1:], strict=True):
-        X_WT = planner.kinematics.forward(q)
-        assert np.allclose(X_WT.position, via.position, atol=1e-9)
-        assert np.allclose(X_WT.rotation[:, 2], [0, 0, -1], atol=1e-9)
-        assert np.allclose(X_WT.rotation[:, 1], [-math.sin(0.4), math.cos(0.4), 0], atol=1e-9)
+def tips_of(planner: Planner, motion: Trajectory) -> Array:
+    """Where the tool is every millisecond `(N, 3)` [m]."""
+    return planner.kinematics.tips(passed(motion).q)[0]
 
 
-def test_a_free_yaw_leaves_joint_7_alone_and_is_shared_by_a_descent(planner, home) -> None:
-    trajectory = planner.plan(home, pick(0.6, -0.2))
-    assert trajectory.waypoints[1, 6] == pytest.approx(home[6])
-    turned = [planner.kinematics.forward(q).rotation for q in trajectory.waypoints[1:]]
-    assert np.allclose(turned[0], turned[1], atol=1e-9)
-    assert np.allclose(turned[0], turned[2], atol=1e-9)
+def with_motion(config: CellConfig, **changed: float) -> CellConfig:
+    """The cell file with another `motion` section."""
+    return config.model_copy(update={"motion": config.motion.model_copy(update=changed)})
 
 
-def test_a_guarded_descent_is_straight_and_even(planner, home) -> None:
-    for x, y in [(0.43, -0.21), (0.63, 0.21), (0.5, 0.0)]:
-        trajectory = planner.plan(home, pick(x, y))
-        positions = tool(planner, trajectory, since=trajectory.rests[2])
-        assert np.max(np.linalg.norm(positions[:, :2] - [x, y], axis=1)) < 0.0005
-        speeds = np.linalg.norm(np.diff(positions, axis=0), axis=1) * 240
-        assert speeds.max() <= 0.03 + 1e-6
-        assert speeds[20:-20].min() > 0.029
+@given(on_the_table, st.floats(-math.pi, math.pi))
+@settings(max_examples=15, deadline=None)
+def test_the_tool_arrives_at_the_goal_pointing_down_with_the_yaw_asked_for(planner, home, place, yaw) -> None:
+    motion = planner.plan(home, Goal(place, yaw, guarded=0.01, speed=0.05))
+    assert np.array_equal(motion.start, home)
+    X_WT = planner.kinematics.forward(motion.end)
+    assert np.allclose(X_WT.position, place, atol=1e-7)
+    assert np.allclose(X_WT.rotation[:, 2], [0, 0, -1], atol=1e-7)
+    assert np.allclose(X_WT.rotation[:, 1], [-math.sin(yaw), math.cos(yaw), 0], atol=1e-7)
 
 
-def test_a_lift_keeps_the_posture_of_the_arm(planner, home) -> None:
-    picked = planner.plan(home, pick(0.6, -0.2)).end
-    lift = planner.plan(picked, [Via(np.array([0.6, -0.2, 0.15]))])
-    assert planner.kinematics.branch(lift.end) == planner.kinematics.branch(picked)
-    assert planner.kinematics.swivel(lift.end) == pytest.approx(planner.kinematics.swivel(picked), abs=1e-6)
+@given(on_the_table)
+@settings(max_examples=10, deadline=None)
+def test_a_free_yaw_leaves_joint_7_alone(planner, home, place) -> None:
+    assert planner.plan(home, Goal(place)).end[6] == pytest.approx(home[6], abs=1e-9)
 
 
-def test_the_choice_of_posture_beats_the_natural_elbow(planner, home, limits) -> None:
-    goal = Via(np.array([0.2, -0.44, 0.2]))
-    chosen = planner.plan(home, [goal]).duration
-    straight = planner.kinematics.grid(tool_down(goal.position), np.zeros(1))[2, 0]
-    assert chosen < Trajectory([home, straight], limits).duration
+@given(on_the_table, st.floats(0.008, 0.03), st.floats(0.02, 0.08))
+@settings(max_examples=15, deadline=None)
+def test_the_guarded_part_is_straight_even_and_no_faster_than_asked(
+    planner, home, place, guarded, speed
+) -> None:
+    motion = planner.plan(home, Goal(place, guarded=guarded, speed=speed))
+    states = passed(motion)
+    tips, axes = planner.kinematics.tips(states.q)
+    low = tips[:, 2] < place[2] + guarded
+    speeds = np.linalg.norm(planner.kinematics.velocities(states.q, states.qd), axis=1)[low]
+    assert np.max(np.linalg.norm(tips[low, :2] - place[:2], axis=1)) < 5e-5
+    assert axes[low, 2].max() < -1 + 1e-6
+    assert speeds.max() <= speed * 1.001
+    steady = tips[low, 2] > place[2] + 0.5 * guarded
+    assert speeds[steady].min() > 0.5 * speed
+    assert (low[1:] >= low[:-1]).all()  # it does not leave that part again
 
 
-def test_the_same_question_gets_the_same_answer(planner, home) -> None:
-    one, other = (planner.plan(home, pick(0.5, 0.1)).waypoints for _ in range(2))
-    assert np.array_equal(one, other)
+def test_a_load_changes_the_way(planner, home) -> None:
+    picked = planner.plan(home, pick(0.5, -0.1)).end
+    empty, loaded = planner.plan(picked, BIN), planner.plan(picked, BIN, CARRYING)
+    assert loaded.duration > empty.duration
+    over_the_wall = []
+    for motion in (empty, loaded):
+        tips = tips_of(planner, motion)
+        over_the_wall.append(tips[np.argmin(np.abs(tips[:, 1] + 0.33)), 2])
+    assert over_the_wall[1] > 0.06 + CUBE.height
+    assert over_the_wall[1] > over_the_wall[0] + 0.02
 
 
-def test_the_next_best_way_is_taken_when_the_best_is_blocked(kinematics, limits, home) -> None:
+@pytest.mark.parametrize("load", [None, Load(CUBE)])
+def test_what_stands_between_is_passed_above(planner, home, load) -> None:
+    wall = tuple(Obstacle(x, 0.0, 0.04, 0.16, "the wall") for x in np.arange(0.2, 0.9, 0.05).tolist())
+    picked = planner.plan(home, pick(0.5, 0.15)).end
+    tips = tips_of(planner, planner.plan(picked, Goal((0.5, -0.15, 0.07)), Task(load, wall)))
+    lowest = tips[np.abs(tips[:, 1]) < 0.03, 2].min()
+    assert lowest > 0.16 + (load.kind.height if load else 0.0)
+    direct = tips_of(planner, planner.plan(picked, Goal((0.5, -0.15, 0.07)), Task(load)))
+    assert direct[np.abs(direct[:, 1]) < 0.03, 2].min() < 0.16
+
+
+def neighbours(x: float, y: float, turn: float, count: int, top: float) -> tuple[Obstacle, ...]:
+    """Cubes around a cube, 12 mm away from it."""
+    apart = 2 * CUBE.radius + 0.012
+    angles = (turn + np.arange(count) * math.pi / 3).tolist()
+    return tuple(
+        Obstacle(x + apart * math.cos(a), y + apart * math.sin(a), CUBE.radius, top, "a neighbour")
+        for a in angles
+    )
+
+
+@given(st.floats(0.47, 0.59), st.floats(-0.17, 0.17), st.floats(0, math.pi), st.integers(1, 6))
+@settings(max_examples=12, deadline=None)
+def test_among_tightly_standing_neighbours_it_still_comes_down_and_leaves_again(
+    planner, config, home, x, y, turn, count
+) -> None:
+    near = neighbours(x, y, turn, count, CUBE.height)
+    down = planner.plan(home, pick(x, y, 0.04), Task(around=near))
+    assert np.allclose(planner.kinematics.tips(down.end[None])[0], (x, y, 0.04), atol=1e-7)
+    for tip in tips_of(planner, down):
+        for thing in near:
+            away = math.hypot(tip[0] - thing.x, tip[1] - thing.y) - thing.radius
+            assert tip[2] > thing.top or away > config.tool.cup_radius
+            assert tip[2] + LIP_LENGTH > thing.top or away > TOOL_RADIUS
+    picked = planner.plan(home, pick(x, y), Task(around=near)).end
+    assert planner.plan(picked, BIN, Task(Load(CUBE), near)).duration < 2.0
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.5])
+@pytest.mark.parametrize(("x", "y"), [(0.5, 0.0), (0.57, 0.15), (0.48, -0.1)])
+def test_a_load_is_lifted_out_of_a_ring_of_taller_neighbours(planner, home, x, y, turn) -> None:
+    near = neighbours(x, y, turn, count=6, top=0.06)
+    picked = planner.plan(home, pick(x, y), Task(around=near)).end
+    for tip in tips_of(planner, planner.plan(picked, BIN, Task(Load(CUBE), near))):
+        for thing in near:
+            away = math.hypot(tip[0] - thing.x, tip[1] - thing.y) - thing.radius - CUBE.radius
+            assert tip[2] - CUBE.height > thing.top or away > 0.006
+
+
+def test_an_approach_does_not_sweep_past_its_target_on_the_way_there(planner, config, home) -> None:
+    """From the table beside it the fastest way would be through its edge."""
+    x, y = 0.5, 0.0
+    low = planner.plan(home, Goal((0.42, 0.0, 0.01))).end
+    goal, target = Goal((x, y, 0.035), guarded=0.02, speed=0.035), Obstacle(x, y, CUBE.radius, 0.05, "it")
+    through, over = (planner.plan(low, goal, task) for task in (Task(), Task(target=target)))
+
+    def nearest(motion: Trajectory) -> float:
+        """How near the cup comes to the target before it is above it, in its last part [m]."""
+        tips = tips_of(planner, motion)
+        away = np.hypot(*(tips[:, :2] - (x, y)).T)
+        coming = tips[: np.argmax(away < 1e-4)]
+        beside = away[: len(coming)] - target.radius - config.tool.cup_radius
+        return float(np.min(np.maximum(coming[:, 2] - target.top, beside)))
+
+    assert nearest(through) < -0.005
+    assert nearest(over) > 0.004
+    assert planner.kinematics.tips(over.end[None])[0][0, 2] < target.top, "it may be touched in the end"
+
+
+def test_the_check_gets_the_whole_path_without_gaps_and_what_has_to_be_heeded(config, home) -> None:
+    asked = []
+    motion = Planner(config, lambda path, task: asked.append((path, task))).plan(home, BIN, CARRYING)
+    ((path, task),) = asked
+    assert task == CARRYING
+    assert np.array_equal(path[[0, -1]], [motion.start, motion.end])
+    assert np.max(np.abs(np.diff(path, axis=0))) < SPACING + 1e-9
+    assert np.array_equal(path, path[np.isin(path[:, 0], motion.sampled().q[:, 0])])
+
+
+def test_what_is_to_be_touched_is_in_the_way_until_the_guarded_part(config, home) -> None:
+    asked = []
+    target, duck = (
+        Obstacle(0.5, 0.0, CUBE.radius, 0.05, "cube-1"),
+        Obstacle(0.6, 0.2, CUBE.radius, 0.05, "duck-1"),
+    )
+    task = Task(around=(duck,), target=target)
+    planner = Planner(config, lambda path, task: asked.append((path, task)))
+    motion = planner.plan(home, Goal((0.5, 0.0, 0.035), guarded=0.02, speed=0.035), task)
+    (free, before), (guarded, after) = asked
+    assert (before, after) == (Task(around=(duck, target)), task)
+    assert np.array_equal(free[0], motion.start)
+    assert np.array_equal(guarded[-1], motion.end)
+    assert np.array_equal(free[-1], guarded[0]), "nothing is left out between"
+    border = planner.kinematics.tips(free[-1][None])[0][0]
+    assert border == pytest.approx((0.5, 0.0, 0.055), abs=5e-4)
+
+
+def test_the_next_way_is_taken_when_the_first_is_blocked(config, home) -> None:
     asked = []
 
-    def clearance(path, carrying) -> None:
+    def check(path: Array, task: Task) -> None:
         asked.append(path)
         if len(asked) < 3:
             raise Blocked("too near")
 
-    found = Planner(kinematics, limits, clearance).plan(home, [Via(np.array([0.5, 0.0, 0.2]))])
-    assert len(asked) == 3
-    assert np.array_equal(found.path(math.radians(1)), asked[-1])
-    assert np.max(np.abs(asked[2][-1] - asked[0][-1])) > 0.2
+    motion = Planner(config, check).plan(home, pick(0.5, 0.0))
+    assert len(asked) == 4, "the last way in two parts"
+    assert np.array_equal(asked[3][-1], motion.end)
+    assert motion.duration > Planner(config).plan(home, pick(0.5, 0.0)).duration
+    assert not np.array_equal(asked[0][-1], asked[2][-1])
 
 
-def test_when_all_ways_are_blocked_the_error_is_the_best_ones(kinematics, limits, home) -> None:
+def test_when_all_ways_are_blocked_the_error_is_the_first_ones_and_counts(config, home) -> None:
     asked = []
 
-    def clearance(path, carrying) -> None:
+    def check(path: Array, task: Task) -> None:
         asked.append(path)
         raise Blocked(f"way {len(asked)} is too near")
 
-    with pytest.raises(Blocked, match=r"way 1 is too near; of \d+ ways tried none is free$"):
-        Planner(kinematics, limits, clearance).plan(home, [Via(np.array([0.5, 0.0, 0.2]))])
-    assert 1 < len(asked) <= 16
+    with pytest.raises(Blocked) as caught:
+        Planner(config, check).plan(home, pick(0.5, 0.0))
+    assert 5 < len(asked) < 40
+    assert str(caught.value) == f"way 1 is too near; of {len(asked)} ways tried none is free"
 
 
-def test_an_unreachable_via_says_how_far_off_it_is(planner, home) -> None:
-    far = Via(np.array([0.9, 0.0, 0.114]))
-    with pytest.raises(Unreachable, match=re.escape("0.080 m farther than the arm is long")):
-        planner.plan(home, [far])
-    with pytest.raises(Unreachable, match=re.escape("0.080 m farther than the arm is long")):
-        planner.require_reachable([Via(np.array([0.5, 0.0, 0.2])), far])
+def test_a_goal_inside_something_is_blocked_by_that(planner, home) -> None:
+    crate = Obstacle(0.5, 0.0, 0.05, 0.3, "the crate")
+    around = Task(around=(crate, Obstacle(0.5, 0.0, 0.12, 0.2, "the heap")))
+    with pytest.raises(
+        Blocked, match=r"too near to the (heap|crate), with the tool at .*; of \d+ ways tried none is free"
+    ):
+        planner.plan(home, pick(0.5, 0.0), around)
+
+
+def test_an_unreachable_goal_says_how_far_off_it_is(planner, home) -> None:
+    far = Goal((0.9, 0.0, 0.114))
+    text = "(0.900, 0.000, 0.114) m: its wrist would be 0.900 m from the shoulder, 0.080 m farther"
+    with pytest.raises(Unreachable, match=re.escape(text)):
+        planner.plan(home, far)
+    with pytest.raises(Unreachable, match="farther than the arm is long"):
+        planner.require_reachable(far)
+    with pytest.raises(Unreachable, match=re.escape("0.110 m nearer than joint 4 can fold")):
+        planner.plan(home, Goal((0.3, 0.0, 0.114)))
 
 
 def test_every_bin_and_the_whole_workspace_can_be_reached(planner, config) -> None:
     spots = [bin.position[:2] for bin in config.bins.values()]
     spots += [(x, y) for x in config.table.x for y in config.table.y]
     for x, y in spots:
-        planner.require_reachable([Via(np.array([x, y, 0.2])), Via(np.array([x, y, 0.04]))])
+        planner.require_reachable(Goal((x, y, 0.04)))
 
 
-def test_a_motion_without_vias_is_a_fault(planner, home) -> None:
-    with pytest.raises(Fault, match="without any via"):
-        planner.plan(home, [])
+def pull(planner: Planner, motion: Trajectory, kind: ObjectClass) -> float:
+    """Largest `m |a + g|` of a load on the way [N]."""
+    tips, axes = planner.kinematics.tips(passed(motion).q)
+    middle = tips + kind.height / 2 * axes
+    acceleration = np.diff(middle[:-1], 2, axis=0) / SOONER**2
+    return float(kind.mass * np.linalg.norm(acceleration + np.array([0, 0, GRAVITY]), axis=1).max())
 
 
-def test_a_joint_goal_can_be_reached_after_a_lift(planner, home) -> None:
+@pytest.mark.parametrize(
+    ("mass", "bears"), [(0.1, 7.9), (0.1, 3.0), (0.1, 2.4), (0.1, 2.25), (0.3, 8.0), (0.05, 1.2)]
+)
+@pytest.mark.parametrize(("x", "y"), [(0.55, 0.1), (0.45, -0.2)])
+def test_a_seal_bears_twice_what_is_asked_of_it(planner, home, mass, bears, x, y) -> None:
+    """As long as it bears more than twice the weight, with some room."""
+    kind = ObjectClass("cube", 0.05, 0.0354, mass=mass)
+    picked = planner.plan(home, pick(x, y)).end
+    motion = planner.plan(picked, BIN, Task(Load(kind, bears)))
+    unhurried = planner.plan(picked, BIN, Task(Load(kind)))
+    assert pull(planner, motion, kind) <= bears / 2 * 1.01
+    if pull(planner, unhurried, kind) > bears / 2 * 1.01:
+        # It is not gentler than it has to be.
+        assert pull(planner, motion, kind) > bears / 2 * 0.85
+
+
+def test_a_seal_that_hardly_bears_the_weight_is_carried_at_the_gentlest(planner, limits, home) -> None:
+    picked = planner.plan(home, pick(0.55, 0.1)).end
+    weak = planner.plan(picked, BIN, Task(Load(CUBE, 1.0)))
+    _, acceleration, jerk = peaks(passed(weak), limits)
+    assert 0.5 * GENTLEST <= acceleration <= GENTLEST + 1e-6
+    assert jerk <= GENTLEST**1.5 + 1e-6
+    assert np.allclose(planner.kinematics.tips(weak.end[None])[0], BIN.position, atol=1e-7)
+
+
+def test_straight_ends_where_the_cell_asks_for_them(config, home) -> None:
+    straight = 0.05
+    planner = Planner(with_motion(config, straight=straight))
+    into = planner.plan(home, BIN)
+    out = planner.plan(into.end, Goal((0.5, 0.1, 0.056)))
+    away = planner.plan(out.end, home)
+    assert (kinds(into), kinds(out), kinds(away)) == (
+        [False, True], [True, False, True], [True, False]
+    )  # fmt: skip
+    for motion, place in ((into, BIN.position), (out, (0.5, 0.1, 0.056))):
+        tips = tips_of(planner, motion)
+        last = np.linalg.norm(tips - place, axis=1) < straight
+        assert np.max(np.linalg.norm(tips[last, :2] - place[:2], axis=1)) < 5e-5
+    for motion, place in ((out, BIN.position), (away, (0.5, 0.1, 0.056))):
+        tips = tips_of(planner, motion)
+        first = np.linalg.norm(tips - place, axis=1) < straight
+        assert first[0]
+        assert np.max(np.linalg.norm(tips[first, :2] - place[:2], axis=1)) < 5e-5
+
+
+def kinds(motion: Trajectory) -> list[bool]:
+    """Whether the tool goes straight, from stretch to stretch."""
+    straight = [isinstance(piece, Line) for piece in motion._pieces]
+    assert all(isinstance(piece, Line | Free) for piece in motion._pieces)
+    return [one for number, one in enumerate(straight) if number == 0 or straight[number - 1] != one]
+
+
+def test_joint_positions_are_a_goal_too(planner, config, home) -> None:
+    aside = np.radians(config.arm.poses_deg["aside"])
     picked = planner.plan(home, pick(0.6, 0.1)).end
-    back = planner.plan_joints(picked, home, first=[Via(np.array([0.6, 0.1, 0.1]))])
-    assert len(back.waypoints) == 3
-    assert np.allclose(back.end, home)
-    assert tool(planner, back)[5:, 2].min() > 0.045
+    for start in (home, picked):
+        motion = planner.plan(start, aside)
+        assert np.array_equal(motion.start, start)
+        assert np.allclose(motion.end, aside, atol=1e-9)
+    assert tips_of(planner, motion)[:, 2].min() > 0.05
+
+
+def test_joint_positions_out_of_range_are_refused(planner, home) -> None:
+    with pytest.raises(Blocked, match=r"would take joint 4 to 12\d\.\d°; its limit is ±120°"):
+        planner.plan(home, np.radians([0, 20, 0, -125, 0, 70, 0]))
+
+
+def test_the_same_question_gets_the_same_answer(config, planner, home) -> None:
+    picked = planner.plan(home, pick(0.5, 0.1)).end
+    fresh = Planner(config)
+    one, other = (asked.plan(picked, BIN, CARRYING).sampled() for asked in (planner, fresh))
+    for values, same in zip(one, other, strict=True):
+        assert np.array_equal(values, same)
+
+
+def test_random_motions_keep_every_limit(planner, limits, config, home) -> None:
+    """To and fro between the table and the bins, empty and loaded, some among other things."""
+    rng = np.random.default_rng(11)
+    q = home
+    for number in range(40):
+        x, y = rng.uniform((0.42, -0.22), (0.64, 0.22))
+        around = tuple(
+            Obstacle(float(a), float(b), 0.0354, 0.05, f"thing {n}")
+            for n, (a, b) in enumerate(rng.uniform((0.42, -0.22), (0.64, 0.22), (3, 2)))
+            if math.hypot(a - x, b - y) > 2 * 0.0354 + 0.012
+        )
+        bin = list(config.bins.values())[int(rng.integers(3))].position
+        goal = Goal((bin[0] + rng.uniform(-0.05, 0.05), bin[1] + rng.uniform(-0.05, 0.05), 0.07))
+        loaded = number % 2
+        motion = (
+            planner.plan(q, goal, Task(Load(CUBE)))
+            if loaded
+            else planner.plan(q, pick(x, y), Task(around=around))
+        )
+        states = passed(motion)
+        assert max(peaks(states, limits)) <= 1 + 1e-6
+        assert np.all(np.abs(states.q) <= limits.position)
+        q = motion.end

@@ -1,82 +1,190 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from joint_states import LIMITS, positions, states
 
 from executive.errors import Fault, Unreachable
-from executive.motion.limits import JointLimits
-from executive.motion.trajectory import Trajectory
+from executive.motion.free import Connector
+from executive.motion.state import State
+from executive.motion.trajectory import STEP, Trajectory, over, thinned
 
-WAYPOINTS = np.radians(
-    [[0, 20, 0, -90, 0, 70, 0], [40, 40, 20, -60, 10, 60, 90], [40, 45, 20, -60, 0, 60, 90]]
+CONNECTOR = Connector(LIMITS)
+A, B, C = np.radians([[0, 20, 0, -90, 0, 70, 0], [40, 40, 20, -60, 10, 60, 90], [40, 45, 20, -60, 0, 60, 90]])
+MOVING = State((A + B) / 2, (B - A) / 3, np.full(7, 0.2))
+
+
+def by_way_of(*passing: State) -> Trajectory:
+    """A motion from A to B, in pieces that meet in the given states."""
+    ends = [State.rest(A), *passing, State.rest(B)]
+    return Trajectory([CONNECTOR.connect(one, other) for one, other in pairwise(ends)])
+
+
+@given(states())
+@settings(max_examples=30, deadline=None)
+def test_position_velocity_and_acceleration_do_not_jump_where_pieces_meet(between: State) -> None:
+    trajectory = by_way_of(between)
+    first = CONNECTOR.connect(State.rest(A), between).duration
+    before, after = trajectory.at(first - 1e-9), trajectory.at(first + 1e-9)
+    for one, other, wanted in zip(before, after, between, strict=True):
+        assert np.allclose(one, other, atol=1e-5)
+        assert np.allclose(one, wanted, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("field", "off"), [("q", "their q differ by 0.01"), ("qd", "qd differ"), ("qdd", "qdd differ")]
 )
-UNIFORM = JointLimits(
-    np.full(7, 3.0), np.ones(7), np.full(7, 5.0), np.full(7, 50.0), np.ones(7), np.ones(7), ""
-)
+def test_pieces_that_do_not_meet_are_a_fault(field: str, off: str) -> None:
+    first = CONNECTOR.connect(State.rest(A), MOVING)
+    wrong = MOVING._replace(**{field: getattr(MOVING, field) + 0.01})
+    second = CONNECTOR.connect(wrong, State.rest(B))
+    with pytest.raises(Fault, match=f"pieces 1 and 2 do not fit together: .*{off}"):
+        Trajectory([first, second])
 
 
-def test_it_is_at_rest_at_every_waypoint(limits) -> None:
-    trajectory = Trajectory(WAYPOINTS, limits)
-    for rest, waypoint in zip(trajectory.rests, WAYPOINTS, strict=True):
-        q, qd, _ = trajectory.at(rest)
-        assert np.allclose(q, waypoint, atol=1e-9)
-        assert np.allclose(qd, 0, atol=1e-9)
-    assert trajectory.duration == trajectory.rests[-1]
+def test_a_motion_that_does_not_begin_or_end_at_rest_is_a_fault() -> None:
+    with pytest.raises(Fault, match="rest and how a trajectory begins do not fit together: their qd"):
+        Trajectory([CONNECTOR.connect(MOVING, State.rest(B))])
+    with pytest.raises(Fault, match="rest and how a trajectory ends do not fit together: their qd"):
+        Trajectory([CONNECTOR.connect(State.rest(A), MOVING)])
 
 
-def test_joints_stay_inside_their_limits_and_some_joint_uses_them(limits) -> None:
-    trajectory = Trajectory(WAYPOINTS, limits)
-    states = [trajectory.at(s) for s in np.arange(0, trajectory.duration, 0.001)]
-    speed = np.max(np.abs([state[1] for state in states]) / limits.velocity)
-    acceleration = np.max(np.abs([state[2] for state in states]) / limits.acceleration)
-    jerk = np.max(np.abs(np.diff([state[2] for state in states], axis=0)) / 0.001 / limits.jerk)
-    assert speed <= 1 + 1e-9
-    assert acceleration == pytest.approx(1, abs=0.01)
-    assert jerk <= 1.001
+def test_it_rests_before_its_start_and_after_its_end() -> None:
+    trajectory = by_way_of(MOVING)
+    assert np.array_equal(trajectory.start, A)
+    assert np.allclose(trajectory.end, B, atol=1e-9)
+    for s, where in (
+        (-1.0, trajectory.start),
+        (0.0, trajectory.start),
+        (trajectory.duration + 1, trajectory.end),
+    ):
+        for value, wanted in zip(trajectory.at(s), State.rest(where), strict=True):
+            assert np.array_equal(value, wanted)
 
 
-@given(st.floats(0, 1))
-def test_segments_are_straight_in_joint_space(share: float) -> None:
-    trajectory = Trajectory(WAYPOINTS[:2], UNIFORM)
-    done = trajectory.at(share * trajectory.duration)[0] - WAYPOINTS[0]
-    way = WAYPOINTS[1] - WAYPOINTS[0]
-    assert np.allclose(done, way * (done @ way) / (way @ way), atol=1e-12)
+def test_who_changes_an_answer_does_not_change_the_motion() -> None:
+    trajectory = by_way_of()
+    trajectory.at(-1.0).q[:] = 9.0
+    trajectory.at(9.0).q[:] = 9.0
+    assert np.array_equal(trajectory.start, A)
+    assert np.allclose(trajectory.end, B, atol=1e-9)
 
 
-def test_the_path_has_no_gaps(limits) -> None:
-    path = Trajectory(WAYPOINTS, limits).path(math.radians(1))
-    assert np.max(np.abs(np.diff(path, axis=0))) <= math.radians(1) + 1e-12
-    assert np.array_equal(path[0], WAYPOINTS[0])
-    assert np.allclose(path[-1], WAYPOINTS[-1])
+@pytest.mark.parametrize("s", [math.nan, math.inf, -math.inf])
+def test_a_time_that_would_crash_ruckig_is_a_fault(s: float) -> None:
+    with pytest.raises(Fault, match=rf"asked for the time {s}; its times are 0 to \d\.\d\d\d s"):
+        by_way_of().at(s)
 
 
-def test_a_motion_to_where_the_arm_is_takes_no_time(limits) -> None:
-    trajectory = Trajectory([WAYPOINTS[0], WAYPOINTS[0]], limits)
+@given(states())
+@settings(max_examples=20, deadline=None)
+def test_samples_are_its_states_every_step_and_the_last(between: State) -> None:
+    trajectory = by_way_of(between)
+    sampled = trajectory.sampled()
+    times = [*np.arange(0, trajectory.duration, STEP), trajectory.duration]
+    for values, wanted in zip(sampled, zip(*map(trajectory.at, times), strict=True), strict=True):
+        assert values.shape == (len(times), 7)
+        assert np.allclose(values, wanted, atol=1e-6)
+
+
+@given(states(), st.floats(0.2, 1.0))
+@settings(max_examples=20, deadline=None)
+def test_slowed_it_takes_the_same_path_in_more_time(between: State, rate: float) -> None:
+    """The chain rule: velocities are multiplied by the rate, accelerations by its square."""
+    trajectory = by_way_of(between)
+    slow = trajectory.slowed(rate)
+    assert slow.duration == pytest.approx(trajectory.duration / rate)
+    assert np.array_equal(slow.start, trajectory.start)
+    assert np.allclose(slow.end, trajectory.end, atol=1e-9)
+    for s in np.linspace(0, trajectory.duration, 13):
+        fast = trajectory.at(s)
+        q, qd, qdd = slow.at(s / rate)
+        assert np.allclose(q, fast.q, atol=1e-6)
+        assert np.allclose(qd, rate * fast.qd, atol=1e-5)
+        assert np.allclose(qdd, rate**2 * fast.qdd, atol=1e-4)
+    states = slow.sampled()
+    measured = np.diff(states.q[:-1], axis=0) / STEP
+    assert np.allclose(measured, (states.qd[1:-1] + states.qd[:-2]) / 2, atol=LIMITS.jerk.max() * STEP**2)
+
+
+def test_a_guarded_motion_slowed_is_guarded_still() -> None:
+    pieces = [CONNECTOR.connect(State.rest(A), State.rest(B))]
+    assert [Trajectory(pieces, guarded).slowed(0.5).guarded for guarded in (True, False)] == [True, False]
+
+
+def test_a_motion_to_where_the_arm_is_takes_no_time() -> None:
+    trajectory = Trajectory([CONNECTOR.connect(State.rest(A), State.rest(A))])
     assert trajectory.duration == 0
-    assert np.array_equal(trajectory.at(0.5)[0], WAYPOINTS[0])
+    assert np.array_equal(trajectory.at(0.5).q, A)
+    assert np.array_equal(trajectory.check(LIMITS).q, [A])
 
 
-def test_leaving_a_joints_range_names_the_joint(limits) -> None:
-    goal = np.radians([0, 0, 0, -125, 0, 0, 0])
-    with pytest.raises(Unreachable, match=r"joint 4 to 125\.0°; its limit is ±120°"):
-        Trajectory([np.zeros(7), goal], limits).check(limits)
+def test_a_motion_inside_the_limits_passes_the_check() -> None:
+    assert np.array_equal(by_way_of(MOVING).check(LIMITS).q, by_way_of(MOVING).sampled().q)
 
 
-def test_what_would_crash_ruckig_is_refused_with_a_sentence(limits) -> None:
-    with pytest.raises(Fault, match=r"waypoint 1 of a trajectory has nan for joint 3"):
-        Trajectory([np.zeros(7), [0, 0, math.nan, 0, 0, 0, 0]], limits)
-    with pytest.raises(Fault, match=r"7 joints, not the shape \(2, 6\)"):
-        Trajectory(np.zeros((2, 6)), limits)
-    with pytest.raises(Fault, match="asked for the time nan"):
-        Trajectory(WAYPOINTS, limits).at(math.nan)
-    with pytest.raises(Fault, match="must be positive"):
-        Trajectory(WAYPOINTS[:2], limits, [0.0])
+def test_leaving_a_joints_range_names_the_joint() -> None:
+    far = State.rest(np.radians([0, 0, 0, -125, 0, 0, 0]))
+    trajectory = Trajectory([CONNECTOR.connect(State.rest(A), far)])
+    with pytest.raises(Unreachable, match=r"would take joint 4 to 125\.0°; its limit is ±120°"):
+        trajectory.check(LIMITS)
 
 
-def test_a_motion_too_slow_for_ruckig_is_a_fault_with_a_sentence(limits) -> None:
-    with pytest.raises(Fault, match="ruckig finds no profile from"):
-        Trajectory(WAYPOINTS[:2], limits, [1e-5])
+@given(st.integers(0, 6), st.floats(0.3, 0.9))
+@settings(max_examples=30, deadline=None)
+def test_leaving_a_joints_range_between_two_states_inside_it_is_seen(joint: int, share: float) -> None:
+    """Where a joint turns back, ruckig's own extremes are too small."""
+    edge = State.rest(np.zeros(7))
+    edge.q[joint] = -LIMITS.position[joint] + 0.01
+    leaving = State.rest(edge.q.copy())
+    leaving.qd[joint] = share * LIMITS.velocity[joint]
+    back = CONNECTOR.connect(leaving, State.rest(np.zeros(7)))
+    trajectory = Trajectory([CONNECTOR.connect(edge, leaving), back])
+    with pytest.raises(Unreachable, match=f"joint {joint + 1} to"):
+        trajectory.check(LIMITS)
+
+
+@pytest.mark.parametrize(
+    ("limit", "text"),
+    [
+        ("velocity", "velocity of joint 5"),
+        ("acceleration", "acceleration of joint 5"),
+        ("jerk", "jerk of joint 5"),
+    ],
+)
+def test_a_motion_outside_a_limit_is_a_fault_that_names_the_joint(limit: str, text: str) -> None:
+    less = getattr(LIMITS, limit).copy()
+    less[4] *= 0.01
+    with pytest.raises(Fault, match=rf"the {text} would be \d+\.\d\d\d times its limit"):
+        by_way_of(MOVING).check(replace(LIMITS, **{limit: less}))
+
+
+@given(positions, st.floats(0.01, 0.2))
+@settings(max_examples=30, deadline=None)
+def test_a_thinned_path_has_no_gaps_and_no_more_points_than_it_needs(end, spacing: float) -> None:
+    qs = Trajectory([CONNECTOR.connect(State.rest(A), State.rest(end))]).sampled().q
+    kept = thinned(qs, spacing)
+    step = np.max(np.abs(np.diff(qs, axis=0)), initial=0.0)
+    assert np.array_equal(kept[[0, -1]], qs[[0, -1]])
+    assert np.max(np.abs(np.diff(kept, axis=0))) <= max(spacing, step) + 1e-12
+    wider = np.max(np.abs(kept[2:] - kept[:-2]), axis=1)
+    assert np.all(wider[:-1] > spacing)
+
+
+def test_states_over_pieces_are_those_of_the_trajectory_they_make() -> None:
+    pieces = [CONNECTOR.connect(State.rest(A), MOVING), CONNECTOR.connect(MOVING, State.rest(C))]
+    trajectory = Trajectory(pieces)
+    times = np.linspace(0, trajectory.duration, 11)
+    for values, wanted in zip(over(pieces, times), zip(*map(trajectory.at, times), strict=True), strict=True):
+        assert np.allclose(values, wanted, atol=1e-6)
+
+
+def test_states_at_no_time_at_all_are_none() -> None:
+    states = over([CONNECTOR.connect(State.rest(A), State.rest(B))], np.zeros(0))
+    assert [values.shape for values in states] == [(0, 7)] * 3

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from rig import Rig
 
 from executive.cell_config import CellConfig
 from executive.mission.parse.cell_file import load_cell
@@ -42,3 +43,11 @@ def build() -> Iterator[Callable[[CellConfig], World]]:
     yield open_world
     for world in worlds:
         world.close()
+
+
+@pytest.fixture
+def rig(overhead: CellConfig) -> Iterator[Rig]:
+    """The arm of the cell with a fixed camera, over an empty table."""
+    rig = Rig(overhead)
+    yield rig
+    rig.close()

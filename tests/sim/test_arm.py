@@ -1,69 +1,30 @@
+"""The simulated arm's driver: what it plans, follows and refuses."""
+
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
+from rig import Rig
 
-from executive.cell import Via
-from executive.cell_config import CellConfig
-from executive.errors import Fault
-from executive.motion.kinematics import Kinematics
-from executive.motion.limits import JointLimits
-from executive.motion.planner import Planner
-from executive.sim.arm import SimArm
-from executive.sim.world import World
+from executive.cell import Goal, Motion, Task
+from executive.errors import Fault, Unreachable
+from executive.messages import Obstacle
 
-OVER = [Via(np.array([0.5, 0.1, 0.15]))]
-
-
-class Rig:
-    """The arm of the shipped overhead cell over its table."""
-
-    def __init__(self, config: CellConfig) -> None:
-        self.world = World(config)
-        self.limits = JointLimits.of(config.arm.limits)
-        kinematics = Kinematics(config.tool.length, self.limits.position)
-        planner = Planner(kinematics, self.limits)
-        self.arm = SimArm(self.world, planner, self.limits, config.arm, travel_height=0.1)
-
-    def step(self, count: int = 1) -> None:
-        for _ in range(count):
-            self.arm.advance()
-            self.world.step()
-
-    def run(self, most: int = 2000) -> int:
-        """Step until the arm rests and return how many steps that took."""
-        for count in range(most):
-            if self.arm.at_rest:
-                return count
-            self.step()
-        raise AssertionError(f"still moving after {most} steps")
-
-
-@pytest.fixture(scope="module")
-def config(missions: Path) -> CellConfig:
-    return CellConfig(**yaml.safe_load((missions / "cells" / "overhead.yaml").read_text(encoding="utf-8")))
-
-
-@pytest.fixture
-def rig(config: CellConfig) -> Iterator[Rig]:
-    rig = Rig(config)
-    yield rig
-    rig.world.close()
+OVER = Goal((0.5, 0.1, 0.15))
+BESIDE = Goal((0.5, -0.1, 0.15))
 
 
 def test_it_follows_a_motion_to_a_hundredth_of_a_degree(rig: Rig) -> None:
-    motion = rig.arm.plan(OVER)
+    motion = rig.planned(OVER)
     rig.arm.start(motion)
     for step in range(1, math.ceil(motion.duration * 240) + 1):
         rig.step()
-        assert np.max(np.abs(rig.arm.q - motion.at(step / 240)[0])) < math.radians(0.01)
+        assert np.max(np.abs(rig.arm.q - motion.at(step / 240).q)) < math.radians(0.01)
     assert rig.arm.at_rest
-    assert np.allclose(rig.arm.tool_pose.position, OVER[0].position, atol=1e-4)
+    assert rig.arm.met is None
+    assert np.allclose(rig.arm.tool_pose.position, OVER.position, atol=1e-4)
 
 
 def test_it_holds_its_place_when_idle(rig: Rig) -> None:
@@ -74,64 +35,136 @@ def test_it_holds_its_place_when_idle(rig: Rig) -> None:
     assert np.max(np.abs(rig.arm.q - before)) < math.radians(0.01)
 
 
-def test_a_halt_stays_on_the_path_and_the_arm_can_go_on_from_there(rig: Rig) -> None:
-    motion = rig.arm.plan(OVER)
-    rig.arm.start(motion)
-    rig.step(int(motion.duration * 120))
-    rig.arm.stop()
-    rig.arm.stop()
-    assert not rig.arm.at_rest
-    assert rig.run() <= 120
-    way, done = motion.end - motion.start, rig.arm.q - motion.start
-    share = (done @ way) / (way @ way)
-    assert 0.5 < share < 1
-    assert np.allclose(done, share * way, atol=math.radians(0.01))
+def test_a_plan_takes_its_time_on_the_clock_and_is_told(rig: Rig) -> None:
+    planning = rig.arm.plan(OVER)
+    waited = 0
+    while not planning.ready:
+        rig.step()
+        waited += 1
+    assert waited == round(rig.config.motion.planning * 240) == 12
+    duration = round(planning.result().duration, 4)
+    assert rig.events == [{"kind": "plan", "ahead": False, "waits": 0.05, "duration": duration}]
 
-    rig.arm.start(rig.arm.plan(OVER))
+
+def test_a_motion_planned_ahead_is_known_at_once_and_begins_where_the_running_one_ends(rig: Rig) -> None:
+    first = rig.planned(OVER)
+    rig.arm.start(first)
+    rig.step(30)
+    rig.arm.plan_ahead(BESIDE)
     rig.run()
-    assert np.allclose(rig.arm.tool_pose.position, OVER[0].position, atol=1e-4)
+    planning = rig.arm.plan(BESIDE)
+    assert planning.ready
+    assert rig.events[-1]["ahead"] is True
+    assert rig.events[-1]["waits"] == 0.0
+    second = planning.result()
+    assert np.array_equal(second.start, first.end)
+    rig.arm.start(second)
+    rig.run()
+    assert np.allclose(rig.arm.tool_pose.position, BESIDE.position, atol=1e-4)
+
+
+def test_a_motion_planned_ahead_too_late_is_waited_for_as_long_as_it_takes(rig: Rig) -> None:
+    rig.arm.start(rig.planned(OVER))
+    rig.run()
+    rig.arm.plan_ahead("home")
+    rig.step(4)
+    assert not rig.arm.plan("home").ready
+    assert rig.events[-1]["waits"] == pytest.approx(8 / 240, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("goal", "task"),
+    [
+        (OVER, Task()),
+        (Goal(BESIDE.position, yaw=0.0), Task()),
+        ("home", Task()),
+        (BESIDE, Task(around=(Obstacle(0.6, 0.2, 0.03, 0.05, "cube-1"),))),
+    ],
+    ids=["another place", "another yaw", "a pose", "other surroundings"],
+)
+def test_what_was_planned_ahead_answers_no_other_question(rig: Rig, goal: Goal | str, task: Task) -> None:
+    rig.arm.plan_ahead(BESIDE)
+    rig.step(20)
+    assert not rig.arm.plan(goal, task).ready
+    assert rig.events[-1]["ahead"] is False
+
+
+def test_what_was_planned_ahead_is_of_no_use_once_the_arm_was_stopped_on_its_way(rig: Rig) -> None:
+    rig.arm.start(rig.planned(OVER))
+    rig.step(24)
+    rig.arm.plan_ahead(BESIDE)
+    rig.arm.stop()
+    rig.arm.plan_ahead(BESIDE)  # from where it will stop, which nobody knows yet
+    rig.run()
+    planning = rig.arm.plan(BESIDE)
+    assert not planning.ready
+    rig.step(12)
+    assert np.allclose(planning.result().start, rig.arm.q, atol=1e-4)
+
+
+def test_its_destination_is_where_the_running_motion_ends_or_where_it_stands(rig: Rig) -> None:
+    assert np.allclose(rig.arm.destination, rig.arm.tool_pose.position, atol=1e-4)
+    rig.arm.start(rig.planned(OVER))
+    rig.step(30)
+    assert rig.arm.destination == pytest.approx(OVER.position, abs=1e-9)
+    rig.arm.stop()
+    rig.run()
+    assert np.allclose(rig.arm.destination, rig.arm.tool_pose.position, atol=1e-4)
+
+
+def test_what_cannot_be_reached_is_said_by_the_result_in_its_time(rig: Rig) -> None:
+    planning = rig.arm.plan(Goal((0.9, 0.0, 0.114)))
+    assert not planning.ready
+    rig.step(12)
+    assert planning.ready
+    with pytest.raises(Unreachable, match=r"the tool cannot reach \(0\.900, 0\.000, 0\.114\) m"):
+        planning.result()
+    assert rig.events[-1]["duration"] == 0.0
+
+
+def test_it_goes_to_the_named_poses_of_the_cell_file(rig: Rig) -> None:
+    for pose in ("aside", "home"):
+        rig.go(pose)
+        assert np.allclose(np.degrees(rig.arm.q), rig.config.arm.poses_deg[pose], atol=0.01)
+
+
+def test_an_unknown_pose_is_a_fault_that_lists_the_known_ones(rig: Rig) -> None:
+    for ask in (rig.arm.plan, rig.arm.plan_ahead):
+        with pytest.raises(Fault, match='the cell file has no arm pose "hime"; it has aside, home'):
+            ask("hime")
 
 
 def test_starting_or_planning_while_moving_is_a_fault(rig: Rig) -> None:
-    motion = rig.arm.plan(OVER)
+    motion = rig.planned(OVER)
     rig.arm.start(motion)
     rig.step(10)
-    with pytest.raises(Fault, match=r"start a motion while moving \(\d\.\d\d s to go\)"):
+    with pytest.raises(Fault, match=r"start a motion while moving \(\d\.\d\d s to go\); wait for `at_rest`"):
         rig.arm.start(motion)
     with pytest.raises(Fault, match="plan a motion while moving"):
         rig.arm.plan(OVER)
 
 
 def test_a_motion_that_starts_elsewhere_is_a_fault_with_numbers(rig: Rig) -> None:
-    motion = rig.arm.plan(OVER)
-    rig.arm.start(motion)
-    rig.run()
+    motion = rig.go(OVER)
     with pytest.raises(Fault, match=r"starts \d+\.\d\d° away from where joint \d of the arm is; 0\.2° are"):
         rig.arm.start(motion)
-    rig.arm.start(rig.arm.plan_to_pose("home"))
+    rig.go("home")
+
+
+def test_a_motion_of_another_arm_is_a_fault(rig: Rig) -> None:
+    class Hop:
+        duration = 1.0
+
+    hop: Motion = Hop()
+    with pytest.raises(Fault, match="follows its own planned motions, not a Hop"):
+        rig.arm.start(hop)
 
 
 def test_an_arm_pushed_off_its_path_brakes_and_says_so(rig: Rig) -> None:
-    rig.arm.start(rig.arm.plan(OVER))
+    rig.arm.start(rig.planned(OVER))
     rig.step(30)
     rig.world.set_arm(rig.arm.q + np.radians([0, 3, 0, 0, 0, 0, 0]))
     rig.step(2)
     with pytest.raises(Fault, match=r"the command is \d\.\d\d° away from where joint 2 of the arm is; 0\.5°"):
         _ = rig.arm.at_rest
     assert rig.run() <= 120
-
-
-def test_it_goes_up_before_it_leaves_for_a_named_pose(rig: Rig) -> None:
-    rig.arm.start(rig.arm.plan([*OVER, Via(np.array([0.5, 0.1, 0.06]))]))
-    rig.run()
-    rig.arm.start(rig.arm.plan_to_pose("home"))
-    while rig.arm.tool_pose.position[2] < 0.098:
-        assert np.allclose(rig.arm.tool_pose.position[:2], [0.5, 0.1], atol=0.002)
-        rig.step()
-    rig.run()
-    assert np.allclose(rig.arm.q, np.radians(rig.world.config.arm.poses_deg["home"]), atol=1e-4)
-
-
-def test_an_unknown_pose_is_a_fault_that_lists_the_known_ones(rig: Rig) -> None:
-    with pytest.raises(Fault, match='no arm pose "hime"; it has aside, home'):
-        rig.arm.plan_to_pose("hime")

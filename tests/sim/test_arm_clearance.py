@@ -7,19 +7,19 @@ import numpy as np
 import pybullet
 import pytest
 
-from executive.cell import Via
+from executive.cell import Goal, Task
 from executive.cell_config import CellConfig
 from executive.errors import Blocked
 from executive.geometry import tool_down
-from executive.messages import ObjectClass
+from executive.messages import Load, ObjectClass, Obstacle
 from executive.mission.parse.cell_file import load_cell
 from executive.motion.kinematics import Kinematics
-from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
 from executive.sim.clearance import PathClearance
 from executive.sim.world import World
 
-DUCK = ObjectClass("duck", 0.05, 0.04)
+DUCK = Task(Load(ObjectClass("duck", 0.05, 0.04)))
+TOWER = Obstacle(0.5, 0.1, 0.03, 0.2, "cube-3")
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +87,7 @@ def test_a_held_object_may_be_put_on_a_bins_floor(clearance: PathClearance, at, 
 
 
 def test_a_motion_may_leave_a_place_too_near_but_not_come_nearer(clearance: PathClearance, at) -> None:
-    clearance.check(np.array([at(0.5, 0.0, z) for z in (0.003, 0.1)]))
+    clearance.check(np.array([at(0.5, 0.0, z) for z in (0.003, 0.004, 0.1)]))
     with pytest.raises(Blocked, match="the table"):
         clearance.check(np.array([at(0.5, 0.0, z) for z in (0.003, 0.001)]))
 
@@ -99,17 +99,114 @@ def test_folding_the_arm_onto_itself_is_blocked(clearance: PathClearance, config
         clearance.check(np.array([home, folded]))
 
 
-def test_no_sorting_motion_is_blocked(clearance: PathClearance, config, kinematics) -> None:
-    planner = Planner(kinematics, JointLimits.of(config.arm.limits), clearance.check)
+def test_a_long_tool_may_meet_the_upper_arm(config: CellConfig) -> None:
+    tool = config.tool.model_copy(update={"length": 0.3})
+    clearance = PathClearance(config.model_copy(update={"tool": tool}))
+    folded = np.radians([(0, -65, 60, -90, 0, 60, 0), (0, -65, 105, -120, 0, 100, 0)])
+    with pytest.raises(Blocked, match=r"the tool 0\.009 m into link 2, with the tool at"):
+        clearance.check(folded)
+    clearance.close()
+
+
+def test_what_stands_around_blocks_and_is_named_with_the_distance(clearance: PathClearance, at) -> None:
+    path = np.array([at(0.5, y, 0.15) for y in (0.0, 0.1)])
+    clearance.check(path)
+    with pytest.raises(Blocked) as caught:
+        clearance.check(path, Task(around=(TOWER,)))
+    assert str(caught.value) == (
+        "the motion would bring the tool 0.036 m into cube-3, with the tool at (0.500, 0.100, 0.150) m; "
+        "0.005 m must stay free"
+    )
+
+
+def test_the_margin_is_kept_above_and_beside_what_stands_around(clearance: PathClearance, at) -> None:
+    def passes(*end: float) -> bool:
+        try:
+            clearance.check(np.array([at(0.5, -0.1, 0.25), at(*end)]), Task(around=(TOWER,)))
+        except Blocked as error:
+            assert "the tool 0.004 m from cube-3" in str(error)
+            return False
+        return True
+
+    assert [passes(0.5, 0.1, 0.2 + gap) for gap in (0.006, 0.004)] == [True, False]
+    beside = TOWER.radius + 0.012
+    assert [passes(0.5, 0.1 - beside - gap, 0.15) for gap in (0.006, 0.004)] == [True, False]
+
+
+def test_several_things_of_one_size_stand_around_at_once(clearance: PathClearance, at) -> None:
+    towers = tuple(Obstacle(0.5, y, 0.03, 0.2, f"cube-{y}") for y in (-0.1, 0.0, 0.1))
+    for tower in towers:
+        with pytest.raises(Blocked, match=f"into {tower.name}, "):
+            clearance.check(np.array([at(0.5, 0.2, 0.25), at(0.5, tower.y, 0.15)]), Task(around=towers))
+
+
+def test_what_stood_around_is_put_away_afterwards(clearance: PathClearance, at) -> None:
+    path = np.array([at(0.5, y, 0.15) for y in (0.0, 0.1)])
+    for _ in range(2):
+        with pytest.raises(Blocked, match="cube-3"):
+            clearance.check(path, Task(around=(TOWER,)))
+        clearance.check(path)
+        clearance.check(path, Task(around=(Obstacle(0.5, 0.3, 0.03, 0.2, "cube-3"),)))
+    count = clearance.world.client.getNumBodies()
+    for _ in range(20):
+        clearance.check(path[:1], Task(around=(TOWER,)))
+    assert clearance.world.client.getNumBodies() == count
+
+
+def test_a_held_object_keeps_clear_of_what_stands_around(clearance: PathClearance, at) -> None:
+    path = np.array([at(0.5, y, 0.23) for y in (-0.1, 0.1)])
+    around = (TOWER,)
+    clearance.check(path, Task(around=around))
+    with pytest.raises(Blocked, match=r"the held duck 0\.020 m into cube-3"):
+        clearance.check(path, Task(DUCK.load, around))
+
+
+def test_a_held_object_may_not_stand_on_what_stands_around(clearance: PathClearance, at) -> None:
+    """Only the table and the floor of a bin are there to put things on."""
+    low = Obstacle(0.5, 0.1, 0.03, 0.0005, "a coin")
+    path = np.array([at(0.5, 0.1, z) for z in (0.1, 0.0505)])
+    clearance.check(path, DUCK)
+    with pytest.raises(Blocked, match=r"the held duck .* a coin"):
+        clearance.check(path, Task(DUCK.load, (low,)))
+
+
+def test_a_held_object_keeps_clear_of_the_arm(clearance: PathClearance) -> None:
+    path = np.radians([(0, -65, 60, -90, 0, 60, 0), (0, -100, 65, -110, 0, 105, 0)])
+    clearance.check(path)
+    with pytest.raises(Blocked, match=r"the held rod 0\.004 m into link 2, with the tool at"):
+        clearance.check(path, Task(Load(ObjectClass("rod", 0.2, 0.03))))
+
+
+def test_a_motion_may_leave_what_stands_too_near_but_not_come_nearer(clearance: PathClearance, at) -> None:
+    around = (TOWER,)
+    clearance.check(np.array([at(0.5, 0.1, z) for z in (0.202, 0.203, 0.25)]), Task(around=around))
+    with pytest.raises(Blocked, match=r"the tool 0\.001 m from cube-3"):
+        clearance.check(np.array([at(0.5, 0.1, z) for z in (0.202, 0.201)]), Task(around=around))
+
+
+def test_no_sorting_motion_is_blocked(clearance: PathClearance, config: CellConfig) -> None:
+    planner = Planner(config, clearance.check)
     rng = np.random.default_rng(5)
     q = np.radians(config.arm.poses_deg["home"])
     for number, bin in enumerate([*config.bins.values()] * 3):
         x, y = rng.uniform(*config.table.x), rng.uniform(*config.table.y)
-        q = planner.plan(q, [Via(np.array([x, y, z])) for z in (0.11, 0.045)]).end
-        over = [bin.position[0], bin.position[1], 0.2]
-        q = planner.plan(q, [Via(np.array([x, y, 0.15])), Via(np.array(over))], DUCK).end
+        q = planner.plan(q, Goal((x, y, 0.0505), guarded=0.01, speed=0.035)).end
+        q = planner.plan(q, Goal((*bin.position[:2], 0.07)), DUCK).end
         if number % 3 == 2:
-            q = planner.plan_joints(q, np.radians(config.arm.poses_deg["home"])).end
+            q = planner.plan(q, np.radians(config.arm.poses_deg["home"])).end
+
+
+def test_a_planned_motion_goes_around_what_stands_there(clearance: PathClearance, config: CellConfig) -> None:
+    """The detour of the search holds in the planning world, and without the obstacle it goes straight."""
+    planner = Planner(config, clearance.check)
+    q = planner.plan(np.radians(config.arm.poses_deg["home"]), Goal((0.5, 0.3, 0.1))).end
+    goal, task = Goal((0.5, -0.25, 0.1)), Task(around=(Obstacle(0.5, 0.0, 0.04, 0.3, "cube-3"),))
+    straight = planner.plan(q, goal)
+    with pytest.raises(Blocked, match="cube-3"):
+        clearance.check(straight.sampled().q, task)
+    around = planner.plan(q, goal, task)
+    clearance.check(around.sampled().q, task)
+    assert straight.duration < around.duration < 4 * straight.duration
 
 
 def test_the_arm_at_home_hides_nothing_of_the_workspace_from_the_fixed_camera(config) -> None:

@@ -181,6 +181,30 @@ def test_a_weak_seal_comes_off_under_a_load_that_a_good_one_bears() -> None:
     assert held == {0.0: True, 0.018: False}
 
 
+def test_the_gauge_tells_what_the_seal_bears_until_nothing_is_held(bench: Bench) -> None:
+    assert bench.tool.bears == 0.0
+    bench.hang()
+    bears = bench.tool.bears
+    assert bears == pytest.approx(bench.config.force, rel=0.2)
+    weight = 0.1 * 9.81
+    bench.steps(60, pull=0.95 * bears - weight)
+    assert bench.tool.bears == bears
+    bench.steps(60, pull=1.05 * bears - weight)
+    assert (bench.tool.holding, bench.tool.bears) == (False, 0.0)
+
+
+def test_a_seal_near_the_edge_bears_less() -> None:
+    bears = []
+    for dx in (0.0, 0.012, 0.018):
+        bench = Bench("sphere")
+        drop = 0.03 - np.sqrt(0.03**2 - max(0.0, dx - bench.config.cup_radius) ** 2)
+        bench.put(0.0008 - drop, dx=dx)
+        bench.tool.close()
+        bears.append(bench.tool.bears)
+        bench.world.close()
+    assert bears[0] > bears[1] > bears[2] > bench.config.least_force
+
+
 def test_a_blow_of_a_single_step_does_not_break_the_seal(bench: Bench) -> None:
     bench.hang()
     bench.steps(1, pull=2 * bench.config.force)

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from executive.cell_config import CellConfig
-from executive.motion.kinematics import Kinematics
-from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
 from executive.sim.arm import SimArm
+from executive.sim.clock import SimClock
 from executive.sim.view import ArmShadow
-from executive.sim.world import World
+from executive.sim.world import STEP, World
 from executive.vision.camera_model import calibrated, project
 
 
@@ -23,10 +22,9 @@ class Stage:
     def __init__(self, config: CellConfig) -> None:
         self.world = World(config, visuals=False)
         self.holds = False
-        limits = JointLimits.of(config.arm.limits)
-        kinematics = Kinematics(config.tool.length, limits.position)
-        arm = SimArm(self.world, Planner(kinematics, limits), limits, config.arm)
-        self.shadow = ArmShadow(arm, kinematics, config, lambda: self.holds)
+        planner = Planner(config)
+        arm = SimArm(self.world, planner, config, SimClock(self.world, STEP))
+        self.shadow = ArmShadow(arm, planner.kinematics, config, lambda: self.holds)
         camera = config.cameras["overhead"]
         self.matrix, self.X_WC = calibrated(camera)
         self.size = camera.width, camera.height

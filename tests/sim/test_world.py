@@ -11,7 +11,7 @@ from executive.errors import InputError
 from executive.geometry import Pose, about_z, tool_down
 from executive.mission.parse.cell_file import load_cell
 from executive.sim.cell import SimCell
-from executive.sim.models import find_model, load_mesh
+from executive.sim.models import find_model, load_mesh, mass_of
 from executive.sim.spawn import spawn
 from executive.sim.world import World
 
@@ -64,6 +64,13 @@ def test_an_object_lies_as_high_and_wide_as_the_cell_file_says(
     assert np.hypot(*(vertices - centre)[:, :2].T).max() == pytest.approx(model.radius, abs=1e-3)
 
 
+@pytest.mark.parametrize("label", ["cube", "sphere", "duck"])
+def test_an_object_weighs_what_a_planner_is_told(build: Build, overhead: CellConfig, label: str) -> None:
+    world = build(overhead)
+    body = world.add_object(label, Pose.of([0.5, 0, 0.1]), (1, 1, 1))
+    assert world.client.getDynamicsInfo(body, -1)[0] == pytest.approx(mass_of(overhead.objects[label]))
+
+
 def test_an_object_is_where_it_was_put_and_can_be_put_elsewhere(build: Build, overhead: CellConfig) -> None:
     world = build(overhead)
     first, second = Pose(about_z(0.7), np.array([0.5, 0.1, 0.2])), Pose.of([0.4, 0, 0.3])
@@ -73,6 +80,19 @@ def test_an_object_is_where_it_was_put_and_can_be_put_elsewhere(build: Build, ov
     assert world.object_pose(body).rounded() == pytest.approx(second.rounded(), abs=1e-6)
     world.remove_object(body)
     assert world.bodies == {}
+
+
+def test_every_body_has_a_name_for_the_text_of_an_error(build: Build, overhead: CellConfig) -> None:
+    world = build(overhead)
+    duck = world.add_object("duck", Pose.of([0.5, 0.1, 0.2]), (1, 1, 1))
+    bodies = world.plane, world.table, *world.bins["blue_bin"], duck, world.arm
+    assert [world.name_of(body) for body in bodies] == [
+        "the floor",
+        "the table",
+        "blue_bin",
+        "a duck",
+        "the arm",
+    ]
 
 
 def test_rebuilding_gives_the_same_bits(build: Build, overhead: CellConfig) -> None:

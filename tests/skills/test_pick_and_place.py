@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from executive.messages import Target
+from executive.skill import SkillFailed
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
@@ -66,6 +67,33 @@ def test_a_target_out_of_reach_is_unreachable_and_nothing_moves(fake: FakeCell, 
     assert fake.arm.commanded == []
 
 
+def test_a_contact_high_above_the_target_is_something_in_the_way(fake: FakeCell, target: Target) -> None:
+    fake.world.objects[0].position[2] += 0.04
+    result = run_skill(Approach(target=target), fake)
+    assert result.reason == "blocked"
+    assert result.message == (
+        "the tool met something at 91 mm, on its way to cube-1, which was expected at 50 mm"
+    )
+    assert not fake.ledger.is_fresh(target)
+
+
+def test_what_the_tool_still_touches_from_before_is_no_contact_with_the_target(fake: FakeCell, look) -> None:
+    fake.world.put("cube", 0.5, 0.0)
+    fake.world.put("duck", 0.5, 0.15)
+    cube, duck = look()
+    run_skill(Approach(target=cube), fake)
+    assert fake.tool.touching
+    assert run_skill(Approach(target=duck), fake).status == "SUCCESS"
+    assert np.allclose(fake.arm.tool_pose.position[:2], duck.position[:2], atol=1e-6)
+
+
+def test_an_approach_that_runs_into_something_is_blocked(fake: FakeCell, target: Target) -> None:
+    fake.arm.runs_into = "link 4 ran into the lamp"
+    result = run_skill(Approach(target=target), fake)
+    assert (result.reason, result.message) == ("blocked", "link 4 ran into the lamp")
+    assert fake.ledger.attempts("cube-1") == 0
+
+
 def test_a_halted_approach_stops_the_arm(fake: FakeCell, target: Target) -> None:
     assert run_skill(Approach(target=target), fake, halt_at=30).status == "HALTED"
     assert fake.arm.at_rest
@@ -116,6 +144,27 @@ def test_a_seal_that_breaks_on_the_way_is_dropped_and_the_arm_stops(fake: FakeCe
             fake.advance()
     assert fake.arm.at_rest
     assert fake.ledger.is_open("cube-1"), "a dropped item is looked for again"
+
+
+def test_a_carry_that_runs_into_something_keeps_what_it_holds(fake: FakeCell, held: str) -> None:
+    fake.arm.runs_into = "the held cube ran into a hand"
+    result = run_skill(Transit(held=held, bin="red_bin"), fake)
+    assert (result.reason, result.message) == ("blocked", "the held cube ran into a hand")
+    assert fake.tool.holding
+    assert run_skill(PutDown(held=held), fake).status == "SUCCESS"
+
+
+def test_what_is_torn_off_by_running_into_something_is_dropped(fake: FakeCell, held: str) -> None:
+    fake.arm.runs_into = "the held cube ran into a hand"
+    skill = Transit(held=held, bin="red_bin")
+    steps = skill.run(fake.cell)
+    with pytest.raises(SkillFailed, match="the seal on cube-1 broke on the way") as failure:
+        while True:
+            next(steps)
+            fake.advance()
+            if fake.arm.met:
+                fake.tool.open()
+    assert failure.value.reason == "dropped"
 
 
 def test_release_places_the_item(fake: FakeCell, held: str) -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from executive.cell import Goal
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import SkillResult, run_skill
 from skills.select_target import SelectTarget
@@ -15,6 +16,21 @@ def test_the_nearest_target_comes_first_with_its_bin(fake: FakeCell, look) -> No
     result = select(fake, look())
     assert (result.outputs["item"], result.outputs["bin"]) == ("duck-1", "yellow_bin")
     assert [decision.item for decision in fake.decisions] == ["duck-1"]
+
+
+def test_a_tentative_choice_is_no_decision(fake: FakeCell, look) -> None:
+    fake.world.put("cube", 0.6, -0.2)
+    assert select(fake, look(), tentative=True).outputs["item"] == "cube-1"
+    assert fake.decisions == []
+
+
+def test_while_the_arm_moves_the_nearest_is_the_one_nearest_to_where_it_will_be(fake: FakeCell, look) -> None:
+    fake.world.put("cube", 0.45, 0.0)
+    fake.world.put("duck", 0.6, -0.2)
+    targets = look()
+    assert select(fake, targets).outputs["item"] == "cube-1"
+    fake.arm.start(fake.arm.plan(Goal((0.6, -0.3, 0.1))).result())
+    assert select(fake, targets).outputs["item"] == "duck-1"
 
 
 def test_of_several_bins_the_one_with_the_fewest_objects_is_next_the_first_among_equals(

@@ -163,7 +163,7 @@ _KINDS: Mapping[str, Json] = {
     "reasons": _ref("reasons"),
     "text": {"type": ["string", "number", "boolean"]},
     "word": {"type": "string", **_WORD},
-    "words": _one_or_several({"pattern": rf"^\$?{_NAME}$"}),
+    "words": {**_one_or_several({"pattern": rf"^\$?{_NAME}$"}), "minItems": 0},
     "list": or_reference({"type": "array"}),
     "value": {},
     "values": _named({}),

@@ -1,0 +1,225 @@
+"""The motions worth checking, best first: direct, over what is in between, or corner by corner."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+
+import numpy as np
+
+from executive.cell import Goal, Task
+from executive.cell_config import CellConfig
+from executive.errors import Unreachable
+from executive.geometry import Array, tool_down
+from executive.layout import travel_height
+from executive.motion.detour import Detour, Gap
+from executive.motion.free import Connector, NoProfile
+from executive.motion.kinematics import Kinematics
+from executive.motion.limits import JointLimits
+from executive.motion.line import SAMPLES, Line
+from executive.motion.postures import line_chain, upright_line
+from executive.motion.seal import Inertia
+from executive.motion.state import Piece, State
+from executive.motion.surroundings import Surroundings, hanging
+from executive.motion.trajectory import over
+from executive.motion.transcription import SAMPLES as PER_STEP
+from executive.motion.transcription import STEPS
+from executive.motion.ways import Way, ways_down
+
+WAYS = 3
+"""Ends of a motion that are tried."""
+FIRST, REST = 4, 8
+"""Steps by which the detour to each of them is improved, and the best one after that."""
+LIFTS = (0.0, 0.05, 0.10)
+"""Heights above travel height at which a motion that stops at every corner is tried [m]."""
+PLACES = np.arange(1, STEPS * PER_STEP) / (STEPS * PER_STEP)
+"""Shares of a motion's duration at which its distances are looked at."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A motion that may be the one.
+
+    Attributes:
+        cost: Its duration, and what it is too near to something in seconds.
+        free: Its pieces up to the straight one at the end.
+        arrival: That one, or none.
+    """
+
+    cost: float
+    free: tuple[Piece, ...]
+    arrival: tuple[Piece, ...]
+
+    @property
+    def pieces(self) -> tuple[Piece, ...]:
+        """All of it."""
+        return self.free + self.arrival
+
+
+class Search:
+    """One question to the planner: what is known for all ways, and the ways.
+
+    Args:
+        config: The cell file.
+        kinematics: The arm's.
+        limits: Its joints'.
+        start: Where it rests `(7,)` [rad].
+        end: Where it goes: a goal, or joint positions `(7,)` [rad].
+        task: What it has to heed; what is to be touched in the end is in `around`.
+    """
+
+    def __init__(
+        self,
+        config: CellConfig,
+        kinematics: Kinematics,
+        limits: JointLimits,
+        start: Array,
+        end: Goal | Array,
+        task: Task,
+    ) -> None:
+        self._kinematics = kinematics
+        self._limits = limits
+        self._connector = Connector(limits)
+        self._height = travel_height(config)
+        self._end = end
+        self._straight = config.motion.straight
+        self._discs = hanging(config, task.load)
+        if not isinstance(end, Goal) and task.load is None:
+            self._discs = self._discs._replace(upright=-1.0)  # from any posture the arm must find home
+        self._inertia = Inertia(task.load, kinematics) if task.load else None
+        place = kinematics.tips(end[None])[0][0] if not isinstance(end, Goal) else np.array(end.position)
+        if isinstance(end, Goal):
+            place[2] += end.guarded
+        tips, axes = kinematics.tips(start[None])
+        self._surroundings = Surroundings(config, task.around, np.array([tips[0, :2], place[:2]]))
+        ends = np.concatenate([axes, [[0.0, 0.0, -1.0]]])
+        self._surroundings.relax(np.concatenate([tips, place[None]]), ends, self._discs)
+        self._rises: dict[tuple[float, bool], tuple[list[Piece], State]] = {}
+        self._departure = self._depart(start, float(tips[0, 2]))
+        self._start = self._departure.at(self._departure.duration) if self._departure else State.rest(start)
+
+    def candidates(self) -> Iterator[Candidate]:
+        """Yield motions, best first: direct ones and arches, then such as stop at every corner."""
+        ways = list(islice(self._ways(), WAYS))
+        yield from self._flights(ways)
+        for lift in LIFTS:
+            for way in ways:
+                try:
+                    yield self._candidate(math.inf, way, *self._corners(way, lift, straight=True))
+                except (Unreachable, NoProfile):
+                    continue
+
+    def require_clear(self, qs: Array) -> None:
+        """Make sure that states `(N, 7)` [rad] keep away from things, and from where things may be.
+
+        Raises:
+            Blocked: One does not.
+        """
+        self._surroundings.require_clear(*self._kinematics.tips(qs), self._discs)
+
+    def _ways(self) -> Iterator[Way]:
+        if not isinstance(self._end, Goal):
+            yield Way(0.0, State.rest(self._end), None, None)
+            return
+        length = max(self._end.guarded, self._straight)
+        yield from ways_down(self._kinematics, self._limits, self._start, self._end, length)
+
+    def _flights(self, ways: Sequence[Way]) -> Iterator[Candidate]:
+        """Yield direct motions where they are clear, and detours over what is in between elsewhere."""
+        direct, detours = self._tried(ways)
+        for _, detour in detours[:1]:
+            detour.improve(REST)
+        direct.sort(key=lambda candidate: candidate.cost)
+        for number, (way, detour) in enumerate(detours):
+            while direct and direct[0].cost <= detour.cost + way.tail:
+                yield direct.pop(0)
+            if number:
+                detour.improve(REST)
+            for exactly in (False, True):
+                with contextlib.suppress(NoProfile):
+                    yield self._candidate(detour.cost + way.tail, way, *detour.fly(exactly))
+        yield from direct
+
+    def _tried(self, ways: Sequence[Way]) -> tuple[list[Candidate], list[tuple[Way, Detour]]]:
+        """Return the direct motions that are clear, and detours a few steps on, the fastest first."""
+        direct: list[Candidate] = []
+        detours: list[tuple[Way, Detour]] = []
+        for way in ways:
+            least = [candidate.cost for candidate in direct] + [d.cost + w.tail for w, d in detours]
+            if min(least, default=math.inf) <= way.estimate + way.tail:
+                break
+            gap = Gap(
+                self._start, way.entry, self._connector, self._kinematics, self._surroundings,
+                self._discs, self._inertia,
+            )  # fmt: skip
+            with contextlib.suppress(NoProfile, Unreachable):
+                free = self._connector.connect(self._start, way.entry)
+                if gap.slack(free.over(PLACES * free.duration).q).min() >= 0:
+                    direct.append(self._candidate(free.duration + way.tail, way, free))
+                    continue
+                corners = self._corners(way, LIFTS[0], straight=False)
+                duration = sum(piece.duration for piece in corners)
+                detour = Detour(gap, over(corners, PLACES * duration).q, duration)
+                detour.improve(FIRST)
+                detours.append((way, detour))
+        detours.sort(key=lambda pair: pair[1].cost + pair[0].tail)
+        return direct, detours
+
+    def _candidate(self, cost: float, way: Way, *free: Piece) -> Candidate:
+        first = (self._departure,) if self._departure else ()
+        last = (way.arrival,) if way.arrival else ()
+        return Candidate(cost, (*first, *free), last)
+
+    def _corners(self, way: Way, lift: float, *, straight: bool) -> list[Piece]:
+        """Return motions that stop above their start and above their goal: slow, and clear if any are.
+
+        `straight`: they go straight up and down, as far as they can, which takes more work to find.
+
+        Raises:
+            Unreachable: The tool does not get so high in its posture.
+            NoProfile: It cannot be flown.
+        """
+        connect, high = self._connector.connect, self._height + lift
+        if (high, straight) not in self._rises:
+            self._rises[high, straight] = self._rise(high, straight)
+        up, here = self._rises[high, straight]
+        (x, y, z), _ = self._tip(way.entry.q)
+        if way.posture is None or z >= high:
+            return [*up, connect(here, way.entry)]
+        if straight and way.arrival is None:
+            chain = line_chain(self._kinematics, way.entry.q, high - z, SAMPLES, *way.posture)
+            return [*up, connect(here, State.rest(chain[-1])), Line(chain[::-1], high - z, self._limits)]
+        above = self._above((x, y, high), *way.posture, way.entry.q)
+        return [*up, connect(here, above), connect(above, way.entry)]
+
+    def _rise(self, high: float, straight: bool) -> tuple[list[Piece], State]:
+        """Return the way up from the start, and the state of rest in which it ends."""
+        q, ((x, y, z), upright) = self._start.q, self._tip(self._start.q)
+        if not upright or z >= high:
+            return [], self._start
+        if straight and self._departure is None:
+            chain = upright_line(self._kinematics, q, high - z, SAMPLES)
+            if chain is not None:
+                return [Line(chain, high - z, self._limits)], State.rest(chain[-1])
+        above = self._above((x, y, high), self._kinematics.branch(q), self._kinematics.swivel(q), q)
+        return [self._connector.connect(self._start, above)], above
+
+    def _tip(self, q: Array) -> tuple[Array, bool]:
+        tips, axes = self._kinematics.tips(q[None])
+        return tips[0], bool(-axes[0, 2] > 0.99)
+
+    def _above(self, place: tuple[float, float, float], branch: int, swivel: float, near: Array) -> State:
+        """Return the state of rest at a place in a posture, joint 7 as at `near` `(7,)` [rad]."""
+        q = self._kinematics.grid(tool_down(place), np.array([swivel]))[branch, 0]
+        q[6] = near[6]
+        return State.rest(q)
+
+    def _depart(self, start: Array, height: float) -> Line | None:
+        """Return the straight way up with which a motion begins where the cell asks for it."""
+        if not self._straight or height + self._straight > self._height:
+            return None
+        chain = upright_line(self._kinematics, start, self._straight, SAMPLES)
+        return None if chain is None else Line(chain, self._straight, self._limits, leaves=True)

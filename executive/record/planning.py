@@ -1,0 +1,25 @@
+"""How many motions of a run were planned ahead, and what waiting for the others cost."""
+
+from __future__ import annotations
+
+from executive.events import Event
+
+
+class PlanningTally:
+    """Counts the plans of a run; an observer."""
+
+    def __init__(self) -> None:
+        self._motions = 0
+        self._ahead = 0
+        self._waited = 0.0
+
+    def __call__(self, event: Event) -> None:
+        """Count `event` if it is a plan."""
+        if event.kind == "plan":
+            self._motions += 1
+            self._ahead += bool(event.data["ahead"])
+            self._waited += float(event.data["waits"])
+
+    def figures(self) -> dict[str, float]:
+        """Return the number of motions, of those planned ahead, and the time waited for plans [s]."""
+        return {"motions": self._motions, "ahead": self._ahead, "waited_s": round(self._waited, 4)}

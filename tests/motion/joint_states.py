@@ -1,0 +1,51 @@
+"""States of the joints for tests: random ones, and those that a motion passes."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import strategies as st
+
+from executive.motion.limits import JointLimits
+from executive.motion.state import Piece, State
+
+LIMITS = JointLimits(
+    position=np.radians([170, 120, 170, 120, 170, 120, 175]),
+    velocity=np.radians([85, 85, 100, 75, 130, 135, 135]),
+    acceleration=np.array([8.57, 8.57, 8.74, 11.36, 12.23, 15.72, 15.72]),
+    jerk=np.array([85.7, 85.7, 87.4, 113.6, 122.3, 157.2, 157.2]),
+    stop_acceleration=np.full(7, 20.0),
+    stop_jerk=np.full(7, 300.0),
+    source="the tests",
+)
+"""Of an iiwa 14, for tests whose examples hypothesis finds."""
+
+SOONER = 1e-3
+"""Time between sampled states [s]."""
+
+shares = st.lists(st.floats(-1, 1), min_size=7, max_size=7).map(np.array)
+"""A number between -1 and 1 for every joint."""
+
+positions = shares.map(lambda share: share * LIMITS.position)
+"""Joint positions inside the limits."""
+
+
+@st.composite
+def states(draw: st.DrawFn) -> State:
+    """States that can be entered and left inside the limits, most of them moving."""
+    qdd = 0.9 * draw(shares) * LIMITS.acceleration
+    most = LIMITS.velocity - qdd**2 / (2 * LIMITS.jerk)
+    return State(draw(positions), 0.99 * draw(shares) * most, qdd)
+
+
+def passed(motion: Piece, spacing: float = SOONER) -> State:
+    """The states of a motion every `spacing` [s], the last one included, each array of shape `(N, 7)`."""
+    times = [*np.arange(0.0, motion.duration, spacing), motion.duration]
+    return State(*map(np.array, zip(*(motion.at(float(s)) for s in times), strict=True)))
+
+
+def peaks(states: State, limits: JointLimits, spacing: float = SOONER) -> tuple[float, float, float]:
+    """The largest velocity, acceleration and jerk of any joint, as shares of its limits."""
+    jerk = np.diff(states.qdd, axis=0) / spacing
+    pairs = (states.qd, limits.velocity), (states.qdd, limits.acceleration), (jerk, limits.jerk)
+    v, a, j = (float(np.max(np.abs(values) / limit, initial=0.0)) for values, limit in pairs)
+    return v, a, j

@@ -1,0 +1,157 @@
+"""Of executive/motion/seal.py: how gently a load is carried."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from executive.messages import Load, ObjectClass
+from executive.motion.seal import GRAVITY, METRES, SAFETY, STRIDE, Inertia, affordable
+from executive.motion.state import State
+from executive.motion.trajectory import STEP, Trajectory
+from executive.motion.transcription import SAMPLES, STEPS
+
+KIND = ObjectClass("cube", 0.05, 0.035, mass=0.1)
+PLACES = np.arange(1, STEPS * SAMPLES) / (STEPS * SAMPLES)
+LENGTH = 1.0 / STEPS
+"""Of a step of a course that sways [s]."""
+
+
+class Sway:
+    """A turn of joint 1 to and fro, at rest where it begins and ends: the tool's middle goes on a circle."""
+
+    duration = 1.0
+
+    def __init__(self, q, angle: float) -> None:
+        self._q, self._angle = q, angle
+
+    def at(self, s: float) -> State:
+        """A quintic from rest to rest."""
+        turn = np.eye(7)[0] * self._angle
+        place, speed, change = (
+            10 * s**3 - 15 * s**4 + 6 * s**5,
+            30 * s**2 * (1 - s) ** 2,
+            60 * s * (1 - s) * (1 - 2 * s),
+        )
+        return State(self._q + turn * place, turn * speed, turn * change)
+
+    def over(self, times) -> State:
+        """The states at many times."""
+        return State(*map(np.array, zip(*map(self.at, times), strict=True)))
+
+
+@pytest.fixture
+def sway(home):
+    return Trajectory([Sway(home, 1.0)])
+
+
+def strongest(trajectory: Trajectory, kinematics) -> float:
+    """The largest acceleration of the tool by the textbook: along the circle, and to its middle [m/s²]."""
+    tips, _ = kinematics.tips(trajectory.start[None])
+    radius = math.hypot(*tips[0, :2])
+    _, qd, qdd = trajectory.sampled()
+    return float(np.max(radius * np.hypot(qdd[:, 0], qd[:, 0] ** 2)))
+
+
+def test_a_level_motion_may_use_what_the_seal_bears_beyond_the_weight(sway, kinematics) -> None:
+    """Level acceleration and gravity are square to each other: `(k a)² + g² = (bears / 2 m)²`."""
+    most = strongest(sway, kinematics)
+    wanted = 0.7
+    bears = SAFETY * KIND.mass * math.hypot(GRAVITY, wanted * most)
+    assert affordable(sway, Load(KIND, bears), kinematics) == pytest.approx(wanted, rel=0.01)
+
+
+def test_a_seal_that_bears_it_all_costs_nothing(sway, kinematics) -> None:
+    assert affordable(sway, Load(KIND), kinematics) == 1.0
+    bears = SAFETY * KIND.mass * math.hypot(GRAVITY, 1.01 * strongest(sway, kinematics))
+    assert affordable(sway, Load(KIND, bears), kinematics) == 1.0
+
+
+@pytest.mark.parametrize("share", [0.25, 0.6, 0.9])
+def test_flown_at_the_root_of_the_share_a_motion_is_just_affordable(sway, kinematics, share: float) -> None:
+    bears = SAFETY * KIND.mass * math.hypot(GRAVITY, share * strongest(sway, kinematics))
+    load = Load(KIND, bears)
+    rate = math.sqrt(affordable(sway, load, kinematics))
+    assert affordable(sway.slowed(rate), load, kinematics) == pytest.approx(1.0, abs=0.01)
+    assert affordable(sway.slowed(1.1 * rate), load, kinematics) < 0.9
+
+
+def test_a_seal_that_does_not_bear_the_weight_twice_affords_nothing(sway, kinematics) -> None:
+    assert affordable(sway, Load(KIND, 0.99 * SAFETY * KIND.mass * GRAVITY), kinematics) == 0.0
+
+
+def test_a_motion_too_short_to_pull_at_anything_is_affordable(kinematics, connector, home) -> None:
+    still = Trajectory([connector.connect(State.rest(home), State.rest(home))])
+    assert affordable(still, Load(KIND, 0.5), kinematics) == 1.0
+
+
+@given(st.floats(1.0, 6.0), st.floats(0.05, 0.3), st.floats(0.05, 0.6))
+@settings(max_examples=20, deadline=None)
+def test_a_heavier_load_a_weaker_seal_and_a_wilder_motion_are_less_affordable(
+    kinematics, home, bears: float, mass: float, angle: float
+) -> None:
+    def share(bears: float, mass: float, angle: float) -> float:
+        motion = Trajectory([Sway(home, angle)])
+        return affordable(motion, Load(ObjectClass("cube", 0.05, 0.035, mass=mass), bears), kinematics)
+
+    here = share(bears, mass, angle)
+    assert 0.0 <= here <= 1.0
+    assert share(bears / 2, mass, angle) <= here
+    assert share(bears, 2 * mass, angle) <= here
+    assert share(bears, mass, 2 * angle) <= here
+    assert Sway.duration > STEP
+
+
+def test_a_demand_is_what_the_seal_bears_beyond_weight_and_inertia(sway, kinematics) -> None:
+    """Of places STRIDE apart on a course, in centimetres for each metre per second squared."""
+    bears = 3.0
+    qs = np.array([sway.at(place).q for place in PLACES])
+    demand = Inertia(Load(KIND, bears), kinematics).demand(qs, LENGTH / SAMPLES, math.inf)
+    middle = demand.rows[:, 1]
+    assert np.array_equal(np.diff(middle), np.full(len(middle) - 1, STRIDE))
+    assert middle[0] < 2 * STRIDE
+    assert middle[-1] > len(qs) - 2 * STRIDE
+    radius = math.hypot(*kinematics.tips(qs[:1])[0][0, :2])
+    states = [sway.at(place) for place in PLACES[middle]]
+    level = radius * np.array([math.hypot(state.qdd[0], state.qd[0] ** 2) for state in states])
+    wanted = METRES * (bears / SAFETY / KIND.mass - np.hypot(level, GRAVITY))
+    assert demand.slack == pytest.approx(wanted, abs=METRES * 0.05)
+
+
+def test_what_is_far_from_its_bounds_is_left_out(sway, kinematics) -> None:
+    qs = np.array([sway.at(place).q for place in PLACES])
+    inertia = Inertia(Load(KIND, 3.0), kinematics)
+    everything, near = (inertia.demand(qs, LENGTH / SAMPLES, far) for far in (math.inf, 0.048 * 2))
+    chosen = everything.slack < 0.048 * 2
+    assert 0 < np.sum(chosen) < len(chosen)
+    for values, wanted in zip(near, everything, strict=True):
+        assert np.array_equal(values, wanted[chosen])
+
+
+def test_slopes_are_the_derivatives_of_a_demand_by_the_positions(sway, kinematics) -> None:
+    qs = np.array([sway.at(place).q for place in PLACES])
+    inertia, h = Inertia(Load(KIND, 3.0), kinematics), 1e-6
+    demand = inertia.demand(qs, LENGTH / SAMPLES, math.inf)
+    for row in range(0, len(demand.slack), 5):
+        for k, joint in np.ndindex(3, 7):
+            there = [qs.copy(), qs.copy()]
+            for moved, sign in zip(there, (1, -1), strict=True):
+                moved[demand.rows[row, k], joint] += sign * h
+            after, before = (inertia.demand(moved, LENGTH / SAMPLES, math.inf).slack[row] for moved in there)
+            assert demand.slopes[row, k, joint] == pytest.approx(
+                (after - before) / (2 * h), rel=1e-2, abs=0.02
+            )
+
+
+def test_growth_is_the_derivative_of_a_demand_by_the_length_of_a_step(sway, kinematics) -> None:
+    qs = np.array([sway.at(place).q for place in PLACES])
+    inertia, h = Inertia(Load(KIND, 3.0), kinematics), 1e-6
+    demand, after, before = (
+        inertia.demand(qs, (LENGTH + change) / SAMPLES, math.inf) for change in (0.0, h, -h)
+    )
+    assert demand.growth.max() > 0.1
+    assert demand.growth == pytest.approx((after.slack - before.slack) / (2 * h), rel=1e-4)

@@ -1,0 +1,147 @@
+"""What the arm runs into although nothing was known to be there."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from rig import Rig, off_path
+
+from executive.cell import Goal, Task
+from executive.geometry import Array, tool_down
+from executive.layout import as_class
+from executive.messages import Load
+from executive.motion.trajectory import Trajectory
+from executive.sim.contacts import PRESSING
+
+LEFT, RIGHT = Goal((0.5, 0.25, 0.15)), Goal((0.5, -0.2, 0.15))
+
+
+def float_at(rig: Rig, label: str, place: Array, mass: float = 0.1) -> int:
+    """Put an object into the air, where it stays until something runs into it."""
+    rig.world.client.setGravity(0, 0, 0)
+    body = rig.add(label, *place)
+    rig.world.client.changeDynamics(body, -1, mass=mass)
+    return body
+
+
+def tool_at(rig: Rig, motion: Trajectory, share: float) -> Array:
+    """Return where the tool is after a share of the time of a motion `(3,)` [m]."""
+    return rig.planner.kinematics.forward(motion.at(share * motion.duration).q).position
+
+
+def bump(rig: Rig, motion: Trajectory) -> str:
+    """Follow a motion until the arm runs into something; return what it says when it is at rest again."""
+    rig.arm.start(motion)
+    while rig.arm.met is None:
+        assert not rig.arm.at_rest, "it ran into nothing"
+        rig.step()
+    assert rig.run() <= 120
+    assert off_path(rig.arm._command, motion) < 1e-9
+    assert rig.arm.met is not None
+    return rig.arm.met
+
+
+def pressed_on_a_cube(rig: Rig) -> int:
+    """Press the tool onto a cube with some force; return the cube."""
+    body = rig.add("cube", 0.5, 0.1)
+    rig.step(60)
+    rig.go(Goal((0.5, 0.1, 0.0495), guarded=0.012, speed=0.035))
+    rig.step(10)
+    assert rig.pressing() > PRESSING
+    return body
+
+
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.7])
+def test_an_object_in_the_way_of_the_tool_makes_the_arm_brake_along_its_path(rig: Rig, share: float) -> None:
+    rig.go(LEFT)
+    motion = rig.planned(RIGHT)
+    place = tool_at(rig, motion, share)
+    float_at(rig, "cube", place)
+    said = bump(rig, motion)
+    found = re.fullmatch(r"the tool ran into a cube, with the tool at \((.*), (.*), (.*)\) m", said)
+    assert found, said
+    assert np.linalg.norm(np.array([float(value) for value in found.groups()]) - place) < 0.05
+    assert rig.arm.destination == pytest.approx(rig.arm.tool_pose.position, abs=1e-4)
+
+
+def test_the_next_motion_begins_where_the_bump_left_the_arm_and_forgets_it(rig: Rig) -> None:
+    rig.go(LEFT)
+    motion = rig.planned(RIGHT)
+    body = float_at(rig, "cube", tool_at(rig, motion, 0.5))
+    bump(rig, motion)
+    rig.world.remove_object(body)
+    again = rig.planned(RIGHT)
+    assert rig.arm.met is not None
+    rig.arm.start(again)
+    assert rig.arm.met is None
+    rig.run()
+    assert rig.arm.met is None
+    assert rig.arm.tool_pose.position == pytest.approx(RIGHT.position, abs=1e-4)
+
+
+@pytest.mark.parametrize("guarded", [0.0, 0.02])
+def test_what_an_upper_part_runs_into_counts_in_a_guarded_motion_too(rig: Rig, guarded: float) -> None:
+    rig.go(LEFT)
+    motion = rig.planned(Goal(RIGHT.position, guarded=guarded))
+    half = motion.at(motion.duration / 2).q
+    wrist = rig.planner.kinematics.joint_frames(half)[5].position
+    float_at(rig, "cube", wrist)
+    assert re.match(r"link [567] ran into a cube, with the tool at", bump(rig, motion))
+
+
+def test_what_the_tool_touches_on_a_guarded_motion_is_what_it_is_for(rig: Rig) -> None:
+    pressed_on_a_cube(rig)
+    assert rig.arm.met is None
+
+
+def test_without_a_guarded_part_a_touch_of_the_tool_counts(rig: Rig) -> None:
+    rig.add("cube", 0.5, 0.1)
+    rig.go(Goal((0.5, 0.1, 0.06)))
+    down = rig.planner.kinematics.nearest_solution(tool_down([0.5, 0.1, 0.0495]), rig.arm.q)
+    assert bump(rig, rig.straight_to(down)).startswith(
+        "the tool ran into a cube, with the tool at (0.500, 0.1"
+    )
+
+
+@pytest.mark.parametrize(("place", "name"), [((0.5, 0.0), "the table"), ((0.24, -0.63), "red_bin")])
+def test_the_cell_itself_is_named_too(rig: Rig, place: tuple[float, float], name: str) -> None:
+    rig.go(Goal((*place, 0.09)))
+    down = rig.planner.kinematics.nearest_solution(tool_down([*place, -0.002]), rig.arm.q)
+    rig.arm.start(rig.straight_to(down))
+    while rig.arm.met is None and rig.arm._motion is not None:
+        rig.step()
+    assert rig.arm.met is not None
+    assert rig.arm.met.startswith(f"the tool ran into {name}, with the tool at")
+
+
+def test_what_it_touches_before_it_sets_out_is_no_bump(rig: Rig) -> None:
+    pressed_on_a_cube(rig)
+    rig.go(LEFT)
+    assert rig.arm.met is None
+    assert rig.arm.tool_pose.position == pytest.approx(LEFT.position, abs=1e-4)
+
+
+def test_what_the_held_object_runs_into_counts_but_neither_the_tool_nor_the_table_it_lay_on(rig: Rig) -> None:
+    held = rig.add("cube", 0.5, 0.1)
+    rig.step(60)
+    rig.touch_down(Goal((0.5, 0.1, 0.045), guarded=0.012, speed=0.035))
+    rig.tool.close()
+    assert rig.tool.held_body == held
+    task = Task(Load(as_class("cube", rig.config.objects["cube"]), rig.tool.bears))
+    rig.go(LEFT, task)
+    assert rig.arm.met is None
+    motion = rig.planned(RIGHT, task)
+    # So light that the seal does not break.
+    float_at(rig, "sphere", tool_at(rig, motion, 0.5) - (0, 0, 0.06), mass=0.005)
+    assert bump(rig, motion).startswith("the held cube ran into a sphere, with the tool at")
+    assert rig.tool.holding
+
+
+def test_the_shaft_of_the_tool_feels_a_bump_on_a_guarded_motion_too(rig: Rig) -> None:
+    """Only the lip is meant to touch something."""
+    rig.go(LEFT)
+    motion = rig.planned(Goal(RIGHT.position, guarded=0.02))
+    float_at(rig, "cube", np.add(tool_at(rig, motion, 0.5), (0, 0, 0.06)))
+    assert bump(rig, motion).startswith("the tool ran into a cube, with the tool at")
