@@ -59,7 +59,7 @@ class Textbook:
             Trajectory([connector.connect(State.rest(a), State.rest(b)) for a, b in pairwise(chain)])
             for chain in (self.fetch, self.carry)
         ]
-        return Ride(sum(motion.duration for motion in motions), tuple(m.sampled() for m in motions))
+        return Ride(sum(motion.duration for motion in motions), tuple(m.samples for m in motions))
 
 
 def textbook(
@@ -140,7 +140,7 @@ def floor(
     free = search.shortest(standing, touching, dropping)
     connector = Connector(limits)
     motions = [Trajectory([connector.connect(State.rest(a), State.rest(b))]) for a, b in pairwise(corners)]
-    ride = Ride(sum(motion.duration for motion in motions), tuple(motion.sampled() for motion in motions))
+    ride = Ride(sum(motion.duration for motion in motions), tuple(motion.samples for motion in motions))
     return ride, float(sum(rest_to_rest(np.diff(free, axis=0), limits)))
 
 

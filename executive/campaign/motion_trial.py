@@ -131,7 +131,7 @@ class _Trial:
         except (Blocked, Unreachable) as error:
             self._failures.append(str(error))
             return
-        self._ours.add(duration, [motion.sampled() for motion in motions])
+        self._ours.add(duration, [motion.samples for motion in motions])
         self._rivals(start, scene)
 
     def figures(self, seed: int) -> MotionFigures:
@@ -179,7 +179,7 @@ class _Trial:
         """
         planner = self._planner
         approach = self._timed(lambda: planner.plan(start, scene.approach, scene.fetching))
-        tips, _ = planner.kinematics.tips(approach.sampled().q)
+        tips, _ = planner.kinematics.tips(approach.samples.q)
         above = int(np.flatnonzero(tips[:, 2] > scene.surface)[-1])
         touched = min((above + 1) * STEP, approach.duration)
         stop = brake(approach, touched, planner.limits, STEP)
@@ -203,7 +203,7 @@ class _Trial:
             world.set_arm(approach.at(float(s)).q)
             self._gauge.measure(scene)
         X_TO = forward(transit.start).inverse() @ world.object_pose(scene.body)
-        for q in transit.sampled().q[::EVERY]:
+        for q in transit.samples.q[::EVERY]:
             world.set_arm(q)
             world.place_object(scene.body, forward(q) @ X_TO)
             self._gauge.measure(scene, held=scene.body)

@@ -78,7 +78,7 @@ def affordable(trajectory: Trajectory, load: Load, kinematics: Kinematics) -> fl
     The seal bears the load's weight and inertia, `m |a + g|`, at the load's middle.
     """
     pull = _pull(load)
-    tips, axes = kinematics.tips(trajectory.sampled().q)
+    tips, axes = kinematics.tips(trajectory.samples.q)
     middle = tips + load.kind.height / 2 * axes
     if len(middle) < 4:
         return 1.0

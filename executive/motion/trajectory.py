@@ -6,6 +6,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import accumulate, pairwise
 
 import numpy as np
@@ -72,8 +73,9 @@ class Trajectory:
         before = self._ends[number - 1] if number else 0.0
         return self._pieces[number].at(s - before)
 
-    def sampled(self) -> State:
-        """Return its states every 1/240 s, the last one included: each array of shape `(N, 7)`."""
+    @cached_property
+    def samples(self) -> State:
+        """Its states every 1/240 s, the last one included: each array of shape `(N, 7)`."""
         states = over(self._pieces, np.asarray(np.arange(0.0, self.duration, STEP), dtype=np.float64))
         return State(*(np.concatenate([a, b[None]]) for a, b in zip(states, self._last, strict=True)))
 
@@ -84,7 +86,7 @@ class Trajectory:
             Unreachable: One would leave its range; the text names it.
             Fault: One would be too fast, or accelerated too much or too suddenly: a planner's mistake.
         """
-        states = self.sampled()
+        states = self.samples
         # Ruckig's `position_extrema` are too small where a joint turns back (pantor/ruckig issue 215).
         q, qd, qdd = states
         _require_inside(np.abs(q).max(axis=0), limits)

@@ -108,31 +108,32 @@ class PathClearance:
     def _near(self, q: Array, carrying: Load | None) -> Iterator[Approach]:
         """Yield what is nearer than its margin at `q`."""
         client, arm = self.world.client, self.world.arm
+        near = client.getClosestPoints  # looked up once: that costs as much as asking
         client.resetJointStatesMultiDof(arm, range(7), [[angle] for angle in q])
         bodies = {"the table": (self.world.table,), **self.world.bins, **self._around}
         for name, parts in bodies.items():
             for body in parts:
-                for point in client.getClosestPoints(arm, body, self._margin):
+                for point in near(arm, body, self._margin):
                     if point[3] >= FIRST_MOVING:
                         yield Approach(self._part(point[3]), name, point[8], self._margin)
         for one, other in SELF_PAIRS:
-            for point in client.getClosestPoints(arm, arm, self._margin, linkIndexA=one, linkIndexB=other):
+            for point in near(arm, arm, self._margin, linkIndexA=one, linkIndexB=other):
                 yield Approach(self._part(one), self._part(other), point[8], self._margin)
         if carrying is not None:
             yield from self._near_held(carrying.kind, bodies)
 
     def _near_held(self, carrying: ObjectClass, bodies: Mapping[str, tuple[int, ...]]) -> Iterator[Approach]:
-        held = self._body(carrying)
+        held, near = self._body(carrying), self.world.client.getClosestPoints
         X_WH = self.world.tool_pose() @ Pose.of([0, 0, carrying.height / 2])
         self.world.client.resetBasePositionAndOrientation(held, X_WH.position, X_WH.quaternion)
         part = f"the held {carrying.label}"
         for name, parts in bodies.items():
             for body in parts:
-                for point in self.world.client.getClosestPoints(held, body, self._margin):
+                for point in near(held, body, self._margin):
                     floor = self._floor(name) + BIN_THICKNESS
                     touchable = point[6][2] <= floor + 0.001 and name not in self._around
                     yield Approach(part, name, point[8], -self._margin if touchable else self._margin)
-        for point in self.world.client.getClosestPoints(held, self.world.arm, self._margin):
+        for point in near(held, self.world.arm, self._margin):
             if FIRST_MOVING <= point[4] < WRIST:
                 yield Approach(part, self._part(point[4]), point[8], self._margin)
         self.world.client.resetBasePositionAndOrientation(held, FAR_AWAY, [0, 0, 0, 1])

@@ -95,7 +95,7 @@ def test_more_steps_never_cost_more(over_the_post) -> None:
 
 
 def test_the_same_gap_gets_the_same_detour(over_the_post) -> None:
-    one, other = (Trajectory(improved(*over_the_post()).fly(exactly=False)).sampled().q for _ in range(2))
+    one, other = (Trajectory(improved(*over_the_post()).fly(exactly=False)).samples.q for _ in range(2))
     assert np.array_equal(one, other)
 
 

@@ -164,7 +164,7 @@ def test_the_check_gets_the_whole_path_without_gaps_and_what_has_to_be_heeded(co
     assert task == CARRYING
     assert np.array_equal(path[[0, -1]], [motion.start, motion.end])
     assert np.max(np.abs(np.diff(path, axis=0))) < SPACING + 1e-9
-    assert np.array_equal(path, path[np.isin(path[:, 0], motion.sampled().q[:, 0])])
+    assert np.array_equal(path, path[np.isin(path[:, 0], motion.samples.q[:, 0])])
 
 
 def test_what_is_to_be_touched_is_in_the_way_until_the_guarded_part(config, home) -> None:
@@ -318,7 +318,7 @@ def test_joint_positions_out_of_range_are_refused(planner, home) -> None:
 def test_the_same_question_gets_the_same_answer(config, planner, home) -> None:
     picked = planner.plan(home, pick(0.5, 0.1)).end
     fresh = Planner(config)
-    one, other = (asked.plan(picked, BIN, CARRYING).sampled() for asked in (planner, fresh))
+    one, other = (asked.plan(picked, BIN, CARRYING).samples for asked in (planner, fresh))
     for values, same in zip(one, other, strict=True):
         assert np.array_equal(values, same)
 

@@ -53,7 +53,7 @@ def strongest(trajectory: Trajectory, kinematics) -> float:
     """The largest acceleration of the tool by the textbook: along the circle, and to its middle [m/s²]."""
     tips, _ = kinematics.tips(trajectory.start[None])
     radius = math.hypot(*tips[0, :2])
-    _, qd, qdd = trajectory.sampled()
+    _, qd, qdd = trajectory.samples
     return float(np.max(radius * np.hypot(qdd[:, 0], qd[:, 0] ** 2)))
 
 

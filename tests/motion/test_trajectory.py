@@ -86,7 +86,7 @@ def test_a_time_that_would_crash_ruckig_is_a_fault(s: float) -> None:
 @settings(max_examples=20, deadline=None)
 def test_samples_are_its_states_every_step_and_the_last(between: State) -> None:
     trajectory = by_way_of(between)
-    sampled = trajectory.sampled()
+    sampled = trajectory.samples
     times = [*np.arange(0, trajectory.duration, STEP), trajectory.duration]
     for values, wanted in zip(sampled, zip(*map(trajectory.at, times), strict=True), strict=True):
         assert values.shape == (len(times), 7)
@@ -108,7 +108,7 @@ def test_slowed_it_takes_the_same_path_in_more_time(between: State, rate: float)
         assert np.allclose(q, fast.q, atol=1e-6)
         assert np.allclose(qd, rate * fast.qd, atol=1e-5)
         assert np.allclose(qdd, rate**2 * fast.qdd, atol=1e-4)
-    states = slow.sampled()
+    states = slow.samples
     measured = np.diff(states.q[:-1], axis=0) / STEP
     assert np.allclose(measured, (states.qd[1:-1] + states.qd[:-2]) / 2, atol=LIMITS.jerk.max() * STEP**2)
 
@@ -126,7 +126,7 @@ def test_a_motion_to_where_the_arm_is_takes_no_time() -> None:
 
 
 def test_a_motion_inside_the_limits_passes_the_check() -> None:
-    assert np.array_equal(by_way_of(MOVING).check(LIMITS).q, by_way_of(MOVING).sampled().q)
+    assert np.array_equal(by_way_of(MOVING).check(LIMITS).q, by_way_of(MOVING).samples.q)
 
 
 def test_leaving_a_joints_range_names_the_joint() -> None:
@@ -168,7 +168,7 @@ def test_a_motion_outside_a_limit_is_a_fault_that_names_the_joint(limit: str, te
 @given(positions, st.floats(0.01, 0.2))
 @settings(max_examples=30, deadline=None)
 def test_a_thinned_path_has_no_gaps_and_no_more_points_than_it_needs(end, spacing: float) -> None:
-    qs = Trajectory([CONNECTOR.connect(State.rest(A), State.rest(end))]).sampled().q
+    qs = Trajectory([CONNECTOR.connect(State.rest(A), State.rest(end))]).samples.q
     kept = thinned(qs, spacing)
     step = np.max(np.abs(np.diff(qs, axis=0)), initial=0.0)
     assert np.array_equal(kept[[0, -1]], qs[[0, -1]])

@@ -115,7 +115,7 @@ def moving(halts: list[Halt]) -> Iterator[tuple[Halt, Trajectory]]:
 
 def distance(q: Array, path: Trajectory) -> float:
     """Return how far joint positions are from all that a motion passes [rad]."""
-    near = int(np.argmin(np.abs(path.sampled().q - q).max(axis=1))) * STEP
+    near = int(np.argmin(np.abs(path.samples.q - q).max(axis=1))) * STEP
     bounds = near - STEP, near + STEP
     apart = minimize_scalar(
         lambda s: np.linalg.norm(path.at(s).q - q), bounds=bounds, method="bounded", options={"xatol": 1e-9}

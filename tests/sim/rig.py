@@ -120,7 +120,7 @@ def off_path(q: Array, motion: Trajectory) -> float:
 
     The nearest place is looked for around the nearest sample, by golden section.
     """
-    number = int(np.argmin(np.abs(motion.sampled().q - q).max(axis=1)))
+    number = int(np.argmin(np.abs(motion.samples.q - q).max(axis=1)))
     low, high = (number - 1) * STEP, (number + 1) * STEP
     ratio = (np.sqrt(5) - 1) / 2
     for _ in range(60):

@@ -203,9 +203,9 @@ def test_a_planned_motion_goes_around_what_stands_there(clearance: PathClearance
     goal, task = Goal((0.5, -0.25, 0.1)), Task(around=(Obstacle(0.5, 0.0, 0.04, 0.3, "cube-3"),))
     straight = planner.plan(q, goal)
     with pytest.raises(Blocked, match="cube-3"):
-        clearance.check(straight.sampled().q, task)
+        clearance.check(straight.samples.q, task)
     around = planner.plan(q, goal, task)
-    clearance.check(around.sampled().q, task)
+    clearance.check(around.samples.q, task)
     assert straight.duration < around.duration < 4 * straight.duration
 
 
