@@ -10,9 +10,11 @@ from executive.errors import Blocked, Unreachable
 from executive.messages import BIN_THICKNESS, Item, Load, Obstacle, Target
 from executive.skill import Skill
 
+PLANS = 3
+"""Times that a motion is planned when what stands around changes meanwhile."""
 ROLLED = 0.002
 """How far an object in a bin may lie from where it was let go [m]."""
-DROP = 0.015
+DROP = 0.01
 """Height above the floor at which the underside of an item is let go, unless a mission says otherwise [m]."""
 OVERTRAVEL = 0.015
 """How far below the expected surface an approach feels, unless a mission says otherwise [m]."""
@@ -27,16 +29,25 @@ def settle(arm: Arm) -> Steps:
         yield
 
 
-def planned(skill: Skill, arm: Arm, goal: Goal | str, task: Task) -> Generator[None, None, Motion]:
-    """Yield until the arm rests and a motion to `goal` is planned, and return it.
+def planned(
+    skill: Skill, arm: Arm, ask: Callable[[], tuple[Goal | str, Task]]
+) -> Generator[None, None, Motion]:
+    """Yield until the arm rests and the motion that `ask` wants is planned, and return it.
+
+    What is wanted is asked once more when the plan is there: if a look has shown something new meanwhile, it
+    is planned anew, a few times at most.
 
     Raises:
         SkillFailed: There is none; the reason is the skill's `unreachable` or `blocked`.
     """
     yield from settle(arm)
-    planning = arm.plan(goal, task)
-    while not planning.ready:
-        yield
+    for _ in range(PLANS):
+        goal, task = ask()
+        planning = arm.plan(goal, task)
+        while not planning.ready:
+            yield
+        if ask() == (goal, task):
+            break
     try:
         return planning.result()
     except Unreachable as error:
@@ -121,18 +132,24 @@ def approach(
     x, y, middle = (float(value) for value in target.position)
     dx, dy = _aside(cell.ledger.attempts(target.item), kind.ring, spacing)
     surface = middle + kind.height / 2
-    lowest = max(surface - overtravel, kind.height / 2)
+    lowest = max(surface - overtravel, middle)
     guarded = surface + cell.descent - lowest
     goal = Goal((x + dx, y + dy, lowest), guarded=guarded, speed=cell.descent_speed)
     return goal, Task(around=around(cell, target.item), target=_standing(cell, target))
 
 
 def into(cell: Cell, bin: str, item: Item, drop: float = DROP) -> Goal:
-    """Return the goal of a transit: `item`, `drop` [m] high, over the next free slot of a bin."""
+    """Return the goal of a transit: over the next free slot of a bin, `drop` [m] above what is there."""
     box, height = cell.bins[bin], cell.classes[cell.ledger.label(item)].height
     layer, place = divmod(slots_taken(cell, bin, item), len(box.slots))
     x, y = (float(value) for value in box.slots[place])
-    return Goal((x, y, float(box.position[2]) + height * (1 + layer) + drop))
+    return Goal((x, y, _layer(cell, bin, layer) + height + drop))
+
+
+def _layer(cell: Cell, bin: str, layer: int) -> float:
+    """Return the height on which a layer of objects in a bin lies at most [m]; layer 0 is on the floor."""
+    tallest = max(kind.height for kind in cell.classes.values())
+    return float(cell.bins[bin].position[2]) + BIN_THICKNESS + layer * tallest
 
 
 def _aside(attempt: int, ring: float, spacing: float) -> tuple[float, float]:
@@ -154,14 +171,11 @@ def _standing(cell: Cell, target: Target) -> Obstacle:
 
 def _filled(cell: Cell, but: Item | None) -> Iterator[Obstacle]:
     """Yield what stands on the slots of bins that were used, the item `but` left out."""
+    widest = max(kind.radius for kind in cell.classes.values())
     for name, box in cell.bins.items():
-        kinds = [cell.classes[label] for label, bins in cell.routes.items() if name in bins]
-        kinds = kinds or list(cell.classes.values())
-        tallest, widest = max(kind.height for kind in kinds), max(kind.radius for kind in kinds)
         count, slots = slots_taken(cell, name, but), len(box.slots)
         for number, (x, y) in enumerate(box.slots[:count]):
-            layers = (count - 1 - number) // slots + 1
-            top = float(box.position[2]) + BIN_THICKNESS + layers * tallest
+            top = _layer(cell, name, (count - 1 - number) // slots + 1)
             yield Obstacle(
                 float(x), float(y), widest + ROLLED, top, f"what lies in slot {number + 1} of {name}"
             )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
-from executive.cell import Cell, LeastTimes, Steps, Tool
+from executive.cell import Cell, Goal, LeastTimes, Steps, Task, Tool
 from executive.messages import Target
 from executive.moving import OVERTRAVEL, SPACING, approach, follow, planned
 from executive.skill import EMPTY, In, Metres, Skill, param, port
@@ -40,8 +40,12 @@ class Approach(Skill):
     def run(self, cell: Cell) -> Steps:
         """Go there, down to the touch."""
         item, tool = self.target.item, cell.tool
-        goal, task = approach(cell, self.target, self.overtravel, self.offset)
-        motion = yield from planned(self, cell.arm, goal, task)
+
+        def ask() -> tuple[Goal, Task]:
+            return approach(cell, self.target, self.overtravel, self.offset)
+
+        motion = yield from planned(self, cell.arm, ask)
+        goal, _ = ask()
         yield from follow(self, cell, motion, until=_landing(tool))
         height, highest = float(cell.arm.tool_pose.position[2]), goal.position[2] + goal.guarded
         expected = f"expected at {(highest - cell.descent) * 1000:.0f} mm"

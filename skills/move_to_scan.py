@@ -31,7 +31,8 @@ class MoveToScan(Skill):
         yield from settle(cell.arm)
         if self.pose == "auto" and cell.camera.sees_table():
             return
-        motion = yield from planned(self, cell.arm, self._name(cell), heeding(cell))
+        name = self._name(cell)
+        motion = yield from planned(self, cell.arm, lambda: (name, heeding(cell)))
         yield from follow(self, cell, motion)
 
     def _name(self, cell: Cell) -> str:

@@ -34,7 +34,7 @@ class PutDown(Skill):
         x, y, floor = (float(value) for value in cell.safe_place)
         kind = cell.classes[cell.ledger.label(self.held)]
         goal = Goal((x, y, floor + kind.height + self.drop))
-        motion = yield from planned(self, cell.arm, goal, carrying(cell, self.held))
+        motion = yield from planned(self, cell.arm, lambda: (goal, carrying(cell, self.held)))
         yield from follow(self, cell, motion)
         cell.tool.open()
         yield from cell.clock.sleep(self.settle)

@@ -14,8 +14,8 @@ from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Skill, SkillFailed,
 class Transit(Skill):
     """Hang the held item over a free slot of a bin, just above the floor.
 
-    One motion: up from where it lies, across above every wall, and down inside, no faster than the seal
-    bears with a safety factor of two. The tool's sensor is watched all the way.
+    One motion: up from where it lies, across above every wall, and down inside, as gently as the
+    seal needs for a safety factor of two. The tool's sensor is watched all the way.
     """
 
     held: In[Item] = port(refers="item", doc="the item in the tool")
@@ -35,7 +35,7 @@ class Transit(Skill):
     def run(self, cell: Cell) -> Steps:
         """Plan the whole way, then follow it as long as the seal holds."""
         goal = into(cell, self.bin, self.held, self.drop)
-        motion = yield from planned(self, cell.arm, goal, carrying(cell, self.held))
+        motion = yield from planned(self, cell.arm, lambda: (goal, carrying(cell, self.held)))
         try:
             yield from follow(self, cell, motion, until=lambda: not cell.tool.holding)
         except SkillFailed:

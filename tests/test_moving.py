@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from executive.messages import BIN_THICKNESS, Target
-from executive.moving import approach, around, carrying, heeding, into, slots_taken
+from executive.cell import Goal, Task
+from executive.messages import BIN_THICKNESS, Obstacle, Target
+from executive.moving import approach, around, carrying, heeding, into, planned, slots_taken
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
@@ -78,7 +79,7 @@ def test_what_is_carried_is_the_load_and_in_nobodys_way(fake: FakeCell, targets:
 
 def test_what_lies_in_a_bin_is_in_the_way_as_high_as_it_is_piled(fake: FakeCell) -> None:
     box = fake.cell.bins["red_bin"]
-    height = fake.cell.classes["cube"].height  # nothing else goes there
+    height = max(kind.height for kind in fake.cell.classes.values())  # anything may lie there
     for number in range(len(box.slots) + 1):
         fake.world.put("cube", 0.5, 0.0)
         (target,) = look(fake)
@@ -127,3 +128,22 @@ def test_an_arm_that_runs_into_something_stops_and_the_whole_table_is_in_doubt(
     assert fake.arm.at_rest
     assert not any(fake.ledger.is_fresh(target) for target in targets)
     assert run_skill(MoveToScan(pose="aside"), fake).status == "SUCCESS", "only that motion was broken off"
+
+
+def test_what_a_look_shows_while_a_motion_is_planned_is_heeded(fake: FakeCell) -> None:
+    asked: list[Task] = []
+
+    def ask() -> tuple[Goal, Task]:
+        stands = (Obstacle(0.5, 0.1, 0.03, 0.05, "cube-9"),) if len(asked) > 0 else ()
+        asked.append(Task(around=stands))
+        return Goal((0.5, -0.1, 0.1)), asked[-1]
+
+    steps = planned(MoveToScan(), fake.cell.arm, ask)
+    ticks = 0
+    with pytest.raises(StopIteration):
+        while True:
+            next(steps)
+            fake.advance()
+            ticks += 1
+    assert len(asked) == 4, "planned, and found changed; planned anew, and found the same"
+    assert ticks == pytest.approx(2 * 0.05 * 240, abs=2)

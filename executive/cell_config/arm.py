@@ -76,6 +76,6 @@ class MotionConfig(Section):
     descent_speed: float = Field(0.035, gt=0)
     """Tool speed of the guarded last part of an approach [m/s]."""
     straight: float = Field(0.0, ge=0, le=0.2)
-    """Length of the last part of a way down and the first part of a way up that are straight [m]; 0: none."""
+    """Length of the last part of a way into a bin and the first part of a way up that are straight [m]."""
     planning: float = Field(0.05, ge=0)
     """Time that planning a motion takes on the run's clock, unless it was planned ahead [s]."""

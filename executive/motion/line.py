@@ -38,7 +38,7 @@ class Line:
         chain: Joint positions `(N, 7)` [rad] at N places evenly spread along it, `N` > 3.
         length: Its length [m].
         limits: What the joints may do.
-        speed: Longest speed of the tool [m/s].
+        speed: Largest speed of the tool [m/s].
         enters: Whether it begins in motion.
         leaves: Whether it ends in motion; not both.
     """

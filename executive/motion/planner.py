@@ -10,7 +10,7 @@ gets the same answer.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -18,15 +18,14 @@ from numpy.typing import ArrayLike
 
 from executive.cell import Goal, Task
 from executive.cell_config import CellConfig
-from executive.errors import Blocked, Unreachable
+from executive.errors import Blocked, Fault, Unreachable
 from executive.geometry import Array
 from executive.layout import travel_height
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.postures import find_postures
 from executive.motion.seal import GENTLEST, affordable
-from executive.motion.search import Search
-from executive.motion.state import Piece
+from executive.motion.search import Candidate, Search
 from executive.motion.trajectory import STEP, Trajectory, thinned
 
 Check = Callable[[Array, Task], None]
@@ -81,30 +80,34 @@ class Planner:
     def _plan(self, start: Array, end: Goal | Array, task: Task) -> Trajectory:
         search = Search(self._config, self.kinematics, self.limits, start, end, _keeping_clear(task))
         guarded = isinstance(end, Goal) and end.guarded > 0
-        blocked: list[Blocked] = []
+        blocked: list[str] = []
         for candidate in search.candidates():
-            trajectory = Trajectory(candidate.pieces, guarded)
             try:
-                qs = trajectory.check(self.limits).q
-                free = qs[: _count(candidate.free)] if guarded else qs
-                search.require_clear(free)
-                if self._check is not None:
-                    self._check(thinned(free, SPACING), _keeping_clear(task))
-                    if guarded:
-                        self._check(thinned(qs[len(free) - 1 :], SPACING), task)
-            except (Blocked, Unreachable) as error:
-                blocked.append(error if isinstance(error, Blocked) else Blocked(str(error)))
-                continue
-            return trajectory
+                return self._checked(search, candidate, guarded, task)
+            except (Blocked, Unreachable, Fault) as error:
+                blocked.append(str(error))
         others = f"; of {len(blocked)} ways tried none is free" if len(blocked) > 1 else ""
         raise Blocked(f"{blocked[0]}{others}" if blocked else "no way there can be flown")
+
+    def _checked(self, search: Search, candidate: Candidate, guarded: bool, task: Task) -> Trajectory:
+        """Return a candidate as the motion it is, if it is clear and keeps the joints' limits.
+
+        Raises:
+            Blocked: It comes too near to something.
+            Unreachable, Fault: It leaves a joint's range, or exceeds another limit.
+        """
+        start = sum(piece.duration for piece in candidate.free) if guarded else math.inf
+        trajectory = Trajectory(candidate.pieces, start)
+        qs = trajectory.check(self.limits).q
+        free = qs[: math.ceil(start / STEP)] if guarded else qs
+        search.require_clear(free)
+        if self._check is not None:
+            self._check(thinned(free, SPACING), _keeping_clear(task))
+            if guarded:
+                self._check(thinned(qs[len(free) - 1 :], SPACING), task)
+        return trajectory
 
 
 def _keeping_clear(task: Task) -> Task:
     """Return the task of the free part of a motion: what is to be touched in the end stands around, too."""
     return task if task.target is None else replace(task, around=(*task.around, task.target), target=None)
-
-
-def _count(pieces: Sequence[Piece]) -> int:
-    """Return how many of a trajectory's samples lie on its first `pieces`."""
-    return math.ceil(sum(piece.duration for piece in pieces) / STEP)

@@ -73,8 +73,11 @@ def upright_line(kinematics: Kinematics, q: Array, length: float, samples: int) 
     X_WT = kinematics.forward(q)
     if -X_WT.rotation[2, 2] < UPRIGHT:
         return None
-    chain = _chain(kinematics, X_WT, length, samples, kinematics.branch(q), kinematics.swivel(q))
-    inside = chain is not None and np.all(np.abs(chain) <= kinematics.position_limit)
+    try:
+        chain = _chain(kinematics, X_WT, length, samples, kinematics.branch(q), kinematics.swivel(q))
+    except Unreachable:
+        return None
+    inside = np.all(np.abs(chain) <= kinematics.position_limit)
     return chain if inside and np.max(np.abs(chain[0] - q)) < 1e-6 else None
 
 

@@ -124,7 +124,7 @@ class Search:
         if not isinstance(self._end, Goal):
             yield Way(0.0, State.rest(self._end), None, None)
             return
-        length = max(self._end.guarded, self._straight)
+        length = self._end.guarded or self._straight
         yield from ways_down(self._kinematics, self._limits, self._start, self._end, length)
 
     def _flights(self, ways: Sequence[Way]) -> Iterator[Candidate]:

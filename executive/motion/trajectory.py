@@ -27,10 +27,10 @@ class Trajectory:
 
     Attributes:
         duration: Time from start to rest [s].
-        guarded: Whether the tool is meant to touch something on its last part.
+        guarded: Time from which on the tool is meant to touch something [s]; infinite: never.
     """
 
-    def __init__(self, pieces: Sequence[Piece], guarded: bool = False) -> None:
+    def __init__(self, pieces: Sequence[Piece], guarded: float = math.inf) -> None:
         """Join `pieces`, one or more, each beginning in the state in which the one before it ends.
 
         Raises:
@@ -48,7 +48,7 @@ class Trajectory:
 
     def slowed(self, rate: float) -> Trajectory:
         """Return the same motion on the same path at `rate` times its speed, 0 to 1."""
-        return Trajectory([_Slowed(piece, rate) for piece in self._pieces], self.guarded)
+        return Trajectory([_Slowed(piece, rate) for piece in self._pieces], self.guarded / rate)
 
     @property
     def start(self) -> Array:

@@ -135,7 +135,7 @@ class SimArm:
         self._require_near(motion.start, START_TOLERANCE, "the motion starts")
         self._raise_fault()
         self._motion, self._time, self._met = motion, 0.0, None
-        self._contacts.begin(motion.guarded)
+        self._contacts.begin()
 
     def stop(self) -> None:
         """Brake along the running motion's path; returns at once, also when nothing runs."""
@@ -151,7 +151,7 @@ class SimArm:
         if self._motion is None:
             return
         if self._braking is None:
-            self._met = self._contacts.new()
+            self._met = self._contacts.new(feeling=self._time >= self._motion.guarded)
             if self._met is not None:
                 self.stop()
         if self._braking is None:

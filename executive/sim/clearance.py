@@ -75,15 +75,24 @@ class PathClearance:
             self._check(path, task.load)
 
     def _check(self, path: Array, carrying: Load | None) -> None:
-        start: dict[tuple[str, str], float] = {}
-        for near in self._near(path[0], carrying):
-            pair = near.part, near.body
-            start[pair] = min(near.distance, start.get(pair, near.distance))
+        # Closer than allowed may be only what was so from the beginning, until it has once been farther away.
+        spared = self._nearest(path[0], carrying)
         for q in path[1:]:
-            for near in self._near(q, carrying):
-                allowed = min(near.allowed, start.get((near.part, near.body), near.allowed))
+            nearest = self._nearest(q, carrying)
+            for pair, near in nearest.items():
+                allowed = min(near.allowed, spared[pair].distance) if pair in spared else near.allowed
                 if near.distance < allowed - SLACK:
                     raise Blocked(self._text(near))
+            spared = {pair: near for pair, near in spared.items() if pair in nearest}
+
+    def _nearest(self, q: Array, carrying: Load | None) -> dict[tuple[str, str], Approach]:
+        """Return the nearest place of every pair that is nearer than the margin at `q`."""
+        found: dict[tuple[str, str], Approach] = {}
+        for near in self._near(q, carrying):
+            pair = near.part, near.body
+            if pair not in found or near.distance - near.allowed < found[pair].distance - found[pair].allowed:
+                found[pair] = near
+        return found
 
     def distances(self, q: Array, carrying: Load | None = None) -> Mapping[str, float]:
         """Return, at `q` `(7,)` [rad], every distance [m] shorter than the margin, by what is near what."""
@@ -132,7 +141,7 @@ class PathClearance:
                 for point in near(held, body, self._margin):
                     floor = self._floor(name) + BIN_THICKNESS
                     touchable = point[6][2] <= floor + 0.001 and name not in self._around
-                    yield Approach(part, name, point[8], -self._margin if touchable else self._margin)
+                    yield Approach(part, name, point[8], 0.0 if touchable else self._margin)
         for point in near(held, self.world.arm, self._margin):
             if FIRST_MOVING <= point[4] < WRIST:
                 yield Approach(part, self._part(point[4]), point[8], self._margin)

@@ -11,8 +11,12 @@ PRESSING = 0.01
 """Force from which a contact is felt [N]; two bodies that only graze each other have none."""
 
 
+APART = 12
+"""Steps without touching after which two bodies have parted: a load that is lifted may graze once more."""
+
+
 class Contacts:
-    """Tells what arm, tool and load touch that they did not touch before.
+    """Tells what arm, tool and load touch that they did not touch all the time since a motion began.
 
     Args:
         world: The world.
@@ -22,18 +26,23 @@ class Contacts:
     def __init__(self, world: World, held: Callable[[], int | None]) -> None:
         self._world = world
         self._held = held
-        self._known: set[int] = set()
-        self._feeling = False
+        self._known: dict[tuple[str, int], int] = {}
 
-    def begin(self, feeling: bool) -> None:
-        """Take what is touched now as known; `feeling`: the tool's lip is meant to touch something."""
-        self._feeling = feeling
-        self._known = {body for _, body, _ in self._touching()}
+    def begin(self) -> None:
+        """Take what touches now as known."""
+        self._known = {(part, body): self._world.steps for part, body, _ in self._touching()}
 
-    def new(self) -> str | None:
-        """Return what touches what for the first time since `begin`, or None."""
+    def new(self, feeling: bool) -> str | None:
+        """Return what touches what and did not before, or None; called once a step.
+
+        `feeling`: the tool's lip is meant to touch something now.
+        """
+        now = self._world.steps
+        self._known = {pair: step for pair, step in self._known.items() if now - step <= APART}
         for part, body, place in self._touching():
-            if body not in self._known and not (self._feeling and part == "the tool" and self._is_lip(place)):
+            if (part, body) in self._known:
+                self._known[part, body] = now
+            elif not (feeling and part == "the tool" and self._is_lip(place)):
                 x, y, z = self._world.tool_pose().position
                 name = self._world.name_of(body)
                 return f"{part} ran into {name}, with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m"
