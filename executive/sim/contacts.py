@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator, Sequence
 from executive.sim.tool import LIP
 from executive.sim.world import World
 
-PRESSING = 0.01
-"""Force from which a contact is felt [N]; two bodies that only graze each other have none."""
+PRESSING = 2.0
+"""Force from which a contact is felt [N]: assumed of joint torque sensors; what only grazes is not felt."""
 
 
 APART = 12

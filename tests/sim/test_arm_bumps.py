@@ -133,8 +133,8 @@ def test_what_the_held_object_runs_into_counts_but_neither_the_tool_nor_the_tabl
     rig.go(LEFT, task)
     assert rig.arm.met is None
     motion = rig.planned(RIGHT, task)
-    # So light that the seal does not break.
-    float_at(rig, "sphere", tool_at(rig, motion, 0.5) - (0, 0, 0.06), mass=0.005)
+    # So light that the seal does not break, so heavy that it is felt.
+    float_at(rig, "sphere", tool_at(rig, motion, 0.5) - (0, 0, 0.06), mass=0.02)
     assert bump(rig, motion).startswith("the held cube ran into a sphere, with the tool at")
     assert rig.tool.holding
 
