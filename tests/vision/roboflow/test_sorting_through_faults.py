@@ -47,27 +47,30 @@ def mission(missions: Path, tmp_path: Path) -> Path:
     return path
 
 
-def settings(stub: StubServer, **further: str) -> dict[str, str]:
-    """Return the overrides of the cell: the stub server, two objects, and what is asked for."""
+def settings(stub: StubServer, objects: int = 2, **further: str) -> dict[str, str]:
+    """Return the overrides of the cell: the stub server, so many objects, and what is asked for."""
     return {
         "cell.detectors.server.url": stub.url,
         "cell.detectors.server.deadline": "10.0",
-        "cell.table.objects": "[2, 2]",
+        "cell.table.objects": f"[{objects}, {objects}]",
         **{f"cell.detectors.{key.replace('__', '.')}": value for key, value in further.items()},
     }
 
 
 @pytest.fixture
 def sort(stub: StubServer, mission: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
-    """Sorts two objects while the server has faults; returns outcome, truth and all that was told."""
+    """Sorts objects while the server has faults; returns outcome, truth and all that was told."""
     monkeypatch.setenv("ROBOFLOW_API_KEY", SECRET)
 
     def sort(
-        faults: Callable[[int], str], told: Callable[[Event], None] = lambda event: None, **further: str
+        faults: Callable[[int], str],
+        told: Callable[[Event], None] = lambda event: None,
+        objects: int = 2,
+        **further: str,
     ) -> tuple[Any, dict[str, int], list[Event]]:
         stub.looks, stub.faults = 0, faults
         events: list[Event] = []
-        loaded = load_mission(mission, discover(), settings(stub, **further))
+        loaded = load_mission(mission, discover(), settings(stub, objects, **further))
         run = Run(loaded, discover(), seed=1, observers=[events.append, told])
         try:
             outcome, truth = run.execute(), run.audit()
@@ -84,8 +87,8 @@ def sort(stub: StubServer, mission: Path, monkeypatch: pytest.MonkeyPatch) -> Ca
 
 def test_every_fault_in_turn_stops_nothing_where_another_detector_is_there(sort: Any, stub: Any) -> None:
     faults = ("401", "500", "broken json", "html", "null", "nan", "huge")
-    outcome, truth, _ = sort(lambda look: faults[look % len(faults)], eye__failures="1000")
-    assert (outcome.status, truth) == ("SUCCESS", {**truth, **NOTHING_WRONG, "right": 2})
+    outcome, truth, _ = sort(lambda look: faults[look % len(faults)], objects=4, eye__failures="1000")
+    assert (outcome.status, truth) == ("SUCCESS", {**truth, **NOTHING_WRONG, "right": 4})
     assert stub.looks >= len(faults)
 
 
@@ -100,9 +103,10 @@ def test_a_server_that_hangs_and_dies_is_used_again_when_it_is_back(sort: Any, s
 
     faults = {2: "hang", 3: "stop"}
     outcome, truth, _ = sort(
-        lambda look: faults.get(look, ""), told, server__deadline="0.5", eye__rest="2.0", eye__failures="1"
-    )
-    assert (outcome.status, truth) == ("SUCCESS", {**truth, **NOTHING_WRONG, "right": 2})
+        lambda look: faults.get(look, ""), told, objects=4,
+        server__deadline="0.5", eye__rest="2.0", eye__failures="1",
+    )  # fmt: skip
+    assert (outcome.status, truth) == ("SUCCESS", {**truth, **NOTHING_WRONG, "right": 4})
     assert dead
     assert stub.looks > 3
 
