@@ -11,7 +11,7 @@ from executive.cell_config import CellConfig
 from executive.errors import InputError, Unreachable
 from executive.geometry import tool_down
 from executive.layout import as_bin, as_class
-from executive.messages import Load, ObjectClass, Obstacle
+from executive.messages import BIN_THICKNESS, Load, ObjectClass, Obstacle
 from executive.motion.planner import Planner
 from executive.moving import DROP, OVERTRAVEL
 from executive.sim.models import load_mesh
@@ -121,7 +121,7 @@ class Scenes:
         """Return a random drop position, as the arm stands after the pair before the first one."""
         x, y, floor = self._slot()
         tallest = max(kind.height for kind in self._config.objects.values())
-        return Goal((x, y, floor + tallest + DROP))
+        return Goal((x, y, floor + tallest + BIN_THICKNESS + DROP))
 
     def _slot(self) -> tuple[float, float, float]:
         bin = self._bins[int(self._rng.integers(len(self._bins)))]
@@ -148,7 +148,7 @@ class Scenes:
                 guarded=top + self._config.motion.descent - lowest,
                 speed=self._config.motion.descent_speed,
             ),
-            drop=Goal((slot[0], slot[1], slot[2] + kind.height + DROP)),
+            drop=Goal((slot[0], slot[1], slot[2] + kind.height + BIN_THICKNESS + DROP)),
         )
 
     def _standing(self, body: int) -> tuple[float, float, float]:

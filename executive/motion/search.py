@@ -31,7 +31,7 @@ from executive.motion.ways import Way, ways_down
 
 WAYS = 3
 """Ends of a motion that are tried."""
-FIRST, REST = 3, 8
+FIRST, REST = 4, 8
 """Steps by which the detour to each of them is improved, and the best one after that."""
 LIFTS = (0.0, 0.05, 0.10)
 """Heights above travel height at which a motion that stops at every corner is tried [m]."""

@@ -55,7 +55,9 @@ def hanging(config: CellConfig, load: Load | None) -> Discs:
     if load is None:
         return Discs(np.array([0.0, -LIP_LENGTH]), np.array([config.tool.cup_radius, TOOL_RADIUS]), UPRIGHT)
     reach = load.kind.radius + load.kind.ring + TOLERANCE
-    return Discs(np.array([load.kind.height, -LIP_LENGTH]), np.array([reach, TOOL_RADIUS]), UPRIGHT_LOADED)
+    # The load's underside and its top, which is elsewhere where the tool leans.
+    offsets = np.array([load.kind.height, 0.0, -LIP_LENGTH])
+    return Discs(offsets, np.array([reach, reach, TOOL_RADIUS]), UPRIGHT_LOADED)
 
 
 class Prisms(NamedTuple):
