@@ -114,8 +114,9 @@ def test_a_load_hangs_below_the_tool_and_is_as_wide_as_its_ring_puts_it(config: 
     empty, washer = hanging(config, None), hanging(config, Load(ObjectClass("washer", 0.006, 0.02, 0.015)))
     assert np.allclose(empty.offset, [0.0, -LIP_LENGTH])
     assert np.allclose(empty.radius, [config.tool.cup_radius, TOOL_RADIUS])
-    assert np.allclose(washer.offset, [0.006, -LIP_LENGTH])
-    assert np.allclose(washer.radius, [0.02 + 0.015 + TOLERANCE, TOOL_RADIUS])
+    wide = 0.02 + 0.015 + TOLERANCE
+    assert np.allclose(washer.offset, [0.006, 0.0, -LIP_LENGTH]), "its underside, its top, the tool above it"
+    assert np.allclose(washer.radius, [wide, wide, TOOL_RADIUS])
     assert washer.upright > empty.upright
 
 
