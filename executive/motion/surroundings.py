@@ -30,6 +30,10 @@ STEEPNESS = 1.5
 """How much higher unknown things may be for every metre farther away than that."""
 TOLERANCE = 0.003
 """How far what was seen may be from where it is believed, and a load from the tool's axis [m]."""
+BETWEEN = 0.001
+"""What is kept beyond the cell's margin, for what happens between the states that are looked at [m]."""
+PRESSED = 2e-4
+"""How far a load may be pressed into what it lies on, in passing [m]."""
 SLANT = 0.1
 """Metres of distance that a tool axis counts for whose cosine is by 1 too small."""
 UPRIGHT, UPRIGHT_LOADED = 0.5, 0.8
@@ -68,6 +72,7 @@ class Prisms(NamedTuple):
         radius: What is added around the rectangle `(K,)` [m].
         top: Height `(K,)` [m].
         open: Whether they do not count around the ends of a motion `(K,)`.
+        flat: Whether they are ground that a load may lie on `(K,)`.
         names: What they are.
     """
 
@@ -76,6 +81,7 @@ class Prisms(NamedTuple):
     radius: Array
     top: Array
     open: NDArray[np.bool_]
+    flat: NDArray[np.bool_]
     names: tuple[str, ...]
 
 
@@ -89,7 +95,7 @@ class Surroundings:
     """
 
     def __init__(self, config: CellConfig, around: Sequence[Obstacle], ends: Array) -> None:
-        self._margin = config.motion.margin
+        self._margin = config.motion.margin + BETWEEN
         self._prisms = _prisms(config, around)
         self._ends = ends
         self._allowed = np.full(len(self._prisms.names), self._margin)
@@ -144,8 +150,9 @@ class Surroundings:
         if (upright := _uprightness(axes, discs)).min() < -TOLERANCE:
             at = int(np.argmin(upright))
             raise Blocked(f"the motion would tilt the tool too far{_at(tips[at])}")
-        # To what may be there the margin need not be kept.
-        spare = np.where(self._prisms.open, self._margin, TOLERANCE)
+        # To what may be there the margin need not be kept; nothing may be pressed into table or floor.
+        spare = np.where(self._prisms.open, self._margin, TOLERANCE + BETWEEN)
+        spare = np.where(self._prisms.flat, PRESSED, spare)
         near = (self._distances(tips, axes, discs) - self._required(tips)[:, None] + spare).min(axis=1)
         at, number = (int(index) for index in np.unravel_index(np.argmin(near), near.shape))
         if near[at, number] < 0:
@@ -222,11 +229,7 @@ def _prisms(config: CellConfig, around: Sequence[Obstacle]) -> Prisms:
         rows.append((left, right, front, back, 0.0, floor + t, False, f"the floor of {name}"))
     rows += [(o.x, o.x, o.y, o.y, o.radius + TOLERANCE, o.top, False, o.name) for o in around]
     table = np.array([row[:7] for row in rows])
-    return Prisms(
-        table[:, [0, 2]],
-        table[:, [1, 3]],
-        table[:, 4],
-        table[:, 5],
-        table[:, 6] > 0,
-        tuple(row[7] for row in rows),
-    )
+    names = tuple(row[7] for row in rows)
+    flat = np.array([name.startswith(("the table", "the floor")) for name in names])
+    corners = table[:, [0, 2]], table[:, [1, 3]]
+    return Prisms(*corners, table[:, 4], table[:, 5], table[:, 6] > 0, flat, names)

@@ -8,7 +8,7 @@ from executive.sim.tool import LIP
 from executive.sim.world import World
 
 PRESSING = 2.0
-"""Force from which a contact is felt [N]: assumed of joint torque sensors; what only grazes is not felt."""
+"""Force from which a new contact is felt [N]: assumed of joint torque sensors; a graze is not felt."""
 
 
 APART = 12
@@ -30,7 +30,7 @@ class Contacts:
 
     def begin(self) -> None:
         """Take what touches now as known."""
-        self._known = {(part, body): self._world.steps for part, body, _ in self._touching()}
+        self._known = {(part, body): self._world.steps for part, body, _, _ in self._touching()}
 
     def new(self, feeling: bool) -> str | None:
         """Return what touches what and did not before, or None; called once a step.
@@ -39,10 +39,10 @@ class Contacts:
         """
         now = self._world.steps
         self._known = {pair: step for pair, step in self._known.items() if now - step <= APART}
-        for part, body, place in self._touching():
+        for part, body, place, force in self._touching():
             if (part, body) in self._known:
                 self._known[part, body] = now
-            elif not (feeling and part == "the tool" and self._is_lip(place)):
+            elif force > PRESSING and not (feeling and part == "the tool" and self._is_lip(place)):
                 x, y, z = self._world.tool_pose().position
                 name = self._world.name_of(body)
                 return f"{part} ran into {name}, with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m"
@@ -52,13 +52,14 @@ class Contacts:
         """Tell whether a place of the tool [m] belongs to its lip."""
         return bool(self._world.tool_pose().inverse().apply(place)[2] > -LIP)
 
-    def _touching(self) -> Iterator[tuple[str, int, Sequence[float]]]:
-        """Yield what touches which body, and where on it [m]."""
+    def _touching(self) -> Iterator[tuple[str, int, Sequence[float], float]]:
+        """Yield what touches which body, where on it [m], and how hard [N]."""
         world, held = self._world, self._held()
         for point in world.client.getContactPoints(bodyA=world.arm) or ():
-            if point[9] > PRESSING and point[2] != held:
-                yield "the tool" if point[3] == world.tool else f"link {point[3] + 1}", point[2], point[5]
+            if point[2] != held:
+                part = "the tool" if point[3] == world.tool else f"link {point[3] + 1}"
+                yield part, point[2], point[5], point[9]
         if held is not None:
             for point in world.client.getContactPoints(bodyA=held) or ():
-                if point[9] > PRESSING and point[2] != world.arm:
-                    yield f"the held {world.bodies[held]}", point[2], point[5]
+                if point[2] != world.arm:
+                    yield f"the held {world.bodies[held]}", point[2], point[5], point[9]

@@ -13,7 +13,7 @@ from executive.errors import Blocked
 from executive.geometry import Array
 from executive.layout import LIP_LENGTH, TOOL_RADIUS, pile_height
 from executive.messages import BIN_THICKNESS, Load, ObjectClass, Obstacle
-from executive.motion.surroundings import LOOKED_AT, SLANT, TOLERANCE, Discs, Surroundings, hanging
+from executive.motion.surroundings import BETWEEN, LOOKED_AT, SLANT, TOLERANCE, Discs, Surroundings, hanging
 
 DOWN = np.array([0.0, 0.0, -1.0])
 AWAY = np.array([[-0.6, 0.0]])
@@ -67,9 +67,9 @@ def test_distances_from_a_cylinder_are_what_geometry_says(config: CellConfig, ti
     grown = Obstacle(POST.x, POST.y, POST.radius + TOLERANCE, POST.top, "")
     nearest = float(to_cylinder(points, grown).min())
     if nearest > 0:
-        assert found == pytest.approx(min(nearest - config.motion.margin, without), abs=5e-4)
+        assert found == pytest.approx(min(nearest - (config.motion.margin + BETWEEN), without), abs=5e-4)
     else:
-        assert found <= -config.motion.margin + 1e-9
+        assert found <= -(config.motion.margin + BETWEEN) + 1e-9
 
 
 @given(near_the_post, st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.booleans())
@@ -80,7 +80,7 @@ def test_a_tilted_disc_is_never_nearer_than_it_is_said_to_be(config, tip, tilt, 
     discs = hanging(config, CUBE if loaded else None)
     found = slack(Surroundings(config, (POST,), AWAY), tip, axis, discs)
     nearest = float(to_cylinder(np.concatenate(discs_of(tip, axis, discs)), POST).min())
-    assert found + config.motion.margin <= nearest + 1e-9
+    assert found + (config.motion.margin + BETWEEN) <= nearest + 1e-9
 
 
 @given(st.tuples(st.floats(0.08, 0.38), st.floats(-0.66, -0.32), st.floats(0.01, 0.2)).map(np.array))
@@ -105,9 +105,9 @@ def test_distances_from_a_bin_are_what_geometry_says(config: CellConfig, tip) ->
     found = slack(Surroundings(config, (), tip[None, :2]), tip, discs=discs)
     if nearest > 0:
         spare = SLANT * (1 - discs.upright)
-        assert found == pytest.approx(min(nearest - config.motion.margin, spare), abs=5e-4)
+        assert found == pytest.approx(min(nearest - (config.motion.margin + BETWEEN), spare), abs=5e-4)
     else:
-        assert found <= -config.motion.margin + 1e-9
+        assert found <= -(config.motion.margin + BETWEEN) + 1e-9
 
 
 def test_a_load_hangs_below_the_tool_and_is_as_wide_as_its_ring_puts_it(config: CellConfig) -> None:
@@ -129,7 +129,7 @@ def test_the_workspace_is_not_entered_low_but_where_it_was_looked_at(config, x, 
     if away > LOOKED_AT + pile_height(config):
         assert slack(Surroundings(config, (), end), tip, discs=discs) < 0
     elif away < LOOKED_AT - 1e-9:
-        wanted = min(tip[2] - config.motion.margin, SLANT * (1 - discs.upright))
+        wanted = min(tip[2] - (config.motion.margin + BETWEEN), SLANT * (1 - discs.upright))
         assert slack(Surroundings(config, (), end), tip, discs=discs) == pytest.approx(wanted, abs=1e-9)
 
 
@@ -138,12 +138,14 @@ def test_near_an_end_what_is_unavoidable_there_is_allowed_and_elsewhere_it_is_no
     beside = np.array([POST.x + POST.radius + TOLERANCE + TOOL_RADIUS + 0.002, POST.y, 0.1])
     opposite = np.array([2 * POST.x - beside[0], POST.y, 0.1])
     surroundings = Surroundings(config, (POST,), beside[None, :2])
-    assert slack(surroundings, beside, discs=discs) == pytest.approx(0.002 - config.motion.margin)
+    assert slack(surroundings, beside, discs=discs) == pytest.approx(0.002 - (config.motion.margin + BETWEEN))
     surroundings.relax(beside[None], DOWN[None], discs)
     assert slack(surroundings, beside, discs=discs) == pytest.approx(0.0, abs=1e-9)
     assert slack(surroundings, beside - (0.001, 0, 0), discs=discs) == pytest.approx(-0.001, abs=1e-9)
     assert np.linalg.norm(opposite - beside) > LOOKED_AT
-    assert slack(surroundings, opposite, discs=discs) == pytest.approx(0.002 - config.motion.margin)
+    assert slack(surroundings, opposite, discs=discs) == pytest.approx(
+        0.002 - (config.motion.margin + BETWEEN)
+    )
 
 
 def test_what_is_entered_already_may_be_left(config: CellConfig) -> None:
@@ -162,7 +164,7 @@ def test_an_error_names_the_thing_the_lack_and_the_place(config: CellConfig) -> 
         surroundings.require_clear(tips, np.array([DOWN, axis, DOWN]), discs)
 
     require((-0.6, 0.0, 0.4))
-    text = "would bring tool or load 15 mm too near to the post, with the tool at (-0.500, 0.100, 0.290) m"
+    text = "would bring tool or load 16 mm too near to the post, with the tool at (-0.500, 0.100, 0.290) m"
     with pytest.raises(Blocked, match=re.escape(text)):
         require((POST.x, POST.y, 0.29))
     with pytest.raises(Blocked, match="too near to the table, with"):
@@ -179,12 +181,13 @@ def test_an_error_names_the_thing_the_lack_and_the_place(config: CellConfig) -> 
 
 def test_a_lack_within_the_tolerance_of_what_is_known_is_let_pass(config: CellConfig) -> None:
     discs, surroundings = hanging(config, None), Surroundings(config, (POST,), AWAY)
-    for lack, passes in ((TOLERANCE - 1e-4, True), (TOLERANCE + 1e-4, False)):
-        tips = np.array([[POST.x, POST.y, POST.top + config.motion.margin - lack]])
+    for more, passes in ((-1e-4, True), (1e-4, False)):
+        lack = TOLERANCE + BETWEEN + more
+        tips = np.array([[POST.x, POST.y, POST.top + (config.motion.margin + BETWEEN) - lack]])
         if passes:
             surroundings.require_clear(tips, DOWN[None], discs)
         else:
-            with pytest.raises(Blocked, match="3 mm too near to the post"):
+            with pytest.raises(Blocked, match="4 mm too near to the post"):
                 surroundings.require_clear(tips, DOWN[None], discs)
 
 
