@@ -48,7 +48,7 @@ class _Run:
         self._tool = SuctionTool(world, config.tool, ignore)
         self._arm = SimArm(world, planner, config, SimClock(world, STEP), lambda: self._tool.held_body)
         self._scenes = Scenes(config, planner, world, seed)
-        self._gauge = Gauge(world)
+        self._gauge = Gauge(world, config.motion.margin)
         self._slip = self._tracking = 0.0
         self._missed = self._drops = 0
         self._times: list[int] = []
@@ -109,6 +109,8 @@ class _Run:
         arm = self._arm
         motion = arm.plan(goal, task).result()
         grasp, steps, braking = self._in_tool(), 0, False
+        if scene is not None:
+            self._gauge.begin(scene, self._tool.held_body)
         arm.start(motion)
         while not arm.at_rest:
             if not braking and until():

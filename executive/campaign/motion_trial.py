@@ -111,7 +111,7 @@ class _Trial:
         self._world = world
         self._planner = planner
         self._scenes = Scenes(config, planner, world, seed)
-        self._gauge = Gauge(world)
+        self._gauge = Gauge(world, config.motion.margin)
         self._home = np.radians(config.arm.poses_deg["home"])
         self._q = planner.plan(self._home, self._scenes.resting_place()).end
         limits = planner.limits
@@ -199,9 +199,12 @@ class _Trial:
     def _look(self, scene: Scene, approach: Trajectory, transit: Trajectory, end: float) -> None:
         """Measure the distances along both motions, the object in the tool on the second."""
         world, forward = self._world, self._planner.kinematics.forward
+        world.set_arm(approach.start)
+        self._gauge.begin(scene)
         for s in np.append(np.arange(0.0, end, EVERY * STEP), end):
             world.set_arm(approach.at(float(s)).q)
             self._gauge.measure(scene)
+        self._gauge.begin(scene, held=scene.body)
         X_TO = forward(transit.start).inverse() @ world.object_pose(scene.body)
         for q in transit.samples.q[::EVERY]:
             world.set_arm(q)

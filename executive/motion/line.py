@@ -39,8 +39,13 @@ class Line:
         length: Its length [m].
         limits: What the joints may do.
         speed: Largest speed of the tool [m/s].
+        acceleration: Largest acceleration of the tool [m/s²].
         enters: Whether it begins in motion.
         leaves: Whether it ends in motion; not both.
+
+    Attributes:
+        duration: Time it takes [s].
+        acceleration: What the tool is accelerated with at most [m/s²]: what was asked, or what the arm can.
     """
 
     def __init__(
@@ -49,13 +54,15 @@ class Line:
         length: float,
         limits: JointLimits,
         speed: float = math.inf,
+        acceleration: float = math.inf,
         *,
         enters: bool = False,
         leaves: bool = False,
     ) -> None:
         self._spline = CubicSpline(np.linspace(0.0, length, len(chain)), chain)
         self._derivatives = [self._spline.derivative(order) for order in (1, 2)]
-        velocity, acceleration, jerk = self._bounds(limits, speed, length)
+        velocity, possible, jerk = self._bounds(limits, speed, length)
+        self.acceleration = acceleration = min(acceleration, possible)
         passing = _passing_speed(length, velocity, acceleration, jerk)
         inputs = InputParameter(1)
         inputs.current_position, inputs.target_position = [0.0], [length]
@@ -85,6 +92,7 @@ class Line:
         tiny = 1e-9  # [rad/m] and so on: a joint that stands still sets no bound
         velocity = min(
             speed,
+            math.sqrt(2 * length * float(np.min(limits.acceleration / (slope + tiny)))),  # faster it cannot get
             float(np.min(limits.velocity / (slope + tiny))),
             float(np.min(np.sqrt(SHARE * limits.acceleration / (bend + tiny)))),
             float(np.min(np.cbrt(SHARE / 2 * limits.jerk / (twist + tiny)))),

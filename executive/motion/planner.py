@@ -24,7 +24,7 @@ from executive.layout import travel_height
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.postures import find_postures
-from executive.motion.seal import GENTLEST, affordable
+from executive.motion.seal import gentle_rate
 from executive.motion.search import Candidate, Search
 from executive.motion.trajectory import STEP, Trajectory, thinned
 
@@ -66,8 +66,8 @@ class Planner:
         trajectory = self._plan(start, end, task)
         if task.load is None:
             return trajectory
-        share = affordable(trajectory, task.load, self.kinematics)
-        return trajectory if share >= 1 else trajectory.slowed(math.sqrt(max(share, GENTLEST)))
+        rate = gentle_rate(trajectory, task.load, self.kinematics)
+        return trajectory if rate >= 1 else trajectory.slowed(rate)
 
     def require_reachable(self, goal: Goal) -> None:
         """Make sure that a goal and travel height above it can be reached from somewhere in one posture.

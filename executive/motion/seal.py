@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from executive.geometry import Array
@@ -18,9 +20,11 @@ GRAVITY = 9.81
 METRES = 0.02
 """What a demand counts for an acceleration of 1 m/s² too much [m]."""
 STRIDE = 4
-"""Distance between the positions of a course that are looked at; even."""
+"""Distance between the positions of a course that are looked at; a divisor of SAMPLES."""
 _WEIGHTS = np.array([1.0, -2.0, 1.0])
 _DIFFERENCE = 1e-4  # [rad]
+GENTLEST_LIFT = 0.5
+"""Acceleration with which even a load is lifted whose seal hardly bears its weight [m/s²]."""
 GENTLEST = 0.2
 """Least share of its limits at which the arm still moves: a seal that bears less is carried all the same."""
 
@@ -38,15 +42,20 @@ class Inertia:
         self._middle = load.kind.height / 2
         self._kinematics = kinematics
 
+    @property
+    def lift(self) -> float:
+        """The largest acceleration straight up that the seal bears [m/s²]."""
+        return max(self._most - GRAVITY, GENTLEST_LIFT)
+
     def demand(self, qs: Array, time: float, near: float) -> Demand:
         """Return what it demands of positions of a course `(M, 7)` [rad], `time` [s] apart from each other.
 
         Left out is what is farther than `near` from its bounds. A metre stands for 50 m/s².
         """
-        middle = np.arange(STRIDE, len(qs) - STRIDE // 2, STRIDE)
-        rows = middle[:, None] + np.array([-1, 0, 1]) * (STRIDE // 2)
-        apart = STRIDE // 2 * time
-        felt = _WEIGHTS @ self._middles(qs)[rows] / apart**2
+        # The ends of the steps of the course are among them: there its accelerations turn.
+        middle = np.arange(STRIDE - 1, len(qs) - 1, STRIDE)
+        rows = middle[:, None] + np.array([-1, 0, 1])
+        felt = _WEIGHTS @ self._middles(qs)[rows] / time**2
         acceleration = felt.copy()
         felt[:, 2] += GRAVITY
         pull = np.linalg.norm(felt, axis=1)
@@ -56,7 +65,7 @@ class Inertia:
         moved = qs[rows][:, :, None] + _DIFFERENCE * np.eye(JOINTS)
         there = self._middles(moved.reshape(-1, JOINTS)).reshape(*moved.shape[:3], 3)
         jacobian = (there - self._middles(qs)[rows][:, :, None]) / _DIFFERENCE
-        slopes = -METRES / apart**2 * np.einsum("k,rkjx,rx->rkj", _WEIGHTS, jacobian, direction)
+        slopes = -METRES / time**2 * np.einsum("k,rkjx,rx->rkj", _WEIGHTS, jacobian, direction)
         # The same positions in more time: accelerations fall with its square.
         growth = 2 * METRES * np.einsum("rx,rx->r", direction, acceleration[chosen]) / (SAMPLES * time)
         return Demand(slack[chosen], rows, slopes, growth)
@@ -85,6 +94,14 @@ def affordable(trajectory: Trajectory, load: Load, kinematics: Kinematics) -> fl
     # The last sample is not a whole step after the one before.
     acceleration = np.diff(middle[:-1], n=2, axis=0) / STEP**2
     return float(np.min(_shares(acceleration, pull)))
+
+
+def gentle_rate(trajectory: Trajectory, load: Load, kinematics: Kinematics) -> float:
+    """Return the rate, 1 at most, at which a motion keeps the seal's safety factor, or what comes nearest.
+
+    Flown at a rate, accelerations are as its square.
+    """
+    return math.sqrt(max(affordable(trajectory, load, kinematics), GENTLEST))
 
 
 def _shares(acceleration: Array, pull: float) -> Array:

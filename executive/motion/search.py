@@ -12,19 +12,20 @@ import numpy as np
 
 from executive.cell import Goal, Task
 from executive.cell_config import CellConfig
-from executive.errors import Unreachable
+from executive.errors import Fault, Unreachable
 from executive.geometry import Array, tool_down
 from executive.layout import travel_height
+from executive.messages import Load
 from executive.motion.detour import Detour, Gap
 from executive.motion.free import Connector, NoProfile
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.line import SAMPLES, Line
 from executive.motion.postures import line_chain, upright_line
-from executive.motion.seal import Inertia
+from executive.motion.seal import Inertia, gentle_rate
 from executive.motion.state import Piece, State
 from executive.motion.surroundings import Surroundings, hanging
-from executive.motion.trajectory import over
+from executive.motion.trajectory import Trajectory, over
 from executive.motion.transcription import SAMPLES as PER_STEP
 from executive.motion.transcription import STEPS
 from executive.motion.ways import Way, ways_down
@@ -35,6 +36,8 @@ FIRST, REST = 4, 8
 """Steps by which the detour to each of them is improved, and the best one after that."""
 LIFTS = (0.0, 0.05, 0.10)
 """Heights above travel height at which a motion that stops at every corner is tried [m]."""
+LOOSE = 5e-4
+"""Way straight up by which a load comes loose from what it lies on [m]."""
 PLACES = np.arange(1, STEPS * PER_STEP) / (STEPS * PER_STEP)
 """Shares of a motion's duration at which its distances are looked at."""
 
@@ -89,6 +92,7 @@ class Search:
         self._discs = hanging(config, task.load)
         if not isinstance(end, Goal) and task.load is None:
             self._discs = self._discs._replace(upright=-1.0)  # from any posture the arm must find home
+        self._load = task.load
         self._inertia = Inertia(task.load, kinematics) if task.load else None
         place = kinematics.tips(end[None])[0][0] if not isinstance(end, Goal) else np.array(end.position)
         if isinstance(end, Goal):
@@ -138,10 +142,25 @@ class Search:
                 yield direct.pop(0)
             if number:
                 detour.improve(REST)
-            for exactly in (False, True):
-                with contextlib.suppress(NoProfile):
-                    yield self._candidate(detour.cost + way.tail, way, *detour.fly(exactly))
+            yield from self._flown(way, detour)
         yield from direct
+
+    def _flown(self, way: Way, detour: Detour) -> list[Candidate]:
+        """Return the motions over a detour, first the one that takes less time as gently as the seal asks for."""
+        flights = []
+        for exactly in (False, True):
+            with contextlib.suppress(NoProfile):
+                flights.append(self._candidate(detour.cost + way.tail, way, *detour.fly(exactly)))
+        load = self._load
+        return flights if load is None else sorted(flights, key=lambda flight: self._gentle_time(flight, load))
+
+    def _gentle_time(self, candidate: Candidate, load: Load) -> float:
+        """Return how long a motion takes when it is as slow as a load's seal asks for [s]."""
+        try:
+            trajectory = Trajectory(candidate.pieces)
+        except Fault:  # of which its check will tell
+            return math.inf
+        return trajectory.duration / gentle_rate(trajectory, load, self._kinematics)
 
     def _tried(self, ways: Sequence[Way]) -> tuple[list[Candidate], list[tuple[Way, Detour]]]:
         """Return the direct motions that are clear, and detours a few steps on, the fastest first."""
@@ -218,8 +237,17 @@ class Search:
         return State.rest(q)
 
     def _depart(self, start: Array, height: float) -> Line | None:
-        """Return the straight way up with which a motion begins where the cell asks for it."""
-        if not self._straight or height + self._straight > self._height:
+        """Return the straight way up with which a motion begins, or None.
+
+        The cell may ask for one. A load goes straight up, too, where its seal and not the arm limits how fast
+        it is lifted: pressed on what it lies on or dragged over it, by micrometres only, it would tear off.
+        """
+        length = self._straight or (LOOSE if self._inertia else 0.0)
+        if not length or height + length > self._height:
             return None
-        chain = upright_line(self._kinematics, start, self._straight, SAMPLES)
-        return None if chain is None else Line(chain, self._straight, self._limits, leaves=True)
+        chain = upright_line(self._kinematics, start, length, SAMPLES)
+        if chain is None:
+            return None
+        borne = self._inertia.lift if self._inertia else math.inf
+        line = Line(chain, length, self._limits, acceleration=borne, leaves=True)
+        return line if self._straight or line.acceleration >= borne else None

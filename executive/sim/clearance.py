@@ -29,7 +29,7 @@ the others, the first of them most often.
 """
 WRIST = 5
 """Lowest link that what is held may be near: it hangs there."""
-SLACK = 1e-4
+SLACK = 1e-5
 """Difference of distances that is rounding [m]."""
 FAR_AWAY = (0.0, 0.0, 50.0)
 

@@ -9,8 +9,6 @@ from executive.sim.world import World
 
 PRESSING = 2.0
 """Force from which a new contact is felt [N]: assumed of joint torque sensors; a graze is not felt."""
-
-
 APART = 12
 """Steps without touching after which two bodies have parted: a load that is lifted may graze once more."""
 

@@ -52,7 +52,7 @@ def table(overhead: CellConfig) -> Iterator[Table]:
     goal = Goal((*PLACE, 0.035), guarded=0.021)
     scene = Scene(body, kind, PLACE, 0.051, 7.9, TARGET, (), goal, Goal((0.24, 0.48, 0.065)))
     kinematics = Kinematics(overhead.tool.length, JointLimits.of(overhead.arm.limits).position)
-    yield Table(world, kinematics, scene, Gauge(world))
+    yield Table(world, kinematics, scene, Gauge(world, overhead.motion.margin))
     world.close()
 
 
@@ -86,6 +86,35 @@ def test_the_nearest_of_all_moments_is_kept(table):
         table.put_tool(*PLACE, z)
         table.gauge.measure(table.scene)
     assert table.gauge.least.distance == pytest.approx(0.008, abs=1e-3)
+
+
+def carried(table, x: float) -> None:
+    """The cube in the tool, 3 mm over the table."""
+    table.put_tool(x, 0.0, 0.053)
+    table.world.place_object(table.scene.body, Pose.of([x, 0.0, 0.028]))
+
+
+@pytest.mark.parametrize(
+    ("places", "counted"),
+    [
+        ((0.499, 0.490), None),
+        ((0.501,), 0.002),
+        ((0.490, 0.499), 0.004),
+    ],
+    ids=["what stood nearer may part", "it must not come nearer still", "once apart, it counts again"],
+)
+def test_what_stood_near_as_the_motion_began_is_spared_until_it_is_apart(table, places, counted):
+    table.world.add_object("cube", Pose.of([PLACE[0] + 0.053, 0.0, 0.025]), (1, 1, 1))
+    carried(table, PLACE[0])
+    table.gauge.begin(table.scene, held=table.scene.body)
+    for x in places:
+        carried(table, x)
+        table.gauge.measure(table.scene, held=table.scene.body)
+    if counted is None:
+        assert table.gauge.least.distance > 0.01
+    else:
+        assert table.gauge.least.what == "the held cube - a cube"
+        assert table.gauge.least.distance == pytest.approx(counted, abs=2e-4)
 
 
 def test_a_contact_that_is_not_allowed_is_told(table):
