@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator, Iterator
 
-from executive.cell import Arm, Cell, Goal, Motion, Steps, Task
+from executive.arm import Arm, Goal, Motion, Task
+from executive.cell import Cell, Steps
 from executive.errors import Blocked, Unreachable
 from executive.messages import BIN_THICKNESS, Item, Load, Obstacle, Target
 from executive.skill import Skill

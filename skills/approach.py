@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
-from executive.cell import Cell, Goal, LeastTimes, Steps, Task, Tool
+from executive.arm import Goal, Task
+from executive.cell import Cell, LeastTimes, Steps, Tool
 from executive.messages import Target
 from executive.moving import OVERTRAVEL, SPACING, approach, follow, planned
 from executive.skill import EMPTY, In, Metres, Skill, param, port

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from executive.cell import Cell, Goal, LeastTimes, Steps
+from executive.arm import Goal
+from executive.cell import Cell, LeastTimes, Steps
 from executive.messages import Item
 from executive.moving import carrying, follow, planned
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, param, port

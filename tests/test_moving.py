@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from executive.cell import Goal, Task
+from executive.arm import Goal, Task
 from executive.messages import BIN_THICKNESS, Obstacle, Target
 from executive.moving import approach, around, carrying, heeding, into, planned, slots_taken
 from executive.testing.fake_cell import FakeCell

@@ -8,10 +8,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from executive.arm import Goal, Task
 from executive.campaign.motion_gauge import Gauge
 from executive.campaign.motion_scenes import Scene, Scenes
 from executive.campaign.motion_trial import EVERY, Progress, opened, silent
-from executive.cell import Goal, Task
 from executive.cell_config import CellConfig
 from executive.errors import Blocked, Fault, Unreachable
 from executive.events import ignore

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from executive.cell import Goal
+from executive.arm import Goal
 from executive.errors import InputError
 from executive.geometry import Array, tool_down
 from executive.motion.free import Connector

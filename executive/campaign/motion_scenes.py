@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from executive.cell import Goal, Task
+from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
 from executive.errors import InputError, Unreachable
 from executive.geometry import tool_down

@@ -90,9 +90,10 @@ class Line:
         """Return the tool's largest speed [m/s], acceleration [m/s²] and jerk [m/s³]."""
         slope, bend, twist = (np.abs(self._spline(_FINE * length, order)).max(axis=0) for order in (1, 2, 3))
         tiny = 1e-9  # [rad/m] and so on: a joint that stands still sets no bound
+        straight = float(np.min(limits.acceleration / (slope + tiny)))
         velocity = min(
             speed,
-            math.sqrt(2 * length * float(np.min(limits.acceleration / (slope + tiny)))),  # faster it cannot get
+            math.sqrt(2 * length * straight),  # so short a way does not make it faster
             float(np.min(limits.velocity / (slope + tiny))),
             float(np.min(np.sqrt(SHARE * limits.acceleration / (bend + tiny)))),
             float(np.min(np.cbrt(SHARE / 2 * limits.jerk / (twist + tiny)))),

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from executive.cell import Clock, Goal, Motion, Task
+from executive.arm import Goal, Motion, Task
+from executive.cell import Clock
 from executive.errors import Blocked, Unreachable
 from executive.events import Emit
 from executive.geometry import Array
@@ -17,7 +18,7 @@ M = TypeVar("M", bound=Motion)
 
 @dataclass(frozen=True, eq=False)
 class Plan(Generic[M]):
-    """A motion being planned; implements `executive.cell.Planning`.
+    """A motion being planned; implements `executive.arm.Planning`.
 
     Attributes:
         due: When it is known [s].

@@ -10,7 +10,7 @@ from itertools import islice
 
 import numpy as np
 
-from executive.cell import Goal, Task
+from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
 from executive.errors import Fault, Unreachable
 from executive.geometry import Array, tool_down
@@ -146,13 +146,14 @@ class Search:
         yield from direct
 
     def _flown(self, way: Way, detour: Detour) -> list[Candidate]:
-        """Return the motions over a detour, first the one that takes less time as gently as the seal asks for."""
+        """Return the motions over a detour, first the one that takes less time as gently as a seal asks."""
         flights = []
         for exactly in (False, True):
             with contextlib.suppress(NoProfile):
                 flights.append(self._candidate(detour.cost + way.tail, way, *detour.fly(exactly)))
-        load = self._load
-        return flights if load is None else sorted(flights, key=lambda flight: self._gentle_time(flight, load))
+        if (load := self._load) is not None:
+            flights.sort(key=lambda flight: self._gentle_time(flight, load))
+        return flights
 
     def _gentle_time(self, candidate: Candidate, load: Load) -> float:
         """Return how long a motion takes when it is as slow as a load's seal asks for [s]."""

@@ -23,7 +23,7 @@ STEP = 1 / 240
 
 
 class Trajectory:
-    """A motion of all joints, at rest where it begins and where it ends; implements `cell.Motion`.
+    """A motion of all joints, at rest where it begins and where it ends; implements `executive.arm.Motion`.
 
     Attributes:
         duration: Time from start to rest [s].

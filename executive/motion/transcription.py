@@ -159,8 +159,7 @@ class Transcription:
             part[:, _INNER + 1] = -1.0
             off = np.einsum("rkj,rkj->r", slopes, start.q - last.qs[demand.rows])
             rows.append(part)
-            import os; P=float(os.environ.get("POW","3")); tt=self._grid.times[demand.rows].mean(axis=1); spare = SPARE*np.minimum(1.0, np.minimum(tt, STEPS-tt))**P
-            most.append(demand.slack - spare + off - step**2 * bent - step * demand.growth)
+            most.append(demand.slack - SPARE + off - step**2 * bent - step * demand.growth)
         return self._course(step, program, np.concatenate(rows), np.concatenate(most))
 
     def _program(self, step: float) -> _Program:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from executive.cell import Goal
+from executive.arm import Goal
 from executive.geometry import Array
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits

@@ -8,7 +8,8 @@ from collections.abc import Callable
 import numpy as np
 import pybullet
 
-from executive.cell import Clock, Goal, Motion, Task
+from executive.arm import Goal, Motion, Task
+from executive.cell import Clock
 from executive.cell_config import CellConfig
 from executive.errors import Fault
 from executive.events import Emit, ignore
@@ -30,7 +31,7 @@ TRACKING_TOLERANCE = math.radians(0.5)
 
 
 class SimArm:
-    """An arm in a PyBullet world, implementing `cell.Arm`.
+    """An arm in a PyBullet world, implementing `executive.arm.Arm`.
 
     `advance` is called once before every physics step. It commands where the motion is one step later
     with full position gain and no velocity, which follows the path to 0.0005°; PyBullet's default gain

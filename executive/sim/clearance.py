@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import pybullet
 
-from executive.cell import Task
+from executive.arm import Task
 from executive.cell_config import CellConfig
 from executive.errors import Blocked
 from executive.geometry import Array, Pose

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from executive.cell import Goal
+from executive.arm import Goal
 from executive.cell_config import CellConfig
 from executive.errors import Unreachable
 from executive.geometry import Array

@@ -9,7 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from executive.cell import Clock, Goal, Motion, Task
+from executive.arm import Goal, Motion, Task
+from executive.cell import Clock
 from executive.cell_config import CellConfig
 from executive.errors import Fault, Unreachable
 from executive.events import Emit, ignore

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from executive.arm import Goal
 from executive.campaign.motion_gauge import Gauge
 from executive.campaign.motion_scenes import Scene
-from executive.cell import Goal
 from executive.cell_config import CellConfig
 from executive.geometry import Pose
 from executive.layout import as_class

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from executive.arm import Goal
 from executive.campaign.motion_article import CYCLE, MOTION, article_peaks
 from executive.campaign.motion_rivals import Textbook, floor, textbook, toppra
 from executive.campaign.motion_trial import peaks
-from executive.cell import Goal
 from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.geometry import Array

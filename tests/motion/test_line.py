@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import LIMITS, SOONER, passed, peaks
 
-from executive.cell import Goal
+from executive.arm import Goal
 from executive.geometry import Array
 from executive.motion.kinematics import Kinematics
 from executive.motion.line import SAMPLES, Line
@@ -94,6 +94,18 @@ def test_velocity_and_acceleration_are_the_derivatives_of_the_way(descent: Desce
     assert np.allclose(measured, states.qd[middle], atol=1e-4)
     measured = (states.qd[2:-1] - states.qd[:-3]) / (2 * SOONER)
     assert np.allclose(measured, states.qdd[middle], atol=2 * SOONER * LIMITS.jerk.max())
+
+
+@given(descents(), st.floats(0.3, 1.5))
+@settings(max_examples=20, deadline=None)
+def test_it_is_no_more_accelerated_than_is_asked(descent: Descent, most: float) -> None:
+    gentle = Line(descent.chain[::-1], descent.length, LIMITS, acceleration=most, leaves=True)
+    fastest = Line(descent.chain[::-1], descent.length, LIMITS, leaves=True)
+    assert gentle.acceleration == min(most, fastest.acceleration)
+    heights = ARM.tips(passed(gentle).q)[0][:-1, 2]
+    assert np.diff(heights, n=2).max() / SOONER**2 <= most * 1.02 + 0.01
+    if most < fastest.acceleration:
+        assert gentle.duration > fastest.duration
 
 
 @given(descents())

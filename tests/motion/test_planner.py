@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import SOONER, passed, peaks
 
-from executive.cell import Goal, Task
+from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
@@ -271,6 +271,22 @@ def test_a_seal_that_hardly_bears_the_weight_is_carried_at_the_gentlest(planner,
     assert 0.5 * GENTLEST <= acceleration <= GENTLEST + 1e-6
     assert jerk <= GENTLEST**1.5 + 1e-6
     assert np.allclose(planner.kinematics.tips(weak.end[None])[0], BIN.position, atol=1e-7)
+
+
+@pytest.mark.parametrize(("bears", "straight"), [(2.5, True), (7.9, False)])
+def test_a_load_of_a_weak_seal_leaves_what_it_lies_on_straight_up(planner, home, bears, straight) -> None:
+    """Dragged over the table or pressed on it by microns only, it would tear off."""
+    picked = planner.plan(home, pick(0.55, 0.1)).end
+    motion = planner.plan(picked, BIN, Task(Load(CUBE, bears)))
+    qs = passed(motion, SOONER / 4).q
+    tips = planner.kinematics.tips(qs)[0] - planner.kinematics.tips(picked[None])[0]
+    leaving = tips[:, 2] < 4.5e-4
+    aside = np.linalg.norm(tips[leaving, :2], axis=1).max()
+    if straight:
+        assert np.all(np.diff(tips[leaving, 2]) >= 0)
+        assert aside < 1e-5
+    else:
+        assert aside > 1e-4
 
 
 def test_straight_ends_where_the_cell_asks_for_them(config, home) -> None:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import LIMITS
 
-from executive.cell import Goal
+from executive.arm import Goal
 from executive.errors import Unreachable
 from executive.geometry import tool_down
 from executive.motion.kinematics import Kinematics, wrapped

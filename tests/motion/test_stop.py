@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import positions
 
-from executive.cell import Goal
+from executive.arm import Goal
 from executive.geometry import Array
 from executive.motion.state import State
 from executive.motion.stop import brake

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from executive.cell import Goal
+from executive.arm import Goal
 from executive.errors import Unreachable
 from executive.motion.kinematics import wrapped
 from executive.motion.state import State

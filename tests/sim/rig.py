@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from executive.cell import Goal, Task
+from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
 from executive.geometry import Array, Pose
 from executive.motion.free import Connector

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rig import Rig
 
-from executive.cell import Goal, Motion, Task
+from executive.arm import Goal, Motion, Task
 from executive.errors import Fault, Unreachable
 from executive.messages import Obstacle
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rig import Rig, off_path
 
-from executive.cell import Goal, Task
+from executive.arm import Goal, Task
 from executive.geometry import Array, tool_down
 from executive.layout import as_class
 from executive.messages import Load

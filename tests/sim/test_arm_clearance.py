@@ -7,7 +7,7 @@ import numpy as np
 import pybullet
 import pytest
 
-from executive.cell import Goal, Task
+from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
 from executive.errors import Blocked
 from executive.geometry import tool_down

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rig import Rig
 
-from executive.cell import Goal, Task
+from executive.arm import Goal, Task
 from executive.geometry import Pose
 from executive.layout import as_bin, as_class
 from executive.messages import Load

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from executive.cell import Goal
+from executive.arm import Goal
 from executive.cell_config import CellConfig
 from executive.layout import as_bin
 from executive.motion.planner import Planner

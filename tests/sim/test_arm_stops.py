@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rig import Rig, off_path
 
-from executive.cell import Goal, Task
+from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
 from executive.layout import as_class
 from executive.messages import Load

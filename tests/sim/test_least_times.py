@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from executive.cell import Goal, Task
+from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
 from executive.geometry import Array, tool_down
 from executive.layout import as_bin, as_class, travel_height

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from executive.cell import Goal
+from executive.arm import Goal
 from executive.errors import InputError
 from executive.events import ignore
 from executive.geometry import Pose

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from executive.cell import Goal
+from executive.arm import Goal
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import SkillResult, run_skill
 from skills.select_target import SelectTarget

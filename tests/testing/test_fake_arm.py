@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from executive.cell import Goal, Motion, Task
+from executive.arm import Goal, Motion, Task
 from executive.errors import Fault, Unreachable
 from executive.geometry import Array
 from executive.messages import Obstacle
