@@ -11,7 +11,7 @@ import numpy as np
 from executive.arm import Goal, Task
 from executive.campaign.motion_gauge import Gauge
 from executive.campaign.motion_scenes import Scene, Scenes
-from executive.campaign.motion_trial import EVERY, Progress, opened, silent
+from executive.campaign.motion_trial import EVERY, Progress, opened, repeat, silent
 from executive.cell_config import CellConfig
 from executive.errors import Blocked, Fault, Unreachable
 from executive.events import ignore
@@ -34,9 +34,7 @@ def execute(config: CellConfig, pairs: int, seed: int, progress: Progress = sile
     """
     with opened(config) as (world, planner):
         run = _Run(config, world, planner, seed)
-        for number in range(pairs):
-            run.pair()
-            progress(number + 1, pairs)
+        repeat(run.pair, pairs, progress)
         return run.figures(pairs)
 
 

@@ -54,6 +54,13 @@ def silent(done: int, total: int) -> None:
     del done, total
 
 
+def repeat(pair: Callable[[], None], pairs: int, progress: Progress) -> None:
+    """Go through so many pairs, telling after each how far it is."""
+    for number in range(pairs):
+        pair()
+        progress(number + 1, pairs)
+
+
 def measure(config: CellConfig, pairs: int, seed: int, progress: Progress = silent) -> MotionFigures:
     """Return the figures of `pairs` random pairs.
 
@@ -62,9 +69,7 @@ def measure(config: CellConfig, pairs: int, seed: int, progress: Progress = sile
     """
     with opened(config) as (world, planner):
         trial = _Trial(config, world, planner, seed)
-        for number in range(pairs):
-            trial.pair()
-            progress(number + 1, pairs)
+        repeat(trial.pair, pairs, progress)
         return trial.figures(seed)
 
 
