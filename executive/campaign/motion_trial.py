@@ -27,9 +27,9 @@ from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
 from executive.motion.state import State
 from executive.motion.stop import brake
-from executive.motion.trajectory import Trajectory
+from executive.motion.trajectory import STEP, Trajectory, peaks
 from executive.sim.clearance import PathClearance
-from executive.sim.world import STEP, World
+from executive.sim.world import World
 from executive.view.motion_figures import MethodFigures, MotionFigures, PlanningFigures
 
 Progress = Callable[[int, int], None]
@@ -84,7 +84,9 @@ class _Tally:
 
     def add(self, duration: float, states: Sequence[State]) -> None:
         self.times.append(duration)
-        self.peaks = np.max([self.peaks, *(peaks(motion, self.limits) for motion in states)], axis=0)
+        self.peaks = np.max(
+            [self.peaks, *(peaks(motion, self.limits).max(axis=1) for motion in states)], axis=0
+        )
 
     def figures(self, name: str, clearance: float | None = None) -> MethodFigures:
         velocity, acceleration, jerk = (float(peak) for peak in self.peaks)
@@ -96,16 +98,6 @@ class _Tally:
         return MethodFigures(
             name, float(np.mean(self.times)), (velocity, acceleration, jerk), planning, clearance
         )
-
-
-def peaks(states: State, limits: JointLimits) -> Array:
-    """Return the largest velocity, acceleration and jerk `(3,)` of a motion sampled every step, over limits.
-
-    The last sample is not a whole step after the one before, so no jerk is taken from it.
-    """
-    jerk = np.diff(states.qdd, axis=0)[:-1] / STEP
-    shares = (states.qd / limits.velocity, states.qdd / limits.acceleration, jerk / limits.jerk)
-    return np.array([np.abs(share).max(initial=0.0) for share in shares])
 
 
 class _Trial:

@@ -1,1 +1,1 @@
-"""Kinematics, limits, trajectories and braking of the arm; no simulator."""
+"""From a goal to a motion of the arm: kinematics, what stands around, the search, the seal, braking."""

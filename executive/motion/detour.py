@@ -17,7 +17,7 @@ from executive.geometry import Array
 from executive.motion.free import Connector, Free, NoProfile
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
-from executive.motion.seal import Inertia
+from executive.motion.seal import Hold
 from executive.motion.state import JOINTS, State
 from executive.motion.surroundings import Discs, Surroundings
 from executive.motion.transcription import SAMPLES, STEPS, WEIGHT, Course, Demand, Transcription
@@ -43,7 +43,7 @@ class Gap:
         kinematics: The arm.
         surroundings: What stands around.
         discs: What hangs under the flange.
-        inertia: What the seal of a load demands, or None.
+        hold: What the seal of a load demands, or None.
     """
 
     start: State
@@ -52,7 +52,7 @@ class Gap:
     kinematics: Kinematics
     surroundings: Surroundings
     discs: Discs
-    inertia: Inertia | None = None
+    hold: Hold | None = None
 
     def slack(self, qs: Array) -> Array:
         """Return by how much joint positions `(N, 7)` keep their distance [m] and limits [rad] `(N,)`."""
@@ -120,8 +120,8 @@ class Detour:
         self._last, self._slack = course, self._gap.slack(course.qs)
         lacks = [-float(self._slack.min())]
         self._gentle = []
-        if self._gap.inertia is not None:
-            self._gentle = [self._gap.inertia.demand(course.qs, course.step / SAMPLES, NEAR)]
+        if self._gap.hold is not None:
+            self._gentle = [self._gap.hold.demand(course.qs, course.step / SAMPLES, NEAR)]
             lacks.append(-float(self._gentle[0].slack.min(initial=NEAR)))
         cost = course.duration + WEIGHT * max(0.0, *lacks)
         if cost < self.cost:

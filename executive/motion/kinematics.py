@@ -65,8 +65,7 @@ class Kinematics:
 
     def forward(self, q: ArrayLike) -> Pose:
         """Return the tool pose `X_WT` at the joint positions `q` `(7,)` [rad]."""
-        R, _, p = self._chain(np.asarray(q, dtype=float)[None])
-        return Pose(R[0, -1], p[0, -1])
+        return self._frames(q)[-1]
 
     def flange(self, q: ArrayLike) -> Pose:
         """Return the flange's pose `X_WF` at `q` `(7,)` [rad]; the tool is fixed on it along z."""
@@ -75,8 +74,7 @@ class Kinematics:
 
     def joint_frames(self, q: ArrayLike) -> tuple[Pose, ...]:
         """Return, for joints 1 to 7, the frame that turns with the joint, z along the arm, at its centre."""
-        R, _, p = self._chain(np.asarray(q, dtype=float)[None])
-        return tuple(Pose(R[0, i], p[0, i]) for i in range(7))
+        return tuple(self._frames(q)[:-1])
 
     def tips(self, qs: Array) -> tuple[Array, Array]:
         """Return tool centre points `(N, 3)` [m] and tool axes `(N, 3)` at many `qs` `(N, 7)` [rad].
@@ -98,12 +96,6 @@ class Kinematics:
             both = turn(both, cosines[joint], sines[joint])
         both[2, 0] += SHOULDER_HEIGHT
         return both[:, 0].T, both[:, 1].T
-
-    def velocities(self, qs: Array, qds: Array) -> Array:
-        """Return the tool centre point's velocities `(N, 3)` [m/s] at `qs`, moving with `qds` `(N, 7)`."""
-        _, axes, p = self._chain(qs)
-        levers = p[:, -1:] - p[:, :7]
-        return np.einsum("nij,ni->nj", np.cross(axes, levers), qds)
 
     def swivel(self, q: ArrayLike) -> float:
         """Return the elbow's angle about the line from shoulder to wrist [rad]; 0 is up."""
@@ -194,23 +186,17 @@ class Kinematics:
             f"{how}"
         )
 
-    def _chain(self, qs: Array) -> tuple[Array, Array, Array]:
-        """Return rotations `(N, 8, 3, 3)` and positions `(N, 8, 3)` of joints and tool, axes `(N, 7, 3)`."""
-        count = len(qs)
-        rotations, positions = np.empty((count, 8, 3, 3)), np.empty((count, 8, 3))
-        axes = np.empty((count, 7, 3))
-        R = np.broadcast_to(np.eye(3), (count, 3, 3))
-        p = np.broadcast_to(np.array([0.0, 0.0, SHOULDER_HEIGHT]), (count, 3))
+    def _frames(self, q: ArrayLike) -> list[Pose]:
+        """Return the frames of joints 1 to 7, see `joint_frames`, and of the tool."""
+        frames = []
+        R, p = np.eye(3), np.array([0.0, 0.0, SHOULDER_HEIGHT])
         lengths = {3: UPPER_ARM, 5: FOREARM}
-        angles = qs * (1, 1, 1, -1, 1, 1, 1)
-        cosines, sines = np.cos(angles), np.sin(angles)
-        for i, is_z in enumerate(_IS_Z):
-            p = p + lengths.get(i, 0.0) * R[:, :, 2]
-            axes[:, i] = R[:, :, 2] if is_z else R[:, :, 1] * (-1 if i == 3 else 1)
-            R = _turned(R, cosines[:, i, None], sines[:, i, None], is_z)
-            rotations[:, i], positions[:, i] = R, p
-        rotations[:, 7], positions[:, 7] = R, p + self.reach * R[:, :, 2]
-        return rotations, axes, positions
+        angles = np.asarray(q, dtype=float) * (1, 1, 1, -1, 1, 1, 1)
+        for i, (c, s) in enumerate(zip(np.cos(angles), np.sin(angles), strict=True)):
+            p = p + lengths.get(i, 0.0) * R[:, 2]
+            R = R @ _turn(c, s, _IS_Z[i])
+            frames.append(Pose(R, p))
+        return [*frames, Pose(R, p + self.reach * R[:, 2])]
 
 
 def _about_z(v: Array, c: Array, s: Array) -> Array:
@@ -223,13 +209,11 @@ def _about_y(v: Array, c: Array, s: Array) -> Array:
     return np.array([c * v[0] + s * v[2], v[1], c * v[2] - s * v[0]])
 
 
-def _turned(R: Array, c: Array, s: Array, is_z: bool) -> Array:
-    """Return rotations `(N, 3, 3)` followed by a turn about their own z or y axis."""
-    first, second = (0, 1) if is_z else (2, 0)
-    turned = np.array(R)
-    turned[:, :, first] = c * R[:, :, first] + s * R[:, :, second]
-    turned[:, :, second] = c * R[:, :, second] - s * R[:, :, first]
-    return turned
+def _turn(c: float, s: float, is_z: bool) -> Array:
+    """Return the rotation about z, or about y, by the angle of a cosine and a sine."""
+    if is_z:
+        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
 
 def _zyz(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:

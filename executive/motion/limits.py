@@ -12,7 +12,7 @@ from executive.geometry import Array
 
 @dataclass(frozen=True, eq=False)
 class JointLimits:
-    """Joint limits, each of shape `(7,)`, with where they come from.
+    """Joint limits, each of shape `(7,)`.
 
     Attributes:
         position: Largest angle to either side [rad].
@@ -21,7 +21,6 @@ class JointLimits:
         jerk: [rad/s³].
         stop_acceleration: Largest acceleration while braking [rad/s²].
         stop_jerk: Largest jerk while braking [rad/s³].
-        source: Where the figures were taken from.
     """
 
     position: Array
@@ -30,7 +29,6 @@ class JointLimits:
     jerk: Array
     stop_acceleration: Array
     stop_jerk: Array
-    source: str
 
     @staticmethod
     def of(config: LimitsConfig) -> JointLimits:
@@ -42,5 +40,4 @@ class JointLimits:
             jerk=np.array(config.jerk),
             stop_acceleration=np.array(config.stop_acceleration),
             stop_jerk=np.array(config.stop_jerk),
-            source=config.source,
         )

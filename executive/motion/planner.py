@@ -2,7 +2,7 @@
 
 The arm has choices: eight branches, the elbow's swivel and, for a round cup, the tool's yaw where it arrives,
 and the shape of the way between. The planner ranks the ends by the least time there can be, flies the direct
-way where nothing is in between and looks for the fastest arch where something is. What it finds is checked
+way where nothing is in between and looks for the fastest detour where something is. What it finds is checked
 in a planning world before it counts. Its budget is a number of steps, never a time: the same question always
 gets the same answer.
 """
@@ -18,14 +18,15 @@ from numpy.typing import ArrayLike
 
 from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
-from executive.errors import Blocked, Fault, Unreachable
+from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
 from executive.layout import travel_height
+from executive.motion.free import NoProfile
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.postures import find_postures
-from executive.motion.seal import gentle_rate
-from executive.motion.search import Candidate, Search
+from executive.motion.seal import Hold
+from executive.motion.search import Search
 from executive.motion.trajectory import STEP, Trajectory, thinned
 
 Check = Callable[[Array, Task], None]
@@ -66,7 +67,7 @@ class Planner:
         trajectory = self._plan(start, end, task)
         if task.load is None:
             return trajectory
-        rate = gentle_rate(trajectory, task.load, self.kinematics)
+        rate = Hold(task.load, self.kinematics).rate(trajectory)
         return trajectory if rate >= 1 else trajectory.slowed(rate)
 
     def require_reachable(self, goal: Goal) -> None:
@@ -79,33 +80,32 @@ class Planner:
 
     def _plan(self, start: Array, end: Goal | Array, task: Task) -> Trajectory:
         search = Search(self._config, self.kinematics, self.limits, start, end, _keeping_clear(task))
-        guarded = isinstance(end, Goal) and end.guarded > 0
         blocked: list[str] = []
-        for candidate in search.candidates():
+        for motion in search.candidates():
             try:
-                return self._checked(search, candidate, guarded, task)
-            except (Blocked, Unreachable, Fault) as error:
+                self._require_clear(motion, search, task)
+            except (Blocked, Unreachable, NoProfile) as error:
                 blocked.append(str(error))
+            else:
+                return motion
         others = f"; of {len(blocked)} ways tried none is free" if len(blocked) > 1 else ""
         raise Blocked(f"{blocked[0]}{others}" if blocked else "no way there can be flown")
 
-    def _checked(self, search: Search, candidate: Candidate, guarded: bool, task: Task) -> Trajectory:
-        """Return a candidate as the motion it is, if it is clear and keeps the joints' limits.
+    def _require_clear(self, motion: Trajectory, search: Search, task: Task) -> None:
+        """Make sure that a motion keeps the joints' limits and its distances.
 
         Raises:
             Blocked: It comes too near to something.
-            Unreachable, Fault: It leaves a joint's range, or exceeds another limit.
+            Unreachable, NoProfile: It leaves a joint's range, or exceeds another limit.
         """
-        start = sum(piece.duration for piece in candidate.free) if guarded else math.inf
-        trajectory = Trajectory(candidate.pieces, start)
-        qs = trajectory.check(self.limits).q
-        free = qs[: math.ceil(start / STEP)] if guarded else qs
+        qs = motion.check(self.limits).q
+        guarded = motion.guarded < math.inf
+        free = qs[: math.ceil(motion.guarded / STEP)] if guarded else qs
         search.require_clear(free)
         if self._check is not None:
             self._check(thinned(free, SPACING), _keeping_clear(task))
             if guarded:
                 self._check(thinned(qs[len(free) - 1 :], SPACING), task)
-        return trajectory
 
 
 def _keeping_clear(task: Task) -> Task:

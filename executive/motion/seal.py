@@ -29,8 +29,10 @@ GENTLEST = 0.2
 """Least share of its limits at which the arm still moves: a seal that bears less is carried all the same."""
 
 
-class Inertia:
-    """What a seal demands of a course: that it bears the load's weight and inertia with the safety factor.
+class Hold:
+    """What a seal demands of motions: that it bears its load's weight and inertia with the safety factor.
+
+    It bears `m |a + g|` at the load's middle.
 
     Args:
         load: What the tool holds.
@@ -38,7 +40,7 @@ class Inertia:
     """
 
     def __init__(self, load: Load, kinematics: Kinematics) -> None:
-        self._most = _pull(load)
+        self._most = load.bears / SAFETY / load.kind.mass  # [m/s²]
         self._middle = load.kind.height / 2
         self._kinematics = kinematics
 
@@ -47,15 +49,31 @@ class Inertia:
         """The largest acceleration straight up that the seal bears [m/s²]."""
         return max(self._most - GRAVITY, GENTLEST_LIFT)
 
+    def share(self, trajectory: Trajectory) -> float:
+        """Return the share of its accelerations at which a motion keeps the safety factor, 1 at most."""
+        middle = self._middles(trajectory.samples.q)
+        if len(middle) < 4:
+            return 1.0
+        # The last sample is not a whole step after the one before.
+        acceleration = np.diff(middle[:-1], n=2, axis=0) / STEP**2
+        return float(np.min(_shares(acceleration, self._most)))
+
+    def rate(self, trajectory: Trajectory) -> float:
+        """Return the rate, 1 at most, at which a motion keeps the safety factor, or what comes nearest.
+
+        Flown at a rate, accelerations are as its square.
+        """
+        return math.sqrt(max(self.share(trajectory), GENTLEST))
+
     def demand(self, qs: Array, time: float, near: float) -> Demand:
         """Return what it demands of positions of a course `(M, 7)` [rad], `time` [s] apart from each other.
 
         Left out is what is farther than `near` from its bounds. A metre stands for 50 m/s².
         """
         # The ends of the steps of the course are among them: there its accelerations turn.
-        middle = np.arange(STRIDE - 1, len(qs) - 1, STRIDE)
-        rows = middle[:, None] + np.array([-1, 0, 1])
-        felt = _WEIGHTS @ self._middles(qs)[rows] / time**2
+        rows = np.arange(STRIDE - 1, len(qs) - 1, STRIDE)[:, None] + np.array([-1, 0, 1])
+        middles = self._middles(qs)
+        felt = _WEIGHTS @ middles[rows] / time**2
         acceleration = felt.copy()
         felt[:, 2] += GRAVITY
         pull = np.linalg.norm(felt, axis=1)
@@ -64,7 +82,7 @@ class Inertia:
         rows, direction = rows[chosen], felt[chosen] / pull[chosen, None]
         moved = qs[rows][:, :, None] + _DIFFERENCE * np.eye(JOINTS)
         there = self._middles(moved.reshape(-1, JOINTS)).reshape(*moved.shape[:3], 3)
-        jacobian = (there - self._middles(qs)[rows][:, :, None]) / _DIFFERENCE
+        jacobian = (there - middles[rows][:, :, None]) / _DIFFERENCE
         slopes = -METRES / time**2 * np.einsum("k,rkjx,rx->rkj", _WEIGHTS, jacobian, direction)
         # The same positions in more time: accelerations fall with its square.
         growth = 2 * METRES * np.einsum("rx,rx->r", direction, acceleration[chosen]) / (SAMPLES * time)
@@ -74,34 +92,6 @@ class Inertia:
         """Return the middle of the load at joint positions `(N, 7)` as `(N, 3)` [m]."""
         tips, axes = self._kinematics.tips(qs)
         return np.asarray(tips + self._middle * axes)
-
-
-def _pull(load: Load) -> float:
-    """Return what the seal may be asked to bear, for each kilogram of the load [m/s²]."""
-    return load.bears / SAFETY / load.kind.mass
-
-
-def affordable(trajectory: Trajectory, load: Load, kinematics: Kinematics) -> float:
-    """Return the share of its accelerations at which a motion keeps the seal's safety factor, 1 at most.
-
-    The seal bears the load's weight and inertia, `m |a + g|`, at the load's middle.
-    """
-    pull = _pull(load)
-    tips, axes = kinematics.tips(trajectory.samples.q)
-    middle = tips + load.kind.height / 2 * axes
-    if len(middle) < 4:
-        return 1.0
-    # The last sample is not a whole step after the one before.
-    acceleration = np.diff(middle[:-1], n=2, axis=0) / STEP**2
-    return float(np.min(_shares(acceleration, pull)))
-
-
-def gentle_rate(trajectory: Trajectory, load: Load, kinematics: Kinematics) -> float:
-    """Return the rate, 1 at most, at which a motion keeps the seal's safety factor, or what comes nearest.
-
-    Flown at a rate, accelerations are as its square.
-    """
-    return math.sqrt(max(affordable(trajectory, load, kinematics), GENTLEST))
 
 
 def _shares(acceleration: Array, pull: float) -> Array:

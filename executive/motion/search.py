@@ -5,61 +5,38 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
 
 from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
-from executive.errors import Fault, Unreachable
+from executive.errors import Unreachable
 from executive.geometry import Array, tool_down
 from executive.layout import travel_height
-from executive.messages import Load
 from executive.motion.detour import Detour, Gap
 from executive.motion.free import Connector, NoProfile
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.line import SAMPLES, Line
 from executive.motion.postures import line_chain, upright_line
-from executive.motion.seal import Inertia, gentle_rate
+from executive.motion.seal import Hold
 from executive.motion.state import Piece, State
 from executive.motion.surroundings import Surroundings, hanging
 from executive.motion.trajectory import Trajectory, over
-from executive.motion.transcription import SAMPLES as PER_STEP
-from executive.motion.transcription import STEPS
+from executive.motion.transcription import PLACES
 from executive.motion.ways import Way, ways_down
 
 WAYS = 3
 """Ends of a motion that are tried."""
 FIRST, REST = 4, 8
-"""Steps by which the detour to each of them is improved, and the best one after that."""
+"""Steps by which the detour to each of them is improved, and one after that before it is flown."""
 LIFTS = (0.0, 0.05, 0.10)
 """Heights above travel height at which a motion that stops at every corner is tried [m]."""
 LOOSE = 5e-4
 """Way straight up by which a load comes loose from what it lies on [m]."""
-PLACES = np.arange(1, STEPS * PER_STEP) / (STEPS * PER_STEP)
-"""Shares of a motion's duration at which its distances are looked at."""
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """A motion that may be the one.
-
-    Attributes:
-        cost: Its duration, and what it is too near to something in seconds.
-        free: Its pieces up to the straight one at the end.
-        arrival: That one, or none.
-    """
-
-    cost: float
-    free: tuple[Piece, ...]
-    arrival: tuple[Piece, ...]
-
-    @property
-    def pieces(self) -> tuple[Piece, ...]:
-        """All of it."""
-        return self.free + self.arrival
+POINTS_DOWN = 0.99
+"""Least cosine between the tool's axis and straight down at which a motion may rise before it goes across."""
 
 
 class Search:
@@ -92,29 +69,22 @@ class Search:
         self._discs = hanging(config, task.load)
         if not isinstance(end, Goal) and task.load is None:
             self._discs = self._discs._replace(upright=-1.0)  # from any posture the arm must find home
-        self._load = task.load
-        self._inertia = Inertia(task.load, kinematics) if task.load else None
-        place = kinematics.tips(end[None])[0][0] if not isinstance(end, Goal) else np.array(end.position)
-        if isinstance(end, Goal):
-            place[2] += end.guarded
-        tips, axes = kinematics.tips(start[None])
-        self._surroundings = Surroundings(config, task.around, np.array([tips[0, :2], place[:2]]))
-        ends = np.concatenate([axes, [[0.0, 0.0, -1.0]]])
-        self._surroundings.relax(np.concatenate([tips, place[None]]), ends, self._discs)
+        self._hold = Hold(task.load, kinematics) if task.load else None
+        tips, axes = map(np.concatenate, zip(kinematics.tips(start[None]), self._arrival(), strict=True))
+        self._surroundings = Surroundings(config, task.around, tips[:, :2])
+        self._surroundings.relax(tips, axes, self._discs)
         self._rises: dict[tuple[float, bool], tuple[list[Piece], State]] = {}
         self._departure = self._depart(start, float(tips[0, 2]))
         self._start = self._departure.at(self._departure.duration) if self._departure else State.rest(start)
 
-    def candidates(self) -> Iterator[Candidate]:
-        """Yield motions, best first: direct ones and arches, then such as stop at every corner."""
+    def candidates(self) -> Iterator[Trajectory]:
+        """Yield motions, best first: direct ones and detours, then such as stop at every corner."""
         ways = list(islice(self._ways(), WAYS))
         yield from self._flights(ways)
         for lift in LIFTS:
             for way in ways:
-                try:
-                    yield self._candidate(math.inf, way, *self._corners(way, lift, straight=True))
-                except (Unreachable, NoProfile):
-                    continue
+                with contextlib.suppress(Unreachable, NoProfile):
+                    yield self._motion(way, *self._corners(way, lift, straight=True))
 
     def require_clear(self, qs: Array) -> None:
         """Make sure that states `(N, 7)` [rad] keep away from things, and from where things may be.
@@ -124,6 +94,13 @@ class Search:
         """
         self._surroundings.require_clear(*self._kinematics.tips(qs), self._discs)
 
+    def _arrival(self) -> tuple[Array, Array]:
+        """Return the tool centre point and the tool's axis, `(1, 3)` each, where the free part ends [m]."""
+        if not isinstance(self._end, Goal):
+            return self._kinematics.tips(self._end[None])
+        x, y, z = self._end.position
+        return np.array([[x, y, z + self._end.guarded]]), np.array([[0.0, 0.0, -1.0]])
+
     def _ways(self) -> Iterator[Way]:
         if not isinstance(self._end, Goal):
             yield Way(0.0, State.rest(self._end), None, None)
@@ -131,67 +108,66 @@ class Search:
         length = self._end.guarded or self._straight
         yield from ways_down(self._kinematics, self._limits, self._start, self._end, length)
 
-    def _flights(self, ways: Sequence[Way]) -> Iterator[Candidate]:
+    def _flights(self, ways: Sequence[Way]) -> Iterator[Trajectory]:
         """Yield direct motions where they are clear, and detours over what is in between elsewhere."""
         direct, detours = self._tried(ways)
-        for _, detour in detours[:1]:
-            detour.improve(REST)
-        direct.sort(key=lambda candidate: candidate.cost)
         for number, (way, detour) in enumerate(detours):
-            while direct and direct[0].cost <= detour.cost + way.tail:
-                yield direct.pop(0)
+            if number == 0:
+                detour.improve(REST)
+            while direct and direct[0][0] <= detour.cost + way.tail:
+                yield direct.pop(0)[1]
             if number:
                 detour.improve(REST)
-            yield from self._flown(way, detour)
-        yield from direct
+            flown = self._flown(way, detour)
+            yield from flown if self._hold is None else sorted(flown, key=self._gentle_time)
+        yield from (motion for _, motion in direct)
 
-    def _flown(self, way: Way, detour: Detour) -> list[Candidate]:
-        """Return the motions over a detour, first the one that takes less time as gently as a seal asks."""
-        flights = []
+    def _flown(self, way: Way, detour: Detour) -> Iterator[Trajectory]:
+        """Yield the motions over a detour."""
         for exactly in (False, True):
             with contextlib.suppress(NoProfile):
-                flights.append(self._candidate(detour.cost + way.tail, way, *detour.fly(exactly)))
-        if (load := self._load) is not None:
-            flights.sort(key=lambda flight: self._gentle_time(flight, load))
-        return flights
+                yield self._motion(way, *detour.fly(exactly))
 
-    def _gentle_time(self, candidate: Candidate, load: Load) -> float:
-        """Return how long a motion takes when it is as slow as a load's seal asks for [s]."""
-        try:
-            trajectory = Trajectory(candidate.pieces)
-        except Fault:  # of which its check will tell
-            return math.inf
-        return trajectory.duration / gentle_rate(trajectory, load, self._kinematics)
+    def _gentle_time(self, motion: Trajectory) -> float:
+        """Return how long a motion takes when it is as slow as the seal asks for [s]."""
+        return motion.duration / (self._hold.rate(motion) if self._hold else 1.0)
 
-    def _tried(self, ways: Sequence[Way]) -> tuple[list[Candidate], list[tuple[Way, Detour]]]:
-        """Return the direct motions that are clear, and detours a few steps on, the fastest first."""
-        direct: list[Candidate] = []
+    def _tried(self, ways: Sequence[Way]) -> tuple[list[tuple[float, Trajectory]], list[tuple[Way, Detour]]]:
+        """Return the direct motions that are clear, with their times [s], and detours a few steps on.
+
+        Both begin with the fastest.
+        """
+        direct: list[tuple[float, Trajectory]] = []
         detours: list[tuple[Way, Detour]] = []
         for way in ways:
-            least = [candidate.cost for candidate in direct] + [d.cost + w.tail for w, d in detours]
+            least = [time for time, _ in direct] + [d.cost + w.tail for w, d in detours]
             if min(least, default=math.inf) <= way.estimate + way.tail:
                 break
             gap = Gap(
                 self._start, way.entry, self._connector, self._kinematics, self._surroundings,
-                self._discs, self._inertia,
+                self._discs, self._hold,
             )  # fmt: skip
             with contextlib.suppress(NoProfile, Unreachable):
                 free = self._connector.connect(self._start, way.entry)
                 if gap.slack(free.over(PLACES * free.duration).q).min() >= 0:
-                    direct.append(self._candidate(free.duration + way.tail, way, free))
+                    direct.append((free.duration + way.tail, self._motion(way, free)))
                     continue
                 corners = self._corners(way, LIFTS[0], straight=False)
                 duration = sum(piece.duration for piece in corners)
                 detour = Detour(gap, over(corners, PLACES * duration).q, duration)
                 detour.improve(FIRST)
                 detours.append((way, detour))
+        direct.sort(key=lambda pair: pair[0])
         detours.sort(key=lambda pair: pair[1].cost + pair[0].tail)
         return direct, detours
 
-    def _candidate(self, cost: float, way: Way, *free: Piece) -> Candidate:
-        first = (self._departure,) if self._departure else ()
-        last = (way.arrival,) if way.arrival else ()
-        return Candidate(cost, (*first, *free), last)
+    def _motion(self, way: Way, *free: Piece) -> Trajectory:
+        """Return a motion whose free part is `free`, the straight ends put to it."""
+        pieces = (self._departure, *free) if self._departure else free
+        guarded = math.inf
+        if isinstance(self._end, Goal) and self._end.guarded > 0:
+            guarded = sum(piece.duration for piece in pieces)
+        return Trajectory((*pieces, way.arrival) if way.arrival else pieces, guarded)
 
     def _corners(self, way: Way, lift: float, *, straight: bool) -> list[Piece]:
         """Return motions that stop above their start and above their goal: slow, and clear if any are.
@@ -229,7 +205,7 @@ class Search:
 
     def _tip(self, q: Array) -> tuple[Array, bool]:
         tips, axes = self._kinematics.tips(q[None])
-        return tips[0], bool(-axes[0, 2] > 0.99)
+        return tips[0], bool(-axes[0, 2] > POINTS_DOWN)
 
     def _above(self, place: tuple[float, float, float], branch: int, swivel: float, near: Array) -> State:
         """Return the state of rest at a place in a posture, joint 7 as at `near` `(7,)` [rad]."""
@@ -243,12 +219,12 @@ class Search:
         The cell may ask for one. A load goes straight up, too, where its seal and not the arm limits how fast
         it is lifted: pressed on what it lies on or dragged over it, by micrometres only, it would tear off.
         """
-        length = self._straight or (LOOSE if self._inertia else 0.0)
+        length = self._straight or (LOOSE if self._hold else 0.0)
         if not length or height + length > self._height:
             return None
         chain = upright_line(self._kinematics, start, length, SAMPLES)
         if chain is None:
             return None
-        borne = self._inertia.lift if self._inertia else math.inf
+        borne = self._hold.lift if self._hold else math.inf
         line = Line(chain, length, self._limits, acceleration=borne, leaves=True)
         return line if self._straight or line.acceleration >= borne else None

@@ -36,6 +36,8 @@ PRESSED = 2e-4
 """How far a load may be pressed into what it lies on, in passing [m]."""
 SLANT = 0.1
 """Metres of distance that a tool axis counts for whose cosine is by 1 too small."""
+TILTED = 0.003
+"""How much farther than that, as a distance, the tool may tilt in passing [m]."""
 UPRIGHT, UPRIGHT_LOADED = 0.5, 0.8
 """Least cosine between the tool's axis and straight down, empty and with a load."""
 
@@ -147,7 +149,7 @@ class Surroundings:
         Raises:
             Blocked: One does not; the text names the thing and where.
         """
-        if (upright := _uprightness(axes, discs)).min() < -TOLERANCE:
+        if (upright := _uprightness(axes, discs)).min() < -TILTED:
             at = int(np.argmin(upright))
             raise Blocked(f"the motion would tilt the tool too far{_at(tips[at])}")
         # To what may be there the margin need not be kept; nothing may be pressed into table or floor.
@@ -212,11 +214,11 @@ def _uprightness(axes: Array, discs: Discs) -> Array:
 
 
 def _prisms(config: CellConfig, around: Sequence[Obstacle]) -> Prisms:
-    rows: list[tuple[float, float, float, float, float, float, bool, str]] = []
+    rows: list[tuple[float, float, float, float, float, float, bool, bool, str]] = []
     widest = max(kind.radius for kind in config.objects.values())
     (x0, x1), (y0, y1) = config.table.x, config.table.y
-    rows.append((x0, x1, y0, y1, widest, pile_height(config), True, "what may lie on the workspace"))
-    rows.append((-2.0, 2.0, -2.0, 2.0, 0.0, 0.0, False, "the table"))
+    rows.append((x0, x1, y0, y1, widest, pile_height(config), True, False, "what may lie on the workspace"))
+    rows.append((-2.0, 2.0, -2.0, 2.0, 0.0, 0.0, False, True, "the table"))
     for name, bin in config.bins.items():
         (x, y, floor), (length, width, height), t = bin.position, bin.size, BIN_THICKNESS
         left, right, front, back = x - length / 2, x + length / 2, y - width / 2, y + width / 2
@@ -225,11 +227,9 @@ def _prisms(config: CellConfig, around: Sequence[Obstacle]) -> Prisms:
             (left - t, left, front - t, back + t), (right, right + t, front - t, back + t),
             (left, right, front - t, front), (left, right, back, back + t),
         ):  # fmt: skip
-            rows.append((*wall, 0.0, top, False, name))
-        rows.append((left, right, front, back, 0.0, floor + t, False, f"the floor of {name}"))
-    rows += [(o.x, o.x, o.y, o.y, o.radius + TOLERANCE, o.top, False, o.name) for o in around]
-    table = np.array([row[:7] for row in rows])
-    names = tuple(row[7] for row in rows)
-    flat = np.array([name.startswith(("the table", "the floor")) for name in names])
+            rows.append((*wall, 0.0, top, False, False, name))
+        rows.append((left, right, front, back, 0.0, floor + t, False, True, f"the floor of {name}"))
+    rows += [(o.x, o.x, o.y, o.y, o.radius + TOLERANCE, o.top, False, False, o.name) for o in around]
+    table, names = np.array([row[:8] for row in rows]), tuple(row[8] for row in rows)
     corners = table[:, [0, 2]], table[:, [1, 3]]
-    return Prisms(*corners, table[:, 4], table[:, 5], table[:, 6] > 0, flat, names)
+    return Prisms(*corners, table[:, 4], table[:, 5], table[:, 6] > 0, table[:, 7] > 0, names)

@@ -13,6 +13,7 @@ import numpy as np
 
 from executive.errors import Fault, Unreachable
 from executive.geometry import Array
+from executive.motion.free import NoProfile
 from executive.motion.limits import JointLimits
 from executive.motion.state import JOINTS, Piece, State
 
@@ -84,20 +85,29 @@ class Trajectory:
 
         Raises:
             Unreachable: One would leave its range; the text names it.
-            Fault: One would be too fast, or accelerated too much or too suddenly: a planner's mistake.
+            NoProfile: One would be too fast, or accelerated too much or too suddenly.
         """
         states = self.samples
         # Ruckig's `position_extrema` are too small where a joint turns back (pantor/ruckig issue 215).
-        q, qd, qdd = states
-        _require_inside(np.abs(q).max(axis=0), limits)
-        jerk = np.diff(qdd, axis=0) / STEP
-        peaks = {"velocity": qd, "acceleration": qdd, "jerk": jerk[:-1]}
-        for name, values in peaks.items():
-            share = np.abs(values).max(axis=0, initial=0.0) / getattr(limits, name)
+        _require_inside(np.abs(states.q).max(axis=0), limits)
+        for name, share in zip(("velocity", "acceleration", "jerk"), peaks(states, limits), strict=True):
             joint = int(np.argmax(share))
             if share[joint] > 1 + _ROUNDING:
-                raise Fault(f"the {name} of joint {joint + 1} would be {share[joint]:.3f} times its limit")
+                raise NoProfile(
+                    f"the {name} of joint {joint + 1} would be {share[joint]:.3f} times its limit"
+                )
         return states
+
+
+def peaks(states: State, limits: JointLimits) -> Array:
+    """Return each joint's largest velocity, acceleration and jerk over its limit `(3, 7)`.
+
+    The states are a motion's samples, every `STEP`. The last one is not a whole step after the one before,
+    so no jerk is taken from it.
+    """
+    jerk = np.diff(states.qdd, axis=0)[:-1] / STEP
+    shares = (states.qd / limits.velocity, states.qdd / limits.acceleration, jerk / limits.jerk)
+    return np.array([np.abs(share).max(axis=0, initial=0.0) for share in shares])
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,6 +28,8 @@ STEPS = 8
 """Steps of time of a motion."""
 SAMPLES = 16
 """Places per step at which distances are looked at."""
+PLACES = np.arange(1, STEPS * SAMPLES) / (STEPS * SAMPLES)
+"""Shares of a motion's duration at which those are `(M,)`."""
 LESS = 0.98, 0.995, 0.995
 """Share of the velocity, acceleration, jerk limits that is used.
 
@@ -271,7 +273,7 @@ def _grid() -> _Grid:
         velocity[k + 1], position[k + 1] = velocity[k], position[k] + velocity[k]
         velocity[k + 1, k : k + 2] += 1 / 2
         position[k + 1, k : k + 2] += 1 / 3, 1 / 6
-    times = np.arange(1, STEPS * SAMPLES) / SAMPLES
+    times = np.asarray(STEPS * PLACES)
     before = times.astype(int)
     into = times - before
     place = position[before] + into[:, None] * velocity[before]

@@ -11,7 +11,6 @@ import pytest
 from executive.arm import Goal
 from executive.campaign.motion_article import CYCLE, MOTION, article_peaks
 from executive.campaign.motion_rivals import Textbook, floor, textbook, toppra
-from executive.campaign.motion_trial import peaks
 from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.geometry import Array
@@ -19,6 +18,7 @@ from executive.layout import travel_height
 from executive.motion.planner import Planner
 from executive.motion.postures import find_postures
 from executive.motion.timing import rest_to_rest
+from executive.motion.trajectory import peaks
 
 TOUCH, DROP = Goal((0.5, 0.1, 0.051)), Goal((0.24, -0.48, 0.065))
 STAND = Goal((0.24, 0.48, 0.065))
@@ -62,7 +62,7 @@ def test_who_stops_at_every_corner_takes_the_sum_of_its_moves_and_uses_its_limit
     ride = way.stopping(limits)
     moves = np.concatenate([np.diff(way.fetch, axis=0), np.diff(way.carry, axis=0)])
     assert ride.time == pytest.approx(rest_to_rest(moves, limits).sum(), abs=1e-6)
-    assert np.max([peaks(states, limits) for states in ride.states], axis=0) == pytest.approx(
+    assert np.max([peaks(states, limits).max(axis=1) for states in ride.states], axis=0) == pytest.approx(
         [1, 1, 1], abs=1e-3
     )
 
@@ -84,7 +84,7 @@ def test_toppra_passes_the_corners_inside_velocity_but_knows_no_jerk(place):
     duration, states = toppra(way.fetch, limits)
     for corner in way.fetch:
         assert np.abs(states.q - corner).max(axis=1).min() < 0.02
-    velocity, acceleration, jerk = peaks(states, limits)
+    velocity, acceleration, jerk = peaks(states, limits).max(axis=1)
     assert velocity <= 1.02 and acceleration < 1.5 and jerk > 5
     assert len(states.q) == pytest.approx(duration * 240, abs=2)
 

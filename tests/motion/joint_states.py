@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import strategies as st
 
+from executive.geometry import Array
+from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.state import Piece, State
 
@@ -15,7 +17,6 @@ LIMITS = JointLimits(
     jerk=np.array([85.7, 85.7, 87.4, 113.6, 122.3, 157.2, 157.2]),
     stop_acceleration=np.full(7, 20.0),
     stop_jerk=np.full(7, 300.0),
-    source="the tests",
 )
 """Of an iiwa 14, for tests whose examples hypothesis finds."""
 
@@ -49,3 +50,10 @@ def peaks(states: State, limits: JointLimits, spacing: float = SOONER) -> tuple[
     pairs = (states.qd, limits.velocity), (states.qdd, limits.acceleration), (jerk, limits.jerk)
     v, a, j = (float(np.max(np.abs(values) / limit, initial=0.0)) for values, limit in pairs)
     return v, a, j
+
+
+def tool_velocities(kinematics: Kinematics, states: State) -> Array:
+    """The tool centre point's velocities `(N, 3)` [m/s] in states, each array of shape `(N, 7)`."""
+    h = 1e-6
+    ahead, behind = (kinematics.tips(states.q + step * states.qd)[0] for step in (h, -h))
+    return (ahead - behind) / (2 * h)

@@ -13,13 +13,12 @@ from executive.geometry import Array, tool_down
 from executive.messages import Load, ObjectClass, Obstacle
 from executive.motion.detour import Detour, Gap
 from executive.motion.free import NoProfile
-from executive.motion.seal import Inertia, affordable
+from executive.motion.seal import Hold
 from executive.motion.state import State
 from executive.motion.surroundings import Surroundings, hanging
 from executive.motion.trajectory import Trajectory, over
-from executive.motion.transcription import SAMPLES, STEPS
+from executive.motion.transcription import PLACES
 
-PLACES = np.arange(1, STEPS * SAMPLES) / (STEPS * SAMPLES)
 POST = Obstacle(0.5, 0.0, 0.04, 0.22, "the post")
 LEFT, RIGHT, HIGH = (0.5, -0.2, 0.12), (0.5, 0.2, 0.12), 0.32
 KIND = ObjectClass("cube", 0.05, 0.0354, mass=0.1)
@@ -38,10 +37,8 @@ def over_the_post(config, kinematics, connector):
 
         corners = [state(*LEFT), state(*LEFT[:2], HIGH), state(*RIGHT[:2], HIGH), state(*RIGHT)]
         surroundings = Surroundings(config, (POST,), np.array([LEFT[:2], RIGHT[:2]]))
-        inertia = Inertia(load, kinematics) if load else None
-        gap = Gap(
-            corners[0], corners[-1], connector, kinematics, surroundings, hanging(config, load), inertia
-        )
+        hold = Hold(load, kinematics) if load else None
+        gap = Gap(corners[0], corners[-1], connector, kinematics, surroundings, hanging(config, load), hold)
         return gap, [connector.connect(a, b) for a, b in pairwise(corners)]
 
     return given
@@ -76,7 +73,7 @@ def test_a_weak_seal_is_part_of_the_search(over_the_post, kinematics) -> None:
     """What is found takes less time than the fastest way, slowed until the seal bears it."""
     weak = Load(KIND, 2.4)
     fastest, gentle = (Trajectory(improved(*over_the_post(load)).fly(exactly=True)) for load in (CUBE, weak))
-    share, wanted = (affordable(motion, weak, kinematics) for motion in (fastest, gentle))
+    share, wanted = (Hold(weak, kinematics).share(motion) for motion in (fastest, gentle))
     assert share < 0.85
     assert wanted > 0.95
     assert fastest.duration < gentle.duration < fastest.duration / math.sqrt(share)

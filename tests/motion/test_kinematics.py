@@ -89,14 +89,6 @@ def test_tips_are_where_the_tool_is_and_where_it_points() -> None:
         assert np.allclose(axis, X_WT.rotation[:, 2], atol=1e-12)
 
 
-def test_velocities_are_the_derivative_of_tips() -> None:
-    rng = np.random.default_rng(3)
-    qs, qds = rng.uniform(-LIMIT, LIMIT, (20, 7)), rng.normal(size=(20, 7))
-    h = 1e-6
-    measured = (ARM.tips(qs + h * qds)[0] - ARM.tips(qs - h * qds)[0]) / (2 * h)
-    assert np.abs(measured - ARM.velocities(qs, qds)).max() < 1e-6
-
-
 def test_a_pose_too_far_away_says_by_how_much() -> None:
     with pytest.raises(Unreachable, match=re.escape("0.080 m farther than the arm is long (0.82 m)")):
         ARM.solutions(tool_down([0.9, 0.0, 0.114]))

@@ -11,4 +11,3 @@ def test_limits_are_the_cell_files_in_radians(config, limits: JointLimits) -> No
     assert np.allclose(limits.acceleration, config.arm.limits.acceleration)
     assert np.all(limits.stop_acceleration > limits.acceleration)
     assert np.all(limits.stop_jerk > limits.jerk)
-    assert "data sheet" in limits.source

@@ -10,13 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from executive.messages import Load, ObjectClass
-from executive.motion.seal import GRAVITY, METRES, SAFETY, STRIDE, Inertia, affordable
+from executive.motion.seal import GRAVITY, METRES, SAFETY, STRIDE, Hold
 from executive.motion.state import State
-from executive.motion.trajectory import STEP, Trajectory
-from executive.motion.transcription import SAMPLES, STEPS
+from executive.motion.trajectory import Trajectory
+from executive.motion.transcription import PLACES, SAMPLES, STEPS
 
 KIND = ObjectClass("cube", 0.05, 0.035, mass=0.1)
-PLACES = np.arange(1, STEPS * SAMPLES) / (STEPS * SAMPLES)
 LENGTH = 1.0 / STEPS
 """Of a step of a course that sways [s]."""
 
@@ -62,31 +61,32 @@ def test_a_level_motion_may_use_what_the_seal_bears_beyond_the_weight(sway, kine
     most = strongest(sway, kinematics)
     wanted = 0.7
     bears = SAFETY * KIND.mass * math.hypot(GRAVITY, wanted * most)
-    assert affordable(sway, Load(KIND, bears), kinematics) == pytest.approx(wanted, rel=0.01)
+    assert Hold(Load(KIND, bears), kinematics).share(sway) == pytest.approx(wanted, rel=0.01)
 
 
 def test_a_seal_that_bears_it_all_costs_nothing(sway, kinematics) -> None:
-    assert affordable(sway, Load(KIND), kinematics) == 1.0
+    assert Hold(Load(KIND), kinematics).share(sway) == 1.0
     bears = SAFETY * KIND.mass * math.hypot(GRAVITY, 1.01 * strongest(sway, kinematics))
-    assert affordable(sway, Load(KIND, bears), kinematics) == 1.0
+    assert Hold(Load(KIND, bears), kinematics).share(sway) == 1.0
 
 
 @pytest.mark.parametrize("share", [0.25, 0.6, 0.9])
 def test_flown_at_the_root_of_the_share_a_motion_is_just_affordable(sway, kinematics, share: float) -> None:
     bears = SAFETY * KIND.mass * math.hypot(GRAVITY, share * strongest(sway, kinematics))
     load = Load(KIND, bears)
-    rate = math.sqrt(affordable(sway, load, kinematics))
-    assert affordable(sway.slowed(rate), load, kinematics) == pytest.approx(1.0, abs=0.01)
-    assert affordable(sway.slowed(1.1 * rate), load, kinematics) < 0.9
+    hold = Hold(load, kinematics)
+    rate = hold.rate(sway)
+    assert hold.share(sway.slowed(rate)) == pytest.approx(1.0, abs=0.01)
+    assert hold.share(sway.slowed(1.1 * rate)) < 0.9
 
 
 def test_a_seal_that_does_not_bear_the_weight_twice_affords_nothing(sway, kinematics) -> None:
-    assert affordable(sway, Load(KIND, 0.99 * SAFETY * KIND.mass * GRAVITY), kinematics) == 0.0
+    assert Hold(Load(KIND, 0.99 * SAFETY * KIND.mass * GRAVITY), kinematics).share(sway) == 0.0
 
 
 def test_a_motion_too_short_to_pull_at_anything_is_affordable(kinematics, connector, home) -> None:
     still = Trajectory([connector.connect(State.rest(home), State.rest(home))])
-    assert affordable(still, Load(KIND, 0.5), kinematics) == 1.0
+    assert Hold(Load(KIND, 0.5), kinematics).share(still) == 1.0
 
 
 @given(st.floats(1.0, 6.0), st.floats(0.05, 0.3), st.floats(0.05, 0.6))
@@ -96,21 +96,20 @@ def test_a_heavier_load_a_weaker_seal_and_a_wilder_motion_are_less_affordable(
 ) -> None:
     def share(bears: float, mass: float, angle: float) -> float:
         motion = Trajectory([Sway(home, angle)])
-        return affordable(motion, Load(ObjectClass("cube", 0.05, 0.035, mass=mass), bears), kinematics)
+        return Hold(Load(ObjectClass("cube", 0.05, 0.035, mass=mass), bears), kinematics).share(motion)
 
     here = share(bears, mass, angle)
     assert 0.0 <= here <= 1.0
     assert share(bears / 2, mass, angle) <= here
     assert share(bears, 2 * mass, angle) <= here
     assert share(bears, mass, 2 * angle) <= here
-    assert Sway.duration > STEP
 
 
-def test_a_demand_is_what_the_seal_bears_beyond_weight_and_inertia(sway, kinematics) -> None:
+def test_a_demand_is_what_the_seal_bears_beyond_weight_and_hold(sway, kinematics) -> None:
     """Of places STRIDE apart on a course, in centimetres for each metre per second squared."""
     bears = 3.0
     qs = np.array([sway.at(place).q for place in PLACES])
-    demand = Inertia(Load(KIND, bears), kinematics).demand(qs, LENGTH / SAMPLES, math.inf)
+    demand = Hold(Load(KIND, bears), kinematics).demand(qs, LENGTH / SAMPLES, math.inf)
     middle = demand.rows[:, 1]
     assert np.array_equal(np.diff(middle), np.full(len(middle) - 1, STRIDE))
     assert middle[0] < 2 * STRIDE
@@ -124,8 +123,8 @@ def test_a_demand_is_what_the_seal_bears_beyond_weight_and_inertia(sway, kinemat
 
 def test_what_is_far_from_its_bounds_is_left_out(sway, kinematics) -> None:
     qs = np.array([sway.at(place).q for place in PLACES])
-    inertia = Inertia(Load(KIND, 3.0), kinematics)
-    everything, near = (inertia.demand(qs, LENGTH / SAMPLES, far) for far in (math.inf, 0.048 * 2))
+    hold = Hold(Load(KIND, 3.0), kinematics)
+    everything, near = (hold.demand(qs, LENGTH / SAMPLES, far) for far in (math.inf, 0.048 * 2))
     chosen = everything.slack < 0.048 * 2
     assert 0 < np.sum(chosen) < len(chosen)
     for values, wanted in zip(near, everything, strict=True):
@@ -134,14 +133,14 @@ def test_what_is_far_from_its_bounds_is_left_out(sway, kinematics) -> None:
 
 def test_slopes_are_the_derivatives_of_a_demand_by_the_positions(sway, kinematics) -> None:
     qs = np.array([sway.at(place).q for place in PLACES])
-    inertia, h = Inertia(Load(KIND, 3.0), kinematics), 1e-6
-    demand = inertia.demand(qs, LENGTH / SAMPLES, math.inf)
+    hold, h = Hold(Load(KIND, 3.0), kinematics), 1e-6
+    demand = hold.demand(qs, LENGTH / SAMPLES, math.inf)
     for row in range(0, len(demand.slack), 5):
         for k, joint in np.ndindex(3, 7):
             there = [qs.copy(), qs.copy()]
             for moved, sign in zip(there, (1, -1), strict=True):
                 moved[demand.rows[row, k], joint] += sign * h
-            after, before = (inertia.demand(moved, LENGTH / SAMPLES, math.inf).slack[row] for moved in there)
+            after, before = (hold.demand(moved, LENGTH / SAMPLES, math.inf).slack[row] for moved in there)
             assert demand.slopes[row, k, joint] == pytest.approx(
                 (after - before) / (2 * h), rel=1e-2, abs=0.02
             )
@@ -149,9 +148,9 @@ def test_slopes_are_the_derivatives_of_a_demand_by_the_positions(sway, kinematic
 
 def test_growth_is_the_derivative_of_a_demand_by_the_length_of_a_step(sway, kinematics) -> None:
     qs = np.array([sway.at(place).q for place in PLACES])
-    inertia, h = Inertia(Load(KIND, 3.0), kinematics), 1e-6
+    hold, h = Hold(Load(KIND, 3.0), kinematics), 1e-6
     demand, after, before = (
-        inertia.demand(qs, (LENGTH + change) / SAMPLES, math.inf) for change in (0.0, h, -h)
+        hold.demand(qs, (LENGTH + change) / SAMPLES, math.inf) for change in (0.0, h, -h)
     )
     assert demand.growth.max() > 0.1
     assert demand.growth == pytest.approx((after.slack - before.slack) / (2 * h), rel=1e-4)

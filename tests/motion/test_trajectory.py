@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from joint_states import LIMITS, positions, states
 
 from executive.errors import Fault, Unreachable
-from executive.motion.free import Connector
+from executive.motion.free import Connector, NoProfile
 from executive.motion.state import State
 from executive.motion.trajectory import STEP, Trajectory, over, thinned
 
@@ -159,10 +159,10 @@ def test_leaving_a_joints_range_between_two_states_inside_it_is_seen(joint: int,
         ("jerk", "jerk of joint 5"),
     ],
 )
-def test_a_motion_outside_a_limit_is_a_fault_that_names_the_joint(limit: str, text: str) -> None:
+def test_a_motion_outside_a_limit_cannot_be_flown_and_the_text_names_the_joint(limit: str, text: str) -> None:
     less = getattr(LIMITS, limit).copy()
     less[4] *= 0.01
-    with pytest.raises(Fault, match=rf"the {text} would be \d+\.\d\d\d times its limit"):
+    with pytest.raises(NoProfile, match=rf"the {text} would be \d+\.\d\d\d times its limit"):
         by_way_of(MOVING).check(replace(LIMITS, **{limit: less}))
 
 

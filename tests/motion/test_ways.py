@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from joint_states import tool_velocities
 
 from executive.arm import Goal
 from executive.errors import Unreachable
@@ -57,9 +58,9 @@ def test_the_straight_part_begins_in_the_entry_and_ends_over_the_goal(ways, kine
             assert np.array_equal(one, other)
         tips, _ = kinematics.tips(np.array([way.entry.q, way.arrival.at(way.arrival.duration).q]))
         assert np.allclose(tips, [(*PLACE[:2], PLACE[2] + 0.02), PLACE], atol=1e-7)
-        assert np.linalg.norm(kinematics.velocities(way.entry.q[None], way.entry.qd[None])) == pytest.approx(
-            0.04, rel=1e-3
-        )
+        assert np.linalg.norm(
+            tool_velocities(kinematics, State(*np.array(way.entry)[:, None]))
+        ) == pytest.approx(0.04, rel=1e-3)
         assert way.posture is not None
         assert way.posture[0] == kinematics.branch(way.entry.q)
         assert wrapped(way.posture[1] - kinematics.swivel(way.entry.q)) == pytest.approx(0, abs=1e-6)
