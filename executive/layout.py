@@ -9,7 +9,7 @@ from executive.messages import Bin, ObjectClass
 
 TOOL_RADIUS = 0.012
 """Radius of the tool's body [m]."""
-LIP_LENGTH = 0.015
+NECK_LENGTH = 0.015
 """Length of the thin part at the tool's end, as wide as the cup [m]."""
 
 
@@ -24,7 +24,7 @@ def as_bin(name: str, config: BinConfig) -> Bin:
 
 
 def as_class(label: str, config: ObjectConfig) -> ObjectClass:
-    """Return what skills know of a class of objects of a cell file."""
+    """Return what skills know of a class of objects of a cell file; its mass is left at the default."""
     return ObjectClass(label, config.height, config.radius, config.ring)
 
 

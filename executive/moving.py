@@ -8,15 +8,19 @@ from collections.abc import Callable, Generator, Iterator
 from executive.arm import Arm, Goal, Motion, Task
 from executive.cell import Cell, Steps
 from executive.errors import Blocked, Unreachable
-from executive.messages import BIN_THICKNESS, Item, Load, Obstacle, Target
-from executive.skill import Skill
+from executive.geometry import Array
+from executive.messages import BIN_THICKNESS, Bin, Item, Load, ObjectClass, Obstacle, Target
+from executive.skill import Skill, SkillFailed
 
 PLANS = 3
 """Times that a motion is planned when what stands around changes meanwhile."""
 ROLLED = 0.002
 """How far an object in a bin may lie from where it was let go [m]."""
 DROP = 0.01
-"""Height above the floor at which the underside of an item is let go, unless a mission says otherwise [m]."""
+"""Height of an item's underside above a bin's floor, or the layer of objects there, when it is let go [m].
+
+A mission may say otherwise.
+"""
 OVERTRAVEL = 0.015
 """How far below the expected surface an approach feels, unless a mission says otherwise [m]."""
 SPACING = 0.0025
@@ -79,6 +83,49 @@ def follow(skill: Skill, cell: Cell, motion: Motion, until: Callable[[], bool] =
         raise skill.failed("blocked", arm.met)
 
 
+def carry(skill: Skill, cell: Cell, item: Item, goal: Goal, whither: str) -> Steps:
+    """Yield until `item` has been carried to `goal`, the tool's sensor watched all the way.
+
+    Args:
+        skill: Who carries.
+        cell: The work cell.
+        item: What the tool holds.
+        goal: Where to.
+        whither: The goal in words, for the text of an error.
+
+    Raises:
+        SkillFailed: There is no way, or the arm ran into something, and the tool holds the item still: the
+            reason is the skill's `unreachable` or `blocked`. Or the seal broke, for whatever cause: then the
+            arm is at rest, the tool open, the ledger told, and the reason is the skill's `dropped`.
+    """
+    try:
+        motion = yield from planned(skill, cell.arm, lambda: (goal, carrying(cell, item)))
+        yield from follow(skill, cell, motion, until=lambda: not cell.tool.holding)
+    except SkillFailed:
+        # Whatever else went wrong: what the tool no longer holds cannot be put down.
+        if cell.tool.holding:
+            raise
+    if not cell.tool.holding:
+        x, y, z = cell.arm.tool_pose.position
+        cell.tool.open()
+        cell.ledger.dropped(item)
+        raise skill.failed(
+            "dropped", f"the seal on {item} broke on the way to {whither}, near ({x:.2f}, {y:.2f}, {z:.2f}) m"
+        )
+
+
+def let_go(skill: Skill, cell: Cell, item: Item, wait: float) -> Steps:
+    """Switch the vacuum off and yield for `wait` [s]; afterwards the tool's sensor says that it is empty.
+
+    Raises:
+        SkillFailed: `item` still hangs on the tool; the reason is the skill's `stuck`.
+    """
+    cell.tool.open()
+    yield from cell.clock.sleep(wait)
+    if cell.tool.holding:
+        raise skill.failed("stuck", f"{item} hangs on the tool {wait:.2f} s after release")
+
+
 def around(cell: Cell, but: Item | None = None) -> tuple[Obstacle, ...]:
     """Return what stands in the cell beyond what its file says, the item `but` left out.
 
@@ -129,28 +176,74 @@ def approach(
             is felt there is the table.
         spacing: Of the spiral of further attempts [m].
     """
-    kind = cell.classes[target.label]
-    x, y, middle = (float(value) for value in target.position)
-    dx, dy = _aside(cell.ledger.attempts(target.item), kind.ring, spacing)
+    goal = onto(
+        cell.classes[target.label],
+        target.position,
+        cell.descent,
+        cell.descent_speed,
+        attempt=cell.ledger.attempts(target.item),
+        overtravel=overtravel,
+        spacing=spacing,
+    )
+    return goal, Task(around=around(cell, target.item), target=_standing(cell, target))
+
+
+def onto(
+    kind: ObjectClass,
+    position: Array,
+    descent: float,
+    descent_speed: float,
+    *,
+    attempt: int = 0,
+    overtravel: float = OVERTRAVEL,
+    spacing: float = SPACING,
+) -> Goal:
+    """Return the goal of an approach to an object.
+
+    Args:
+        kind: Its class.
+        position: Its centre `(3,)` [m].
+        descent: Length of the guarded part above its surface [m].
+        descent_speed: Tool speed of that part [m/s].
+        attempt: How many have failed before.
+        overtravel: See `approach`.
+        spacing: See `approach`.
+    """
+    x, y, middle = (float(value) for value in position)
+    dx, dy = _aside(attempt, kind.ring, spacing)
     surface = middle + kind.height / 2
     lowest = max(surface - overtravel, middle)
-    guarded = surface + cell.descent - lowest
-    goal = Goal((x + dx, y + dy, lowest), guarded=guarded, speed=cell.descent_speed)
-    return goal, Task(around=around(cell, target.item), target=_standing(cell, target))
+    return Goal((x + dx, y + dy, lowest), guarded=surface + descent - lowest, speed=descent_speed)
 
 
 def into(cell: Cell, bin: str, item: Item, drop: float = DROP) -> Goal:
     """Return the goal of a transit: over the next free slot of a bin, `drop` [m] above what is there."""
-    box, height = cell.bins[bin], cell.classes[cell.ledger.label(item)].height
-    layer, place = divmod(slots_taken(cell, bin, item), len(box.slots))
-    x, y = (float(value) for value in box.slots[place])
-    return Goal((x, y, _layer(cell, bin, layer) + height + drop))
+    height = cell.classes[cell.ledger.label(item)].height
+    return over(cell.bins[bin], slots_taken(cell, bin, item), height, _tallest(cell), drop)
 
 
-def _layer(cell: Cell, bin: str, layer: int) -> float:
+def over(bin: Bin, number: int, height: float, tallest: float, drop: float = DROP) -> Goal:
+    """Return the goal of a transit over a slot of a bin.
+
+    Args:
+        bin: The bin.
+        number: Of the slot; from the number of slots on, those of the next layer.
+        height: Of what is carried [m].
+        tallest: Height of the tallest objects that may lie in a layer below [m].
+        drop: Of the underside above that layer, or the floor [m].
+    """
+    layer, place = divmod(number, len(bin.slots))
+    x, y = (float(value) for value in bin.slots[place])
+    return Goal((x, y, _level(bin, layer, tallest) + height + drop))
+
+
+def _tallest(cell: Cell) -> float:
+    return max(kind.height for kind in cell.classes.values())
+
+
+def _level(bin: Bin, layer: int, tallest: float) -> float:
     """Return the height on which a layer of objects in a bin lies at most [m]; layer 0 is on the floor."""
-    tallest = max(kind.height for kind in cell.classes.values())
-    return float(cell.bins[bin].position[2]) + BIN_THICKNESS + layer * tallest
+    return float(bin.position[2]) + BIN_THICKNESS + layer * tallest
 
 
 def _aside(attempt: int, ring: float, spacing: float) -> tuple[float, float]:
@@ -172,11 +265,11 @@ def _standing(cell: Cell, target: Target) -> Obstacle:
 
 def _filled(cell: Cell, but: Item | None) -> Iterator[Obstacle]:
     """Yield what stands on the slots of bins that were used, the item `but` left out."""
-    widest = max(kind.radius for kind in cell.classes.values())
+    widest, tallest = max(kind.radius for kind in cell.classes.values()), _tallest(cell)
     for name, box in cell.bins.items():
         count, slots = slots_taken(cell, name, but), len(box.slots)
         for number, (x, y) in enumerate(box.slots[:count]):
-            top = _layer(cell, name, (count - 1 - number) // slots + 1)
+            top = _level(box, (count - 1 - number) // slots + 1, tallest)
             yield Obstacle(
                 float(x), float(y), widest + ROLLED, top, f"what lies in slot {number + 1} of {name}"
             )

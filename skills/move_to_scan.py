@@ -1,4 +1,4 @@
-"""Bring the arm where the camera sees the whole workspace."""
+"""Bring the arm into a pose, mostly for a look."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from executive.skill import Skill, param
 
 
 class MoveToScan(Skill):
-    """Stand where the camera sees the whole workspace.
+    """Bring the arm to rest in a pose of the cell, for a look or out of the way.
 
-    Succeeds when the arm is at rest and the workspace is in view; at once where it already is, unless a
-    pose is asked for.
+    With `auto` it stays where it is if the camera sees the whole workspace already. What is in view after a
+    motion is not asked; that the scan poses of a simulated cell show the whole workspace, `executive check`
+    makes sure.
     """
 
     pose: str = param(

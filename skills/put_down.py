@@ -8,21 +8,24 @@ from typing import Any, ClassVar
 from executive.arm import Goal
 from executive.cell import Cell, LeastTimes, Steps
 from executive.messages import Item
-from executive.moving import carrying, follow, planned
+from executive.moving import carry, let_go
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, param, port
 
 
 class PutDown(Skill):
-    """Put the held item down on the cell's safe place, where the next look finds it."""
+    """Put the held item down on the cell's safe place, where the next look finds it.
+
+    The tool's sensor is watched all the way.
+    """
 
     held: In[Item] = port(refers="item", doc="the item in the tool")
     drop: Metres = param(0.005, ge=0, le=0.05, doc="height of the item's underside above the table")
     settle: Seconds = param(0.10, ge=0, le=2, doc="time given to the vacuum to vanish")
-    reasons: ClassVar = ("unreachable", "blocked", "stuck")
+    reasons: ClassVar = ("unreachable", "blocked", "dropped", "stuck")
     uses: ClassVar = ("arm", "tool")
     moves: ClassVar = True
     tool_state: ClassVar = (HOLDING, EMPTY)
-    tool_left: ClassVar = {"halt": ANY}
+    tool_left: ClassVar = {"dropped": EMPTY, "halt": ANY}
 
     @classmethod
     def shortest(cls, least: LeastTimes, given: Mapping[str, Any]) -> float:
@@ -35,10 +38,6 @@ class PutDown(Skill):
         x, y, floor = (float(value) for value in cell.safe_place)
         kind = cell.classes[cell.ledger.label(self.held)]
         goal = Goal((x, y, floor + kind.height + self.drop))
-        motion = yield from planned(self, cell.arm, lambda: (goal, carrying(cell, self.held)))
-        yield from follow(self, cell, motion)
-        cell.tool.open()
-        yield from cell.clock.sleep(self.settle)
-        if cell.tool.holding:
-            raise self.failed("stuck", f"{self.held} hangs on the tool {self.settle:.2f} s after release")
+        yield from carry(self, cell, self.held, goal, "the safe place")
+        yield from let_go(self, cell, self.held, self.settle)
         cell.ledger.returned(self.held)

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from executive.cell import Cell, LeastTimes, Steps
 from executive.messages import Item
+from executive.moving import let_go
 from executive.skill import ANY, EMPTY, HOLDING, In, Out, Seconds, Skill, param, port
 
 
@@ -30,9 +31,6 @@ class Release(Skill):
 
     def run(self, cell: Cell) -> Steps:
         """Switch the vacuum off and ask the sensor."""
-        cell.tool.open()
-        yield from cell.clock.sleep(self.settle)
-        if cell.tool.holding:
-            raise self.failed("stuck", f"{self.held} hangs on the tool {self.settle:.2f} s after release")
+        yield from let_go(self, cell, self.held, self.settle)
         cell.ledger.placed(self.held, self.bin)
         self.placed = self.held

@@ -7,12 +7,12 @@ from typing import Any, ClassVar
 
 from executive.cell import Cell, LeastTimes, Steps
 from executive.messages import Item
-from executive.moving import DROP, carrying, follow, into, planned
-from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Skill, SkillFailed, param, port
+from executive.moving import DROP, carry, into
+from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Skill, param, port
 
 
 class Transit(Skill):
-    """Hang the held item over a free slot of a bin, just above the floor.
+    """Hang the held item over a free slot of a bin, just above its floor or the layer of objects there.
 
     One motion: up from where it lies, across above every wall, and down inside, as gently as the
     seal needs for a safety factor of two. The tool's sensor is watched all the way.
@@ -20,7 +20,12 @@ class Transit(Skill):
 
     held: In[Item] = port(refers="item", doc="the item in the tool")
     bin: In[str] = port(refers="bin", doc="where to")
-    drop: Metres = param(DROP, ge=0.005, le=0.1, doc="height of the item's underside above the floor")
+    drop: Metres = param(
+        DROP,
+        ge=0.005,
+        le=0.1,
+        doc="height of the item's underside above the floor, or the layer of objects there",
+    )
     reasons: ClassVar = ("unreachable", "blocked", "dropped")
     uses: ClassVar = ("arm", "tool")
     moves: ClassVar = True
@@ -35,18 +40,4 @@ class Transit(Skill):
     def run(self, cell: Cell) -> Steps:
         """Plan the whole way, then follow it as long as the seal holds."""
         goal = into(cell, self.bin, self.held, self.drop)
-        motion = yield from planned(self, cell.arm, lambda: (goal, carrying(cell, self.held)))
-        try:
-            yield from follow(self, cell, motion, until=lambda: not cell.tool.holding)
-        except SkillFailed:
-            # Whatever the arm ran into: what it no longer holds cannot be put down.
-            if cell.tool.holding:
-                raise
-        if not cell.tool.holding:
-            x, y, z = cell.arm.tool_pose.position
-            cell.tool.open()
-            cell.ledger.dropped(self.held)
-            raise self.failed(
-                "dropped",
-                f"the seal on {self.held} broke on the way to {self.bin}, near ({x:.2f}, {y:.2f}, {z:.2f}) m",
-            )
+        yield from carry(self, cell, self.held, goal, self.bin)

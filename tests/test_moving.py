@@ -6,8 +6,19 @@ import numpy as np
 import pytest
 
 from executive.arm import Goal, Task
-from executive.messages import BIN_THICKNESS, Obstacle, Target
-from executive.moving import approach, around, carrying, heeding, into, planned, slots_taken
+from executive.messages import BIN_THICKNESS, ObjectClass, Obstacle, Target
+from executive.moving import (
+    DROP,
+    approach,
+    around,
+    carrying,
+    heeding,
+    into,
+    onto,
+    over,
+    planned,
+    slots_taken,
+)
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
@@ -117,6 +128,27 @@ def test_the_goal_of_an_approach_lies_below_the_surface_and_the_last_part_is_slo
     assert goal.position == pytest.approx((0.5, 0.0, 0.035))
     assert goal.position[2] + goal.guarded == pytest.approx(0.05 + fake.cell.descent)
     assert goal.speed == fake.cell.descent_speed
+
+
+def test_an_approach_never_feels_below_the_middle_of_what_it_is_to_touch() -> None:
+    washer = ObjectClass("washer", 0.006, 0.025, ring=0.017)
+    goal = onto(washer, np.array([0.5, 0.1, 0.013]), 0.02, 0.05)  # on another one
+    assert goal.position == pytest.approx((0.517, 0.1, 0.013))
+    assert (goal.guarded, goal.speed) == pytest.approx((0.003 + 0.02, 0.05))
+    further = onto(washer, np.array([0.5, 0.1, 0.013]), 0.02, 0.05, attempt=1, overtravel=0.001)
+    assert further.position[2] == pytest.approx(0.015)
+    assert np.hypot(further.position[0] - 0.5, further.position[1] - 0.1) == pytest.approx(0.017)
+
+
+def test_what_goes_onto_a_layer_hangs_as_far_above_it_as_the_first_ones_above_the_floor(
+    fake: FakeCell,
+) -> None:
+    box = fake.cell.bins["red_bin"]
+    first, second = (over(box, number, 0.05, tallest=0.07) for number in (1, len(box.slots) + 1))
+    floor = float(box.position[2]) + BIN_THICKNESS
+    assert first == Goal((*map(float, box.slots[1]), floor + 0.05 + DROP))
+    assert second.position == pytest.approx((*box.slots[1], floor + 0.07 + 0.05 + DROP))
+    assert over(box, 1, 0.05, 0.07, drop=0.03).position[2] == pytest.approx(floor + 0.05 + 0.03)
 
 
 def test_an_arm_that_runs_into_something_stops_and_the_whole_table_is_in_doubt(

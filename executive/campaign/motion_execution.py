@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections.abc import Callable
 
@@ -13,7 +12,7 @@ from executive.campaign.motion_gauge import Gauge
 from executive.campaign.motion_scenes import Scene, Scenes
 from executive.campaign.motion_trial import EVERY, Progress, opened, repeat, silent
 from executive.cell_config import CellConfig
-from executive.errors import Blocked, Fault, Unreachable
+from executive.errors import Blocked, Unreachable
 from executive.events import ignore
 from executive.geometry import Pose
 from executive.motion.planner import Planner
@@ -31,6 +30,11 @@ def execute(config: CellConfig, pairs: int, seed: int, progress: Progress = sile
     """Return what was seen while the arm made the motions of `pairs` random pairs, which a seed decides.
 
     An object is removed where it was let go, so the bins stay empty.
+
+    Raises:
+        InputError: The cell has no pairs to move between.
+        Unreachable, Blocked: The arm finds no way to where it begins.
+        Fault: The arm left its path.
     """
     with opened(config) as (world, planner):
         run = _Run(config, world, planner, seed)
@@ -58,23 +62,23 @@ class _Run:
         scene = self._scenes.next()
         try:
             self._fetch_and_carry(scene)
-        except (Blocked, Unreachable, Fault) as error:
+        except (Blocked, Unreachable) as error:
             self._failures.append(str(error))
-            self._settle()
         self._tool.open()
 
     def figures(self, pairs: int) -> ExecutionFigures:
         """Return what was seen."""
+        nearest = self._gauge.least
         return ExecutionFigures(
             pairs=pairs,
-            clearance=self._gauge.least.distance,
-            nearest=self._gauge.least.what,
+            clearance=nearest.distance if math.isfinite(nearest.distance) else None,
+            nearest=nearest.what,
             contacts=tuple(sorted(self._gauge.contacts)),
             slip=self._slip,
             missed=self._missed,
             drops=self._drops,
             tracking=self._tracking,
-            time=float(np.mean(self._times)) * STEP if self._times else math.nan,
+            time=float(np.mean(self._times)) * STEP if self._times else None,
             failures=tuple(self._failures),
         )
 
@@ -140,15 +144,6 @@ class _Run:
         """Return the pose of what is held in the tool's frame, or None."""
         held, world = self._tool.held_body, self._world
         return None if held is None else world.tool_pose().inverse() @ world.object_pose(held)
-
-    def _settle(self) -> None:
-        """Wait until the arm is at rest, whatever befell it."""
-        self._arm.stop()
-        resting = False
-        while not resting:
-            self._step()
-            with contextlib.suppress(Fault):
-                resting = self._arm.at_rest
 
     def _step(self) -> None:
         self._arm.advance()

@@ -12,7 +12,7 @@ from executive.campaign.motion_scenes import Scene
 from executive.motion.surroundings import LOOKED_AT
 from executive.sim.clearance import FIRST_MOVING, SELF_PAIRS, WRIST
 from executive.sim.contacts import PRESSING
-from executive.sim.world import World
+from executive.sim.world import World, held_part
 
 RANGE = 0.03
 """Distance up to which things are looked at [m]."""
@@ -75,7 +75,7 @@ class Gauge:
         below = self._below(scene, held)
         for point in client.getContactPoints(bodyA=arm) or ():
             if point[9] > PRESSING and point[3] >= FIRST_MOVING and point[2] not in (held, arm, *below):
-                self.contacts.add(f"{self._part(point[3])} - {self._world.name_of(point[2])}")
+                self.contacts.add(f"{self._world.part_of(point[3])} - {self._world.name_of(point[2])}")
         if held is not None:
             for point in client.getContactPoints(bodyA=held) or ():
                 if point[9] > PRESSING and point[2] not in (arm, *below):
@@ -98,12 +98,12 @@ class Gauge:
                 continue
             for point in client.getClosestPoints(world.arm, body, RANGE):
                 if point[3] >= FIRST_MOVING:
-                    yield Near(point[8], f"{self._part(point[3])} - {world.name_of(body)}")
+                    yield Near(point[8], f"{world.part_of(point[3])} - {world.name_of(body)}")
         for one, other in SELF_PAIRS:
             for point in client.getClosestPoints(
                 world.arm, world.arm, RANGE, linkIndexA=one, linkIndexB=other
             ):
-                yield Near(point[8], f"{self._part(one)} - {self._part(other)}")
+                yield Near(point[8], f"{world.part_of(one)} - {world.part_of(other)}")
         if held is None:
             return
         for body in things:
@@ -113,7 +113,7 @@ class Gauge:
                 yield Near(point[8], f"{self._load(held)} - {world.name_of(body)}")
         for point in client.getClosestPoints(held, world.arm, RANGE):
             if FIRST_MOVING <= point[4] < WRIST:
-                yield Near(point[8], f"{self._load(held)} - {self._part(point[4])}")
+                yield Near(point[8], f"{self._load(held)} - {world.part_of(point[4])}")
 
     def _below(self, scene: Scene, held: int | None) -> tuple[int, ...]:
         """Return the body that may be touched just now by what is lowest: by the tool, or by the load."""
@@ -124,8 +124,5 @@ class Gauge:
             return (scene.body,) if away <= OFF_LINE and z <= guarded + EXACT else ()
         return (self._world.table,) if away <= LOOKED_AT else ()
 
-    def _part(self, link: int) -> str:
-        return "the tool" if link == self._world.tool else f"link {link + 1}"
-
     def _load(self, held: int) -> str:
-        return f"the held {self._world.bodies[held]}"
+        return held_part(self._world.bodies[held])

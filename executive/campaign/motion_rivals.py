@@ -169,15 +169,15 @@ class _Search:
 
     def shortest(self, *ends: _Ends) -> Array:
         """Return joint positions `(3, 7)` [rad] of the shortest ride by three sets of ends, then refined."""
-        for _ in range(2):
-            begin, touch, drop = (end.q for end in ends)
-            there = rest_to_rest(touch[:, None] - begin, self._limits)
-            back = rest_to_rest(touch[:, None] - drop, self._limits)
-            j = int(np.argmin(there.min(axis=1) + back.min(axis=1)))
-            chosen = int(np.argmin(there[j])), j, int(np.argmin(back[j]))
-            corners = np.array([end.q[number] for end, number in zip(ends, chosen, strict=True)])
-            ends = tuple(self._around(end, number) for end, number in zip(ends, chosen, strict=True))
-        return corners
+        around = [self._around(end, number) for end, number in zip(ends, self._best(*ends), strict=True)]
+        return np.array([end.q[number] for end, number in zip(around, self._best(*around), strict=True)])
+
+    def _best(self, begin: _Ends, touch: _Ends, drop: _Ends) -> tuple[int, int, int]:
+        """Return the numbers of the postures of the shortest ride by three sets of ends."""
+        there = rest_to_rest(touch.q[:, None] - begin.q, self._limits)
+        back = rest_to_rest(touch.q[:, None] - drop.q, self._limits)
+        j = int(np.argmin(there.min(axis=1) + back.min(axis=1)))
+        return int(np.argmin(there[j])), j, int(np.argmin(back[j]))
 
     def _around(self, ends: _Ends, number: int) -> _Ends:
         """Return the posture of that number and those with the elbow a little to its sides."""

@@ -10,11 +10,11 @@ from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
 from executive.errors import InputError, Unreachable
 from executive.geometry import tool_down
-from executive.layout import as_bin, as_class
-from executive.messages import BIN_THICKNESS, Load, ObjectClass, Obstacle
+from executive.layout import as_bin
+from executive.messages import Bin, Load, ObjectClass, Obstacle
 from executive.motion.planner import Planner
-from executive.moving import DROP, OVERTRAVEL
-from executive.sim.models import load_mesh
+from executive.moving import onto, over
+from executive.sim.models import load_mesh, weighed
 from executive.sim.seal import breakaway, measure
 from executive.sim.spawn import spawn
 from executive.sim.tool import TOUCH
@@ -31,7 +31,7 @@ class Scene:
     Attributes:
         body: Body of the object to pick.
         kind: Its class.
-        place: Where its middle is, seen from above [m].
+        place: Where it is touched, seen from above [m].
         surface: Height of the tool centre point at which the cup feels it [m].
         bears: Pull that a seal there bears [N].
         target: The object to pick, where it really is.
@@ -84,6 +84,7 @@ class Scenes:
         self._world = world
         self._rng = np.random.default_rng(seed)
         self._bins = [as_bin(name, bin) for name, bin in config.bins.items()]
+        self._tallest = max(kind.height for kind in config.objects.values())
 
     def next(self) -> Scene:
         """Take away the objects of the last scene and put those of a new one.
@@ -95,12 +96,12 @@ class Scenes:
         for _ in range(TRIES):
             self.clear()
             bodies = spawn(self._world, self._config, int(self._rng.integers(2**31)))
-            drop = self._slot()
+            bin, slot = self._slot()
             if not bodies:
                 why = "nothing was spawned"
                 continue
             try:
-                scene = self._scene(bodies, drop)
+                scene = self._scene(bodies, bin, slot)
                 self._planner.require_reachable(scene.approach)
                 self._planner.require_reachable(scene.drop)
             except Unreachable as error:
@@ -119,36 +120,31 @@ class Scenes:
 
     def resting_place(self) -> Goal:
         """Return a random drop position, as the arm stands after the pair before the first one."""
-        x, y, floor = self._slot()
-        tallest = max(kind.height for kind in self._config.objects.values())
-        return Goal((x, y, floor + tallest + BIN_THICKNESS + DROP))
+        return over(*self._slot(), self._tallest, self._tallest)
 
-    def _slot(self) -> tuple[float, float, float]:
+    def _slot(self) -> tuple[Bin, int]:
+        """Return a random bin and the number of one of its slots."""
         bin = self._bins[int(self._rng.integers(len(self._bins)))]
-        x, y = (float(value) for value in bin.slots[int(self._rng.integers(len(bin.slots)))])
-        return x, y, float(bin.position[2])
+        return bin, int(self._rng.integers(len(bin.slots)))
 
-    def _scene(self, bodies: tuple[int, ...], slot: tuple[float, float, float]) -> Scene:
+    def _scene(self, bodies: tuple[int, ...], bin: Bin, slot: int) -> Scene:
         first, *others = bodies
-        kind = self._kind(first)
-        middle, y, underside = self._standing(first)
-        x, top = middle + kind.ring, underside + kind.height
-        surface, bears = self._seal(first, (x, y), top)
-        lowest = max(top - OVERTRAVEL, kind.height / 2)
+        kind, motion = self._kind(first), self._config.motion
+        x, y, underside = self._standing(first)
+        centre = np.array([x, y, underside + kind.height / 2])
+        approach = onto(kind, centre, motion.descent, motion.descent_speed)
+        place = approach.position[:2]
+        surface, bears = self._seal(first, place, underside + kind.height)
         return Scene(
             body=first,
             kind=kind,
-            place=(x, y),
+            place=place,
             surface=surface + TOUCH,
             bears=bears,
             target=self._obstacle(first, 1),
             others=tuple(self._obstacle(body, number) for number, body in enumerate(others, start=2)),
-            approach=Goal(
-                (x, y, lowest),
-                guarded=top + self._config.motion.descent - lowest,
-                speed=self._config.motion.descent_speed,
-            ),
-            drop=Goal((slot[0], slot[1], slot[2] + kind.height + BIN_THICKNESS + DROP)),
+            approach=approach,
+            drop=over(bin, slot, kind.height, self._tallest),
         )
 
     def _standing(self, body: int) -> tuple[float, float, float]:
@@ -166,7 +162,7 @@ class Scenes:
 
     def _kind(self, body: int) -> ObjectClass:
         label = self._world.bodies[body]
-        return as_class(label, self._config.objects[label])
+        return weighed(label, self._config.objects[label])
 
     def _seal(self, body: int, place: tuple[float, float], top: float) -> tuple[float, float]:
         """Return how high the object is under a cup at `place` [m], and the pull that a seal bears there [N].

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from executive.cell_config import CellConfig
 from executive.errors import Blocked
 from executive.geometry import Array
-from executive.layout import LIP_LENGTH, TOOL_RADIUS, pile_height
+from executive.layout import NECK_LENGTH, TOOL_RADIUS, pile_height
 from executive.messages import BIN_THICKNESS, Load, Obstacle
 
 LOOKED_AT = 0.05
@@ -59,10 +59,10 @@ class Discs(NamedTuple):
 def hanging(config: CellConfig, load: Load | None) -> Discs:
     """Return the discs of the tool and what it holds."""
     if load is None:
-        return Discs(np.array([0.0, -LIP_LENGTH]), np.array([config.tool.cup_radius, TOOL_RADIUS]), UPRIGHT)
+        return Discs(np.array([0.0, -NECK_LENGTH]), np.array([config.tool.cup_radius, TOOL_RADIUS]), UPRIGHT)
     reach = load.kind.radius + load.kind.ring + TOLERANCE
     # The load's underside and its top, which is elsewhere where the tool leans.
-    offsets = np.array([load.kind.height, 0.0, -LIP_LENGTH])
+    offsets = np.array([load.kind.height, 0.0, -NECK_LENGTH])
     return Discs(offsets, np.array([reach, reach, TOOL_RADIUS]), UPRIGHT_LOADED)
 
 

@@ -1,4 +1,4 @@
-"""How many motions of a run were planned ahead, and what waiting for the others cost."""
+"""How many plans of a run were made ahead, and what waiting for the others cost."""
 
 from __future__ import annotations
 
@@ -21,5 +21,8 @@ class PlanningTally:
             self._waited += float(event.data["waits"])
 
     def figures(self) -> dict[str, float]:
-        """Return the number of motions, of those planned ahead, and the time waited for plans [s]."""
+        """Return the number of plans asked for, of those made ahead, and the time waited for plans [s].
+
+        A motion planned anew counts once more, and one for which no way was found counts, too.
+        """
         return {"motions": self._motions, "ahead": self._ahead, "waited_s": round(self._waited, 4)}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from executive.cell import Cell, Routes
 from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.events import Emit
-from executive.layout import as_bin, as_class
+from executive.layout import as_bin
 from executive.ledger.ledger import ItemLedger
 from executive.messages import Target
 from executive.motion.planner import Planner
@@ -23,7 +22,7 @@ from executive.sim.camera import SimCamera
 from executive.sim.clearance import PathClearance
 from executive.sim.clock import SimClock
 from executive.sim.least_times import SimLeastTimes
-from executive.sim.models import mass_of, missing_models
+from executive.sim.models import missing_models, weighed
 from executive.sim.poses import unfit_poses
 from executive.sim.ray import cast
 from executive.sim.reach import out_of_reach
@@ -92,10 +91,7 @@ class SimCell:
             shadow=ArmShadow(self._arm, planner.kinematics, config, lambda: self._tool.holding),
             epoch=lambda: self._ledger.epoch,
         )
-        classes = {
-            label: replace(as_class(label, kind), mass=mass_of(kind))
-            for label, kind in config.objects.items()
-        }
+        classes = {label: weighed(label, kind) for label, kind in config.objects.items()}
 
         def decided(target: Target, bin: str) -> None:
             emit("decision", item=target.item, label=target.label, frame=target.frame, bin=bin)

@@ -17,7 +17,7 @@ from executive.cell_config import CellConfig
 from executive.errors import Blocked
 from executive.geometry import Array, Pose
 from executive.messages import BIN_THICKNESS, Load, ObjectClass, Obstacle
-from executive.sim.world import World
+from executive.sim.world import World, held_part
 
 FIRST_MOVING = 1
 """Lowest link that can come near anything: the base and link 1 only turn about the base's axis."""
@@ -94,10 +94,6 @@ class PathClearance:
                 found[pair] = near
         return found
 
-    def distances(self, q: Array, carrying: Load | None = None) -> Mapping[str, float]:
-        """Return, at `q` `(7,)` [rad], every distance [m] shorter than the margin, by what is near what."""
-        return {f"{near.part} - {near.body}": near.distance for near in self._near(q, carrying)}
-
     def too_near(self, q: Array) -> Approach | None:
         """Return what an empty arm at `q` `(7,)` [rad] brings nearest, if nearer than the margin, or None."""
         nearest = min(self._near(q, None), key=lambda near: near.distance, default=None)
@@ -124,10 +120,10 @@ class PathClearance:
             for body in parts:
                 for point in near(arm, body, self._margin):
                     if point[3] >= FIRST_MOVING:
-                        yield Approach(self._part(point[3]), name, point[8], self._margin)
+                        yield Approach(self.world.part_of(point[3]), name, point[8], self._margin)
         for one, other in SELF_PAIRS:
             for point in near(arm, arm, self._margin, linkIndexA=one, linkIndexB=other):
-                yield Approach(self._part(one), self._part(other), point[8], self._margin)
+                yield Approach(self.world.part_of(one), self.world.part_of(other), point[8], self._margin)
         if carrying is not None:
             yield from self._near_held(carrying.kind, bodies)
 
@@ -135,7 +131,7 @@ class PathClearance:
         held, near = self._body(carrying), self.world.client.getClosestPoints
         X_WH = self.world.tool_pose() @ Pose.of([0, 0, carrying.height / 2])
         self.world.client.resetBasePositionAndOrientation(held, X_WH.position, X_WH.quaternion)
-        part = f"the held {carrying.label}"
+        part = held_part(carrying.label)
         for name, parts in bodies.items():
             for body in parts:
                 for point in near(held, body, self._margin):
@@ -144,7 +140,7 @@ class PathClearance:
                     yield Approach(part, name, point[8], 0.0 if touchable else self._margin)
         for point in near(held, self.world.arm, self._margin):
             if FIRST_MOVING <= point[4] < WRIST:
-                yield Approach(part, self._part(point[4]), point[8], self._margin)
+                yield Approach(part, self.world.part_of(point[4]), point[8], self._margin)
         self.world.client.resetBasePositionAndOrientation(held, FAR_AWAY, [0, 0, 0, 1])
 
     @contextmanager
@@ -183,6 +179,3 @@ class PathClearance:
             )
             self._held[carrying] = int(client.createMultiBody(0, shape, basePosition=FAR_AWAY))
         return self._held[carrying]
-
-    def _part(self, link: int) -> str:
-        return "the tool" if link == self.world.tool else f"link {link + 1}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from executive.sim.tool import LIP
-from executive.sim.world import World
+from executive.sim.world import World, held_part
 
 PRESSING = 2.0
 """Force from which a new contact is felt [N]: assumed of joint torque sensors; a graze is not felt."""
@@ -55,9 +55,8 @@ class Contacts:
         world, held = self._world, self._held()
         for point in world.client.getContactPoints(bodyA=world.arm) or ():
             if point[2] != held:
-                part = "the tool" if point[3] == world.tool else f"link {point[3] + 1}"
-                yield part, point[2], point[5], point[9]
+                yield world.part_of(point[3]), point[2], point[5], point[9]
         if held is not None:
             for point in world.client.getContactPoints(bodyA=held) or ():
                 if point[2] != world.arm:
-                    yield f"the held {world.bodies[held]}", point[2], point[5], point[9]
+                    yield held_part(world.bodies[held]), point[2], point[5], point[9]

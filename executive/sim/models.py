@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
 from pathlib import Path
@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from executive.cell_config import CellConfig, ObjectConfig
 from executive.errors import InputError
 from executive.geometry import Array, Pose
+from executive.layout import as_class
+from executive.messages import ObjectClass
 from executive.workcell import KeyPath
 
 TOLERANCE = 0.003
@@ -89,6 +91,11 @@ def mass_of(config: ObjectConfig) -> float:
         return config.mass
     masses = ElementTree.parse(find_model(config.urdf)).getroot().iterfind(".//inertial/mass")
     return sum(float(mass.get("value", "0")) for mass in masses)
+
+
+def weighed(label: str, config: ObjectConfig) -> ObjectClass:
+    """Return what skills know of a class of objects of a cell file, with what it weighs in simulation."""
+    return replace(as_class(label, config), mass=mass_of(config))
 
 
 def missing_models(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:

@@ -16,7 +16,7 @@ from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell_config import BinConfig, CellConfig
 from executive.geometry import Array, Pose
-from executive.layout import LIP_LENGTH, TOOL_RADIUS
+from executive.layout import NECK_LENGTH, TOOL_RADIUS
 from executive.messages import BIN_THICKNESS
 from executive.motion.kinematics import FLANGE_OFFSET
 from executive.sim.bodies import add_body
@@ -96,6 +96,10 @@ class World:
                 return name
         return f"a {self.bodies[body]}" if body in self.bodies else "the arm"
 
+    def part_of(self, link: int) -> str:
+        """Return which part of the arm a link is, by its index, for the text of an error."""
+        return "the tool" if link == self.tool else f"link {link + 1}"
+
     def object_pose(self, body: int) -> Pose:
         """Return `X_WO` of a loose object, the frame that `add_object` takes."""
         X_WI = Pose.of(*self.client.getBasePositionAndOrientation(body))
@@ -145,6 +149,11 @@ class World:
             return int(self.client.loadURDF(str(generated), useFixedBase=True, flags=flags))
 
 
+def held_part(label: str) -> str:
+    """Return what an object of class `label` is while it hangs at the tool, for the text of an error."""
+    return f"the held {label}"
+
+
 def add_bin(client: BulletClient, bin: BinConfig) -> int:
     """Build floor and walls as one static body standing at the bin's position, and return it."""
     (length, width, height), t = bin.size, BIN_THICKNESS
@@ -174,8 +183,8 @@ def add_bin(client: BulletClient, bin: BinConfig) -> int:
 
 def _tool_link(length: float, cup_radius: float) -> str:
     """Return the URDF text of the tool, from the flange to the lip, and the closing tag."""
-    body = length - LIP_LENGTH
-    parts = [(body, TOOL_RADIUS, body / 2), (LIP_LENGTH, cup_radius, length - LIP_LENGTH / 2)]
+    body = length - NECK_LENGTH
+    parts = [(body, TOOL_RADIUS, body / 2), (NECK_LENGTH, cup_radius, length - NECK_LENGTH / 2)]
     shapes = "".join(
         f'<{kind}><origin xyz="0 0 {z}"/><geometry>'
         f'<cylinder length="{size - 2 * less}" radius="{radius - less}"/></geometry>'

@@ -37,7 +37,7 @@ class PlanningFigures:
     """How long the planner took on the wall for one motion, its checks included.
 
     Attributes:
-        motions: How many were planned.
+        motions: How many were planned, those for which no way was found included.
         median, p99: [ms]
         within_50, within_150: Share of the motions planned within so many milliseconds.
         failures: Why a motion was not planned, one text each.
@@ -57,26 +57,27 @@ class ExecutionFigures:
 
     Attributes:
         pairs: How many.
-        clearance: Least distance of arm, tool and load to anything that must not be touched [m].
+        clearance: Least distance of arm, tool and load to anything that must not be touched [m], or None
+            where nothing of it came near enough to be measured.
         nearest: What that was, and to what.
         contacts: What touched what although it must not, one text each.
         slip: How far an object moved in the tool's frame between the grasp and the drop, at most [m].
         missed: Grasps that did not hold.
         drops: Objects lost on the way.
         tracking: Largest difference between a joint and its command [rad].
-        time: Mean motion time of a pair [s].
+        time: Mean motion time of a pair [s], or None where no object was brought.
         failures: Why a motion was not planned, one text each.
     """
 
     pairs: int
-    clearance: float
+    clearance: float | None
     nearest: str
     contacts: tuple[str, ...]
     slip: float
     missed: int
     drops: int
     tracking: float
-    time: float
+    time: float | None
     failures: tuple[str, ...]
 
 
@@ -191,9 +192,10 @@ def _parts(figures: MotionFigures) -> Iterator[RenderableType]:
 
 
 def _executed(one: ExecutionFigures, margin: float) -> Iterator[str]:
+    time = "-" if one.time is None else f"{one.time:.3f}"
     yield (
-        f"\nexecuted {one.pairs} pairs in the live world: {one.time:.3f} s of motion each\n"
-        f"  least clearance {_mm(one.clearance)} mm ({one.nearest}), margin {margin * 1000:g} mm\n"
+        f"\nexecuted {one.pairs} pairs in the live world: {time} s of motion each\n"
+        f"  least clearance {_mm(one.clearance) or '-'} mm ({one.nearest}), margin {margin * 1000:g} mm\n"
         f"  worst slip in the hand {one.slip * 1000:.2f} mm; {one.missed} grasps missed, {one.drops} objects "
         f"dropped\n"
         f"  worst tracking error {math.degrees(one.tracking):.5f}°; contacts that are not allowed: "
@@ -246,8 +248,8 @@ def _method(figures: MotionFigures, method: MethodFigures) -> dict[str, Any]:
 def _execution(one: ExecutionFigures) -> dict[str, Any]:
     return {
         "pairs": one.pairs,
-        "time_s": round(one.time, 4),
-        "clearance_mm": round(one.clearance * 1000, 3),
+        "time_s": None if one.time is None else round(one.time, 4),
+        "clearance_mm": None if one.clearance is None else round(one.clearance * 1000, 3),
         "nearest": one.nearest,
         "contacts": list(one.contacts),
         "slip_mm": round(one.slip * 1000, 3),

@@ -13,7 +13,7 @@ from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
-from executive.layout import LIP_LENGTH, TOOL_RADIUS
+from executive.layout import NECK_LENGTH, TOOL_RADIUS
 from executive.messages import Load, ObjectClass, Obstacle
 from executive.motion.free import Free
 from executive.motion.line import Line
@@ -121,7 +121,7 @@ def test_among_tightly_standing_neighbours_it_still_comes_down_and_leaves_again(
         for thing in near:
             away = math.hypot(tip[0] - thing.x, tip[1] - thing.y) - thing.radius
             assert tip[2] > thing.top or away > config.tool.cup_radius
-            assert tip[2] + LIP_LENGTH > thing.top or away > TOOL_RADIUS
+            assert tip[2] + NECK_LENGTH > thing.top or away > TOOL_RADIUS
     picked = planner.plan(home, pick(x, y), Task(around=near)).end
     assert planner.plan(picked, BIN, Task(Load(CUBE), near)).duration < 2.0
 

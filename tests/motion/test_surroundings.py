@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from executive.cell_config import CellConfig
 from executive.errors import Blocked
 from executive.geometry import Array
-from executive.layout import LIP_LENGTH, TOOL_RADIUS, pile_height
+from executive.layout import NECK_LENGTH, TOOL_RADIUS, pile_height
 from executive.messages import BIN_THICKNESS, Load, ObjectClass, Obstacle
 from executive.motion.surroundings import BETWEEN, LOOKED_AT, SLANT, TOLERANCE, Discs, Surroundings, hanging
 
@@ -112,10 +112,10 @@ def test_distances_from_a_bin_are_what_geometry_says(config: CellConfig, tip) ->
 
 def test_a_load_hangs_below_the_tool_and_is_as_wide_as_its_ring_puts_it(config: CellConfig) -> None:
     empty, washer = hanging(config, None), hanging(config, Load(ObjectClass("washer", 0.006, 0.02, 0.015)))
-    assert np.allclose(empty.offset, [0.0, -LIP_LENGTH])
+    assert np.allclose(empty.offset, [0.0, -NECK_LENGTH])
     assert np.allclose(empty.radius, [config.tool.cup_radius, TOOL_RADIUS])
     wide = 0.02 + 0.015 + TOLERANCE
-    assert np.allclose(washer.offset, [0.006, 0.0, -LIP_LENGTH]), "its underside, its top, the tool above it"
+    assert np.allclose(washer.offset, [0.006, 0.0, -NECK_LENGTH]), "its underside, its top, the tool above it"
     assert np.allclose(washer.radius, [wide, wide, TOOL_RADIUS])
     assert washer.upright > empty.upright
 

@@ -12,5 +12,12 @@ def test_plans_are_counted_and_what_was_waited_for_them():
     assert tally.figures() == {"motions": 3, "ahead": 2, "waited_s": 0.07}
 
 
+def test_a_plan_that_found_no_way_counts_too():
+    tally = PlanningTally()
+    found_nothing = {"ahead": False, "waits": 0.05, "duration": 0.0}
+    tally(Event("plan", 1, 1 / 240, found_nothing))
+    assert tally.figures()["motions"] == 1
+
+
 def test_a_run_without_a_motion_has_none():
     assert PlanningTally().figures() == {"motions": 0, "ahead": 0, "waited_s": 0.0}

@@ -10,12 +10,13 @@ from rig import Rig, off_path
 
 from executive.arm import Goal, Task
 from executive.geometry import Array, tool_down
-from executive.layout import as_class
+from executive.layout import NECK_LENGTH, TOOL_RADIUS, as_class
 from executive.messages import Load
 from executive.motion.trajectory import Trajectory
 from executive.sim.contacts import PRESSING
 
 LEFT, RIGHT = Goal((0.5, 0.25, 0.15)), Goal((0.5, -0.2, 0.15))
+LONG_DESCENT = Goal(RIGHT.position, guarded=0.1, speed=0.05)
 
 
 def float_at(rig: Rig, label: str, place: Array, mass: float = 0.1) -> int:
@@ -31,12 +32,22 @@ def tool_at(rig: Rig, motion: Trajectory, share: float) -> Array:
     return rig.planner.kinematics.forward(motion.at(share * motion.duration).q).position
 
 
-def bump(rig: Rig, motion: Trajectory) -> str:
-    """Follow a motion until the arm runs into something; return what it says when it is at rest again."""
+def on_the_way_down(rig: Rig, motion: Trajectory) -> Array:
+    """Return where the tool is in the middle of the guarded part of a motion `(3,)` [m]."""
+    return tool_at(rig, motion, (motion.guarded / motion.duration + 1) / 2)
+
+
+def bump(rig: Rig, motion: Trajectory, earliest: float = 0.0) -> str:
+    """Follow a motion until the arm runs into something; return what it says when it is at rest again.
+
+    Before the path time `earliest` [s] nothing may be met.
+    """
     rig.arm.start(motion)
     while rig.arm.met is None:
         assert not rig.arm.at_rest, "it ran into nothing"
+        s = rig.arm._time
         rig.step()
+    assert s >= earliest, rig.arm.met
     assert rig.run() <= 120
     assert off_path(rig.arm._command, motion) < 1e-9
     assert rig.arm.met is not None
@@ -81,14 +92,23 @@ def test_the_next_motion_begins_where_the_bump_left_the_arm_and_forgets_it(rig: 
     assert rig.arm.tool_pose.position == pytest.approx(RIGHT.position, abs=1e-4)
 
 
-@pytest.mark.parametrize("guarded", [0.0, 0.02])
-def test_what_an_upper_part_runs_into_counts_in_a_guarded_motion_too(rig: Rig, guarded: float) -> None:
+def test_what_an_upper_part_runs_into_counts_too(rig: Rig) -> None:
     rig.go(LEFT)
-    motion = rig.planned(Goal(RIGHT.position, guarded=guarded))
+    motion = rig.planned(RIGHT)
     half = motion.at(motion.duration / 2).q
     wrist = rig.planner.kinematics.joint_frames(half)[5].position
     float_at(rig, "cube", wrist)
     assert re.match(r"link [567] ran into a cube, with the tool at", bump(rig, motion))
+
+
+def test_it_counts_on_the_guarded_part_of_a_motion_as_well(rig: Rig) -> None:
+    """What the tool is meant to touch there, the wrist is not."""
+    rig.go(LEFT)
+    motion = rig.planned(LONG_DESCENT)
+    under_the_flange = np.add(on_the_way_down(rig, motion), (0, -0.045, rig.config.tool.length - 0.025))
+    float_at(rig, "cube", under_the_flange, mass=1.0)
+    said = bump(rig, motion, earliest=motion.guarded)
+    assert re.match(r"link 7 ran into a cube, with the tool at", said)
 
 
 def test_what_the_tool_touches_on_a_guarded_motion_is_what_it_is_for(rig: Rig) -> None:
@@ -142,6 +162,9 @@ def test_what_the_held_object_runs_into_counts_but_neither_the_tool_nor_the_tabl
 def test_the_shaft_of_the_tool_feels_a_bump_on_a_guarded_motion_too(rig: Rig) -> None:
     """Only the lip is meant to touch something."""
     rig.go(LEFT)
-    motion = rig.planned(Goal(RIGHT.position, guarded=0.02))
-    float_at(rig, "cube", np.add(tool_at(rig, motion, 0.5), (0, 0, 0.06)))
-    assert bump(rig, motion).startswith("the tool ran into a cube, with the tool at")
+    motion = rig.planned(LONG_DESCENT)
+    # Its edge lies beside the thin end of the tool, under the wider shaft.
+    beside = 0.025 + (rig.config.tool.cup_radius + TOOL_RADIUS) / 2
+    float_at(rig, "cube", np.add(on_the_way_down(rig, motion), (0, -beside, NECK_LENGTH - 0.025)), mass=1.0)
+    said = bump(rig, motion, earliest=motion.guarded)
+    assert said.startswith("the tool ran into a cube, with the tool at")

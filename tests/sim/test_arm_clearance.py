@@ -15,7 +15,7 @@ from executive.messages import Load, ObjectClass, Obstacle
 from executive.mission.parse.cell_file import load_cell
 from executive.motion.kinematics import Kinematics
 from executive.motion.planner import Planner
-from executive.sim.clearance import PathClearance
+from executive.sim.clearance import SELF_PAIRS, PathClearance
 from executive.sim.world import World
 
 DUCK = Task(Load(ObjectClass("duck", 0.05, 0.04)))
@@ -230,10 +230,13 @@ def test_the_arm_at_home_hides_nothing_of_the_workspace_from_the_fixed_camera(co
 
 
 @pytest.mark.parametrize("cell", ["overhead", "wrist"])
-def test_home_is_three_centimetres_clear_of_everything(missions: Path, cell: str) -> None:
+def test_home_is_three_centimetres_clear_of_everything(
+    missions: Path, cell: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # The usual distance of links 5 and 7 is 29 mm.
+    monkeypatch.setattr("executive.sim.clearance.SELF_PAIRS", [pair for pair in SELF_PAIRS if pair != (4, 6)])
     config = load_cell(missions / "cells" / f"{cell}.yaml")
     config = config.model_copy(update={"motion": config.motion.model_copy(update={"margin": 0.03})})
     clearance = PathClearance(config)
-    near = clearance.distances(np.radians(config.arm.poses_deg["home"]))
-    assert set(near) <= {"link 5 - link 7"}, near  # their usual distance is 29 mm
+    assert clearance.too_near(np.radians(config.arm.poses_deg["home"])) is None
     clearance.close()

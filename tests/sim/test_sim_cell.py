@@ -165,6 +165,14 @@ def test_the_table_is_hidden_while_the_arm_is_over_it(build_cell: Build) -> None
     assert not frame.visible[int(y / z), int(x / z)]
 
 
+@pytest.mark.parametrize("name", ["overhead", "fasteners"])
+def test_a_class_weighs_what_its_objects_do(build_cell: Build, name: str) -> None:
+    made = build_cell(name)
+    for body, label in made._world.bodies.items():
+        mass = made._world.client.getDynamicsInfo(body, -1)[0]
+        assert made.cell.classes[label].mass == pytest.approx(mass), label
+
+
 def test_time_passes_by_physics_steps_alone(build_cell: Build) -> None:
     made = build_cell()
     assert made.cell.clock.now == 0.0

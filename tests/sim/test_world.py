@@ -13,7 +13,7 @@ from executive.mission.parse.cell_file import load_cell
 from executive.sim.cell import SimCell
 from executive.sim.models import find_model, load_mesh, mass_of
 from executive.sim.spawn import spawn
-from executive.sim.world import World
+from executive.sim.world import World, held_part
 
 Build = Callable[[CellConfig], World]
 
@@ -93,6 +93,17 @@ def test_every_body_has_a_name_for_the_text_of_an_error(build: Build, overhead: 
         "a duck",
         "the arm",
     ]
+
+
+def test_every_part_of_the_arm_has_a_name_too(build: Build, overhead: CellConfig) -> None:
+    world = build(overhead)
+    assert [world.part_of(link) for link in (-1, 0, world.flange, world.tool)] == [
+        "link 0",
+        "link 1",
+        "link 7",
+        "the tool",
+    ]
+    assert held_part("duck") == "the held duck"
 
 
 def test_rebuilding_gives_the_same_bits(build: Build, overhead: CellConfig) -> None:

@@ -185,10 +185,16 @@ def test_the_next_item_goes_to_the_next_slot(fake: FakeCell, held: str, look) ->
     assert np.allclose(fake.arm.tool_pose.position[:2], fake.cell.bins["red_bin"].slots[1])
 
 
-def test_put_down_leaves_the_item_where_the_next_look_finds_it(fake: FakeCell, held: str, look) -> None:
-    assert run_skill(PutDown(held=held), fake).status == "SUCCESS"
-    assert not fake.tool.holding
-    assert [target.item for target in look("full")] == ["cube-1"]
+def test_what_does_not_come_off_is_stuck_and_not_placed(
+    fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run_skill(Transit(held=held, bin="red_bin"), fake)
+    monkeypatch.setattr(fake.tool, "open", lambda: None)
+    result = run_skill(Release(held=held, bin="red_bin", settle=0.2), fake)
+    assert (result.reason, result.message) == ("stuck", "cube-1 hangs on the tool 0.20 s after release")
+    assert result.ticks == pytest.approx(0.2 * 240, abs=1)
+    assert fake.ledger.in_tool() == held
+    assert fake.ledger.balance()["placed"] == 0
 
 
 def test_a_rejected_item_keeps_its_reason(fake: FakeCell, target: Target) -> None:

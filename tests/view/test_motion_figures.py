@@ -33,6 +33,11 @@ EXECUTED = ExecutionFigures(
     missed=1, drops=2, tracking=1e-6, time=1.912, failures=("too far", "too far"),
 )  # fmt: skip
 
+NOTHING_BROUGHT = ExecutionFigures(
+    pairs=100, clearance=None, nearest="nothing", contacts=(), slip=0.0, missed=100, drops=0, tracking=1e-6,
+    time=None, failures=(),
+)  # fmt: skip
+
 
 @pytest.fixture
 def printed(capsys):
@@ -83,6 +88,20 @@ def test_what_was_executed_is_told_where_it_was(printed):
         "contact, 1 times: link 5 - red_bin",
         "failed, 2 times: too far",
     ]
+
+
+def test_a_dash_stands_where_no_pair_could_be_measured(printed):
+    lines = printed(replace(MEASURED, execution=NOTHING_BROUGHT))
+    assert lines[-4:-2] == [
+        "executed 100 pairs in the live world: - s of motion each",
+        "least clearance - mm (nothing), margin 5 mm",
+    ]
+
+
+def test_what_could_not_be_measured_is_none_as_plain_value():
+    plain = as_plain(replace(MEASURED, execution=NOTHING_BROUGHT))
+    execution = json.loads(json.dumps(plain, allow_nan=False))["execution"]
+    assert (execution["missed"], execution["time_s"], execution["clearance_mm"]) == (100, None, None)
 
 
 def test_as_plain_values_they_are_one_json_object():

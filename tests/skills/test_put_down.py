@@ -1,0 +1,134 @@
+"""Putting down what is held, and losing it on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from executive.arm import Goal, Task
+from executive.errors import Unreachable
+from executive.events import Event
+from executive.mission.load import load_mission
+from executive.motion.plans import Plan
+from executive.runtime.run import Run
+from executive.skill import EMPTY, SkillFailed, discover
+from executive.testing.fake_cell import FakeCell
+from executive.testing.run_skill import run_skill
+from skills.approach import Approach
+from skills.grasp import Grasp
+from skills.put_down import PutDown
+
+
+@pytest.fixture
+def held(fake: FakeCell, look) -> str:
+    """A cube from the middle of the fake table, in the tool."""
+    fake.world.put("cube", 0.5, 0.0)
+    (target,) = look()
+    run_skill(Approach(target=target), fake)
+    return run_skill(Grasp(target=target), fake).outputs["held"]
+
+
+def lost(fake: FakeCell, held: str, when: Callable[[], bool]) -> SkillFailed:
+    """Return how a PutDown fails whose seal breaks as soon as `when` holds."""
+    steps = PutDown(held=held).run(fake.cell)
+    with pytest.raises(SkillFailed) as failure:
+        while True:
+            next(steps)
+            fake.advance()
+            if when():
+                fake.tool.open()
+    return failure.value
+
+
+def test_it_is_let_go_on_the_safe_place_where_the_next_look_finds_it(fake: FakeCell, held: str, look) -> None:
+    assert run_skill(PutDown(held=held), fake).status == "SUCCESS"
+    assert fake.arm.tool_pose.position == pytest.approx([*fake.cell.safe_place[:2], 0.055])
+    assert (fake.tool.holding, fake.ledger.in_tool()) == (False, None)
+    assert [target.item for target in look("full")] == [held]
+
+
+def test_what_falls_on_the_way_is_dropped_where_the_arm_stops(fake: FakeCell, held: str) -> None:
+    failure = lost(fake, held, lambda: fake.arm.tool_pose.position[1] < -0.1)
+    assert (failure.reason, failure.message) == (
+        "dropped",
+        "the seal on cube-1 broke on the way to the safe place, near (0.48, -0.10, 0.16) m",
+    )
+    assert fake.arm.at_rest
+    assert fake.arm.tool_pose.position[1] == pytest.approx(-0.1, abs=0.01)
+    assert fake.ledger.in_tool() is None
+    assert fake.ledger.attempts(held) == 1, "it counts as a failure, as any loss in the tool does"
+    assert fake.ledger.is_open(held), "it is looked for again"
+
+
+def test_what_is_torn_off_by_running_into_something_is_dropped(fake: FakeCell, held: str) -> None:
+    fake.arm.runs_into = "the held cube ran into a hand"
+    failure = lost(fake, held, lambda: fake.arm.met is not None)
+    assert failure.reason == "dropped"
+    assert failure.message.startswith("the seal on cube-1 broke on the way to the safe place, near (")
+    assert fake.ledger.in_tool() is None
+
+
+def test_what_falls_while_the_way_is_planned_is_dropped_though_there_is_none(
+    fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan, nothing = fake.arm.plan, Unreachable("too far")
+    monkeypatch.setattr(fake.arm, "plan", lambda *asked: replace(plan(*asked), outcome=nothing))
+    assert run_skill(PutDown(held=held), fake).reason == "unreachable"
+    assert lost(fake, held, lambda: True).reason == "dropped"
+    assert fake.ledger.in_tool() is None
+
+
+def test_a_run_into_something_keeps_what_it_holds(fake: FakeCell, held: str) -> None:
+    fake.arm.runs_into = "the held cube ran into a hand"
+    result = run_skill(PutDown(held=held), fake)
+    assert (result.reason, result.message) == ("blocked", "the held cube ran into a hand")
+    assert fake.tool.holding
+    assert fake.ledger.in_tool() == held
+
+
+def test_what_does_not_come_off_is_stuck(fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fake.tool, "open", lambda: None)
+    result = run_skill(PutDown(held=held), fake)
+    assert (result.reason, result.message) == ("stuck", "cube-1 hangs on the tool 0.10 s after release")
+    assert fake.ledger.in_tool() == held
+
+
+def test_the_check_knows_that_the_tool_is_empty_after_a_drop_alone() -> None:
+    assert "dropped" in PutDown.reasons
+    assert PutDown.tool_left["dropped"] is EMPTY
+    assert not {"unreachable", "blocked", "stuck"} & PutDown.tool_left.keys()
+
+
+@pytest.mark.parametrize("name", ["sort_overhead", "sort_wrist", "sort_fasteners"])
+def test_a_sorting_mission_finds_again_what_fell_and_places_it(
+    missions: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    events: list[Event] = []
+    loaded = load_mission(missions / f"{name}.yaml", discover())
+    run = Run(loaded, discover(), seed=1, observers=[events.append], kind=FakeCell)
+    fake = run.workcell
+    assert isinstance(fake, FakeCell)
+    plan, advance = fake.arm.plan, fake.advance
+    carries: list[Goal | str] = []
+
+    def plan_all_but_the_first_carry(goal: Goal | str, task: Task = Task()) -> Plan:
+        if task.load is not None:
+            carries.append(goal)
+        made = plan(goal, task)
+        first = task.load is not None and len(carries) == 1
+        return replace(made, outcome=Unreachable("too far")) if first else made
+
+    def advance_and_lose_the_second() -> None:
+        advance()
+        if len(carries) == 2 and fake.arm.tool_pose.position[2] > 0.08:
+            fake.tool.open()
+
+    monkeypatch.setattr(fake.arm, "plan", plan_all_but_the_first_carry)
+    monkeypatch.setattr(fake, "advance", advance_and_lose_the_second)
+    outcome, items = run.execute(), run.items()
+    failed = [event.data["reason"] for event in events if event.data.get("status") == "FAILURE"]
+    assert [failed.count(reason) for reason in ("unreachable", "dropped")] == [1, 1]
+    assert (outcome.status, items["placed"], run.audit()["right"]) == ("SUCCESS", *[items["seen"]] * 2)
