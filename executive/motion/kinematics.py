@@ -29,6 +29,9 @@ SHOULDER_HEIGHT, UPPER_ARM, FOREARM, WRIST_TO_FLANGE = 0.36, 0.42, 0.40, 0.081 +
 BRANCHES = np.array([[s, e, w] for s in (1, -1) for e in (1, -1) for w in (1, -1)])
 """Signs of joints 2, 4 and 6 in the eight solutions of one swivel angle, `(8, 3)`."""
 
+_BENT = 120.0, 115.0, 110.0, 105.0, 100.0, 95.0, 90.0  # [degree]
+_APART = -0.0132, -0.0059, 0.0012, 0.0079, 0.0141, 0.0195, 0.0237  # [m]
+
 _FLIPPED = np.zeros((8, 7))
 _FLIPPED[:, [0, 2]] += (BRANCHES[:, :1] < 0) * math.pi
 _FLIPPED[:, [2, 4]] += (BRANCHES[:, 1:2] < 0) * math.pi
@@ -42,6 +45,15 @@ _ROUNDING = 1e-9  # [m]
 def wrapped(angle: Array) -> Array:
     """Return every `angle` [rad] turned by full turns into [-π, π)."""
     return (angle + math.pi) % (2 * math.pi) - math.pi
+
+
+def fold(distance: float) -> float:
+    """Return how far joint 6 may bend for link 7 to stay `distance` [m] away from link 5 [rad].
+
+    How far apart they are depends on joint 6 alone, to 0.3 mm; taken from the collision shapes of
+    pybullet_data kuka_iiwa/model.urdf. 90 degrees are always allowed.
+    """
+    return math.radians(float(np.interp(distance, _APART, _BENT)))
 
 
 class Kinematics:

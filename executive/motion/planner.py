@@ -22,11 +22,12 @@ from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
 from executive.layout import travel_height
 from executive.motion.free import NoProfile
-from executive.motion.kinematics import Kinematics
+from executive.motion.kinematics import Kinematics, fold
 from executive.motion.limits import JointLimits
 from executive.motion.postures import find_postures
 from executive.motion.seal import Hold
 from executive.motion.search import Search
+from executive.motion.surroundings import BETWEEN
 from executive.motion.trajectory import STEP, Trajectory, thinned
 
 Check = Callable[[Array, Task], None]
@@ -44,13 +45,15 @@ class Planner:
         check: The last word on clearance; by default none beyond the search's own.
 
     Attributes:
-        kinematics: The arm's.
+        kinematics: The arm's; joint 6 bends only as far as the wrist may fold.
         limits: Its joints'.
     """
 
     def __init__(self, config: CellConfig, check: Check | None = None) -> None:
         self.limits = JointLimits.of(config.arm.limits)
-        self.kinematics = Kinematics(config.tool.length, self.limits.position)
+        bent = self.limits.position.copy()
+        bent[5] = min(bent[5], fold(config.motion.margin + BETWEEN))
+        self.kinematics = Kinematics(config.tool.length, bent)
         self._config = config
         self._check = check
         self._height = travel_height(config)

@@ -13,7 +13,7 @@ from executive.errors import Blocked
 from executive.geometry import tool_down
 from executive.messages import Load, ObjectClass, Obstacle
 from executive.mission.parse.cell_file import load_cell
-from executive.motion.kinematics import Kinematics
+from executive.motion.kinematics import Kinematics, fold
 from executive.motion.planner import Planner
 from executive.sim.clearance import SELF_PAIRS, PathClearance
 from executive.sim.world import World
@@ -240,3 +240,14 @@ def test_home_is_three_centimetres_clear_of_everything(
     clearance = PathClearance(config)
     assert clearance.too_near(np.radians(config.arm.poses_deg["home"])) is None
     clearance.close()
+
+
+@pytest.mark.parametrize("distance", [-0.01, 0.0, 0.0035, 0.006, 0.012, 0.02])
+def test_the_wrist_may_fold_as_far_as_links_5_and_7_stay_apart(clearance, distance) -> None:
+    world, rng = clearance.world, np.random.default_rng(6)
+    for side in (-1, 1):
+        q = rng.uniform(-2, 2, 7)
+        q[5] = side * fold(distance)
+        world.set_arm(q)
+        points = world.client.getClosestPoints(world.arm, world.arm, 0.05, linkIndexA=4, linkIndexB=6)
+        assert min(point[8] for point in points) == pytest.approx(distance, abs=5e-4)
