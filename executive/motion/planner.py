@@ -68,10 +68,7 @@ class Planner:
         start = np.asarray(q_start, dtype=float)
         end = goal if isinstance(goal, Goal) else np.asarray(goal, dtype=float)
         trajectory = self._plan(start, end, task)
-        if task.load is None:
-            return trajectory
-        rate = Hold(task.load, self.kinematics).rate(trajectory)
-        return trajectory if rate >= 1 else trajectory.slowed(rate)
+        return Hold(task.load, self.kinematics).gentle(trajectory) if task.load else trajectory
 
     def require_reachable(self, goal: Goal) -> None:
         """Make sure that a goal and travel height above it can be reached from somewhere in one posture.

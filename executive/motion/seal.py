@@ -58,12 +58,11 @@ class Hold:
         acceleration = np.diff(middle[:-1], n=2, axis=0) / STEP**2
         return float(np.min(_shares(acceleration, self._most)))
 
-    def rate(self, trajectory: Trajectory) -> float:
-        """Return the rate, 1 at most, at which a motion keeps the safety factor, or what comes nearest.
-
-        Flown at a rate, accelerations are as its square.
-        """
-        return math.sqrt(max(self.share(trajectory), GENTLEST))
+    def gentle(self, trajectory: Trajectory) -> Trajectory:
+        """Return a motion so slow that it keeps the safety factor, or comes nearest to it."""
+        share = self.share(trajectory)
+        # Flown at a rate, accelerations are as its square.
+        return trajectory if share >= 1 else trajectory.slowed(math.sqrt(max(share, GENTLEST)))
 
     def demand(self, qs: Array, time: float, near: float) -> Demand:
         """Return what it demands of positions of a course `(M, 7)` [rad], `time` [s] apart from each other.

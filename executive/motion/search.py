@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
 
 import numpy as np
@@ -111,26 +111,22 @@ class Search:
     def _flights(self, ways: Sequence[Way]) -> Iterator[Trajectory]:
         """Yield direct motions where they are clear, and detours over what is in between elsewhere."""
         direct, detours = self._tried(ways)
-        for number, (way, detour) in enumerate(detours):
-            if number == 0:
-                detour.improve(REST)
+        for way, detour in detours:
+            detour.improve(REST)
             while direct and direct[0][0] <= detour.cost + way.tail:
                 yield direct.pop(0)[1]
-            if number:
-                detour.improve(REST)
-            flown = self._flown(way, detour)
-            yield from flown if self._hold is None else sorted(flown, key=self._gentle_time)
+            yield from self._flown(way, detour)
         yield from (motion for _, motion in direct)
 
-    def _flown(self, way: Way, detour: Detour) -> Iterator[Trajectory]:
-        """Yield the motions over a detour."""
+    def _flown(self, way: Way, detour: Detour) -> Iterable[Trajectory]:
+        """Return the motions over a detour, first the one that takes less time, as gently as a seal asks."""
+        hold, flights = self._hold, self._flights_over(way, detour)
+        return flights if hold is None else sorted(flights, key=lambda flight: hold.gentle(flight).duration)
+
+    def _flights_over(self, way: Way, detour: Detour) -> Iterator[Trajectory]:
         for exactly in (False, True):
             with contextlib.suppress(NoProfile):
                 yield self._motion(way, *detour.fly(exactly))
-
-    def _gentle_time(self, motion: Trajectory) -> float:
-        """Return how long a motion takes when it is as slow as the seal asks for [s]."""
-        return motion.duration / (self._hold.rate(motion) if self._hold else 1.0)
 
     def _tried(self, ways: Sequence[Way]) -> tuple[list[tuple[float, Trajectory]], list[tuple[Way, Detour]]]:
         """Return the direct motions that are clear, with their times [s], and detours a few steps on.
