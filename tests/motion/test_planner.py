@@ -16,6 +16,7 @@ from executive.geometry import Array
 from executive.layout import NECK_LENGTH, TOOL_RADIUS
 from executive.messages import Load, ObjectClass, Obstacle
 from executive.motion.free import Free
+from executive.motion.kinematics import fold
 from executive.motion.line import Line
 from executive.motion.planner import SPACING, Planner
 from executive.motion.seal import GENTLEST, GRAVITY
@@ -271,6 +272,15 @@ def test_a_seal_that_hardly_bears_the_weight_is_carried_at_the_gentlest(planner,
     assert 0.5 * GENTLEST <= acceleration <= GENTLEST + 1e-6
     assert jerk <= GENTLEST**1.5 + 1e-6
     assert np.allclose(planner.kinematics.tips(weak.end[None])[0], BIN.position, atol=1e-7)
+
+
+def test_the_wrist_folds_no_farther_than_links_5_and_7_keep_the_margin(planner, config, limits, home) -> None:
+    """The data sheet would let joint 6 bend by 120 degrees."""
+    most = fold(config.motion.margin)
+    motion = planner.plan(home, Goal((0.3, 0.0, 0.6)))
+    assert math.radians(95) < np.abs(motion.samples.q[:, 5]).max() <= most < limits.position[5]
+    with pytest.raises(Unreachable, match=r"leaves joint 6 \d\.\d° outside ±106°"):
+        planner.plan(home, Goal((0.3, 0.0, 0.7)))
 
 
 @pytest.mark.parametrize(("bears", "straight"), [(2.5, True), (7.9, False)])
