@@ -8,12 +8,25 @@ from typing import Any
 
 
 @dataclass(frozen=True)
+class Exact:
+    """A value of an event that is kept as it is, to the last bit.
+
+    Attributes:
+        value: Plain JSON already: None, truth values, finite numbers, texts, lists, and mappings with texts
+            as keys.
+    """
+
+    value: Any
+
+
+@dataclass(frozen=True)
 class Event:
     """One thing that happened in a run.
 
     Attributes:
         kind: What sort of thing, from a small set: `run`, `status`, `intent`, `item`, `look`,
-            `asking`, `request`, `decision`, `choice`, `plan`, `fault`, `end`.
+            `asking`, `request`, `decision`, `choice`, `plan`, `sense`, `halt`, `resume`, `disturbance`,
+            `fault`, `end`.
         tick: Control step at which it happened.
         clock: Time on the run's clock [s].
         data: Plain values (numbers, texts, lists, mappings) that describe it.

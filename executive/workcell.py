@@ -35,6 +35,19 @@ class Workcell(Protocol):
     def accounts(self) -> Accounts:
         """The books of the cell's ledger."""
 
+    @property
+    def steps(self) -> int:
+        """Control steps that its world has made since the run began, those before a resumption included."""
+
+    def log_to(self, path: Path) -> None:
+        """Keep in a file, from now on, what a simulated world can be rebuilt from at any moment.
+
+        Called before the first control step; a cell of hardware has nothing to keep.
+
+        Raises:
+            InputError: The file cannot be written.
+        """
+
     def advance(self) -> None:
         """Let one control step pass."""
 
@@ -46,6 +59,25 @@ class Workcell(Protocol):
 
 
 @dataclass(frozen=True)
+class CellPast:
+    """What a run that is taken up again has had of its cell.
+
+    A simulated world is rebuilt from the log that the run left, its arm braking, and the log goes on.
+
+    Attributes:
+        log: What `log_to` was given.
+        steps: Control steps made, as far as the journal knows.
+        frames: Images taken.
+        turns: Times that the camera was asked for its next pose.
+    """
+
+    log: Path
+    steps: int = 0
+    frames: int = 0
+    turns: int = 0
+
+
+@dataclass(frozen=True)
 class CellOptions:
     """How a run wants its cell.
 
@@ -53,11 +85,13 @@ class CellOptions:
         operator: Who is asked for requests.
         base: Folder that paths in the cell file start from.
         gui: Show the world in a window.
+        past: What a run that is taken up again has had of the cell; None: a run begins.
     """
 
     operator: Operator
     base: Path
     gui: bool = False
+    past: CellPast | None = None
 
 
 KeyPath = tuple[str | int, ...]

@@ -20,7 +20,7 @@ def halt(root: Behaviour) -> list[str]:
             try:
                 node.stop(Status.INVALID)
             except Exception as error:
-                where = error.node if isinstance(error, Fault) else node.name
+                where = (error.node if isinstance(error, Fault) else "") or node.name
                 problems.append(f"{where}: {error}")
                 # A node whose clean-up failed has ended all the same: nobody may halt it twice.
                 node.status = Status.INVALID

@@ -188,5 +188,7 @@ class Record:
         self.frame, self.stamp, self.confidence = found.frame, found.stamp, found.confidence
         self.overlooked = 1.0
         self.looks += found.looks
+        # Where it was first, it was before it fell or was pushed.
+        self.moved = True
         if self.state is State.DROPPED:
             self.state = State.SEEN

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-import pybullet
 
 from executive.arm import Goal, Motion, Task
 from executive.cell import Clock
@@ -19,11 +18,11 @@ from executive.motion.plans import Plan, Plans
 from executive.motion.state import JOINTS
 from executive.motion.stop import brake
 from executive.motion.trajectory import Trajectory
+from executive.sim import command_log
 from executive.sim.contacts import Contacts
+from executive.sim.rebuild import UnderWay
 from executive.sim.world import STEP, World
 
-TORQUES = (320.0, 320.0, 176.0, 176.0, 110.0, 40.0, 40.0)
-"""Largest joint torques of the iiwa 14 [Nm], data sheet as in RobotLocomotion/models iiwa_description."""
 START_TOLERANCE = math.radians(0.2)
 """Largest joint difference between the arm and the start of a motion [rad]."""
 TRACKING_TOLERANCE = math.radians(0.5)
@@ -46,6 +45,7 @@ class SimArm:
         clock: The run's.
         held: Returns the body that hangs at the tool, or None: its weight and what it hits are felt.
         emit: Tells the run what happens.
+        under_way: What the arm was doing in a world that was rebuilt; it brakes. None: the arm is at rest.
 
     Attributes:
         planner: Plans its motions.
@@ -59,6 +59,7 @@ class SimArm:
         clock: Clock,
         held: Callable[[], int | None] = lambda: None,
         emit: Emit = ignore,
+        under_way: UnderWay | None = None,
     ) -> None:
         self.planner = planner
         self._world = world
@@ -71,7 +72,11 @@ class SimArm:
         self._fault: str | None = None
         self._met: str | None = None
         self._command = self.q
-        self._send()
+        if under_way is None:
+            self._send()
+        else:
+            self._command, self._motion, self._time = under_way.command, under_way.motion, under_way.time
+            self.stop()
 
     @property
     def q(self) -> Array:
@@ -137,11 +142,22 @@ class SimArm:
         self._raise_fault()
         self._motion, self._time, self._met = motion, 0.0, None
         self._contacts.begin()
+        self._world.log.motion(motion)
 
     def stop(self) -> None:
         """Brake along the running motion's path; returns at once, also when nothing runs."""
         if self._motion is not None and self._braking is None:
             self._braking = list(brake(self._motion, self._time, self.planner.limits, STEP))
+
+    def run_into(self, what: str) -> None:
+        """Brake as after running into `what`, which `met` then tells; nothing where no motion runs."""
+        if self._motion is not None and self._braking is None:
+            self._met = what
+            self.stop()
+
+    def hold(self) -> None:
+        """Send the last command once more."""
+        self._send()
 
     def advance(self) -> None:
         """Send the command for the coming physics step; called once before each."""
@@ -162,9 +178,10 @@ class SimArm:
             self._time = self._braking.pop(0)
             done = not self._braking
         self._command = self._motion.at(self._time)[0]
+        self._send()
         if done:
             self._motion, self._braking = None, None
-        self._send()
+            self._world.log.note(command_log.DONE)
 
     @property
     def _goal(self) -> Array:
@@ -179,14 +196,7 @@ class SimArm:
             raise Fault(f'the cell file has no arm pose "{goal}"; it has {", ".join(sorted(self._poses))}')
 
     def _send(self) -> None:
-        self._world.client.setJointMotorControlArray(
-            self._world.arm,
-            range(JOINTS),
-            pybullet.POSITION_CONTROL,
-            targetPositions=self._command.tolist(),
-            forces=TORQUES,
-            positionGains=[1.0] * JOINTS,
-        )
+        self._world.command_arm(self._command, self._time)
 
     def _require_near(self, q: Array, tolerance: float, what: str) -> None:
         """Keep a fault in mind if the arm is farther from `q` than `tolerance`."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
 from executive.cell import Routes
 from executive.geometry import Array
 from executive.ledger.item import Record, State
-from executive.messages import Bin
+from executive.messages import BIN_THICKNESS, Bin
 from executive.sim.world import World
 
 FLOOR = -0.05
@@ -18,39 +18,54 @@ FLOOR = -0.05
 
 def audit(
     world: World,
-    initial: Mapping[int, Array],
+    stood: Mapping[int, Sequence[Array]],
     records: Sequence[Record],
     bins: Mapping[str, Bin],
     routes: Routes,
     reach: float,
     held: int | None = None,
+    fallen: Collection[int] = (),
 ) -> dict[str, int]:
     """Return how many bodies ended `right`, `wrong_bin`, `left` on the table, or `elsewhere`.
 
-    What is still in the tool was let go nowhere and is `left`, also over a bin. `unseen` counts the
-    bodies that no item of the ledger was first seen near.
+    What is still in the tool was let go nowhere and is `left`, also over a bin; and what fell into a wrong
+    bin was put there by nobody: it is out of reach, `elsewhere`. What somebody took away is
+    `elsewhere`, if it was seen before. `unseen` counts the other bodies that no item of the ledger was first
+    seen near.
 
     Args:
         world: The simulated world as the run left it.
-        initial: Where each body `(3,)` [m] lay when the run began, by body id.
+        stood: Where each body `(3,)` [m] lay when the run began, and wherever it was put since then, by body.
         records: The ledger's items.
         bins: The cell's bins.
         routes: Class label to the bins that are right for it.
-        reach: How far from a body's first place an item may have been seen first [m].
+        reach: How far from one of these places an item may have been seen first [m].
         held: Body in the tool, or None.
+        fallen: Bodies that fell from the tool and were not in it again.
     """
     counts = {"right": 0, "wrong_bin": 0, "left": 0, "elsewhere": 0, "unseen": 0}
     real = [record for record in records if record.state is not State.PHANTOM]
-    for body, label in world.bodies.items():
-        position = world.object_pose(body).position
-        inside = next((name for name, bin in bins.items() if bin.contains(position)), None)
-        if position[2] < FLOOR:
-            counts["elsewhere"] += 1
-        elif inside is not None and body != held:
-            counts["right" if inside in routes.get(label, ()) else "wrong_bin"] += 1
-        else:
-            counts["left"] += 1
-        near = [r for r in real if float(np.linalg.norm(r.first[:2] - initial[body][:2])) <= reach]
-        if not near:
-            counts["unseen"] += 1
+    for body, places in stood.items():
+        seen = any(
+            float(np.linalg.norm(record.first[:2] - place[:2])) <= reach
+            for record in real
+            for place in places
+        )
+        if body not in world.bodies:
+            counts["elsewhere"] += seen
+            continue
+        fate = "left" if body == held else _fate(world, body, bins, routes)
+        counts["elsewhere" if fate == "wrong_bin" and body in fallen else fate] += 1
+        counts["unseen"] += not seen
     return counts
+
+
+def _fate(world: World, body: int, bins: Mapping[str, Bin], routes: Routes) -> str:
+    position = world.object_pose(body).position
+    # What leans on a wall from inside may have its middle over it.
+    inside = next((name for name, bin in bins.items() if bin.contains(position, BIN_THICKNESS)), None)
+    if position[2] < FLOOR:
+        return "elsewhere"
+    if inside is None:
+        return "left"
+    return "right" if inside in routes.get(world.bodies[body], ()) else "wrong_bin"

@@ -204,6 +204,10 @@ class SimCamera:
             epoch=self._epoch(),
         )
 
+    def skip(self, frames: int, turns: int) -> None:
+        """Go on as if so many frames had been taken and next poses been asked for."""
+        self._frames, self._turn = frames, turns
+
     @property
     def _size(self) -> tuple[int, int]:
         return self.config.width, self.config.height

@@ -21,11 +21,13 @@ from executive.sim.audit import audit
 from executive.sim.camera import SimCamera
 from executive.sim.clearance import PathClearance
 from executive.sim.clock import SimClock
+from executive.sim.command_log import CommandLog, read_commands
 from executive.sim.least_times import SimLeastTimes
 from executive.sim.models import missing_models, weighed
 from executive.sim.poses import unfit_poses
 from executive.sim.ray import cast
 from executive.sim.reach import out_of_reach
+from executive.sim.rebuild import UnderWay, rebuild
 from executive.sim.spawn import spawn
 from executive.sim.tool import SuctionTool
 from executive.sim.view import ArmShadow
@@ -73,13 +75,15 @@ class SimCell:
         self._world = World(config, gui=options.gui)
         self._world.set_arm(np.radians(config.arm.poses_deg["home"]))
         spawn(self._world, config, spawn_seed)
+        self._world.stood.clear()
         self._initial = {body: self._world.object_pose(body).position for body in self._world.bodies}
         self._bins = {name: as_bin(name, bin) for name, bin in config.bins.items()}
-        clock = SimClock(self._world, STEP)
+        self._clock = clock = SimClock(self._world, STEP)
         self._clearance = PathClearance(config)
         planner = Planner(config, self._clearance.check)
-        self._tool = SuctionTool(self._world, config.tool, emit)
-        self._arm = SimArm(self._world, planner, config, clock, lambda: self._tool.held_body, emit)
+        self._tool = SuctionTool(self._world, config.tool)
+        under_way = None if options.past is None else self._rebuilt(options.past.log)
+        self._arm = SimArm(self._world, planner, config, clock, lambda: self._tool.held_body, emit, under_way)
         self._ledger = ItemLedger(config.ledger, config.table, self._bins, routes, emit)
         name, camera_config = next(iter(config.cameras.items()))
         self._camera = camera(
@@ -91,6 +95,8 @@ class SimCell:
             shadow=ArmShadow(self._arm, planner.kinematics, config, lambda: self._tool.holding),
             epoch=lambda: self._ledger.epoch,
         )
+        if options.past is not None:
+            self._camera.skip(options.past.frames, options.past.turns)
         classes = {label: weighed(label, kind) for label, kind in config.objects.items()}
 
         def decided(target: Target, bin: str) -> None:
@@ -155,6 +161,16 @@ class SimCell:
         """The books of the cell's ledger."""
         return self._ledger
 
+    @property
+    def steps(self) -> int:
+        """Control steps that its world has made since the run began."""
+        return self._clock.steps
+
+    def log_to(self, path: Path) -> None:
+        """Keep in a file, from now on, what is done to the world."""
+        self._world.log = CommandLog(path)
+        self._arm.hold()
+
     def advance(self) -> None:
         """Let one physics step pass."""
         self._arm.advance()
@@ -165,12 +181,13 @@ class SimCell:
         """Return what really became of the objects; for after the run only."""
         return audit(
             self._world,
-            self._initial,
+            {body: [place, *self._world.stood.get(body, ())] for body, place in self._initial.items()},
             self._ledger.records,
             self._bins,
             self._routes,
             self._config.ledger.gate,
             held=self._tool.held_body,
+            fallen=self._tool.fallen,
         )
 
     def close(self) -> None:
@@ -179,6 +196,13 @@ class SimCell:
             detector.close()
         self._clearance.close()
         self._world.close()
+
+    def _rebuilt(self, log: Path) -> UnderWay:
+        """Rebuild the world as its log says, and go on with the log."""
+        under_way = rebuild(self._world, self._tool, read_commands(log))
+        self._clock.skip(under_way.idle)
+        self._world.log = CommandLog(log, again=True)
+        return under_way
 
 
 def _lacking_depth(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:

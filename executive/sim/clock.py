@@ -15,14 +15,23 @@ class SimClock:
         self._start = world.steps
 
     @property
+    def steps(self) -> int:
+        """Physics steps since the run began."""
+        return self._world.steps - self._start
+
+    @property
     def now(self) -> float:
         """Time since the run began [s]."""
-        return (self._world.steps - self._start) * self._step
+        return self.steps * self._step
 
     @property
     def step(self) -> float:
         """Length of one control step [s]."""
         return self._step
+
+    def skip(self, steps: int) -> None:
+        """Leave out physics steps that were none of the run."""
+        self._start += steps
 
     def sleep(self, duration: float) -> Steps:
         """Yield until `duration` [s] has passed on this clock."""

@@ -9,8 +9,8 @@ import numpy as np
 import pybullet
 
 from executive.cell_config import ToolConfig
-from executive.events import Emit
 from executive.geometry import Array, Pose
+from executive.sim import command_log
 from executive.sim.seal import breakaway, measure
 from executive.sim.world import World
 
@@ -43,16 +43,21 @@ class SuctionTool:
     its breakaway force. Moments count for nothing. A seal that has given way forms again only after
     cup and object have parted or the vacuum was off: the object is still within reach at that moment,
     but moving away.
+
+    Attributes:
+        fallen: Bodies whose last seal gave way: the truth, as `held_body`.
     """
 
-    def __init__(self, world: World, config: ToolConfig, emit: Emit) -> None:
+    def __init__(self, world: World, config: ToolConfig) -> None:
         self._world = world
         self._config = config
-        self._emit = emit
         self._vacuum = False
         self._grip: _Grip | None = None
         self._parting: int | None = None
         self._felt = (-1, False)
+        self.fallen: set[int] = set()
+        self._leaks = False
+        self._sticks = False
 
     @property
     def touching(self) -> bool:
@@ -83,19 +88,48 @@ class SuctionTool:
         """The low-passed pull on the seal [N], 0 when nothing is held; the truth, as `held_body`."""
         return 0.0 if self._grip is None else float(np.linalg.norm(self._grip.pull))
 
+    @property
+    def leaks(self) -> bool:
+        """True keeps it from sealing anything; for fault scripts to say, as is `sticks`."""
+        return self._leaks
+
+    @leaks.setter
+    def leaks(self, leaks: bool) -> None:
+        self._world.log.note(command_log.LEAKS, leaks)
+        self._leaks = leaks
+
+    @property
+    def sticks(self) -> bool:
+        """True keeps it from letting go when it is opened."""
+        return self._sticks
+
+    @sticks.setter
+    def sticks(self, sticks: bool) -> None:
+        self._world.log.note(command_log.STICKS, sticks)
+        self._sticks = sticks
+
     def close(self) -> None:
         """Switch the vacuum on: what is within reach is sealed on if the seal bears enough."""
-        self._emit("intent", action="close")
+        self._world.log.note(command_log.CLOSE)
         self._vacuum = True
         if self._grip is None:
             self._seal()
 
     def open(self) -> None:
         """Let go and switch the vacuum off."""
-        self._emit("intent", action="open")
+        self._world.log.note(command_log.OPEN)
         self._vacuum = False
         self._parting = None
-        self._let_go()
+        if not self._sticks:
+            self._let_go()
+
+    def part(self) -> None:
+        """Let the seal give way, as it does under too much pull; what hung there falls."""
+        self._world.log.note(command_log.PART)
+        if self._grip is not None:
+            self._parting = self._grip.body
+            self.fallen.add(self._grip.body)
+            self._let_go()
 
     def advance(self) -> None:
         """Bring the seal up to date with the physics step just made."""
@@ -109,11 +143,12 @@ class SuctionTool:
         force = np.array(self._world.client.getConstraintState(grip.constraint)[:3])
         grip.pull += SMOOTHING * (force - grip.pull)
         if float(np.linalg.norm(grip.pull)) > grip.bears:
-            self._parting = grip.body
-            self._let_go()
+            self.part()
 
     def _seal(self) -> None:
         """Seal the cup to what is within reach, if anything is and the seal bears enough."""
+        if self._leaks:
+            return
         near = set(self._near(self._config.reach))
         if self._parting not in near:
             self._parting = None
@@ -124,6 +159,7 @@ class SuctionTool:
         seal = measure(world.client, world.tool_pose(), movable, config.cup_radius, config.reach)
         bears = breakaway(seal, config)
         if seal is not None and bears >= config.least_force:
+            self.fallen.discard(seal.body)
             self._grip = _Grip(seal.body, self._attach(seal.body), bears)
             # Held a hair's breadth inside the cup, the pair would push against the constraint.
             self._collide(seal.body, False)

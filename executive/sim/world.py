@@ -19,7 +19,10 @@ from executive.geometry import Array, Pose
 from executive.layout import NECK_LENGTH, TOOL_RADIUS
 from executive.messages import BIN_THICKNESS
 from executive.motion.kinematics import FLANGE_OFFSET
+from executive.motion.state import JOINTS
+from executive.sim import command_log
 from executive.sim.bodies import add_body
+from executive.sim.command_log import CommandLog
 from executive.sim.models import find_model, upright
 
 STEP = 1 / 240
@@ -32,6 +35,8 @@ CYLINDER_MARGIN = 0.001
 """What Bullet adds all around a URDF's cylinder when it collides [m]."""
 TOOL_MASS = 0.1
 """Mass of the tool [kg]."""
+TORQUES = (320.0, 320.0, 176.0, 176.0, 110.0, 40.0, 40.0)
+"""Largest joint torques of the iiwa 14 [Nm], data sheet as in RobotLocomotion/models iiwa_description."""
 
 
 class World:
@@ -51,6 +56,9 @@ class World:
         bins: Bodies of each bin.
         bodies: Label of every loose object, by body.
         steps: Physics steps made so far.
+        log: Where all that is done to it is noted, before it is done.
+        idle: True while it is stepped for nobody's run.
+        stood: Where loose objects `(3,)` [m] were put after they had been added, by body.
     """
 
     flange = 6
@@ -75,6 +83,9 @@ class World:
         self.bins = {name: (add_bin(self.client, bin),) for name, bin in config.bins.items()}
         self.bodies: dict[int, str] = {}
         self.steps = 0
+        self.log = CommandLog()
+        self.idle = False
+        self.stood: dict[int, list[Array]] = {}
         self.set_arm(np.radians(config.arm.poses_deg["home"]))
 
     def add_object(self, label: str, X_WO: Pose, colour: Sequence[float]) -> int:
@@ -86,6 +97,7 @@ class World:
 
     def remove_object(self, body: int) -> None:
         """Take a loose object out of the world."""
+        self.log.note(command_log.REMOVE, body)
         del self.bodies[body]
         self.client.removeBody(body)
 
@@ -108,6 +120,8 @@ class World:
 
     def place_object(self, body: int, X_WO: Pose) -> None:
         """Move a loose object to `X_WO`, at rest."""
+        self.stood.setdefault(body, []).append(X_WO.position)
+        self.log.note(command_log.PLACE, body, *X_WO.position, *X_WO.quaternion)
         X_LI = Pose.of(*self.client.getDynamicsInfo(body, -1)[3:5])
         X_WI = X_WO @ upright(self.config.objects[self.bodies[body]]) @ X_LI
         self.client.resetBasePositionAndOrientation(body, X_WI.position, X_WI.quaternion)
@@ -116,6 +130,21 @@ class World:
         """Put the arm at joint positions `q` `(7,)` [rad], at rest, whatever is in the way."""
         for joint, angle in enumerate(q):
             self.client.resetJointState(self.arm, joint, angle)
+
+    def command_arm(self, q: Array, time: float = 0.0) -> None:
+        """Have the arm's motors go to joint positions `q` `(7,)` [rad], `time` [s] on the path of its motion.
+
+        Full position gain and no velocity: sent before every step, it follows a path to 0.0005°.
+        """
+        self.log.note(command_log.JOINTS_TO, time, *q)
+        self.client.setJointMotorControlArray(
+            self.arm,
+            range(JOINTS),
+            pybullet.POSITION_CONTROL,
+            targetPositions=q.tolist(),
+            forces=TORQUES,
+            positionGains=[1.0] * JOINTS,
+        )
 
     def flange_pose(self) -> Pose:
         """Return `X_WF`, the pose of the flange."""
@@ -128,11 +157,13 @@ class World:
 
     def step(self) -> None:
         """Advance the physics by 1/240 s."""
+        self.log.note(command_log.IDLE if self.idle else command_log.STEP)
         self.client.stepSimulation()
         self.steps += 1
 
     def close(self) -> None:
         """Give the physics server back; the world cannot be used afterwards."""
+        self.log.close()
         self.client.disconnect()
 
     def _load_arm(self, flags: int) -> int:

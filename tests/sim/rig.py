@@ -38,7 +38,7 @@ class Rig:
         self.planner = Planner(config, self.clearance.check)
         self.clock = SimClock(self.world, STEP)
         self.events: list[dict[str, Any]] = []
-        self.tool = SuctionTool(self.world, config.tool, self.emit)
+        self.tool = SuctionTool(self.world, config.tool)
         self.arm = SimArm(
             self.world, self.planner, config, self.clock, lambda: self.tool.held_body, self.emit
         )

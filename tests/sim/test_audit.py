@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from executive.geometry import Pose
@@ -19,10 +21,10 @@ class OneBody:
         return Pose.of((0.2, -0.44, 0.12))
 
 
-def counted(bins_of_cube: tuple[str, ...], held: int | None = None) -> dict[str, int]:
+def counted(bins_of_cube: tuple[str, ...], held: int | None = None, **more: Any) -> dict[str, int]:
     bins = {"red_bin": Bin("red_bin", np.array([0.2, -0.44, 0]), np.array([0.2, 0.2, 0.1]), np.zeros((1, 2)))}
-    initial = {7: np.array([0.5, 0.0, 0.025])}
-    return audit(OneBody(), initial, [], bins, {"cube": bins_of_cube}, 0.025, held=held)  # type: ignore[arg-type]
+    stood = {7: [np.array([0.5, 0.0, 0.025])]}
+    return audit(OneBody(), stood, [], bins, {"cube": bins_of_cube}, 0.025, held=held, **more)  # type: ignore[arg-type]
 
 
 def test_what_hangs_in_the_tool_over_its_bin_is_left_and_not_placed() -> None:
@@ -34,3 +36,9 @@ def test_what_hangs_in_the_tool_over_its_bin_is_left_and_not_placed() -> None:
 def test_any_bin_of_its_class_is_right_and_no_other() -> None:
     assert counted(("blue_bin", "red_bin"))["right"] == 1
     assert counted(("blue_bin", "grey_bin"))["wrong_bin"] == 1
+
+
+def test_what_fell_into_a_wrong_bin_was_put_there_by_nobody() -> None:
+    ended = counted(("blue_bin",), fallen={7})
+    assert (ended["wrong_bin"], ended["elsewhere"]) == (0, 1)
+    assert counted(("red_bin",), fallen={7})["right"] == 1

@@ -1,0 +1,148 @@
+"""What was done to a simulated world, step by step: from it the world can be rebuilt as it stands.
+
+PyBullet's own snapshots lose constraints and motor targets; the same commands to the same world give the
+same bits.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from executive.errors import Fault, InputError
+from executive.geometry import Array
+from executive.motion.state import JOINTS, State
+from executive.motion.trajectory import Trajectory
+
+MAGIC = b"executive world 1\n"
+"""Begins every log; the number is that of the format."""
+STEP, IDLE, CLOSE, OPEN, PART, JOINTS_TO, MOTION, DONE, PLACE, REMOVE, LEAKS, STICKS = b"SICOPJMDXRLK"
+"""Kinds of commands: a physics step of the run, and one between two parts of a run; vacuum on and off; a seal
+that gives way; joint targets; a motion that begins, and one that is over; an object that is put elsewhere,
+and one that is taken away; whether the cup leaks, and whether it sticks to what it let go."""
+_BODIES = {
+    STEP: "", IDLE: "", CLOSE: "", OPEN: "", PART: "", DONE: "", JOINTS_TO: f"{1 + JOINTS}d", MOTION: "2dI",
+    PLACE: "i7d", REMOVE: "i", LEAKS: "?", STICKS: "?",
+}  # fmt: skip
+_STATE = 3 * JOINTS
+
+
+class Command(NamedTuple):
+    """One command: its kind, its numbers, and the states `(N, 21)` of a motion."""
+
+    kind: int
+    numbers: tuple[float, ...] = ()
+    states: Array | None = None
+
+
+class CommandLog:
+    """Appends commands to a file, each before it is done.
+
+    Args:
+        path: The file; None: nothing is kept.
+        again: Whether the file is there already, and goes on; a command that a kill tore is cut off.
+
+    Raises:
+        InputError: It cannot be written, or is no log.
+    """
+
+    def __init__(self, path: Path | None = None, *, again: bool = False) -> None:
+        self._path = path
+        self._file: int | None = None
+        if path is None:
+            return
+        length = max((end for _, end in _commands(path)), default=len(MAGIC)) if again else 0
+        try:
+            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+            os.ftruncate(self._file, length)
+            if not again:
+                os.write(self._file, MAGIC)
+        except OSError as error:
+            raise InputError(f'cannot write "{path}": {(error.strerror or str(error)).lower()}') from error
+
+    def note(self, kind: int, *numbers: float) -> None:
+        """Append a command."""
+        if self._file is not None:
+            self._write(bytes([kind]) + struct.pack(f"<{_BODIES[kind]}", *numbers))
+
+    def motion(self, motion: Trajectory) -> None:
+        """Append that the arm begins to follow a motion: whoever comes later can brake on its path."""
+        if self._file is not None:
+            states = np.hstack(motion.samples)
+            head = struct.pack(f"<{_BODIES[MOTION]}", motion.duration, motion.guarded, len(states))
+            self._write(bytes([MOTION]) + head + states.astype("<f8").tobytes())
+
+    def close(self) -> None:
+        """Close the file; more calls do nothing."""
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None
+
+    def _write(self, data: bytes) -> None:
+        """Append all of `data`.
+
+        Raises:
+            Fault: The disk does not take it. What is done later is not kept, without another fault, so that
+                the arm can be brought to rest.
+        """
+        assert self._file is not None
+        try:
+            # Without a buffer: what was done before a kill is in the file.
+            while data:
+                data = data[os.write(self._file, data) :]
+        except OSError as error:
+            self.close()
+            raise Fault(
+                f'the log of the world "{self._path}" cannot be written: {(error.strerror or "").lower()}; '
+                "the run stops because it could not be taken up again"
+            ) from error
+
+
+def read_commands(path: Path) -> Iterator[Command]:
+    """Yield the commands of a log, in order; one that a kill tore is left out.
+
+    Raises:
+        InputError: There is no such log.
+    """
+    for command, _ in _commands(path):
+        yield command
+
+
+def _commands(path: Path) -> Iterator[tuple[Command, int]]:
+    """Yield the whole commands of a log, each with how long the log is up to its end."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(
+            f'cannot read the log of the world "{path}": {(error.strerror or str(error)).lower()}; '
+            "without it a simulated run cannot be taken up again"
+        ) from error
+    if not data.startswith(MAGIC):
+        raise InputError(f'"{path}" is no log of a world: it does not begin with {MAGIC.decode().strip()!r}')
+    place = len(MAGIC)
+    while place < len(data):
+        kind = data[place]
+        body = struct.Struct(f"<{_BODIES[kind]}")
+        if place + 1 + body.size > len(data):
+            return
+        numbers = body.unpack_from(data, place + 1)
+        place += 1 + body.size
+        states = None
+        if kind == MOTION:
+            size = 8 * _STATE * int(numbers[-1])
+            if place + size > len(data):
+                return
+            states = np.frombuffer(data, "<f8", _STATE * int(numbers[-1]), place).reshape(-1, _STATE)
+            place += size
+        yield Command(kind, numbers, states), place
+
+
+def states_of(command: Command) -> State:
+    """Return the states of a motion that begins, each array of shape `(N, 7)`."""
+    assert command.states is not None
+    return State(*np.hsplit(command.states, 3))

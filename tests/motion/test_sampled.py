@@ -1,0 +1,33 @@
+"""A motion that is known by its samples alone."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from executive.arm import Goal
+from executive.motion.sampled import sampled
+from executive.motion.stop import brake
+from executive.motion.trajectory import STEP
+
+
+def test_it_passes_the_same_states_between_the_samples(planner, home, limits) -> None:
+    motion = planner.plan(home, Goal((0.55, 0.15, 0.055), guarded=0.02, speed=0.04))
+    again = sampled(motion.samples, motion.duration, motion.guarded)
+    times = np.linspace(0.0, motion.duration, 997)
+    for s in times:
+        one, other = motion.at(float(s)), again.at(float(s))
+        assert np.abs(one.q - other.q).max() < 1e-7
+        assert np.abs(one.qd - other.qd).max() < 1e-4
+        # Between two samples the jerk may jump, which no polynomial does.
+        assert np.abs(one.qdd - other.qdd).max() <= limits.jerk.max() * STEP
+    assert (again.duration, again.guarded) == (motion.duration, motion.guarded)
+    assert np.array_equal(again.at(motion.duration).qd, np.zeros(7))
+
+
+def test_a_stop_on_it_is_the_same_stop(planner, home, limits) -> None:
+    motion = planner.plan(home, Goal((0.5, -0.1, 0.08)))
+    again = sampled(motion.samples, motion.duration, motion.guarded)
+    for s in np.arange(0.0, motion.duration, 20 * STEP):
+        one, other = (brake(each, float(s), limits, STEP) for each in (motion, again))
+        assert len(one) == len(other)
+        assert np.abs(one - other).max() < 1e-9

@@ -1,0 +1,98 @@
+"""What a fault script does to the simulated tool and arm."""
+
+from __future__ import annotations
+
+import pytest
+from rig import Rig
+
+from executive.arm import Goal, Task
+from executive.layout import as_class
+from executive.messages import Load
+
+CUBE = (0.5, 0.1)
+OVER = Goal((*CUBE, 0.15))
+ONTO = Goal((*CUBE, 0.04), guarded=0.015, speed=0.035)
+
+
+@pytest.fixture
+def held(rig: Rig) -> int:
+    """A cube that hangs at the tool, in the air."""
+    body = rig.add("cube", *CUBE)
+    rig.step(60)
+    rig.touch_down(ONTO)
+    rig.tool.close()
+    assert rig.tool.held_body == body
+    rig.go(OVER, Task(load=Load(as_class("cube", rig.config.objects["cube"]), rig.tool.bears)))
+    return body
+
+
+def height(rig: Rig, body: int) -> float:
+    return float(rig.world.object_pose(body).position[2])
+
+
+def test_a_seal_gives_way_and_the_object_falls(rig: Rig, held: int) -> None:
+    assert height(rig, held) > 0.1
+    rig.tool.part()
+    assert not rig.tool.holding
+    rig.step(120)
+    assert height(rig, held) == pytest.approx(0.025, abs=0.002)
+    assert not rig.tool.holding, "the vacuum is on and nothing is near"
+
+
+def test_where_there_is_no_seal_none_gives_way(rig: Rig) -> None:
+    rig.tool.part()
+    assert not rig.tool.holding
+
+
+def test_a_leaking_tool_seals_nothing_and_a_sound_one_does(rig: Rig) -> None:
+    body = rig.add("cube", *CUBE)
+    rig.step(60)
+    rig.touch_down(ONTO)
+    rig.tool.leaks = True
+    rig.tool.close()
+    rig.step(24)
+    assert rig.tool.touching
+    assert not rig.tool.holding
+    rig.tool.leaks = False
+    rig.step()
+    assert rig.tool.held_body == body, "the vacuum is on still"
+
+
+def test_a_leak_takes_nothing_that_is_held(rig: Rig, held: int) -> None:
+    rig.tool.leaks = True
+    rig.step(24)
+    assert rig.tool.held_body == held
+
+
+def test_what_sticks_comes_off_when_the_tool_is_opened_once_more(rig: Rig, held: int) -> None:
+    rig.tool.sticks = True
+    rig.tool.open()
+    rig.step(60)
+    assert rig.tool.held_body == held
+    rig.tool.sticks = False
+    rig.step(60)
+    assert rig.tool.held_body == held
+    rig.tool.open()
+    assert not rig.tool.holding
+
+
+def test_an_arm_that_runs_into_something_brakes_and_says_what(rig: Rig) -> None:
+    rig.arm.start(rig.planned(OVER))
+    rig.step(60)
+    rig.arm.run_into("a hand")
+    assert not rig.arm.at_rest
+    assert rig.run() <= 120
+    assert rig.arm.met == "a hand"
+    rig.go("home")
+    assert rig.arm.met is None
+
+
+def test_an_arm_at_rest_or_braking_already_runs_into_nothing(rig: Rig) -> None:
+    rig.arm.run_into("a hand")
+    assert (rig.arm.met, rig.arm.at_rest) == (None, True)
+    rig.arm.start(rig.planned(OVER))
+    rig.step(60)
+    rig.arm.stop()
+    rig.arm.run_into("a hand")
+    rig.run()
+    assert rig.arm.met is None
