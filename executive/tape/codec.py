@@ -1,0 +1,94 @@
+"""Frames, answers and poses as plain values that lose nothing, and back."""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from executive.geometry import Array, Pose
+from executive.messages import Answer, Detection, Frame, Reliability
+
+
+def write_array(array: Array) -> list[Any]:
+    """Return an array as lists of floats."""
+    return array.tolist()
+
+
+def read_array(value: Any) -> Array:
+    """Return what `write_array` was given."""
+    return np.array(value, dtype=np.float64)
+
+
+def write_pose(pose: Pose) -> list[Any]:
+    """Return rotation and position of a pose."""
+    return [pose.rotation.tolist(), pose.position.tolist()]
+
+
+def read_pose(value: Any) -> Pose:
+    """Return what `write_pose` was given."""
+    rotation, position = value
+    return Pose(read_array(rotation), read_array(position))
+
+
+def write_frame(frame: Frame) -> dict[str, Any]:
+    """Return a frame without what it shows: image and depth are not kept."""
+    return {
+        "id": frame.id,
+        "camera": frame.camera,
+        "matrix": write_array(frame.matrix),
+        "X_WC": write_pose(frame.X_WC),
+        "stamp": frame.stamp,
+        "epoch": frame.epoch,
+        "visible": _packed(frame.visible),
+        "size": list(frame.visible.shape),
+    }
+
+
+def read_frame(value: Any) -> Frame:
+    """Return what `write_frame` was given, its image black and without depth."""
+    height, width = value["size"]
+    return Frame(
+        id=value["id"],
+        camera=value["camera"],
+        image=np.zeros((height, width, 3), np.uint8),
+        depth=None,
+        matrix=read_array(value["matrix"]),
+        X_WC=read_pose(value["X_WC"]),
+        stamp=value["stamp"],
+        visible=_unpacked(value["visible"], (height, width)),
+        epoch=value["epoch"],
+    )
+
+
+def write_answer(answer: Answer) -> dict[str, Any]:
+    """Return a detector's answer."""
+    sure = answer.reliability
+    return {
+        "detector": answer.detector,
+        "found": [[one.label, float(one.confidence), [float(x) for x in one.box]] for one in answer.found],
+        "reliability": [sure.threshold, sure.misses, sure.confused, sure.invented, sure.jitter],
+    }
+
+
+def read_answer(value: Any) -> Answer:
+    """Return what `write_answer` was given."""
+    found = tuple(Detection(label, confidence, tuple(box)) for label, confidence, box in value["found"])
+    return Answer(value["detector"], found, Reliability(*value["reliability"]))
+
+
+def _packed(mask: NDArray[np.bool_]) -> str:
+    """Return a mask as text; "" where all of it is true."""
+    if mask.all():
+        return ""
+    return base64.b64encode(zlib.compress(np.packbits(mask).tobytes())).decode("ascii")
+
+
+def _unpacked(text: str, size: tuple[int, int]) -> NDArray[np.bool_]:
+    if not text:
+        return np.ones(size, np.bool_)
+    bits = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.uint8)
+    return np.unpackbits(bits, count=size[0] * size[1]).reshape(size).astype(np.bool_)

@@ -1,0 +1,132 @@
+"""The tape: what a cell was asked and what it answered.
+
+While it records, every answer that is unlike the one before to the same question becomes a `sense` event.
+While it plays, questions are answered from such events, and commands go nowhere: whatever is decided by a
+tree, its skills and the ledger is then decided once more, from the same answers, without the cell.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from executive import errors
+from executive.errors import Fault
+from executive.events import Emit, Exact
+from executive.tape.past import Past, Sense
+
+T = TypeVar("T")
+
+
+class Unrecorded(Fault):
+    """Something was asked that the recorded run never asked: there is no answer to play."""
+
+
+def same(value: Any) -> Any:
+    """Return the value: what makes a plain answer plain, and back."""
+    return value
+
+
+class Tape:
+    """Records a cell's answers, or plays those of a `Past` and then goes on to record.
+
+    Only the tick thread asks it.
+
+    Args:
+        emit: Takes its `sense` events.
+        step: Length of a control step [s].
+        now: The time on the cell's own clock [s].
+        past: What to play; None: record from the beginning.
+    """
+
+    def __init__(self, emit: Emit, step: float, now: Callable[[], float], past: Past | None = None) -> None:
+        self.playing = past is not None
+        self.step = step
+        self._emit = emit
+        self._now = now
+        self._tick = 0
+        self._asked: dict[str, int] = {}
+        self._last: dict[str, Any] = {}
+        self._to_come = {name: deque(senses) for name, senses in past.senses.items()} if past else {}
+
+    def begin_tick(self, tick: int) -> None:
+        """Note that a control step begins."""
+        self._tick = tick
+        self._asked.clear()
+
+    def go_live(self) -> None:
+        """Play no more: from now on the cell itself is asked, and what it answers is recorded."""
+        self.playing = False
+        self._to_come = {}
+
+    @property
+    def now(self) -> float:
+        """Time on the run's clock [s]: that of all control steps, and what a cell's own clock is ahead."""
+        ahead = self._last.get("clock", 0.0) if self.playing else self._ahead()
+        return self._tick * self.step + ahead
+
+    def clock(self) -> float:
+        """Return the time on the run's clock [s], as an answer of the cell."""
+        return self._tick * self.step + self.sense("clock", self._ahead)
+
+    def command(self, do: Callable[[], None]) -> None:
+        """Let the cell do something; nothing while playing.
+
+        Raises:
+            Exception: What the cell raises, played as it was.
+        """
+        self.sense("command", do)
+
+    def sense(
+        self,
+        name: str,
+        ask: Callable[[], T],
+        write: Callable[[T], Any] = same,
+        read: Callable[[Any], T] = same,
+    ) -> T:
+        """Return the cell's answer to a question.
+
+        Args:
+            name: What is asked; the same question has the same name.
+            ask: Asks the cell.
+            write: Returns an answer as plain values.
+            read: Returns an answer from plain values.
+
+        Raises:
+            Unrecorded: It plays, and this was never asked before.
+            Exception: What the cell raised; while playing, of the same name with the same text.
+        """
+        nth = self._asked[name] = self._asked.get(name, 0) + 1
+        if self.playing:
+            return self._play(name, nth, read)
+        try:
+            answer = ask()
+        except Exception as error:
+            self._emit("sense", name=name, nth=nth, value=str(error), raised=type(error).__name__)
+            raise
+        value = write(answer)
+        if name not in self._last or value != self._last[name]:
+            self._last[name] = value
+            self._emit("sense", name=name, nth=nth, value=Exact(value))
+        return answer
+
+    def _play(self, name: str, nth: int, read: Callable[[Any], T]) -> T:
+        to_come = self._to_come.get(name, deque())
+        while to_come and (to_come[0].tick, to_come[0].nth) <= (self._tick, nth):
+            sense = to_come.popleft()
+            if sense.raised:
+                raise _error(sense)
+            self._last[name] = sense.value
+        if name not in self._last:
+            raise Unrecorded(f"the record holds no answer to what is asked here first: {name}")
+        return read(self._last[name])
+
+    def _ahead(self) -> float:
+        return self._now() - self._tick * self.step
+
+
+def _error(sense: Sense) -> Exception:
+    """Return an exception like the one recorded."""
+    kind = getattr(errors, sense.raised, None) or type(sense.raised, (Exception,), {})
+    return kind(sense.value)
