@@ -15,9 +15,16 @@ Entry = dict[str, Any]
 
 
 def entry_of(event: Event) -> Entry:
-    """Return the entry for `event`; its data cannot overwrite the stamp."""
+    """Return the entry for `event`; its data cannot overwrite the stamp.
+
+    What cannot be made plain, such as a list that holds itself, is told by the name of its type.
+    """
     entry = {"tick": event.tick, "clock": plain(event.clock), "kind": event.kind}
     for key, value in event.data.items():
         if key not in TRANSIENT and key not in entry:
-            entry[key] = plain(value)
+            try:
+                entry[key] = plain(value)
+            except Exception:
+                # A skill hands on values of any type: one that misbehaves must not cost the record.
+                entry[key] = type(value).__name__
     return entry

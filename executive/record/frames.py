@@ -134,6 +134,16 @@ class Frames:
         )
 
 
+def picture_of(folder: Path, item: str, reason: str) -> Path | None:
+    """Return the last picture in `folder` of an item's failure for that reason; None where there is none.
+
+    Without a reason it is that of the last decision for the item, without an item that of the last look.
+    """
+    about = "_".join(part for part in (item, reason) if part)
+    pictures = [file for file in folder.glob("*.jpg") if file.stem.partition("_")[2] == about]
+    return max(pictures, key=lambda file: int(file.stem.partition("_")[0]), default=None)
+
+
 def _file(event: Event, choice: Mapping[str, Any]) -> str:
     """Return the name of the file that shows a choice at an event."""
     parts = (f"{event.tick:06d}", choice.get("item"), event.data.get("reason"))

@@ -2,30 +2,53 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import json
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 from executive.errors import Fault, InputError
 from executive.events import Event
 from executive.record.entry import Entry, entry_of
+from executive.record.lock import lock
 
 _ENCODER = json.JSONEncoder(ensure_ascii=False, allow_nan=False, check_circular=False)
+_ESCAPING = json.JSONEncoder(ensure_ascii=True, allow_nan=False, check_circular=False)
 
 
 class Journal:
     """Appends every event to a file, as it happens.
 
-    What the tool is about to do is on the disk before it does it, and so is every placement: after a
-    power cut the record says what may be in the tool and what surely is in a bin.
+    What the tool is about to do is on the disk before it does it, and so are every placement and the end:
+    after a power cut the record says what may be in the tool and what surely is in a bin. No other process
+    can write to it meanwhile; the kernel gives it free when this one ends, in whatever way.
+
+    Args:
+        path: The file.
+        again: Go on with the journal that is there, the torn end of its last line cut off; otherwise there
+            must be none.
+
+    Raises:
+        InputError: It is being written already, holds a run although a new one begins, or cannot be opened.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, again: bool = False) -> None:
         self._path = path
+        self._broken = False
+        self._unsynced = False
         try:
-            self._file: int | None = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+            file = os.open(path, os.O_RDWR | os.O_APPEND | (0 if again else os.O_CREAT), 0o644)
+            try:
+                lock(file, path)
+                self._length = _mended(file) if again else _empty(file, path)
+            except BaseException:
+                os.close(file)
+                raise
         except OSError as error:
-            raise InputError(f'cannot open the journal "{path}": {(error.strerror or "").lower()}') from error
+            raise InputError(f'cannot open the journal "{path}": {_reason(error)}') from error
+        self._file: int | None = file
 
     def __call__(self, event: Event) -> None:
         """Append the entry for `event`; see `append`."""
@@ -35,74 +58,167 @@ class Journal:
         """Append `entry`.
 
         Raises:
-            Fault: The disk does not take it; the run must not go on unrecorded. Later events are
-                dropped without another fault, so that the arm can be brought to rest.
+            Fault: The disk does not take it, or the file was deleted: the run must not go on unrecorded.
+                Later events are dropped without another fault, so that the arm can be brought to rest.
+                Or JSON has no words for it: then only this entry is missing.
         """
-        if self._file is None:
+        if self._file is None or self._broken:
             return
+        line = self._encode(entry)
         try:
-            # One unbuffered write per line: what was said before a crash is in the file.
-            _write_all(self._file, _line_of(entry))
+            self._write(self._file, line)
             if _must_last(entry):
-                os.fsync(self._file)
+                self._sync(self._file)
         except OSError as error:
-            os.close(self._file)
-            self._file = None
+            self._broken = True
+            # A part of the line is of no use to anybody.
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._file, self._length)
             raise Fault(
-                f'the journal "{self._path}" cannot be written: {(error.strerror or str(error)).lower()}; '
+                f'the journal "{self._path}" cannot be written: {_reason(error)}; '
                 "the run stops because it could not be explained afterwards"
             ) from error
 
     def close(self) -> None:
-        """Bring everything to the disk and close the file; more calls do nothing."""
+        """Bring everything to the disk and close the file; more calls do nothing.
+
+        Raises:
+            Fault: The disk does not take it, or the file was deleted, and `append` has not said so.
+        """
         if self._file is None:
             return
         file, self._file = self._file, None
         try:
-            os.fsync(file)
+            if self._unsynced and not self._broken:
+                self._sync(file)
+        except OSError as error:
+            raise Fault(
+                f'the journal "{self._path}" may lack its last lines: {_reason(error)}; '
+                "believe what you see in the cell rather than the record"
+            ) from error
         finally:
-            os.close(file)
+            # What it could say, the sync has said.
+            with contextlib.suppress(OSError):
+                os.close(file)
+
+    def _encode(self, entry: Entry) -> bytes:
+        try:
+            return _line_of(entry)
+        except (TypeError, ValueError, RecursionError) as error:
+            raise Fault(
+                f'the journal has no words for an event of kind "{entry["kind"]}": {error}; '
+                "what is to be kept exactly must be plain JSON already"
+            ) from error
+
+    def _write(self, file: int, line: bytes) -> None:
+        """Write all of `line`; a disk that is nearly full takes a part of it first."""
+        # One unbuffered write per line: what was said before a crash is in the file.
+        rest = line
+        while rest:
+            rest = rest[os.write(file, rest) :]
+        self._length += len(line)
+        self._unsynced = True
+
+    def _sync(self, file: int) -> None:
+        os.fsync(file)
+        self._unsynced = False
+        if os.fstat(file).st_nlink == 0:
+            # The disk takes what is written to a deleted file, and forgets it when the file is closed.
+            raise FileNotFoundError(errno.ENOENT, "it was deleted while the run went on")
 
 
 def read_journal(path: Path) -> list[Entry]:
-    """Return the journal's entries; a last line torn by a power cut is left out.
+    """Return the journal's entries in the order in which they came about; that of line `n` is at `n - 1`.
+
+    What a power cut tore at the end is left out: a part of the last line, zeros where its text was to come.
 
     Raises:
-        InputError: The file is missing, or another line than the last is broken.
+        InputError: The file cannot be read, or another line than the last is broken.
     """
     try:
-        lines = path.read_bytes().split(b"\n")
+        content = path.read_bytes()
     except OSError as error:
-        raise InputError(
-            f'cannot read the journal "{path}": {(error.strerror or str(error)).lower()}'
-        ) from error
+        raise InputError(f'cannot read the journal "{path}": {_reason(error)}') from error
     entries = []
-    for number, line in enumerate(lines, start=1):
-        if not line.strip():
-            continue
+    for number, line in enumerate(content[: _whole(content)].splitlines(), start=1):
         try:
-            entry = json.loads(line)
+            entries.append(_entry_in(line))
         except ValueError as error:
-            # Only the text after the last line end can be torn.
-            if number == len(lines):
-                break
             raise InputError(
                 f"{path}:{number}: this line is not JSON ({error}); a journal is only ever appended to, "
-                "so it was changed after the run"
+                "so it was changed after the run, or the disk lost a part of it; bring back a copy of it"
             ) from error
-        entries.append(entry)
     return entries
 
 
+def ending_of(entries: Sequence[Entry]) -> Entry | None:
+    """Return the `end` of a run by its journal, or None: it was cut off, or goes on.
+
+    A run that was taken up again has ended only when it ended again.
+    """
+    return entries[-1] if entries and entries[-1].get("kind") == "end" else None
+
+
 def _line_of(entry: Entry) -> bytes:
-    return (_ENCODER.encode(entry) + "\n").encode()
+    try:
+        return (_ENCODER.encode(entry) + "\n").encode()
+    except UnicodeEncodeError:
+        # Half a surrogate pair, in a text that is to be kept exactly, can only be written as an escape.
+        return (_ESCAPING.encode(entry) + "\n").encode()
+
+
+def _entry_in(line: bytes) -> Entry:
+    """Return the entry that a line holds.
+
+    Raises:
+        ValueError: It holds none.
+    """
+    try:
+        entry = json.loads(line.decode())
+    except RecursionError as error:
+        raise ValueError("nested too deeply") from error
+    if not isinstance(entry, dict):
+        raise ValueError("it is no object")
+    return entry
 
 
 def _must_last(entry: Entry) -> bool:
-    return entry["kind"] == "intent" or (entry["kind"] == "item" and entry.get("state") == "placed")
+    kind = entry["kind"]
+    return kind in ("intent", "end") or (kind == "item" and entry.get("state") == "placed")
 
 
-def _write_all(file: int, line: bytes) -> None:
-    """Write all of `line`; a disk that is nearly full takes a part of it first."""
-    while line:
-        line = line[os.write(file, line) :]
+def _whole(content: bytes) -> int:
+    """Return how many bytes of a journal are whole lines; the last one may lack its line end."""
+    written = content.rstrip(b"\0")
+    last = written.rfind(b"\n") + 1
+    try:
+        _entry_in(written[last:])
+    except ValueError:
+        return last
+    return len(written)
+
+
+def _mended(file: int) -> int:
+    """Cut the torn end off the journal, so that the next line is one by itself; return its length."""
+    with open(file, "rb", closefd=False) as journal:
+        content = journal.read()
+    length = _whole(content)
+    os.ftruncate(file, length)
+    if length and content[length - 1 : length] != b"\n":
+        length += os.write(file, b"\n")
+    os.fsync(file)
+    return length
+
+
+def _empty(file: int, path: Path) -> int:
+    """Return the length of a new journal: 0."""
+    if os.fstat(file).st_size:
+        raise InputError(
+            f'"{path}" is the record of another run; a new run needs a directory of its own, '
+            "for instance below another --runs DIR"
+        )
+    return 0
+
+
+def _reason(error: OSError) -> str:
+    return (error.strerror or str(error)).lower()

@@ -12,17 +12,24 @@ from typing import Any
 
 import numpy as np
 
+from executive.events import Exact
 from executive.geometry import Pose
 from executive.messages import Frame
 
 DIGITS = 6
 """Decimal places kept: a micrometre, a microradian, a microsecond."""
 
+LONGEST = 2048
+"""Bits of the largest integer that is kept as a number: Python reads and writes no more than 640 digits
+for certain."""
+
 
 def plain(value: Any) -> Any:
     """Return `value` as JSON can hold it: floats to `DIGITS` places, a frame by its number only.
 
-    Numbers that JSON does not have (infinities, NaN) become text, so a record stays readable by any parser.
+    What JSON does not have (infinities, NaN, integers beyond `LONGEST`) becomes text, and so does the half
+    of a surrogate pair that stands in a file name which is not UTF-8: a record stays readable by any parser.
+    Only what is `Exact` is taken over as it is.
     """
     return _rule(value.__class__)(value)
 
@@ -32,7 +39,11 @@ def _rule(kind: type) -> Callable[[Any], Any]:
     """Return what makes values of this type plain; found once per type, for events are told within a tick."""
     if issubclass(kind, Enum):
         return lambda value: plain(value.value)
-    if issubclass(kind, (str, int, type(None))):
+    if issubclass(kind, str):
+        return _text
+    if issubclass(kind, int):
+        return lambda value: value if value.bit_length() <= LONGEST else hex(value)
+    if issubclass(kind, type(None)):
         return lambda value: value
     if issubclass(kind, (float, np.floating)):
         return _number
@@ -45,18 +56,30 @@ def _rule(kind: type) -> Callable[[Any], Any]:
     if issubclass(kind, Pose):
         return lambda pose: pose.rounded(DIGITS)
     if issubclass(kind, Mapping):
-        return lambda mapping: {str(key): plain(value) for key, value in mapping.items()}
+        return lambda mapping: {_text(str(key)): plain(value) for key, value in mapping.items()}
     if issubclass(kind, (list, tuple)):
         return lambda values: [plain(value) for value in values]
     if issubclass(kind, (set, frozenset)):
         return lambda values: sorted((plain(value) for value in values), key=repr)
+    if issubclass(kind, Exact):
+        return lambda exact: exact.value
     if dataclasses.is_dataclass(kind):
         names = [field.name for field in dataclasses.fields(kind)]
         return lambda value: {name: plain(getattr(value, name)) for name in names}
     if issubclass(kind, PurePath):
-        return str
+        return lambda path: _text(str(path))
     # A default repr holds a memory address, which would make equal runs look different.
     return lambda _: kind.__name__
+
+
+def _text(value: str) -> str:
+    if value.isascii():
+        return value
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        return value.encode(errors="backslashreplace").decode()
+    return value
 
 
 def _number(value: Any) -> float | str:

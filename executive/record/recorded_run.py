@@ -3,30 +3,37 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from executive.events import Event
+from executive.errors import ExecutiveError
+from executive.events import Event, Observer
 from executive.record.planning import PlanningTally
 from executive.record.recorder import Recorder
-from executive.record.result import result_of, write_result
+from executive.record.requests import Requests
+from executive.record.result import ENDED, result_of, write_result
 from executive.record.run_directory import RunDirectory
+from executive.record.story.story import Story
 
 if TYPE_CHECKING:
     from py_trees.behaviour import Behaviour
 
     from executive.mission.load import LoadedMission
+    from executive.runtime.outcome import Outcome
+    from executive.runtime.run import Run
+    from executive.runtime.run_control import RunControl
     from executive.skill import Skill
+    from executive.workcell import Workcell
 
 
 class View(Protocol):
     """Something a person watches: an observer that is told the tree first and the end last."""
 
-    def open(self, root: Behaviour) -> None:
-        """Begin to show a run of this tree."""
+    def open(self, root: Behaviour, control: RunControl) -> None:
+        """Begin to show a run of this tree; `control` stops, pauses and steps it."""
 
     def __call__(self, event: Event) -> None:
         """Take an event and return at once."""
@@ -49,8 +56,21 @@ def recorded_run(
     realtime: bool = False,
     requests: Sequence[str] | None = None,
     frames: bool = True,
+    kind: Callable[..., Workcell] | None = None,
 ) -> dict[str, Any]:
     """Run `loaded` once, leave its run directory below `runs` and return the result object.
+
+    Args:
+        loaded: The mission and its cell.
+        skills: Installed skills by name.
+        seed: Decides everything random.
+        runs: Folder of the run directories.
+        view: Shows it.
+        gui: Show the simulated world in a window.
+        realtime: Pace the run by the wall clock.
+        requests: What the operator asks for, or None to ask at the terminal.
+        frames: Keep the pictures behind the decisions, and of a run that is over the log of its world.
+        kind: Makes the work cell; by default the installed kind that the cell file names.
 
     Raises:
         InputError: The run directory cannot be made, or the cell cannot be built.
@@ -59,37 +79,99 @@ def recorded_run(
     from executive.runtime.run import Run
 
     began = time.perf_counter()
-    with closing(Run(loaded, skills, seed=seed, gui=gui, realtime=realtime, requests=requests)) as run:
+    run = Run(loaded, skills, seed=seed, gui=gui, realtime=realtime, requests=requests, kind=kind)
+    with closing(run):
         directory = RunDirectory.create(runs, mission=loaded.mission.name, seed=seed, started=datetime.now())
         directory.save_inputs(
             mission=loaded.text,
             params=loaded.params,
-            cell=loaded.cell_config.model_dump(mode="json"),
+            cell=loaded.cell_config.model_dump(mode="json", exclude_unset=True),
             libraries=loaded.libraries,
         )
+        run.log_to(directory.world)
         recorder = Recorder(directory, frames=frames)
-        run.observe(recorder)
-        planning = PlanningTally()
-        run.observe(planning)
-        completed = False
+        result = Recording(run, loaded, skills, directory, recorder, view).execute(seed, began)
+    if not frames and result["status"] in ENDED:
+        # Of a run that is over nothing can be taken up again, and who wants no pictures wants no film.
+        directory.world.unlink(missing_ok=True)
+    return result
+
+
+class Recording:
+    """A run, and all who follow it.
+
+    Args:
+        run: The run.
+        loaded: Its mission.
+        skills: Installed skills by name.
+        directory: Where its record is kept.
+        recorder: Keeps it.
+        view: Shows it.
+        past: What is told of before it begins.
+    """
+
+    def __init__(
+        self,
+        run: Run,
+        loaded: LoadedMission,
+        skills: Mapping[str, type[Skill]],
+        directory: RunDirectory,
+        recorder: Recorder,
+        view: View | None,
+        past: Iterable[Event] = (),
+    ) -> None:
+        self._run, self._loaded, self._directory = run, loaded, directory
+        self._recorder, self._view, self._past = recorder, view, past
+        self._planning, self._requested = PlanningTally(), Requests()
+        self._story = Story(loaded, skills)
+
+    def execute(self, seed: int, began: float) -> dict[str, Any]:
+        """Execute the run and return its result object, which is in the run directory then.
+
+        `began` is when the work on it did [s], by `time.perf_counter`.
+
+        Raises:
+            ExecutiveError: The result cannot be written.
+        """
+        outcome, items, audit = self._watched()
+        run, path = self._run, self._directory.path
+        result = result_of(
+            mission=self._loaded.mission.name, seed=seed, outcome=outcome, items=items, audit=audit,
+            planning=self._planning.figures(), requests=self._requested.words,
+            story=self._story.tell(outcome, path, lambda: run.workcell.cell.arm.at_rest),
+            wall_time=time.perf_counter() - began, trace=self._recorder.trace, run=path,
+        )  # fmt: skip
+        problems = [self._recorder.problem]
+        try:
+            write_result(self._directory.result, result)
+        except ExecutiveError as error:
+            problems.append(str(error))
+            if result["status"] != "FAULT":
+                # What `--json` prints is then all that there is of it.
+                result |= {"status": "FAULT", "reason": "fault", "message": str(error), "node": ""}
+        if self._view is not None and any(problems):
+            self._view.note("; ".join(filter(None, problems)))
+        return result
+
+    def _watched(self) -> tuple[Outcome, dict[str, Any], Mapping[str, int] | None]:
+        """Execute the run before everybody's eyes, and let them go at whatever end."""
+        run, view, completed = self._run, self._view, False
+        watchers: list[Observer] = [self._planning, self._requested, self._story]
         try:
             if view is not None:
-                run.observe(view)
-                view.open(run.root)
-            outcome = run.execute()
-            items, audit = run.items(), run.audit()
+                watchers.append(view)
+                view.open(run.root, run.control)
+            for watcher in watchers:
+                run.observe(watcher)
+            for event in self._past:
+                for watcher in watchers:
+                    watcher(event)
+            run.record(self._recorder)
+            ended = run.execute(), run.items(), run.audit()
             completed = True
         finally:
             if view is not None:
                 view.close()
             # Whoever ends a run by force does not want to wait for its pictures.
-            recorder.close(wait=completed)
-    result = result_of(
-        mission=loaded.mission.name, seed=seed, outcome=outcome, items=items, audit=audit,
-        planning=planning.figures(),
-        wall_time=time.perf_counter() - began, trace=recorder.trace, run=directory.path,
-    )  # fmt: skip
-    write_result(directory.result, result)
-    if view is not None and recorder.problem:
-        view.note(recorder.problem)
-    return result
+            self._recorder.close(wait=completed)
+        return ended

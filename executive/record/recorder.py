@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from executive.errors import Fault
 from executive.events import Event
 from executive.record.entry import entry_of
 from executive.record.frames import Frames
@@ -11,12 +15,30 @@ from executive.record.trace import Trace
 
 
 class Recorder:
-    """Feeds journal, trace and, where wanted, the pictures of a run."""
+    """Feeds journal, trace and, where wanted, the pictures of a run.
 
-    def __init__(self, directory: RunDirectory, *, frames: bool = True) -> None:
+    Args:
+        directory: Where the record is kept.
+        frames: Keep pictures.
+        again: Go on with the journal of a run that was cut off.
+        journal: Makes the journal.
+
+    Raises:
+        InputError: The journal cannot be opened.
+    """
+
+    def __init__(
+        self,
+        directory: RunDirectory,
+        *,
+        frames: bool = True,
+        again: bool = False,
+        journal: Callable[..., Journal] = Journal,
+    ) -> None:
         self._trace = Trace()
-        self._journal = Journal(directory.journal)
+        self._journal = journal(directory.journal, again=again)
         self._frames = Frames(directory.frames) if frames else None
+        self._problem = ""
 
     def __call__(self, event: Event) -> None:
         """Record `event`; the trace first, for it cannot fail."""
@@ -24,11 +46,26 @@ class Recorder:
         self._trace.take(entry)
         self._journal.append(entry)
         if self._frames is not None:
-            self._frames(event)
+            try:
+                self._frames(event)
+            except Exception as error:
+                # A run can be explained without its pictures.
+                self._problem = f"not every picture was drawn: {type(error).__name__}: {error}"
+
+    def remember(self, past: Iterable[Mapping[str, Any]]) -> None:
+        """Take the entries of a run that goes on into the trace; they are in the journal already."""
+        for entry in past:
+            self._trace.take(dict(entry))
 
     def close(self, *, wait: bool = True) -> None:
-        """Bring everything to the disk, with `wait` the pictures too; more calls do nothing."""
-        self._journal.close()
+        """Bring everything to the disk, with `wait` the pictures too; more calls do nothing.
+
+        What did not get there, `problem` tells.
+        """
+        try:
+            self._journal.close()
+        except Fault as fault:
+            self._problem = str(fault)
         if self._frames is not None and wait:
             self._frames.close()
 
@@ -40,4 +77,5 @@ class Recorder:
     @property
     def problem(self) -> str:
         """What the record lacks, in a sentence, or ""."""
-        return "" if self._frames is None else self._frames.problem
+        pictures = "" if self._frames is None else self._frames.problem
+        return "; ".join(filter(None, (self._problem, pictures)))

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from executive.errors import ExecutiveError
 from executive.record.plain import plain
+from executive.record.whole_file import write_whole
 
 if TYPE_CHECKING:
-    from executive.runtime.run import Outcome
+    from executive.runtime.outcome import Outcome
 
 FATES = ("seen", "placed", "rejected", "lost", "phantom")
 """What the ledger counts."""
@@ -23,6 +23,9 @@ PLACES = ("right", "wrong_bin", "left", "elsewhere", "unseen")
 EXIT_CODES = {"SUCCESS": 0, "FAILURE": 1, "FAULT": 3, "HALTED": 130}
 """How a command ends, by the status of its run."""
 
+ENDED = ("SUCCESS", "FAILURE")
+"""Status of a run that cannot be taken up again: its tree has come to its end."""
+
 
 def result_of(
     *,
@@ -32,29 +35,36 @@ def result_of(
     items: Mapping[str, Any],
     audit: Mapping[str, int] | None,
     planning: Mapping[str, float],
+    requests: Sequence[str],
+    story: Mapping[str, Any] | None,
     wall_time: float,
     trace: str,
     run: Path,
 ) -> dict[str, Any]:
     """Return the result as a plain mapping; `wall_time` in seconds, `run` the run directory.
 
-    `audit` is None in a cell that has no ground truth; `planning` as `PlanningTally.figures` gives it.
+    `audit` is None in a cell that has no ground truth; `planning` as `PlanningTally.figures` gives it,
+    `requests` as `Requests.words` and `story` as `Story.tell` do.
     """
     return {
         "mission": mission,
         "status": outcome.status,
         "reason": outcome.reason,
-        "message": outcome.message,
+        # It may quote a file name that is not UTF-8.
+        "message": plain(outcome.message),
         "node": outcome.node,
+        "holds": outcome.holds,
         "seed": seed,
         "items": {fate: int(items.get(fate, 0)) for fate in FATES},
         "audit": None if audit is None else {place: int(audit[place]) for place in PLACES},
         "planning": dict(planning),
+        "requests": list(requests),
         "ticks": outcome.ticks,
         "robot_time_s": plain(outcome.robot_time),
         "wall_time_s": round(wall_time, 3),
         "trace": trace,
-        "run": str(run),
+        "run": plain(run),
+        "story": plain(story),
     }
 
 
@@ -64,18 +74,12 @@ def write_result(path: Path, result: Mapping[str, Any]) -> None:
     Raises:
         ExecutiveError: The disk does not take it.
     """
-    fresh = path.with_name(f".{path.name}.part")
     try:
-        with fresh.open("w", encoding="utf-8") as file:
-            json.dump(result, file, indent=2, ensure_ascii=False, allow_nan=False)
-            file.write("\n")
-            file.flush()
-            os.fsync(file.fileno())
-        fresh.replace(path)
+        write_whole(path, json.dumps(result, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
     except OSError as error:
         raise ExecutiveError(
             f'cannot write the result "{path}": {(error.strerror or str(error)).lower()}; '
-            "the journal beside it tells how the run ended"
+            "the journal beside it tells how the run ended, and so does what --json prints"
         ) from error
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import yaml
 
 from executive.errors import InputError
-from executive.record.plain import plain
+from executive.record.whole_file import write_whole
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,11 @@ class RunDirectory:
         return self.path / "journal.jsonl"
 
     @property
+    def world(self) -> Path:
+        """File from which a simulated world can be rebuilt as the run left it."""
+        return self.path / "world.log"
+
+    @property
     def result(self) -> Path:
         """File with the object that `executive run --json` prints."""
         return self.path / "result.json"
@@ -43,7 +48,7 @@ class RunDirectory:
 
     @staticmethod
     def create(runs: Path, *, mission: str, seed: int, started: datetime) -> RunDirectory:
-        """Make a new directory below `runs`, point `runs/latest` at it and return it.
+        """Make a new directory below `runs` and return it.
 
         `started` only names it. A second run in the same second gets the suffix `-2`, a third `-3`.
 
@@ -60,7 +65,6 @@ class RunDirectory:
                 f'cannot make a run directory below "{runs}": {_reason(error)}; '
                 "free some space or name another place with --runs DIR"
             ) from error
-        _point_latest(runs, path)
         return RunDirectory(path)
 
     def save_inputs(
@@ -73,10 +77,12 @@ class RunDirectory:
     ) -> None:
         """Write the mission's text as it was read, the params as they were resolved, and the cell.
 
-        The text of every library goes where the mission looks for it, beside the mission.
+        The text of every library goes where the mission looks for it, beside the mission. All of it is on
+        the disk before the run begins; then `runs/latest` points at this directory. Params and cell are of
+        values that YAML knows, and are kept to the last digit: the run may be repeated with them.
 
         Raises:
-            InputError: The directory cannot be written to.
+            InputError: The directory cannot be written to; no file in it is half-written.
         """
         try:
             # First, and under no name of the record's own.
@@ -84,16 +90,17 @@ class RunDirectory:
                 library = self.path / reference
                 if library not in (self.journal, self.result) and self.frames not in library.parents:
                     library.parent.mkdir(parents=True, exist_ok=True)
-                    library.write_text(text, encoding="utf-8")
-            (self.path / "mission.yaml").write_text(mission, encoding="utf-8")
+                    write_whole(library, text)
+            write_whole(self.path / "mission.yaml", mission)
             for name, content in (("params.yaml", params), ("cell.yaml", cell)):
-                text = yaml.safe_dump(plain(content), sort_keys=False, allow_unicode=True)
-                (self.path / name).write_text(text, encoding="utf-8")
+                text = yaml.safe_dump(dict(content), sort_keys=False, allow_unicode=True)
+                write_whole(self.path / name, text)
         except OSError as error:
             raise InputError(
                 f'cannot write to the run directory "{self.path}": {_reason(error)}; '
                 "free some space or name another place with --runs DIR"
             ) from error
+        _point_latest(self.path.parents[1], self.path)
 
 
 def _make_unique(day: Path, name: str) -> Path:

@@ -10,7 +10,7 @@ from executive.events import Event
 from executive.geometry import Pose
 from executive.messages import Frame
 from executive.record import frames as module
-from executive.record.frames import KEPT, Frames
+from executive.record.frames import KEPT, Frames, picture_of
 from executive.record.pictures.drawer import Drawer
 
 CUBE = {"label": "cube", "confidence": 0.9, "box": (20, 40, 50, 70), "position": (0.5, 0.1, 0.02)}
@@ -207,3 +207,30 @@ def test_pictures_that_cannot_be_written_are_told_and_break_nothing(tmp_path):
     frames(decision())
     frames.close()
     assert frames.problem == "no pictures were drawn: file exists"
+
+
+@pytest.mark.parametrize(
+    ("item", "reason", "name"),
+    [
+        ("cube-1", "missed", "1000000_cube-1_missed.jpg"),
+        ("cube-1", "no_contact", "000007_cube-1_no_contact.jpg"),
+        ("cube-1", "", "000012_cube-1.jpg"),
+        ("hex_nut-1", "", "000003_hex_nut-1.jpg"),
+        ("", "unseen", "000020_unseen.jpg"),
+        ("cube-1", "dropped", None),
+        ("cube-2", "missed", None),
+        ("", "", None),
+    ],
+)
+def test_the_last_picture_of_an_item_and_a_reason_is_found_again(tmp_path, item, reason, name):
+    for file in (
+        "000003_hex_nut-1.jpg", "000007_cube-1_no_contact.jpg", "000012_cube-1.jpg", "000020_unseen.jpg",
+        "000090_cube-1_missed.jpg", "1000000_cube-1_missed.jpg", "000004_cube-1.jpg",
+    ):  # fmt: skip
+        (tmp_path / file).touch()
+    found = picture_of(tmp_path, item, reason)
+    assert (found and found.name) == name
+
+
+def test_a_run_without_pictures_has_none_of_anything(tmp_path):
+    assert picture_of(tmp_path / "frames", "cube-1", "missed") is None

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
+from collections.abc import Mapping
 from contextlib import closing
+from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -12,11 +15,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pydantic_core import from_json
 
 from executive.errors import Fault, InputError
-from executive.events import Event
-from executive.record.entry import TRANSIENT
-from executive.record.journal import Journal, read_journal
+from executive.events import Event, Exact
+from executive.record.entry import TRANSIENT, entry_of
+from executive.record.journal import Journal, ending_of, read_journal
 from executive.record.plain import plain
 
 
@@ -66,6 +70,86 @@ def test_every_line_is_the_json_of_the_stamp_and_of_the_data_made_plain(event):
         assert path.read_bytes() == line.encode()
 
 
+class Shy(Mapping):
+    """Raises whenever it is asked for what it holds."""
+
+    def __iter__(self):
+        raise RuntimeError
+
+    __len__ = __getitem__ = __iter__
+
+
+@dataclass
+class Unfinished:
+    value: object = field(init=False)
+
+
+def endless() -> list:
+    values: list = [1]
+    values.append(values)
+    return values
+
+
+def nested(depth: int) -> object:
+    value: object = 1
+    for number in range(depth):
+        value = [value] if number % 2 else {"a": value}
+    return value
+
+
+TEXTS = st.text(st.characters(), max_size=5)  # with halves of surrogate pairs
+ANYTHING = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.integers(2000, 20_000).map(lambda bits: -(1 << bits) + 1)
+    | st.floats()
+    | TEXTS
+    | st.binary(max_size=5)
+    | st.floats(width=32).map(np.float32)
+    | st.integers(0, 255).map(np.uint8)
+    | TEXTS.map(lambda text: Path("a" + text.replace("\0", "")))
+    | st.lists(st.floats(), max_size=3).map(np.array)
+    | st.sampled_from([np.bool_(True), np.clongdouble(1), np.datetime64("now"), np.void(b"a"), 1j, int])
+    | st.sampled_from([Shy, Unfinished, endless]).map(lambda made: made())
+    | st.sampled_from([90, 900, 5000]).map(nested),
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(TEXTS | st.integers() | st.binary(max_size=2), inner, max_size=3)
+        | st.lists(inner, max_size=2).map(lambda values: np.array([*values, None], dtype=object))
+        | st.sets(TEXTS | st.integers() | st.floats(), max_size=3)
+    ),
+    max_leaves=8,
+)
+
+
+@settings(deadline=None)
+@given(st.dictionaries(st.text(max_size=3), ANYTHING, max_size=3))
+def test_whatever_is_told_becomes_one_line_of_json_that_reads_back(data):
+    event = Event("status", 0, 0.0, data)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "journal.jsonl"
+        with closing(Journal(path)) as journal:
+            journal(event)
+            journal(Event("end", 1, 0.0, {}))
+        told, end = read_journal(path)
+        lines = path.read_bytes().splitlines()
+    assert len(lines) == 2
+    assert told == entry_of(event)
+    assert end["kind"] == "end"
+    # Python reads more than is JSON.
+    assert from_json(lines[0], allow_inf_nan=False) == told
+
+
+@pytest.mark.parametrize(
+    "value", [Shy(), Unfinished(), endless(), nested(5000)], ids=lambda value: type(value).__name__
+)
+def test_what_cannot_be_told_is_told_by_the_name_of_its_type(value):
+    entry = entry_of(Event("status", 0, 0.0, {"a": 1, "outputs": value, "b": 2}))
+    assert entry["outputs"] == type(value).__name__
+    assert (entry["a"], entry["b"]) == (1, 2)
+
+
 def test_leaves_the_pixels_out(tmp_path):
     journal = Journal(tmp_path / "journal.jsonl")
     journal(Event("look", 0, 0.0, {"frame": 1, "frame_object": object()}))
@@ -87,26 +171,92 @@ def test_data_cannot_overwrite_the_stamp(tmp_path):
         (Event("item", 1, 0.0, {"state": "placed"}), True),
         (Event("item", 1, 0.0, {"state": "held"}), False),
         (Event("status", 1, 0.0, {}), False),
+        (Event("sense", 1, 0.0, {}), False),
+        (Event("end", 1, 0.0, {}), True),
     ],
 )
-def test_intents_and_placements_are_on_the_disk_at_once(tmp_path, syncs, event, synced):
+def test_intents_placements_and_the_end_are_on_the_disk_at_once(tmp_path, syncs, event, synced):
     journal = Journal(tmp_path / "journal.jsonl")
     journal(event)
     assert syncs == ([(tmp_path / "journal.jsonl").stat().st_size] if synced else [])
     journal.close()
 
 
+def full(*args):
+    raise OSError(28, "No space left on device")
+
+
 def test_a_full_disk_is_one_fault_and_then_silence(tmp_path, monkeypatch):
     journal = Journal(tmp_path / "journal.jsonl")
-
-    def full(file, line):
-        raise OSError(28, "No space left on device")
-
     monkeypatch.setattr(os, "write", full)
     with pytest.raises(Fault, match=r"cannot be written: no space left on device; the run stops"):
         journal(Event("status", 0, 0.0, {}))
     journal(Event("end", 1, 0.0, {}))
     journal.close()
+
+
+@pytest.mark.parametrize("taken", [0, 1, 17])
+def test_a_line_the_disk_takes_a_part_of_is_taken_back(tmp_path, monkeypatch, taken):
+    path = tmp_path / "journal.jsonl"
+    journal = Journal(path)
+    journal(Event("status", 0, 0.0, {}))
+    write, parts = os.write, iter([taken] if taken else [])
+    monkeypatch.setattr(os, "write", lambda file, line: write(file, line[: next(parts, None) or full()]))
+    with pytest.raises(Fault, match="no space left"):
+        journal(Event("status", 1, 0.0, {}))
+    journal.close()
+    assert path.read_text() == '{"tick": 0, "clock": 0.0, "kind": "status"}\n'
+
+
+def test_what_does_not_reach_the_disk_is_a_fault_before_anything_is_done(tmp_path, monkeypatch):
+    journal = Journal(tmp_path / "journal.jsonl")
+    monkeypatch.setattr(os, "fsync", full)
+    journal(Event("status", 0, 0.0, {}))
+    with pytest.raises(Fault, match=r"cannot be written: no space left on device"):
+        journal(Event("intent", 1, 0.0, {"action": "close"}))
+    journal.close()
+
+
+def test_what_reaches_the_disk_only_at_the_close_is_not_believed_unseen(tmp_path, monkeypatch):
+    journal = Journal(tmp_path / "journal.jsonl")
+    journal(Event("status", 0, 0.0, {}))
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(Fault, match=r"may lack its last lines: no space left on device; believe"):
+        journal.close()
+    journal.close()
+
+
+def test_what_is_on_the_disk_already_is_not_brought_there_again(tmp_path, syncs):
+    journal = Journal(tmp_path / "journal.jsonl")
+    journal(Event("end", 0, 0.0, {}))
+    journal.close()
+    assert len(syncs) == 1
+
+
+@pytest.mark.parametrize("whole", [True, False])
+@pytest.mark.parametrize("kind", ["intent", "end"])
+def test_a_journal_deleted_meanwhile_is_a_fault_at_the_next_intent_or_the_end(tmp_path, kind, whole):
+    directory = tmp_path / "run"
+    directory.mkdir()
+    journal = Journal(directory / "journal.jsonl")
+    journal(Event("status", 0, 0.0, {}))
+    if whole:
+        shutil.rmtree(directory)
+    else:
+        (directory / "journal.jsonl").unlink()
+    journal(Event("status", 1, 0.0, {}))
+    with pytest.raises(Fault, match="cannot be written: it was deleted while the run went on; the run stops"):
+        journal(Event(kind, 2, 0.0, {}))
+    journal.close()
+
+
+def test_a_journal_whose_folder_is_moved_meanwhile_is_written_on(tmp_path):
+    (tmp_path / "run").mkdir()
+    journal = Journal(tmp_path / "run" / "journal.jsonl")
+    (tmp_path / "run").rename(tmp_path / "moved")
+    journal(Event("end", 0, 0.0, {}))
+    journal.close()
+    assert len(read_journal(tmp_path / "moved" / "journal.jsonl")) == 1
 
 
 def test_a_line_the_disk_takes_in_parts_is_whole(tmp_path, monkeypatch):
@@ -126,18 +276,119 @@ def test_closing_twice_is_harmless(tmp_path):
     assert (tmp_path / "journal.jsonl").read_text() == ""
 
 
-@pytest.mark.parametrize("torn", range(1, 20, 3))
-def test_a_torn_last_line_is_left_out(tmp_path, torn):
-    path = tmp_path / "journal.jsonl"
-    path.write_bytes(b'{"tick": 1}\n' + b'{"tick": 2, "a": "\xc3\xa4"}\n'[:torn])
-    assert read_journal(path) == [{"tick": 1}]
+FIRST = b'{"tick": 1, "kind": "run"}\n'
+LAST = '{"tick": 2, "kind": "ä"}'.encode()
+ENDS = {
+    b"": 0,
+    FIRST: 1,
+    FIRST + LAST: 2,
+    FIRST + LAST + b"\n": 2,
+    FIRST + LAST + b"\0\0\0": 2,
+    FIRST + LAST + b"\n\0\0\0": 2,
+    FIRST + b"\0": 1,
+    b"\0" * 5000: 0,
+    **{FIRST + LAST[:length]: 1 for length in range(1, len(LAST))},
+    **{FIRST + LAST[:length] + b"\0" * 9: 1 for length in range(1, len(LAST))},
+    LAST[:5]: 0,
+}
+"""What a kill or a power cut may leave, and how many entries that is."""
 
 
-def test_a_broken_line_in_the_middle_is_an_error_with_its_number(tmp_path):
+@pytest.mark.parametrize("content", ENDS)
+def test_a_torn_end_is_left_out(tmp_path, content):
     path = tmp_path / "journal.jsonl"
-    path.write_text('{"tick": 1}\n{"tick"\n{"tick": 3}\n')
-    with pytest.raises(InputError, match=r"journal\.jsonl:2: this line is not JSON"):
+    path.write_bytes(content)
+    assert [entry["tick"] for entry in read_journal(path)] == [1, 2][: ENDS[content]]
+
+
+@pytest.mark.parametrize("content", ENDS)
+def test_a_journal_opened_again_goes_on_with_a_line_of_its_own(tmp_path, content):
+    path = tmp_path / "journal.jsonl"
+    path.write_bytes(content)
+    journal = Journal(path, again=True)
+    journal(Event("resume", 3, 0.0, {}))
+    journal.close()
+    entries = [json.loads(line) for line in path.read_bytes().splitlines()]
+    assert [entry["tick"] for entry in entries] == [*[1, 2][: ENDS[content]], 3]
+    assert read_journal(path) == entries
+
+
+def test_a_torn_end_is_cut_on_the_disk_before_anything_is_appended(tmp_path, syncs):
+    (tmp_path / "journal.jsonl").write_bytes(FIRST + LAST[:5])
+    Journal(tmp_path / "journal.jsonl", again=True).close()
+    assert syncs == [len(FIRST)]
+
+
+def test_a_line_the_disk_takes_a_part_of_is_taken_back_from_an_old_journal(tmp_path, monkeypatch):
+    (tmp_path / "journal.jsonl").write_bytes(FIRST + LAST)
+    journal = Journal(tmp_path / "journal.jsonl", again=True)
+    write, parts = os.write, iter([3])
+    monkeypatch.setattr(os, "write", lambda file, line: write(file, line[: next(parts, None) or full()]))
+    with pytest.raises(Fault):
+        journal(Event("resume", 3, 0.0, {}))
+    assert (tmp_path / "journal.jsonl").read_bytes() == FIRST + LAST + b"\n"
+
+
+def test_a_journal_that_is_not_there_cannot_be_gone_on_with(tmp_path):
+    with pytest.raises(InputError, match=r'cannot open the journal ".*": no such file or directory'):
+        Journal(tmp_path / "journal.jsonl", again=True)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_new_run_does_not_go_on_with_the_journal_of_another(tmp_path):
+    path = tmp_path / "journal.jsonl"
+    path.write_bytes(FIRST)
+    with pytest.raises(InputError, match="the record of another run; a new run needs a directory of its own"):
+        Journal(path)
+    assert path.read_bytes() == FIRST
+    Journal(path, again=True).close()
+
+
+def test_a_full_disk_is_told_when_a_journal_is_opened_again(tmp_path, monkeypatch):
+    path = tmp_path / "journal.jsonl"
+    path.write_bytes(FIRST + LAST)
+    monkeypatch.setattr(os, "write", full)
+    with pytest.raises(InputError, match=r"cannot open the journal .*: no space left on device"):
+        Journal(path, again=True)
+    monkeypatch.undo()
+    Journal(path, again=True).close()
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        (b'{"tick"', "Expecting"),
+        (b"", "Expecting value"),
+        (b"[1]", "it is no object"),
+        (b"\0\0\0\0", "Expecting value"),
+        (b'{"a": "\xc3"}', "can't decode"),
+        (b"[" * 100_000, "nested too deeply"),
+    ],
+)
+def test_a_broken_line_in_the_middle_is_an_error_with_its_number(tmp_path, line, why):
+    path = tmp_path / "journal.jsonl"
+    path.write_bytes(FIRST + line + b"\n" + FIRST)
+    with pytest.raises(InputError) as raised:
         read_journal(path)
+    said = str(raised.value)
+    assert f"{path}:2: this line is not JSON (" in said
+    assert why in said
+    assert "it was changed after the run, or the disk lost a part of it; bring back a copy of it" in said
+
+
+@pytest.mark.parametrize(
+    ("kinds", "ended"),
+    [
+        ([], None),
+        (["run", "status"], None),
+        (["run", "status", "end"], 2),
+        (["run", "end", "resume", "status"], None),
+        (["run", "end", "resume", "end"], 3),
+    ],
+)
+def test_a_run_has_ended_where_nothing_comes_after_its_end(kinds, ended):
+    entries = [{"tick": number, "kind": kind} for number, kind in enumerate(kinds)]
+    assert ending_of(entries) == (None if ended is None else entries[ended])
 
 
 def test_a_missing_journal_is_a_sentence(tmp_path):
@@ -154,3 +405,21 @@ def test_what_is_read_is_what_was_written(tmp_path):
     entries = read_journal(tmp_path / "journal.jsonl")
     assert [entry["message"] for entry in entries] == [event.data["message"] for event in events]
     assert json.dumps(entries)
+
+
+def test_an_exact_value_comes_back_as_it_was(tmp_path):
+    value = {"q": [0.1 + 0.2, -0.0, 5e-324], "text": "caf\udce9 ä\n", "off": None, "n": 2**70, "on": True}
+    journal = Journal(tmp_path / "journal.jsonl")
+    journal(Event("sense", 0, 0.0, {"value": Exact(value)}))
+    journal.close()
+    assert repr(read_journal(tmp_path / "journal.jsonl")[0]["value"]) == repr(value)
+
+
+@pytest.mark.parametrize("value", [float("nan"), {"a": [float("inf")]}, object(), b"", {1, 2}, {(1,): 2}])
+def test_an_exact_value_that_is_not_json_is_a_fault_and_the_journal_goes_on(tmp_path, value):
+    journal = Journal(tmp_path / "journal.jsonl")
+    with pytest.raises(Fault, match=r'no words for an event of kind "sense": .*; what is .* plain JSON'):
+        journal(Event("sense", 0, 0.0, {"value": Exact(value)}))
+    journal(Event("end", 1, 0.0, {}))
+    journal.close()
+    assert [entry["kind"] for entry in read_journal(tmp_path / "journal.jsonl")] == ["end"]

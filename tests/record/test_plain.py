@@ -17,9 +17,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from executive.events import Exact
 from executive.geometry import Pose
 from executive.messages import Detection, Detections, Frame, Reliability, Target
-from executive.record.plain import DIGITS, plain
+from executive.record.plain import DIGITS, LONGEST, plain
 
 
 class Colour(Enum):
@@ -73,6 +74,14 @@ FRAME = Frame(
         (float("nan"), "nan"),
         (float("-inf"), "-inf"),
         (object(), "object"),
+        pytest.param(2**LONGEST - 1, 2**LONGEST - 1, id="largest"),
+        pytest.param(-(2**LONGEST), "-0x1" + "0" * (LONGEST // 4), id="too large"),
+        ("größe", "größe"),
+        ("caf\udce9 ü", "caf\\udce9 ü"),
+        ({"\ud800": 1}, {"\\ud800": 1}),
+        (Path("a\udcff"), "a\\udcff"),
+        (np.str_("\udfff"), "\\udfff"),
+        ([Exact([1 / 3, "\udfff"]), 1 / 3], [[1 / 3, "\udfff"], 0.333333]),
     ],
 )
 def test_becomes_plain(value, kept):
@@ -159,3 +168,21 @@ def test_says_what_the_straightforward_way_says(value):
 @given(st.recursive(st.floats() | st.integers() | st.text(), lambda inner: st.lists(inner, max_size=3)))
 def test_everything_plain_is_json(value):
     json.dumps(plain(value), allow_nan=False)
+
+
+EXACT = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text(st.characters()),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(st.characters()), inner, max_size=3),
+    max_leaves=10,
+)
+
+
+@given(EXACT)
+def test_what_is_exact_comes_back_from_json_bit_for_bit(value):
+    assert plain(Exact(value)) is value
+    # A repr tells -0.0 from 0.0 and every float from its neighbours.
+    assert repr(json.loads(json.dumps(plain({"value": Exact(value)})))) == repr({"value": value})

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from dataclasses import dataclass
 from types import ModuleType, SimpleNamespace
 
 import pytest
@@ -13,16 +12,7 @@ from executive.errors import InputError
 from executive.events import Event
 from executive.record.journal import read_journal
 from executive.record.recorded_run import recorded_run
-
-
-@dataclass(frozen=True)
-class Outcome:
-    status: str
-    reason: str
-    message: str
-    node: str
-    ticks: int
-    robot_time: float
+from executive.runtime.outcome import Outcome
 
 
 class PretendedRun:
@@ -31,12 +21,19 @@ class PretendedRun:
     error: BaseException | None = None
     closed = 0
     root = "the tree"
+    control = "the control"
 
-    def __init__(self, loaded, skills, *, seed, gui, realtime, requests):
+    def __init__(self, loaded, skills, *, seed, gui, realtime, requests, kind):
         self._observers = []
 
     def observe(self, observer):
         self._observers.append(observer)
+
+    def record(self, recorder):
+        self._observers.append(recorder)
+
+    def log_to(self, path):
+        path.write_bytes(b"the world")
 
     def execute(self):
         for event in (Event("run", 0, 0.0, {"seed": 7}), Event("decision", 3, 0.1, {"item": "cube-1"})):
@@ -44,7 +41,7 @@ class PretendedRun:
                 observer(event)
         if self.error is not None:
             raise self.error
-        return Outcome("SUCCESS", "", "", "", 240, 1.0)
+        return Outcome("SUCCESS", "", "", "", "", 240, 1.0)
 
     def items(self):
         return {"seen": 1, "placed": 1, "rejected": 0, "lost": 0, "phantom": 0, "rows": []}
@@ -60,7 +57,7 @@ class Watcher:
     def __init__(self):
         self.seen = []
 
-    def open(self, root):
+    def open(self, root, control):
         self.seen.append(root)
 
     def __call__(self, event):
@@ -89,7 +86,7 @@ LOADED = SimpleNamespace(
     params={"attempts": 3},
     libraries={"library/own.yaml": "library: own\n"},
     mission=SimpleNamespace(name="sort"),
-    cell_config=SimpleNamespace(model_dump=lambda mode: {"cell": "overhead"}),
+    cell_config=SimpleNamespace(model_dump=lambda mode, exclude_unset: {"cell": "overhead"}),
 )
 
 
@@ -97,7 +94,9 @@ def test_leaves_a_directory_that_explains_the_run(tmp_path, runtime):
     result = recorded_run(LOADED, {}, seed=7, runs=tmp_path)
     left = tmp_path / "latest"
     names = {path.name for path in left.iterdir()}
-    assert names == {"mission.yaml", "library", "params.yaml", "cell.yaml", "journal.jsonl", "result.json"}
+    assert names == {
+        "mission.yaml", "library", "params.yaml", "cell.yaml", "journal.jsonl", "world.log", "result.json",
+    }  # fmt: skip
     assert json.loads((left / "result.json").read_text()) == result
     assert [entry["kind"] for entry in read_journal(left / "journal.jsonl")] == ["run", "decision"]
     assert result["items"] == {"seen": 1, "placed": 1, "rejected": 0, "lost": 0, "phantom": 0}

@@ -18,6 +18,7 @@ class Ended:
     reason: str = ""
     message: str = ""
     node: str = ""
+    holds: str = ""
     ticks: int = 240
     robot_time: float = 1.0
 
@@ -25,12 +26,13 @@ class Ended:
 ITEMS = {"seen": 3, "placed": 2, "rejected": 1, "lost": 0, "phantom": 1, "rows": [{}]}
 AUDIT = {"right": 2, "wrong_bin": 0, "left": 1, "elsewhere": 0, "unseen": 0}
 PLANNING = {"motions": 4, "ahead": 1, "waited_s": 0.15}
+STORY = {"verdict": "Grasp failed"}
 
 
 def result(items=ITEMS, audit=AUDIT) -> dict:
     return result_of(
         mission="sort", seed=7, outcome=Ended(), items=items, audit=audit, planning=PLANNING,
-        wall_time=0.5, trace="ab", run=Path("r"),
+        requests=["cube"], story=STORY, wall_time=0.5, trace="ab", run=Path("r"),
     )  # fmt: skip
 
 
@@ -40,6 +42,7 @@ def test_has_every_field_that_is_promised():
     assert made["items"] == {"seen": 3, "placed": 2, "rejected": 1, "lost": 0, "phantom": 1}
     assert made["audit"] == AUDIT
     assert made["planning"] == PLANNING
+    assert (made["requests"], made["story"]) == (["cube"], STORY)
 
 
 def test_is_written_whole_and_can_be_read_again(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from datetime import datetime
 from pathlib import Path
 
@@ -27,9 +28,14 @@ def test_runs_of_the_same_second_do_not_share_a_directory(tmp_path):
     assert names == ["03-15-42_sort_s7", "03-15-42_sort_s7-2", "03-15-42_sort_s7-3"]
 
 
+def full(*args, **kwargs):
+    raise OSError(28, "No space left on device")
+
+
 def test_latest_points_to_the_last_run_and_survives_moving_the_folder(tmp_path):
-    create(tmp_path / "runs")
+    create(tmp_path / "runs").save_inputs(mission="", params={}, cell={})
     last = create(tmp_path / "runs")
+    last.save_inputs(mission="", params={}, cell={})
     (last.path / "mark").touch()
     (tmp_path / "runs").rename(tmp_path / "moved")
     assert (tmp_path / "moved" / "latest" / "mark").exists()
@@ -41,6 +47,23 @@ def test_keeps_the_mission_verbatim_and_the_rest_as_yaml(tmp_path):
     assert (directory.path / "mission.yaml").read_text() == "mission: sort  # mine\n"
     assert yaml.safe_load((directory.path / "params.yaml").read_text()) == {"attempts": 3}
     assert yaml.safe_load((directory.path / "cell.yaml").read_text()) == {"size": [1, 2]}
+
+
+def test_keeps_params_and_cell_to_the_last_digit(tmp_path):
+    directory = create(tmp_path)
+    kept = {"step": 1 / 240, "small": 1.5e-7, "none": -0.0, "name": "caf\udce9", "off": None}
+    directory.save_inputs(mission="", params=kept, cell={"arm": kept})
+    assert repr(yaml.safe_load((directory.path / "params.yaml").read_text())) == repr(kept)
+    assert repr(yaml.safe_load((directory.path / "cell.yaml").read_text())) == repr({"arm": kept})
+
+
+def test_what_repeats_a_run_is_on_the_disk_before_it_begins(tmp_path, monkeypatch):
+    synced = []
+    monkeypatch.setattr(os, "fsync", lambda file: synced.append(os.fstat(file).st_ino))
+    directory = create(tmp_path)
+    directory.save_inputs(mission="sort", params={"a": 1}, cell={}, libraries={"own.yaml": "own"})
+    names = ("own.yaml", "mission.yaml", "params.yaml", "cell.yaml")
+    assert synced == [(directory.path / name).stat().st_ino for name in names]
 
 
 def test_libraries_lie_where_the_mission_looks_for_them(tmp_path):
@@ -59,12 +82,15 @@ def test_a_place_that_cannot_be_written_to_is_a_sentence(tmp_path):
     assert "--runs DIR" in str(raised.value)
 
 
-def test_a_full_disk_is_a_sentence(tmp_path, monkeypatch):
+@pytest.mark.parametrize("room", range(3))
+def test_a_full_disk_is_a_sentence_and_leaves_nothing_half_written(tmp_path, monkeypatch, room):
+    create(tmp_path).save_inputs(mission="", params={}, cell={})
+    before = (tmp_path / "latest").resolve()
     directory = create(tmp_path)
-
-    def full(*args, **kwargs):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(Path, "write_text", full)
+    left = iter(range(room))
+    monkeypatch.setattr(os, "fsync", lambda file: None if next(left, None) is not None else full())
     with pytest.raises(InputError, match="no space left on device; free some space"):
-        directory.save_inputs(mission="", params={}, cell={})
+        directory.save_inputs(mission="sort", params={}, cell={})
+    names = [path.name for path in directory.path.iterdir()]
+    assert sorted(names) == sorted(("mission.yaml", "params.yaml", "cell.yaml")[:room])
+    assert (tmp_path / "latest").resolve() == before

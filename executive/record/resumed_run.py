@@ -1,0 +1,120 @@
+"""A run that was cut off, taken up again where it was, in its own directory."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from executive.errors import InputError
+from executive.events import Event
+from executive.record.journal import ending_of, read_journal
+from executive.record.recorded_mission import recorded_mission
+from executive.record.recorded_run import Recording, View
+from executive.record.recorder import Recorder
+from executive.record.replay import Replay, compare
+from executive.record.result import ENDED
+from executive.record.run_directory import RunDirectory
+from executive.tape.past import Past
+
+if TYPE_CHECKING:
+    from executive.skill import Skill
+    from executive.workcell import Workcell
+
+UNPLAYED = ("run", "plan", "request")
+"""Events that do not come about again when a past is played."""
+
+
+def resumed_run(
+    path: Path,
+    skills: Mapping[str, type[Skill]],
+    *,
+    view: View | None = None,
+    gui: bool = False,
+    realtime: bool = False,
+    frames: bool = True,
+    kind: Callable[..., Workcell] | None = None,
+) -> dict[str, Any]:
+    """Take up again the run in a directory, and return the result object.
+
+    Its journal is played to where it was cut off: then tree, variables and ledger are what they were. The
+    world of a simulated cell is rebuilt as it was, too, the arm braking. Since nobody watched the cell
+    meanwhile, the tool's sensor decides what is held, everything on the table is in doubt until it was seen
+    again, and each skill that was under way begins anew.
+
+    Args:
+        path: The run directory.
+        skills: Installed skills by name.
+        view: Shows it.
+        gui: Show the simulated world in a window.
+        realtime: Pace the run by the wall clock.
+        frames: Keep the pictures behind the decisions.
+        kind: Makes the work cell; by default the installed kind that the cell file names.
+
+    Raises:
+        InputError: There is nothing to take up: the run goes on, has come to its end, left too little of a
+            record, or would be decided otherwise by what is installed now.
+        ExecutiveError: The result cannot be written.
+    """
+    from executive.runtime.run import Run
+
+    began = time.perf_counter()
+    directory = RunDirectory(path)
+    # First of all: from here on no other process writes to the directory.
+    recorder = Recorder(directory, frames=frames, again=True)
+    try:
+        past, seed = _past(directory)
+        assert past.start is not None, "a past to take up has begun"
+        loaded = recorded_mission(path, past.start, skills)
+        _require_same(compare(loaded, skills, past, seed), path)
+        run = Run(
+            loaded, skills, seed=seed, gui=gui, realtime=realtime, requests=past.start["requests"],
+            kind=kind, past=past, takes_up=directory.world,
+        )  # fmt: skip
+    except BaseException:
+        recorder.close(wait=False)
+        raise
+    with closing(run):
+        assert run.played is not None, "a run that is taken up again plays its past"
+        recorder.remember(run.played.entries)
+        told = _events(run.played)
+        return Recording(run, loaded, skills, directory, recorder, view, told).execute(seed, began)
+
+
+def _past(directory: RunDirectory) -> tuple[Past, int]:
+    """Return what a run to take up again has had, and its seed.
+
+    Raises:
+        InputError: There is nothing to take up.
+    """
+    entries = read_journal(directory.journal)
+    ending = ending_of(entries)
+    if ending is not None and ending["status"] in ENDED:
+        raise InputError(
+            f'the run in "{directory.path}" came to its end: {ending["status"]}; '
+            "there is nothing to take up again"
+        )
+    past = Past.of(entries)
+    if past.start is None:
+        raise InputError(
+            f'the run in "{directory.path}" had not begun when it was cut off; run the mission anew'
+        )
+    return past, int(past.start["seed"])
+
+
+def _events(past: Past) -> Iterator[Event]:
+    """Yield what those who follow a run have to know, and are not told when its past is played."""
+    for entry in past.entries:
+        if entry["kind"] in UNPLAYED:
+            data = {key: value for key, value in entry.items() if key not in ("tick", "clock", "kind")}
+            yield Event(entry["kind"], entry["tick"], entry["clock"], data)
+
+
+def _require_same(replay: Replay, path: Path) -> None:
+    if not replay.same:
+        raise InputError(
+            f'the run in "{path}" cannot be taken up again: {replay.difference}. The executive or a skill '
+            "has been changed since; go back to what it was run with, or run the mission anew"
+        )

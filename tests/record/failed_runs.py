@@ -1,0 +1,102 @@
+"""Runs on the fake cell that go wrong in one way or another, and the stories they leave."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from executive.mission.load import load_mission
+from executive.record.story.story import Story
+from executive.runtime.run import Run
+from executive.skill import discover
+from executive.testing.fake_cell import FakeCell
+
+HEAD = """\
+mission: trial
+description: A test's.
+cell: cells/overhead.yaml
+params: {attempts: 3, patience: 2.0}
+routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}
+tree:
+"""
+
+PICK = """\
+  - MoveToScan
+  - Detect
+  - Localize
+  - SelectTarget
+  - retry:
+      attempts: $attempts
+      on: [Grasp.missed, Transit.dropped]
+      recover: [Detect, Localize, {SelectTarget: {same: $item}}]
+      do: [Approach, Grasp, Transit, Release]
+"""
+"""Picks one object, and deals with nothing that may fail but by trying again."""
+
+
+class FailedRun:
+    """A run of a mission, its parts to be broken before it is executed; writes a file where it is.
+
+    Args:
+        mission: Name of a shipped mission, or the tree of one.
+        objects: What lies on the table: label and place [m]; by default what the seed says.
+        overrides: As with `--set`.
+        requests: As with `--request`.
+    """
+
+    def __init__(
+        self,
+        mission: str,
+        *,
+        objects: Sequence[tuple[str, float, float]] = (),
+        overrides: Mapping[str, str] | None = None,
+        requests: Sequence[str] | None = (),
+    ) -> None:
+        file: str | Path = mission
+        if "\n" in mission:
+            file = Path("trial.yaml")
+            file.write_text(HEAD + mission)
+        self.loaded = load_mission(file, discover(), overrides or {})
+        self.story = Story(self.loaded, discover())
+        self.run = Run(
+            self.loaded, discover(), seed=3, observers=[self.story], kind=FakeCell, requests=requests
+        )
+        assert isinstance(self.run.workcell, FakeCell)
+        self.fake = self.run.workcell
+        if objects:
+            self.fake.world.objects.clear()
+            for label, x, y in objects:
+                self.fake.world.put(label, x, y)
+
+    def tell(self) -> dict[str, Any] | None:
+        """Execute the run and return its story."""
+        return self.story.tell(self.run.execute(), Path(), lambda: self.fake.arm.at_rest)
+
+    def at_every_step(self, do: Callable[[], None]) -> None:
+        """Have something done after every control step."""
+        advance = self.fake.advance
+
+        def advance_and_do() -> None:
+            advance()
+            do()
+
+        self.fake.advance = advance_and_do  # type: ignore[method-assign]
+
+    @property
+    def height(self) -> float:
+        """Height of the tool over the table [m]."""
+        return float(self.fake.arm.tool_pose.position[2])
+
+    def slip(self, times: int = 1000, *, vanish: bool = False) -> None:
+        """Let whatever is lifted fall, so many times; it may vanish in the act."""
+        slips = iter(range(times))
+
+        def watch() -> None:
+            held = self.fake.world.held
+            if held is not None and self.height > 0.12 and next(slips, None) is not None:
+                self.fake.tool.open()
+                if vanish:
+                    self.fake.world.objects.remove(held)
+
+        self.at_every_step(watch)

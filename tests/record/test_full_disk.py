@@ -1,0 +1,171 @@
+"""A disk that fills up at any moment of a run, on the command line: how it ends, and what is left."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from executive.cli.main import main
+from executive.record.journal import read_journal
+from executive.record.pictures.drawer import Drawer
+from executive.record.recorder import Recorder
+from executive.testing.fake_cell import FakeCell
+
+MISSION = """\
+mission: bring_one
+description: Bring one object.
+cell: cells/overhead.yaml
+routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}
+tree: [MoveToScan, Detect, Localize, SelectTarget, Approach, Grasp, Transit, Release]
+"""
+RECORD = ("write", "fsync", "replace", "rename")
+WORLD = ("pwrite",)
+
+
+class Disk:
+    """Takes so many calls, then half of one more, and nothing after that."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, names: tuple[str, ...]) -> None:
+        self.room, self.asked = 1_000_000, 0
+        for name in names:
+            monkeypatch.setattr(os, name, self._limited(getattr(os, name)))
+
+    @property
+    def full(self) -> bool:
+        return self.asked > self.room
+
+    def _limited(self, call):
+        def limited(*args, **options):
+            self.asked += 1
+            if not self.full:
+                return call(*args, **options)
+            if self.asked == self.room + 1 and call.__name__ == "write" and len(args[1]) > 1:
+                return call(args[0], args[1][: len(args[1]) // 2])
+            raise OSError(28, "No space left on device")
+
+        return limited
+
+
+@pytest.fixture
+def cells(monkeypatch):
+    """The cells that runs were made on."""
+    made = []
+
+    class Cell(FakeCell):
+        def __init__(self, *args, **options):
+            super().__init__(*args, **options)
+            made.append(self)
+
+    monkeypatch.setattr("executive.runtime.run.cell_kind", lambda name: Cell)
+    return made
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch, cells):
+    """Run the command once, without pictures; the result, and the directory that it left, if any."""
+    (tmp_path / "bring_one.yaml").write_text(MISSION)
+    monkeypatch.setattr(Drawer, "draw", lambda self, name, scene: True)
+
+    def once() -> tuple[Result, Path | None]:
+        before = set(tmp_path.glob("runs/[0-9]*/*"))
+        few = ("--set", "cell.kind=fake", "--set", "cell.table.objects=[1, 1]")
+        words = ["run", str(tmp_path / "bring_one.yaml"), "--runs", str(tmp_path / "runs"), *few, "--json"]
+        shown = CliRunner().invoke(main, words)
+        (left,) = set(tmp_path.glob("runs/[0-9]*/*")) - before or {None}
+        return shown, left
+
+    return once
+
+
+def test_wherever_the_disk_fills_up_the_run_ends_at_rest_and_says_so(run, monkeypatch, cells):
+    disk = Disk(monkeypatch, RECORD)
+    shown, whole = run()
+    assert shown.exit_code == 0, shown.output
+    kinds = [entry["kind"] for entry in read_journal(whole / "journal.jsonl")]
+    codes = []
+    while True:
+        disk.room, disk.asked = len(codes), 0
+        shown, left = run()
+        if not disk.full:
+            break
+        codes.append(shown.exit_code)
+        assert cells[-1].arm.at_rest
+        assert "Traceback" not in shown.output
+        assert "no space left on device" in shown.stderr
+        assert left is None or not list(left.rglob(".*.part"))
+        if shown.exit_code == 2:
+            assert shown.stdout == ""
+            assert left is None or not (left / "journal.jsonl").exists()
+            continue
+        result = json.loads(shown.stdout)
+        assert shown.exit_code == 3
+        assert (result["status"], result["run"]) == ("FAULT", str(left))
+        assert "no space left on device" in result["message"]
+        # What stands in the journal is what came about, as far as it goes.
+        told = [json.loads(line) for line in (left / "journal.jsonl").read_bytes().splitlines()]
+        assert [entry["kind"] for entry in told] == kinds[: len(told)]
+        assert not (left / "result.json").exists() or json.loads((left / "result.json").read_text()) == result
+    # Where the run has not begun it is bad input: a place that cannot be written to.
+    assert codes == sorted(codes)
+    assert codes.count(2) > 5
+    assert codes.count(3) > len(kinds)
+
+
+@pytest.mark.parametrize("room", [0, 1, 20, 100, 150, 200, 300])
+def test_wherever_the_world_cannot_be_kept_the_run_ends_at_rest_and_says_so(run, monkeypatch, cells, room):
+    disk = Disk(monkeypatch, WORLD)
+    disk.room = room
+    shown, left = run()
+    assert cells[-1].arm.at_rest
+    assert "no space left on device" in shown.stderr
+    assert "Traceback" not in shown.output
+    assert shown.exit_code == (3 if room else 2)
+    if room:
+        assert json.loads(shown.stdout) == json.loads((left / "result.json").read_text())
+        assert json.loads(shown.stdout)["message"].endswith("because it could not be taken up again")
+
+
+@pytest.mark.parametrize("room", range(9))
+def test_wherever_the_disk_fills_up_while_a_run_is_halted_it_ends_at_rest_and_says_so(
+    run, monkeypatch, cells, room
+):
+    disk, advance = Disk(monkeypatch, RECORD), FakeCell.advance
+
+    def interrupted(self):
+        advance(self)
+        if self.steps == 60:
+            disk.room = disk.asked + room
+            os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(FakeCell, "advance", interrupted)
+    shown, _ = run()
+    assert disk.full
+    assert cells[-1].arm.at_rest
+    assert shown.exit_code == 3
+    message = json.loads(shown.stdout)["message"]
+    assert "no space left on device" in message
+    assert "could not be braked" not in message
+
+
+def test_a_run_whose_directory_is_deleted_ends_at_rest_and_says_so(run, monkeypatch, cells):
+    record = Recorder.__call__
+
+    def steal(self, event):
+        record(self, event)
+        if event.kind == "decision":
+            shutil.rmtree(self._journal._path.parent)
+
+    monkeypatch.setattr(Recorder, "__call__", steal)
+    shown, left = run()
+    assert shown.exit_code == 3
+    assert left is None
+    assert "it was deleted while the run went on; the run stops" in json.loads(shown.stdout)["message"]
+    assert "note: cannot write the result" in shown.stderr
+    assert "no such file or directory; the journal beside it" in shown.stderr
+    assert cells[-1].arm.at_rest

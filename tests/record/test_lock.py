@@ -1,0 +1,109 @@
+"""Two runs in one directory, and what is said to the second."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from executive.errors import InputError
+from executive.record import lock as module
+from executive.record.journal import Journal
+
+HOLD = (
+    "import sys; from pathlib import Path; from executive.record.journal import Journal\n"
+    "journal = Journal(Path(sys.argv[1])); print('open', flush=True); sys.stdin.read()"
+)
+
+
+@pytest.fixture
+def holder(tmp_path):
+    """A process that writes the journal in `tmp_path`."""
+    command = [sys.executable, "-c", HOLD, tmp_path / "journal.jsonl"]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    with process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        yield process
+        process.kill()
+
+
+def refusal(path: Path, **how: bool) -> str:
+    with pytest.raises(InputError) as raised:
+        Journal(path, **how)
+    return str(raised.value)
+
+
+@pytest.mark.parametrize("again", [True, False])
+def test_a_second_run_is_told_which_process_writes_there(tmp_path, holder, again):
+    assert refusal(tmp_path / "journal.jsonl", again=again) == (
+        f'the run directory "{tmp_path}" is in use: process {holder.pid} writes its journal, and two runs '
+        f'cannot share it; wait until that run has ended, or end it with "kill {holder.pid}"'
+    )
+
+
+def test_where_nobody_tells_which_process_it_is_it_is_another(tmp_path, holder, monkeypatch):
+    monkeypatch.setattr(module, "LOCKS", tmp_path / "none")
+    assert "is in use: another process writes its journal" in refusal(tmp_path / "journal.jsonl", again=True)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "1: POSIX  ADVISORY  WRITE {pid} {file} 0 EOF",
+        "1: FLOCK  ADVISORY  WRITE {pid} 00:00:1 0 EOF",
+        "1: FLOCK  ADVISORY  WRITE 0 {file} 0 EOF",
+        "1: FLOCK  ADVISORY  WRITE -1 {file} 0 EOF",
+        "1: -> FLOCK  ADVISORY  WRITE {pid} {file} 0 EOF",
+        "",
+    ],
+)
+def test_a_process_that_holds_another_lock_is_not_named(tmp_path, holder, monkeypatch, line):
+    monkeypatch.setattr(module, "LOCKS", tmp_path / "locks")
+    state = (tmp_path / "journal.jsonl").stat()
+    file = f"{os.major(state.st_dev):02x}:{os.minor(state.st_dev):02x}:{state.st_ino}"
+    module.LOCKS.write_text(line.format(pid=holder.pid, file=file) + "\n")
+    assert "another process" in refusal(tmp_path / "journal.jsonl", again=True)
+
+
+def test_a_killed_run_leaves_no_lock(tmp_path, holder):
+    holder.send_signal(signal.SIGKILL)
+    holder.wait()
+    Journal(tmp_path / "journal.jsonl", again=True).close()
+
+
+def test_the_lock_is_given_up_when_the_journal_is_closed_and_not_before(tmp_path):
+    path = tmp_path / "journal.jsonl"
+    with closing(Journal(path)):
+        assert f"process {os.getpid()} writes" in refusal(path)
+    Journal(path, again=True).close()
+
+
+def test_a_journal_that_could_not_be_opened_is_locked_by_nobody(tmp_path):
+    path = tmp_path / "journal.jsonl"
+    path.write_text("{}\n")
+    assert "is the record of another run" in refusal(path)
+    Journal(path, again=True).close()
+
+
+def test_a_child_that_outlives_the_run_does_not_keep_the_lock(tmp_path):
+    path = tmp_path / "journal.jsonl"
+    with closing(Journal(path)):
+        child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    with child:
+        Journal(path, again=True).close()
+        child.kill()
+
+
+def test_a_file_system_without_locks_is_told(tmp_path, monkeypatch):
+    def none(file, operation):
+        raise OSError(37, "No locks available")
+
+    monkeypatch.setattr("fcntl.flock", none)
+    with pytest.raises(InputError, match=r"cannot open the journal .*: no locks available"):
+        Journal(tmp_path / "journal.jsonl")

@@ -1,0 +1,196 @@
+"""What takes the record away while a run goes on: each time a sentence, and the arm at rest."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from executive.errors import InputError
+from executive.mission.load import load_mission
+from executive.record.journal import ending_of, read_journal
+from executive.record.recorded_run import recorded_run
+from executive.record.recorder import Recorder
+from executive.record.run_directory import RunDirectory
+from executive.runtime.cells import cell_kind
+from executive.skill import discover
+from executive.testing.fake_cell import FakeCell
+
+MISSION = """\
+mission: bring_one
+description: Bring one object.
+cell: cells/overhead.yaml
+routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}
+tree: [MoveToScan, Detect, Localize, SelectTarget, Approach, Grasp, Transit, Release]
+"""
+SMALL = {"cell.kind": "fake", "cell.table.objects": "[1, 1]"}
+
+
+class Thief:
+    """A view that does something to the record as soon as the arm is about to grasp."""
+
+    items: dict = {}  # noqa: RUF012
+
+    def __init__(self, does):
+        self._does = does
+        self.notes = []
+
+    def __call__(self, event):
+        if event.kind == "status" and event.data["node"].endswith("/Grasp") and self._does:
+            does, self._does = self._does, None
+            does()
+
+    def open(self, root, control):
+        pass
+
+    def close(self):
+        pass
+
+    def note(self, sentence):
+        self.notes.append(sentence)
+
+
+@pytest.fixture
+def cells(monkeypatch):
+    """The cells that runs were made on."""
+    made = []
+
+    class Cell(FakeCell):
+        def __init__(self, *args, **options):
+            super().__init__(*args, **options)
+            made.append(self)
+
+    monkeypatch.setattr("executive.runtime.run.cell_kind", lambda name: Cell)
+    return made
+
+
+@pytest.fixture
+def run(tmp_path, cells):
+    """Run the mission once, with something done to its directory before the grasp."""
+    (tmp_path / "bring_one.yaml").write_text(MISSION)
+    skills = discover()
+
+    def once(does=None, *, frames=False):
+        loaded = load_mission(str(tmp_path / "bring_one.yaml"), skills, SMALL, cell_kind)
+        view = Thief(does)
+        runs = tmp_path / "runs"
+        return recorded_run(loaded, skills, seed=1, runs=runs, view=view, frames=frames), view.notes
+
+    return once
+
+
+def test_a_journal_deleted_meanwhile_ends_the_run(run, tmp_path, cells):
+    result, _ = run(lambda: (tmp_path / "runs" / "latest" / "journal.jsonl").unlink())
+    assert (result["status"], result["reason"]) == ("FAULT", "fault")
+    assert "it was deleted while the run went on; the run stops because it could not be" in result["message"]
+    assert cells[0].arm.at_rest
+    assert json.loads((tmp_path / "runs" / "latest" / "result.json").read_text()) == result
+
+
+def test_pictures_that_cannot_be_written_end_nothing(run, tmp_path):
+    directory = tmp_path / "runs" / "latest"
+    result, notes = run(
+        lambda: (shutil.rmtree(directory / "frames"), (directory / "frames").touch()), frames=True
+    )
+    assert result["status"] == "SUCCESS"
+    (note,) = notes
+    assert note.startswith("not every picture was drawn: ")
+    assert ending_of(read_journal(directory / "journal.jsonl"))
+
+
+def test_a_second_run_in_the_directory_is_refused_and_the_first_goes_on(run, tmp_path):
+    def second():
+        with pytest.raises(InputError, match=f"is in use: process {os.getpid()} writes its journal"):
+            Recorder(RunDirectory((tmp_path / "runs" / "latest").resolve()), again=True)
+
+    result, _ = run(second)
+    assert result["status"] == "SUCCESS"
+    assert ending_of(read_journal(tmp_path / "runs" / "latest" / "journal.jsonl"))
+
+
+def forbidden(does) -> str:
+    """Return what a user who may do nothing is told."""
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            if os.getuid() == 0:
+                os.setuid(65534)
+            does()
+        except InputError as error:
+            os.write(writer, str(error).encode())
+        finally:
+            os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader) as told:
+        said = told.read()
+    os.waitpid(child, 0)
+    return said
+
+
+def test_whoever_may_not_write_there_is_told(tmp_path):
+    directory = RunDirectory(tmp_path / "runs" / "day" / "run")
+    directory.path.mkdir(parents=True)
+    directory.journal.write_text("{}\n")
+    directory.journal.chmod(0o444)
+    directory.path.chmod(0o555)
+    inputs = {"mission": "", "params": {}, "cell": {}}
+    assert forbidden(lambda: directory.save_inputs(**inputs)) == (
+        f'cannot write to the run directory "{directory.path}": permission denied; '
+        "free some space or name another place with --runs DIR"
+    )
+    assert forbidden(lambda: Recorder(directory, again=True)) == (
+        f'cannot open the journal "{directory.journal}": permission denied'
+    )
+    assert read_journal(directory.journal) == [{}]
+
+
+def limited(folder: Path, size: int, *words: str) -> subprocess.CompletedProcess[str]:
+    """Run the command where no file may be longer than so many bytes."""
+    (folder / "bring_one.yaml").write_text(MISSION)
+    settings = [word for key, value in SMALL.items() for word in ("--set", f"{key}={value}")]
+    return subprocess.run(
+        [sys.executable, "-m", "executive.cli.main", "run", "bring_one.yaml", "--json", *settings, *words],
+        cwd=folder, capture_output=True, text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)),
+    )  # fmt: skip
+
+
+def test_a_journal_for_which_there_is_no_more_room_ends_the_run_on_the_command_line(tmp_path):
+    shown = limited(tmp_path, 6000)
+    assert shown.returncode == 3
+    result = json.loads(shown.stdout)
+    assert result["status"] == "FAULT"
+    assert "file too large; the run stops because it could not be explained afterwards" in result["message"]
+    assert "Traceback" not in shown.stderr
+    latest = tmp_path / "runs" / "latest"
+    assert json.loads((latest / "result.json").read_text()) == result
+    entries = [json.loads(line) for line in (latest / "journal.jsonl").read_text().splitlines()]
+    assert entries == read_journal(latest / "journal.jsonl")
+    assert entries[0]["kind"] == "run"
+    assert ending_of(entries) is None
+
+
+def test_a_cell_for_which_there_is_no_room_is_bad_input_on_the_command_line(tmp_path):
+    shown = limited(tmp_path, 2000)
+    assert (shown.returncode, shown.stdout) == (2, "")
+    assert 'cannot write to the run directory "runs/' in shown.stderr
+    assert "file too large; free some space or name another place with --runs DIR" in shown.stderr
+    assert "Traceback" not in shown.stderr
+    assert not list(tmp_path.glob("runs/latest"))
+    assert sorted(path.name for path in tmp_path.glob("runs/*/*/*")) == ["mission.yaml", "params.yaml"]
+
+
+def test_a_picture_for_which_there_is_no_room_ends_nothing_on_the_command_line(tmp_path):
+    shown = limited(tmp_path, 12_000)
+    assert shown.returncode == 0
+    assert json.loads(shown.stdout)["status"] == "SUCCESS"
+    assert "note: not every picture was drawn: " in shown.stderr
+    assert "Traceback" not in shown.stderr
+    assert list(tmp_path.glob("runs/*/*/frames/*")) == []

@@ -1,0 +1,99 @@
+"""The observer that keeps the record: what it lacks is told, and ends nothing that can go on."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from executive.errors import Fault, InputError
+from executive.events import Event
+from executive.record.frames import Frames
+from executive.record.journal import Journal, read_journal
+from executive.record.recorder import Recorder
+from executive.record.run_directory import RunDirectory
+
+STATUS, END = Event("status", 0, 0.0, {"node": "a"}), Event("end", 1, 0.0, {})
+
+
+@pytest.fixture
+def directory(tmp_path):
+    return RunDirectory(tmp_path)
+
+
+def full(*args):
+    raise OSError(28, "No space left on device")
+
+
+def test_a_picture_that_cannot_be_drawn_is_told_and_ends_nothing(directory, monkeypatch):
+    def none(self, event):
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(Frames, "__call__", none)
+    recorder = Recorder(directory)
+    recorder(STATUS)
+    recorder(END)
+    recorder.close()
+    assert recorder.problem == "not every picture was drawn: RuntimeError: can't start new thread"
+    assert len(read_journal(directory.journal)) == 2
+
+
+def test_a_journal_that_cannot_be_written_is_a_fault_and_its_close_is_silent(directory, monkeypatch):
+    recorder = Recorder(directory)
+    monkeypatch.setattr(os, "write", full)
+    with pytest.raises(Fault, match="no space left on device; the run stops"):
+        recorder(STATUS)
+    recorder(END)
+    recorder.close()
+    assert recorder.problem == ""
+
+
+def test_what_does_not_reach_the_disk_at_the_close_is_told(directory, monkeypatch):
+    (directory.path / "frames").write_text("a file, no folder")
+    recorder = Recorder(directory)
+    recorder(STATUS)
+    monkeypatch.setattr(os, "fsync", full)
+    recorder.close()
+    recorder.close()
+    assert recorder.problem.startswith(f'the journal "{directory.journal}" may lack its last lines: no space')
+
+
+def test_the_pictures_are_waited_for_whatever_became_of_the_journal(directory, monkeypatch):
+    closed = []
+    monkeypatch.setattr(Frames, "close", lambda self: closed.append("frames"))
+    monkeypatch.setattr(Frames, "problem", "no pictures were drawn: file exists")
+    monkeypatch.setattr(os, "fsync", full)
+    recorder = Recorder(directory)
+    recorder(STATUS)
+    recorder.close(wait=False)
+    assert closed == []
+    recorder.close()
+    assert closed == ["frames"]
+    first, second = recorder.problem.split("; believe what you see in the cell rather than the record; ")
+    assert "may lack its last lines" in first
+    assert second == "no pictures were drawn: file exists"
+
+
+def test_a_run_that_is_taken_up_again_goes_on_with_its_journal(directory):
+    for again in (False, True):
+        recorder = Recorder(directory, frames=False, again=again)
+        recorder(END)
+        recorder.close()
+    assert len(read_journal(directory.journal)) == 2
+    with pytest.raises(InputError, match="the record of another run"):
+        Recorder(directory)
+
+
+def test_the_journal_may_be_of_another_make(directory):
+    opened = []
+
+    class Counted(Journal):
+        def append(self, entry):
+            opened.append(entry["kind"])
+            super().append(entry)
+
+    recorder = Recorder(directory, frames=False, journal=Counted)
+    recorder(STATUS)
+    recorder.close()
+    assert opened == ["status"]
+    assert len(read_journal(directory.journal)) == 1

@@ -1,0 +1,108 @@
+"""Deciding a recorded run once more."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from executive.errors import InputError
+from executive.mission.load import load_mission
+from executive.record.entry import entry_of
+from executive.record.find_run import find_run
+from executive.record.journal import read_journal
+from executive.record.recorded_run import recorded_run
+from executive.record.replay import Replay, compare, replay
+from executive.skill import discover
+from executive.tape.past import Past
+from executive.testing.disturbances.script import during
+from executive.testing.disturbances.tool import seal_fails
+from executive.testing.fake_cell import FakeCell
+from executive.testing.oracle import oracle_cell
+from executive.testing.run_mission import run_mission
+
+ALL = sorted(path.stem for path in (Path(__file__).parents[2] / "missions").glob("*.yaml"))
+
+
+def recorded(missions: Path, runs: Path, name: str, **options: Any) -> Path:
+    loaded = load_mission(missions / f"{name}.yaml", discover())
+    requests = [*loaded.routes] * 4
+    recorded_run(
+        loaded,
+        discover(),
+        runs=runs,
+        requests=requests,
+        frames=False,
+        **{"seed": 3, "kind": FakeCell} | options,
+    )
+    return find_run("latest", runs)
+
+
+def again(path: Path, mission: Path | None = None) -> Replay:
+    return replay(path, read_journal(path / "journal.jsonl"), discover(), mission)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_the_same_mission_decides_the_same(missions: Path, tmp_path: Path, name: str) -> None:
+    done = again(recorded(missions, tmp_path, name))
+    assert (done.same, done.difference) == (True, "")
+    assert done.decisions > 100
+
+
+def test_so_it_does_without_the_simulator(missions: Path, tmp_path: Path) -> None:
+    done = again(recorded(missions, tmp_path, "sort_wrist", kind=oracle_cell()))
+    assert (done.same, done.edited) == (True, False)
+
+
+def edited(path: Path, missions: Path, old: str, new: str) -> Path:
+    text = (path / "mission.yaml").read_text()
+    assert old in text
+    # Beside its library, as a mission lies.
+    file = path / "edited.yaml"
+    file.write_text(text.replace(old, new))
+    return file
+
+
+def test_the_first_decision_of_an_edited_mission_that_differs_is_told(missions: Path, tmp_path: Path) -> None:
+    path = recorded(missions, tmp_path, "sort_overhead")
+    done = again(path, edited(path, missions, "do: SelectTarget}", "do: {SelectTarget: {prefer: surest}}}"))
+    assert done.edited
+    assert done.recorded is not None
+    assert done.replayed is not None
+    assert (done.recorded["kind"], done.replayed["kind"]) == ("decision", "decision")
+    assert done.recorded["item"] != done.replayed["item"]
+    assert done.difference == (
+        f"the record says at {done.recorded['clock']:.3f} s (step {done.recorded['tick']}) decision: "
+        f"item {done.recorded['item']}, label {done.recorded['label']}, bin {done.recorded['bin']}, "
+        f"and now it is at {done.replayed['clock']:.3f} s (step {done.replayed['tick']}) decision: "
+        f"item {done.replayed['item']}, label {done.replayed['label']}, bin {done.replayed['bin']}"
+    )
+
+
+def test_another_word_for_the_same_is_no_difference(missions: Path, tmp_path: Path) -> None:
+    path = recorded(missions, tmp_path, "sort_overhead")
+    done = again(path, edited(path, missions, "description: Sort every", "description: Sort simply every"))
+    assert (done.edited, done.same) == (True, True)
+
+
+def test_another_tree_around_the_same_skills_is_no_difference(missions: Path, tmp_path: Path) -> None:
+    path = recorded(missions, tmp_path, "sort_fruit")
+    done = again(path, edited(path, missions, "do: {use: carry}", "do: {sequence: [{use: carry}, succeed]}"))
+    assert (done.edited, done.same, done.difference) == (True, True, "")
+
+
+def test_a_mission_that_gives_up_sooner_says_where(missions: Path) -> None:
+    file, skills = missions / "sort_overhead.yaml", discover()
+    four_times = [during("*/Grasp", seal_fails(), nth=(1, 2, 3, 4))]
+    past = Past.of([entry_of(event) for event in run_mission(file, seed=3, disturbances=four_times).events])
+    assert compare(load_mission(file, skills), skills, past, 3).same
+    done = compare(load_mission(file, skills, {"attempts": "2"}), skills, past, 3, edited=True)
+    assert done.replayed is not None
+    assert done.replayed["node"] == "RejectTarget"
+
+
+def test_a_directory_without_answers_cannot_be_replayed(missions: Path, tmp_path: Path) -> None:
+    path = recorded(missions, tmp_path, "sort_fruit")
+    with pytest.raises(InputError, match=r"no run that can be replayed: its journal tells of no answers"):
+        replay(path, [], discover())
