@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from math import inf
 from typing import Any
 
@@ -24,6 +25,7 @@ from executive.control.skill_node import SkillNode, Wiring
 from executive.control.succeed import Succeed
 from executive.control.timeout import Timeout
 from executive.control.while_loop import While
+from executive.errors import InputError
 from executive.events import Emit
 from executive.mission.load import LoadedMission
 from executive.mission.model import nodes
@@ -37,10 +39,27 @@ TreeNode = ControlNode | SkillNode
 
 
 def build(
-    loaded: LoadedMission, skills: Mapping[str, type[Skill]], cell: Cell, scope: Scope, emit: Emit
+    loaded: LoadedMission,
+    skills: Mapping[str, type[Skill]],
+    cell: Cell,
+    scope: Scope,
+    emit: Emit,
+    substitutes: Mapping[str, type[Skill]] | None = None,
 ) -> TreeNode:
-    """Return the root of a fresh tree of py_trees behaviours; every node has a unique, readable `path`."""
-    return Builder(skills, cell, scope, emit).node(loaded.tree)
+    """Return the root of a fresh tree of py_trees behaviours; every node has a unique, readable `path`.
+
+    `substitutes` run instead of the skills of nodes, by a pattern of their paths as a shell knows them: `*`
+    stands for anything, `/` included. The first one that fits is taken.
+
+    Raises:
+        InputError: A pattern fits no node that runs a skill.
+    """
+    builder = Builder(skills, cell, scope, emit, substitutes or {})
+    root = builder.node(loaded.tree)
+    if unused := [pattern for pattern in builder.substitutes if pattern not in builder.used]:
+        paths = [node.path for node in root.iterate() if isinstance(node, SkillNode)]
+        raise InputError(f'no node is called "{unused[0]}"; there are: {", ".join(paths)}')
+    return root
 
 
 @dataclass(frozen=True)
@@ -51,6 +70,8 @@ class Builder:
     cell: Cell
     scope: Scope
     emit: Emit
+    substitutes: Mapping[str, type[Skill]] = field(default_factory=dict)
+    used: list[str] = field(default_factory=list)
 
     def node(self, node: nodes.Node) -> TreeNode:
         """Return the behaviour for a node."""
@@ -121,7 +142,13 @@ class Builder:
             inputs={wire.port.name: wire.variable for wire in wires(node, skill, Direction.IN)},
             outputs={wire.port.name: wire.variable for wire in wires(node, skill, Direction.OUT)},
         )
-        return SkillNode(self._site(node), node.skill, skill, wiring, self.cell, self.scope)
+        runs = self._substitute(node.path) or skill
+        return SkillNode(self._site(node), node.skill, runs, wiring, self.cell, self.scope)
+
+    def _substitute(self, path: str) -> type[Skill] | None:
+        fitting = [pattern for pattern in self.substitutes if fnmatchcase(path, pattern)]
+        self.used.extend(fitting)
+        return self.substitutes[fitting[0]] if fitting else None
 
 
 def _names(matches: Sequence[Match]) -> list[tuple[str, str]]:

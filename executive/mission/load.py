@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from executive.mission.flow.endings import Ending, endings
 from executive.mission.model.mission import Mission
 from executive.mission.model.nodes import Node
 from executive.mission.model.paths import with_paths
-from executive.mission.parse.read_mission import MissionFiles, read_mission
+from executive.mission.parse.read_mission import GivenCell, MissionFiles, read_mission
 from executive.mission.text.files import find_mission
 from executive.skill import Skill
 from executive.workcell import CellKind
@@ -40,6 +40,7 @@ class LoadedMission:
         libraries: The text of every library file by its path as the mission writes it.
         endings: Failures that can still end it.
         warnings: Findings that are no reason not to run.
+        overrides: Other values for params and keys of the cell, as they were given.
     """
 
     mission: Mission
@@ -51,6 +52,7 @@ class LoadedMission:
     libraries: Mapping[str, str]
     endings: tuple[Ending, ...] = ()
     warnings: tuple[Finding, ...] = ()
+    overrides: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def params(self) -> dict[str, Any]:
@@ -68,6 +70,7 @@ def load_mission(
     skills: Mapping[str, type[Skill]],
     overrides: Mapping[str, str] | None = None,
     kinds: Kinds | None = None,
+    cell: GivenCell | None = None,
 ) -> LoadedMission:
     """Return the mission in a file, or of a shipped name.
 
@@ -76,13 +79,14 @@ def load_mission(
         skills: Installed skills by name.
         overrides: Other values for params by name, and for the cell as `cell.<key>.<key>`.
         kinds: Finds the kind of the cell, which is asked what it cannot do; None: nobody is asked.
+        cell: The cell to take instead of the one that the mission names, or None.
 
     Raises:
         MissionError: Something is wrong with mission or cell; every finding is in it.
         InputError: There is no such mission.
     """
     file = find_mission(path)
-    files = read_mission(file, overrides or {}, skills)
+    files = read_mission(file, overrides or {}, skills, cell)
     mission, config = files.mission, files.cell.config if files.cell else None
     findings = list(files.findings)
     kind = _kind(files, kinds, findings)
@@ -102,7 +106,7 @@ def load_mission(
         raise MissionError(ordered)
     return LoadedMission(
         mission, tree, config, files.source.text, file, files.cell_path, files.libraries,
-        endings(case.flow), ordered,
+        endings(case.flow), ordered, dict(overrides or {}),
     )  # fmt: skip
 
 

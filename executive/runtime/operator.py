@@ -17,15 +17,21 @@ SLICE = 0.1
 class ScriptedOperator:
     """Asks for what a list says, then quits; every request is recorded.
 
+    Args:
+        requests: The list.
+        choices: What can be asked for.
+        emit: Takes the `request` events.
+        served: How many of the list were asked for before, in a run that is taken up again.
+
     Raises:
         InputError: A request names none of the `choices`.
     """
 
-    def __init__(self, requests: Sequence[str], choices: Sequence[str], emit: Emit) -> None:
+    def __init__(self, requests: Sequence[str], choices: Sequence[str], emit: Emit, served: int = 0) -> None:
         for word in requests:
             if understood(word, choices) == "":
                 raise InputError(f'cannot pick "{word}"; ask for one of: {", ".join(choices)}')
-        self._requests = list(requests)
+        self._requests = list(requests)[served:]
         self._emit = emit
 
     def ask(self, choices: Sequence[str]) -> str | None:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import signal
-import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass
-from types import FrameType
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any
 
 from py_trees.common import Status
@@ -19,52 +16,27 @@ from executive.control.failure import Failure
 from executive.control.halting import halt
 from executive.control.scope import Scope
 from executive.errors import ExecutiveError, Fault
-from executive.events import Event, Observer
+from executive.events import Exact, Observer
 from executive.mission.build import build
 from executive.mission.load import LoadedMission
 from executive.runtime.cells import cell_kind
 from executive.runtime.operator import ScriptedOperator, TerminalOperator
+from executive.runtime.outcome import Ending, Outcome
+from executive.runtime.plant import Plant
+from executive.runtime.run_control import RunControl
+from executive.runtime.signals import stopped_by_signals
+from executive.runtime.take_up import begin_anew, reconcile
 from executive.skill import Skill
-from executive.workcell import CellOptions, Workcell
-
-LONGEST_BRAKING = 2.0
-"""Time after which an arm that was told to brake must be at rest [s]."""
-
-
-@dataclass(frozen=True)
-class _Ending:
-    """How the tick loop ended; see `Outcome`."""
-
-    status: str
-    reason: str = ""
-    message: str = ""
-    node: str = ""
-    traceback: str = ""
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """How a run ended.
-
-    Attributes:
-        status: `SUCCESS`, `FAILURE`, `FAULT` or `HALTED`.
-        reason: What failed, for instance `Transit.dropped`; "" on success.
-        message: One sentence with numbers.
-        node: Path of the deciding node, or "".
-        ticks: Control steps taken.
-        robot_time: Time on the run's clock [s].
-    """
-
-    status: str
-    reason: str
-    message: str
-    node: str
-    ticks: int
-    robot_time: float
+from executive.tape.past import Past
+from executive.workcell import CellOptions, CellPast, Workcell
 
 
 class Run:
     """A mission on a cell, ready to be executed once.
+
+    Whatever the cell answers goes through a tape, which tells the observers. A run with a `past` begins by
+    playing what an earlier one was told: its tree, its variables and its ledger come to stand as they stood
+    then. It ends with the tape, or with `takes_up` goes on from there on the cell itself.
 
     Args:
         loaded: The mission and its cell, as loaded.
@@ -75,6 +47,15 @@ class Run:
         realtime: Pace the run by the wall clock.
         requests: What the operator asks for, or None to ask at the terminal.
         kind: Makes the work cell; by default the installed kind that the cell file names.
+        substitutes: What runs instead of a node's skill, by a pattern of the node's path (`*/Grasp`).
+        past: What an earlier run was told; None: there was none.
+        takes_up: The log of the world that the earlier run left, to go on where it was cut off; None: only
+            its past is played.
+
+    Attributes:
+        root: The tree.
+        control: Through it the run is stopped, paused and stepped, from any thread.
+        played: What it plays first, or None.
 
     Raises:
         InputError: The cell is of a kind that is not installed, or a request names no class.
@@ -91,62 +72,75 @@ class Run:
         realtime: bool = False,
         requests: Sequence[str] | None = None,
         kind: Callable[..., Workcell] | None = None,
+        substitutes: Mapping[str, type[Skill]] | None = None,
+        past: Past | None = None,
+        takes_up: Path | None = None,
     ) -> None:
         self._loaded = loaded
         self._seed = seed
-        self._observers = list(observers)
+        self._requests = requests
         self._realtime = realtime
-        self._tick = 0
-        self._interrupted = False
-        self._workcell: Workcell | None = None
+        self._past = past
+        self._holds = ""
+        self.control = RunControl()
+        self._plant = Plant(observers)
         kind = kind or cell_kind(loaded.cell_config.kind)
-        operator: Operator
-        if requests is None:
-            operator = TerminalOperator(self._emit, interrupted=lambda: self._interrupted)
-        else:
-            operator = ScriptedOperator(requests, tuple(loaded.routes), self._emit)
-        self._workcell = kind(
-            loaded.cell_config,
-            seed=seed,
-            routes=loaded.routes,
-            emit=self._emit,
-            options=CellOptions(operator, base=loaded.cell_path.parent, gui=gui),
+        options = CellOptions(
+            self._operator(),
+            base=loaded.cell_path.parent,
+            gui=gui,
+            past=_cell_past(past, takes_up) if past and takes_up else None,
         )
-        self.root = build(loaded, skills, self._workcell.cell, Scope(), self._emit)
+        workcell = kind(
+            loaded.cell_config, seed=seed, routes=loaded.routes, emit=self._plant.emit, options=options
+        )
+        self._live_from = past.complete(workcell.steps) if past and takes_up else None
+        self.played = past.before(self._live_from) if past and self._live_from is not None else past
+        self._plant.connect(workcell, self.played)
+        self.root = build(loaded, skills, self._plant.cell, Scope(), self._plant.emit, substitutes)
 
     def observe(self, observer: Observer) -> None:
-        """Tell `observer` of every event from now on."""
-        self._observers.append(observer)
+        """Tell `observer` of every event from now on, those of the past among them."""
+        self._plant.observe(observer)
+
+    def record(self, recorder: Observer) -> None:
+        """Tell `recorder` of every event that is not of the past."""
+        self._plant.record(recorder)
+
+    def log_to(self, path: Path) -> None:
+        """Keep in a file what a simulated world can be rebuilt from at any moment; before `execute`."""
+        self.workcell.log_to(path)
+
+    @property
+    def tick(self) -> int:
+        """Control steps taken so far."""
+        return self._plant.tick
 
     @property
     def workcell(self) -> Workcell:
         """The cell this run drives."""
-        assert self._workcell is not None
-        return self._workcell
+        return self._plant.workcell
 
     def execute(self) -> Outcome:
         """Tick the tree to its end and return how it ended; the arm is then at rest.
 
         Ctrl-C halts the tree and brakes the arm; a second one ends the process at once.
         """
-        self._emit("run", mission=self._loaded.mission.name, seed=self._seed, params=self._loaded.params)
-        with self._interruptible():
+        with stopped_by_signals(self.control):
             ending = self._loop()
-            problems = [*halt(self.root), *self._brake()]
+            problems = [*halt(self.root), *filter(None, [self._plant.come_to_rest()])]
         if ending.traceback:
             # Only now: a record that cannot be written must not keep the arm from braking.
-            self._emit("fault", traceback=ending.traceback)
-        if problems and ending.status != "FAULT":
-            ending = _Ending("FAULT", "fault", problems[0])
-        self.workcell.accounts.close()
-        lost = self.workcell.accounts.balance()["lost"]
-        if ending.status == "SUCCESS" and lost:
-            ending = _Ending("FAILURE", "lost", f"{lost} object(s) were lost and not found again")
-        now = round(self.workcell.cell.clock.now, 6)
-        outcome = Outcome(
-            ending.status, ending.reason, ending.message, ending.node, ticks=self._tick, robot_time=now
-        )
-        self._emit("end", **asdict(outcome))
+            problems += self._tried(lambda: self._emit("fault", traceback=ending.traceback))
+        problems += self._tried(self._ask_tool)
+        problems += self._tried(self._close_books)
+        if problems and ending.status == "FAULT":
+            ending = replace(ending, message="; ".join([ending.message, *problems]))
+        elif problems:
+            ending = Ending("FAULT", "fault", "; ".join(problems))
+        outcome = self._outcome(ending)
+        if broken := self._tried(lambda: self._emit("end", **asdict(outcome))):
+            outcome = replace(outcome, status="FAULT", reason="fault", message=broken[0], node="")
         return outcome
 
     def items(self) -> dict[str, Any]:
@@ -162,71 +156,131 @@ class Run:
         """Give the cell back."""
         self.workcell.close()
 
-    def _loop(self) -> _Ending:
-        began = time.monotonic()
+    def _operator(self) -> Operator:
+        if self._requests is None:
+            return TerminalOperator(self._emit, interrupted=lambda: self.control.stopped)
+        served = self._past.number_of("request") if self._past else 0
+        return ScriptedOperator(self._requests, tuple(self._loaded.routes), self._emit, served)
+
+    def _begin(self) -> None:
+        loaded = self._loaded
+        self._emit(
+            "run",
+            mission=loaded.mission.name,
+            file=str(loaded.path),
+            seed=self._seed,
+            params=loaded.params,
+            overrides=loaded.overrides,
+            requests=self._requests,
+            base=str(loaded.cell_path.parent.resolve()),
+            step=Exact(self._plant.tape.step),
+        )
+
+    def _loop(self) -> Ending:
+        began = time.monotonic() - self._plant.tape.now
+        ticked = False
         try:
-            while not self._interrupted:
+            if self._past is None:
+                self._begin()
+            while not self.control.stopped:
+                ticked = False
+                self._plant.begin_tick()
+                self._take_up()
+                if self._halted(before=True):
+                    break
+                ticked = True
                 self.root.tick_once()
-                if self._interrupted:
+                if self.control.stopped or self._halted(before=False):
                     # At a question to the operator Ctrl-C looks like their wish to quit: it is none.
                     break
                 if self.root.status is not Status.RUNNING:
                     return self._verdict()
-                self.workcell.advance()
-                self._tick += 1
+                self._plant.advance()
                 if self._realtime:
-                    time.sleep(max(0.0, began + self.workcell.cell.clock.now - time.monotonic()))
+                    time.sleep(max(0.0, began + self._plant.tape.now - time.monotonic()))
+                self.control.wait()
+            ending = Ending("HALTED", "halted", "halted by the user")
         except Exception as error:
             named = str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"
             node = error.node if isinstance(error, Fault) else ""
-            return _Ending("FAULT", "fault", named, node, traceback.format_exc())
-        return _Ending("HALTED", "halted", "halted by the user")
+            ending = Ending("FAULT", "fault", named, node, traceback.format_exc())
+        if (broken := self._tried(lambda: self._emit("halt", ticked=ticked))) and ending.status != "FAULT":
+            ending = Ending("FAULT", "fault", broken[0])
+        return ending
 
-    def _verdict(self) -> _Ending:
+    def _take_up(self) -> None:
+        """Where a run was cut off, begin anew what was under way."""
+        plant = self._plant
+        if plant.tape.playing and plant.tick == self._live_from:
+            assert self._past is not None
+            ticked, intent = plant.tick, self._past.last_intent
+            plant.go_live()
+            self._emit("resume", ticked=ticked, intent=intent)
+        elif plant.tape.playing and self._past and plant.tick in self._past.resumes:
+            entry = self._past.resumes[plant.tick]
+            plant.tick, intent = entry["tick"], entry["intent"]
+            plant.begin_tick()
+        else:
+            return
+        begin_anew(self.root, self._rest)
+        reconcile(plant.cell, intent)
+
+    def _rest(self) -> None:
+        if problem := self._plant.come_to_rest():
+            raise Fault(problem)
+
+    def _halted(self, *, before: bool) -> bool:
+        """Tell whether the run that is played was halted here, before or after the tree was ticked."""
+        if self._past is None or not self._plant.tape.playing or self._live_from is not None:
+            return False
+        entry = self._past.halt
+        if entry is None:
+            return self.tick > self._past.last_tick
+        return bool(entry["tick"] == self.tick and entry["ticked"] is not before)
+
+    def _verdict(self) -> Ending:
         failure: Failure | None = self.root.failure
         if failure is None:
-            return _Ending("SUCCESS")
-        return _Ending("FAILURE", str(failure), failure.message, failure.path)
+            return Ending("SUCCESS")
+        return Ending("FAILURE", str(failure), failure.message, failure.path)
 
-    def _brake(self) -> list[str]:
-        """Let the arm come to rest; return what went wrong on the way."""
-        arm, clock = self.workcell.cell.arm, self.workcell.cell.clock
+    def _tried(self, do: Callable[[], None]) -> list[str]:
+        """Do one thing of a run's end; return what went wrong, so that the others are done none the less."""
         try:
-            arm.stop()
-            deadline = clock.now + LONGEST_BRAKING
-            while not arm.at_rest:
-                if clock.now > deadline:
-                    return [f"the arm is not at rest {LONGEST_BRAKING:.0f} s after it was told to brake"]
-                self.workcell.advance()
-                self._tick += 1
+            do()
         except Exception as error:
-            return [f"the arm could not be braked: {error}"]
+            return [str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"]
         return []
 
+    def _close_books(self) -> None:
+        """Have the ledger decide what became of everything still open, and see that nothing is left over.
+
+        Raises:
+            Fault: More or less was seen than was placed, rejected and lost.
+        """
+        self.workcell.accounts.close()
+        books = self.workcell.accounts.balance()
+        if books["seen"] != books["placed"] + books["rejected"] + books["lost"]:
+            told = ", ".join(f"{number} {fate}" for fate, number in books.items())
+            raise Fault(f"the books do not balance: {told}; seen must be what was placed, rejected and lost")
+
+    def _outcome(self, ending: Ending) -> Outcome:
+        lost = self.workcell.accounts.balance()["lost"]
+        if ending.status == "SUCCESS" and lost:
+            ending = Ending("FAILURE", "lost", f"{lost} object(s) were lost and not found again")
+        now = round(self._plant.tape.now, 6)
+        return Outcome(ending.status, ending.reason, ending.message, ending.node, self._holds, self.tick, now)
+
+    def _ask_tool(self) -> None:
+        """Note what the tool holds: the item that the ledger believes there, or `something`."""
+        cell = self._plant.cell
+        if cell.tool.holding:
+            self._holds = cell.ledger.in_tool() or "something"
+
     def _emit(self, kind: str, **data: Any) -> None:
-        clock = self._workcell.cell.clock.now if self._workcell is not None else 0.0
-        event = Event(kind, self._tick, round(clock, 6), data)
-        for observer in self._observers:
-            observer(event)
+        self._plant.emit(kind, **data)
 
-    @contextmanager
-    def _interruptible(self) -> Iterator[None]:
-        """Turn the first Ctrl-C (or SIGTERM) into a wish to halt; the second is Python's own."""
-        if threading.current_thread() is not threading.main_thread():
-            yield
-            return
 
-        def wish(number: int, frame: FrameType | None) -> None:
-            del number, frame
-            self._interrupted = True
-            for name, handler in previous.items():
-                signal.signal(name, handler)
-
-        previous = {name: signal.getsignal(name) for name in (signal.SIGINT, signal.SIGTERM)}
-        for name in previous:
-            signal.signal(name, wish)
-        try:
-            yield
-        finally:
-            for name, handler in previous.items():
-                signal.signal(name, handler)
+def _cell_past(past: Past, log: Path) -> CellPast:
+    frames, turns = (past.number_of_answers(f"camera.{name}") for name in ("frame", "next_pose"))
+    return CellPast(log, past.last_tick, frames, turns)

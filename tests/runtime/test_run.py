@@ -128,7 +128,7 @@ def test_a_bug_in_a_part_is_a_fault_and_the_arm_is_at_rest(missions: Path) -> No
 
 def test_ctrl_c_halts_every_node_and_brakes_the_arm(missions: Path) -> None:
     def interrupt(event: Event) -> None:
-        if event.kind == "intent" or (event.tick > 100 and event.kind == "status" and not sent):
+        if event.kind == "intent" and not sent:
             sent.append(1)
             os.kill(os.getpid(), signal.SIGINT)
 
@@ -195,3 +195,17 @@ def test_an_object_that_slips_out_of_the_cup_every_time_is_given_up_in_the_end(m
     assert (items["rejected"], audit["left"]) == (1, 1)
     assert items["placed"] == audit["right"] == items["seen"] - 1
     assert next(row for row in items["rows"] if row["state"] == "rejected")["attempts"] == 12
+
+
+def test_books_that_do_not_balance_are_a_fault(missions: Path) -> None:
+    run, events = make(missions)
+    fake_of(run).ledger.balance = lambda: {  # type: ignore[method-assign]
+        "seen": 3, "placed": 1, "rejected": 0, "lost": 1, "phantom": 0,
+    }  # fmt: skip
+    outcome = run.execute()
+    assert outcome.status == "FAULT"
+    assert outcome.message == (
+        "the books do not balance: 3 seen, 1 placed, 0 rejected, 1 lost, 0 phantom; "
+        "seen must be what was placed, rejected and lost"
+    )
+    assert events[-1].kind == "end"

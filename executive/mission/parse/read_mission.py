@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.mission.findings import Finding, MissionError, error, in_file_order
 from executive.mission.model.mission import Mission, Subtree
@@ -40,8 +41,23 @@ class MissionFiles:
     findings: tuple[Finding, ...]
 
 
-def read_mission(file: Path, overrides: Mapping[str, str], skills: Skills) -> MissionFiles:
-    """Return a mission file and the files that it names.
+@dataclass(frozen=True)
+class GivenCell:
+    """A cell that need not be read: as it was in a recorded run.
+
+    Attributes:
+        config: What its file said, bases and overrides put in.
+        path: Where that was.
+    """
+
+    config: CellConfig
+    path: Path
+
+
+def read_mission(
+    file: Path, overrides: Mapping[str, str], skills: Skills, given: GivenCell | None = None
+) -> MissionFiles:
+    """Return a mission file and the files that it names; a cell that is `given` instead of its cell file.
 
     Raises:
         MissionError: The mission file is no YAML that a mission could be.
@@ -59,7 +75,12 @@ def read_mission(file: Path, overrides: Mapping[str, str], skills: Skills) -> Mi
     }
     texts = {name: text for name, text in read.items() if text is not None}
     whole = len(texts) == len(read)
-    cell_path, cell = _cell(mission.cell, file.parent, overrides, findings)
+    cell_path: Path | None
+    cell: CellFile | None
+    if given is None:
+        cell_path, cell = _cell(mission.cell, file.parent, overrides, findings)
+    else:
+        cell_path, cell = given.path, CellFile(given.config, Source(str(given.path), ""), None, ())
     return MissionFiles(
         source, replace(mission, trees=trees, whole=whole), texts, cell, cell_path, tuple(findings)
     )

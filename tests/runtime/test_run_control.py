@@ -1,0 +1,85 @@
+"""Pausing, stepping and stopping a run from outside."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import pytest
+
+from executive.errors import Fault
+from executive.events import Event
+from executive.mission.load import load_mission
+from executive.runtime.run import Run
+from executive.skill import discover
+from executive.testing.fake_cell import FakeCell
+
+
+def make(missions: Path, observer) -> Run:
+    loaded = load_mission(missions / "sort_overhead.yaml", discover())
+    return Run(loaded, discover(), seed=3, kind=FakeCell, observers=[observer])
+
+
+def test_a_paused_run_stands_still_until_it_goes_on(missions: Path) -> None:
+    ticks: list[int] = []
+
+    def pause_once(event: Event) -> None:
+        if event.tick >= 50 and not ticks:
+            ticks.append(event.tick)
+            run.control.pause()
+            threading.Timer(0.2, lambda: (ticks.append(run.tick), run.control.resume())).start()
+
+    run = make(missions, pause_once)
+    assert run.execute().status == "SUCCESS"
+    # It ends the tick it is in, and begins no other.
+    assert ticks[1] == ticks[0] + 1
+
+
+def test_a_step_is_a_tick(missions: Path) -> None:
+    seen: list[int] = []
+
+    def step(event: Event) -> None:
+        if event.tick >= 50 and not seen:
+            run.control.step(3)
+            threading.Timer(0.2, lambda: (seen.append(run.tick), run.control.resume())).start()
+            seen.append(event.tick)
+
+    run = make(missions, step)
+    assert run.execute().status == "SUCCESS"
+    assert seen[1] == seen[0] + 1 + 3
+
+
+def test_a_paused_run_can_be_stopped(missions: Path) -> None:
+    run = make(missions, lambda event: None)
+    run.control.step(50)
+    threading.Timer(0.3, run.control.stop).start()
+    outcome = run.execute()
+    assert (outcome.status, outcome.message) == ("HALTED", "halted by the user")
+    assert run.workcell.cell.arm.at_rest
+    assert run.tick >= 50
+
+
+def test_what_the_tool_holds_at_the_end_is_told(missions: Path) -> None:
+    def stop(event: Event) -> None:
+        if event.kind == "item" and event.data["state"] == "held":
+            run.control.stop()
+
+    run = make(missions, stop)
+    held = run.execute().holds
+    assert held in {row["item"] for row in run.items()["rows"]}
+
+
+@pytest.mark.parametrize("kind", ["item", "end", "fault"])
+def test_a_record_that_breaks_at_the_very_end_is_a_fault_with_an_outcome(missions: Path, kind: str) -> None:
+    def refuse(event: Event) -> None:
+        if event.tick >= 100:
+            run.control.stop()
+        if run.control.stopped and event.kind == kind:
+            raise Fault("the disk is full")
+        if kind == "fault" and event.tick >= 100:
+            raise Fault("the disk is full")
+
+    run = make(missions, refuse)
+    outcome = run.execute()
+    assert (outcome.status, outcome.message) == ("FAULT", "the disk is full")
+    assert run.workcell.cell.arm.at_rest
