@@ -118,11 +118,21 @@ class FakeArm:
         self._half = len(self._path) // 2
         self._met = None
 
+    def put(self, pose: Pose) -> None:
+        """Let the tool be at `pose`, at rest."""
+        self._tool, self._path = pose, []
+
     def stop(self) -> None:
         """Stand still at once."""
         if self._path:
             self.commanded.append("stop")
         self._path = []
+
+    def run_into(self, what: str) -> None:
+        """Stop as after running into `what`, which `met` then tells; nothing where no motion runs."""
+        if self._path:
+            self._met = what
+            self.stop()
 
     def advance(self) -> None:
         """Go one step along the path, with what the tool holds."""
@@ -159,6 +169,8 @@ class FakeTool:
     Attributes:
         seals: Tells whether the cup seals what it is on.
         strength: The pull that its seals bear [N].
+        leaks: True keeps it from sealing anything; for fault scripts to say, as is `sticks`.
+        sticks: True keeps it from letting go when it is opened.
     """
 
     def __init__(self, world: FakeWorld, tip: Callable[[], Array]) -> None:
@@ -166,6 +178,8 @@ class FakeTool:
         self._tip = tip
         self.seals: Callable[[], bool] = lambda: True
         self.strength = BEARS
+        self.leaks = False
+        self.sticks = False
 
     @property
     def touching(self) -> bool:
@@ -185,14 +199,25 @@ class FakeTool:
     def close(self) -> None:
         """Seal what the cup is on."""
         thing = self._world.under(self._tip())
-        if thing is not None and self.seals():
-            self._world.held = thing
+        if thing is not None and not self.leaks and self.seals():
+            self._world.held, thing.fell = thing, False
 
     def open(self) -> None:
         """Let go; the object falls straight down."""
+        if not self.sticks:
+            self._let_go()
+
+    def part(self) -> None:
+        """Let the seal give way; what hung there falls straight down."""
+        if self._world.held is not None:
+            self._world.held.fell = True
+        self._let_go()
+
+    def _let_go(self) -> None:
         thing, self._world.held = self._world.held, None
         if thing is not None:
             thing.position[2] = self._world.classes[thing.label].height / 2
+            thing.stood.append(thing.position.copy())
 
 
 def named_poses(config: CellConfig) -> dict[str, Pose]:

@@ -87,6 +87,10 @@ class FakeCamera:
             epoch=self._epoch(),
         )
 
+    def skip(self, frames: int, turns: int) -> None:
+        """Go on as if so many frames had been taken and next poses been asked for."""
+        self._count, self._turn = frames, turns
+
     def _visible(self, size: tuple[int, int]) -> NDArray[np.bool_]:
         visible = np.ones(size, dtype=bool)
         for left, top, right, bottom in self.hides:

@@ -14,14 +14,16 @@ from executive.errors import InputError
 from executive.events import Emit, ignore
 from executive.geometry import Pose
 from executive.layout import as_bin, as_class
+from executive.ledger.item import State
 from executive.ledger.ledger import ItemLedger
 from executive.messages import Target
 from executive.mission.parse.cell_file import load_cell
 from executive.mission.text.files import shipped_folder
 from executive.testing.fake_arm import FakeArm, FakeTool, out_of_reach
 from executive.testing.fake_camera import FakeCamera, FakeDetector
+from executive.testing.fake_log import FakeLog, read_state, restore
 from executive.testing.fake_times import FakeTimes
-from executive.testing.fake_world import FakeClock, FakeWorld
+from executive.testing.fake_world import FakeClock, FakeObject, FakeWorld
 from executive.vision.localization.plane import PlaneLocalizer
 from executive.workcell import CellOptions, KeyPath
 
@@ -77,6 +79,7 @@ class FakeCell:
         if options.gui:
             raise InputError(f'cell {config.cell} is of kind "fake" and has no window; run it without --gui')
         self._emit = emit
+        self._gate = config.ledger.gate
         self.routes = dict(routes)
         classes = {label: as_class(label, kind) for label, kind in config.objects.items()}
         self.world = FakeWorld(classes)
@@ -102,6 +105,11 @@ class FakeCell:
         }
         self.detector = next(iter(self.detectors.values()))
         self.decisions: list[Target] = []
+        self._log: FakeLog | None = None
+        if options.past is not None:
+            restore(read_state(options.past.log), self.world, self.arm)
+            self.camera.skip(options.past.frames, options.past.turns)
+            self.log_to(options.past.log)
         self._cell = Cell(
             clock=clock,
             arm=self.arm,
@@ -147,24 +155,59 @@ class FakeCell:
         """The books of the cell's ledger."""
         return self.ledger
 
+    @property
+    def steps(self) -> int:
+        """Control steps that its world has made since the run began."""
+        return self.world.steps
+
+    def log_to(self, path: Path) -> None:
+        """Keep in a file, from now on, what the world is like."""
+        self._log = FakeLog(path, self.world, self.arm)
+
+    def note(self) -> None:
+        """Write into the log what the world is like now."""
+        if self._log is not None:
+            self._log.write(self.world, self.arm)
+
     def advance(self) -> None:
         """Let one control step pass."""
         self.arm.advance()
         self.world.steps += 1
+        self.note()
 
     def audit(self) -> dict[str, int]:
-        """Return what became of the objects."""
+        """Return what became of the objects.
+
+        `elsewhere` is what was taken away, if it was seen before, and what fell into a wrong bin; `unseen`
+        counts what lies there and was never seen.
+        """
         counts = {"right": 0, "wrong_bin": 0, "left": 0, "elsewhere": 0, "unseen": 0}
         for thing in self.world.objects:
             inside = next((n for n, bin in self._cell.bins.items() if bin.contains(thing.position)), None)
             if inside is None or thing is self.world.held:
                 counts["left"] += 1
+            elif inside in self.routes.get(thing.label, ()):
+                counts["right"] += 1
             else:
-                counts["right" if inside in self.routes.get(thing.label, ()) else "wrong_bin"] += 1
+                counts["elsewhere" if thing.fell else "wrong_bin"] += 1
+            counts["unseen"] += not self._was_seen(thing)
+        counts["elsewhere"] += sum(map(self._was_seen, self.world.removed))
         return counts
 
     def close(self) -> None:
-        """Have nothing to give back."""
+        """Close the log."""
+        if self._log is not None:
+            self._log.close()
+            self._log = None
+
+    def _was_seen(self, thing: FakeObject) -> bool:
+        """Tell whether an item of the ledger was first seen where an object stood at some time."""
+        return any(
+            float(np.linalg.norm((record.first - place)[:2])) <= self._gate
+            for record in self.ledger.records
+            if record.state is not State.PHANTOM
+            for place in thing.stood
+        )
 
     def _decided(self, target: Target, bin: str) -> None:
         self.decisions.append(target)

@@ -23,10 +23,22 @@ TOUCH = 0.002
 
 @dataclass(eq=False)
 class FakeObject:
-    """One object on the fake table; `position` `(3,)` [m] is its centre."""
+    """One object on the fake table.
+
+    Attributes:
+        label: Its class.
+        position: Its centre `(3,)` [m].
+        stood: Where that was in the beginning, and wherever the object fell or was put since `(3,)` [m].
+        fell: Whether it fell from the tool, and was not in it again.
+    """
 
     label: str
     position: Array
+    stood: list[Array] = field(init=False)
+    fell: bool = False
+
+    def __post_init__(self) -> None:
+        self.stood = [self.position.copy()]
 
 
 @dataclass(eq=False)
@@ -36,12 +48,14 @@ class FakeWorld:
     Attributes:
         classes: What objects there may be.
         objects: The objects, in the order they were put down.
+        removed: Those that somebody took away.
         held: The object at the tool, or None.
         steps: Control steps since the run began.
     """
 
     classes: Mapping[str, ObjectClass]
     objects: list[FakeObject] = field(default_factory=list)
+    removed: list[FakeObject] = field(default_factory=list)
     held: FakeObject | None = None
     steps: int = 0
 
@@ -55,6 +69,11 @@ class FakeWorld:
         added = FakeObject(label, np.array([x, y, self.classes[label].height / 2]))
         self.objects.append(added)
         return added
+
+    def remove(self, thing: FakeObject) -> None:
+        """Take an object away that is not held."""
+        self.objects.remove(thing)
+        self.removed.append(thing)
 
     def top(self, thing: FakeObject) -> float:
         """Return the height of an object's upper side [m]."""

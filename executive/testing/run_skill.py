@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from executive.cell import Cell
+from executive.errors import Fault, InputError
 from executive.skill import Direction, Skill, SkillFailed
+from executive.testing.commands import written_down
 from executive.workcell import Workcell
+
+LONGEST_BRAKING = 2.0
+"""Time after which the arm must be at rest when a skill was taken away [s]."""
 
 
 @dataclass(frozen=True)
@@ -19,6 +26,9 @@ class SkillResult:
         message: Its sentence, or "".
         outputs: Values of the output ports, on success.
         ticks: Control steps it took.
+        commanded: What it commanded of the cell, in order and in words (`written_down`).
+        braking: Control steps from a halt until the arm was at rest; None if it still moved after
+            `LONGEST_BRAKING`.
     """
 
     status: str
@@ -26,30 +36,84 @@ class SkillResult:
     message: str = ""
     outputs: dict[str, Any] = field(default_factory=dict)
     ticks: int = 0
+    commanded: list[str] = field(default_factory=list)
+    braking: int | None = 0
 
 
 def run_skill(
-    skill: Skill, workcell: Workcell, *, ticks: int = 20_000, halt_at: int | None = None
+    skill: Skill | type[Skill],
+    workcell: Workcell,
+    *,
+    inputs: Mapping[str, Any] | None = None,
+    ticks: int = 20_000,
+    halt_at: int | None = None,
 ) -> SkillResult:
-    """Tick `skill` on `workcell` until it ends, is halted at tick `halt_at`, or `ticks` have passed.
+    """Tick a skill on `workcell` until it ends, is halted at tick `halt_at`, or `ticks` have passed.
 
-    Exceptions that are no declared failure come out as they are: in a mission they would be faults.
+    After a halt the arm is given time to come to rest. Exceptions that are no declared failure come out as
+    they are: in a mission they would be faults.
+
+    Args:
+        skill: The skill, or its class.
+        workcell: Where it runs.
+        inputs: Params and inputs of the class by name, for those without a default.
+        ticks: Control steps after which nobody waits any longer.
+        halt_at: Control step before which the skill is taken away; None: it is left to its end.
+
+    Raises:
+        InputError: An input is missing or unknown.
+        Fault: The skill broke its own declarations: it succeeded without setting an output, failed with a
+            reason that it does not declare, or yielded something.
     """
-    steps = skill.run(workcell.cell)
+    skill = _instance(skill, inputs)
+    commanded: list[str] = []
+    steps = _steps(skill, written_down(workcell.cell, commanded))
     for tick in range(ticks):
         if tick == halt_at:
-            steps.close()  # type: ignore[attr-defined]
-            return SkillResult("HALTED", ticks=tick)
+            steps.close()
+            return SkillResult("HALTED", ticks=tick, commanded=commanded, braking=_braking(workcell))
         try:
-            next(steps)
+            yielded = next(steps)
         except StopIteration:
-            outputs = {
-                name: getattr(skill, name)
-                for name, port in skill.ports.items()
-                if port.direction is Direction.OUT
-            }
-            return SkillResult("SUCCESS", outputs=outputs, ticks=tick)
+            return SkillResult("SUCCESS", outputs=_outputs(skill), ticks=tick, commanded=commanded)
         except SkillFailed as failure:
-            return SkillResult("FAILURE", failure.reason, failure.message, ticks=tick)
+            skill.failed(failure.reason, failure.message)
+            return SkillResult("FAILURE", failure.reason, failure.message, ticks=tick, commanded=commanded)
+        if yielded is not None:
+            kind = type(yielded).__name__
+            raise Fault(f'{type(skill).__name__} yielded a {kind}; to run steps of others write "yield from"')
         workcell.advance()
-    return SkillResult("RUNNING", ticks=ticks)
+    return SkillResult("RUNNING", ticks=ticks, commanded=commanded)
+
+
+def _instance(skill: Skill | type[Skill], inputs: Mapping[str, Any] | None) -> Skill:
+    if isinstance(skill, type):
+        return skill(**(inputs or {}))
+    if inputs is not None:
+        name = type(skill).__name__
+        raise InputError(f"this {name} has its inputs already; pass the class {name} with them, or none")
+    return skill
+
+
+def _steps(skill: Skill, cell: Cell) -> Generator[Any, None, None]:
+    """Yield what the skill yields; a `run` without any yield is a plain function."""
+    yield from skill.run(cell) or ()
+
+
+def _outputs(skill: Skill) -> dict[str, Any]:
+    names = [name for name, port in skill.ports.items() if port.direction is Direction.OUT]
+    if unset := [name for name in names if not hasattr(skill, name)]:
+        raise Fault(f"{type(skill).__name__} succeeded without setting its output {', '.join(unset)}")
+    return {name: getattr(skill, name) for name in names}
+
+
+def _braking(workcell: Workcell) -> int | None:
+    """Let the arm come to rest and return after how many control steps it was."""
+    arm, clock = workcell.cell.arm, workcell.cell.clock
+    steps, deadline = 0, clock.now + LONGEST_BRAKING
+    while not arm.at_rest:
+        if clock.now >= deadline:
+            return None
+        workcell.advance()
+        steps += 1
+    return steps

@@ -1,0 +1,80 @@
+"""One check of one skill: a thing that is true of it if it conforms."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from executive.testing.conformance.case import Case
+from executive.testing.conformance.situations import NotArranged
+
+Rule = Callable[[Case], Iterator[str]]
+"""Yields what is wrong with a skill: what happened, where, what to do. Its docstring says what is true."""
+
+
+class NotConforming(AssertionError):
+    """A skill does not do what every skill must; the text says what, where, and what to do."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a check found.
+
+    Attributes:
+        skill: Name of the skill.
+        check: Name of the check.
+        doc: What is true where it passes.
+        status: `ok`, `failed`, or `not run` where nobody knows what to give the skill.
+        problems: What is wrong, a text each.
+    """
+
+    skill: str
+    check: str
+    doc: str
+    status: str
+    problems: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Check:
+    """A rule to hold a skill to; called, it returns if the skill keeps it.
+
+    Attributes:
+        case: The skill.
+        rule: The rule.
+    """
+
+    case: Case
+    rule: Rule
+
+    def __str__(self) -> str:
+        return f"{self.case.name}.{self.name}"
+
+    @property
+    def name(self) -> str:
+        """A short name, of the rule alone."""
+        return self.rule.__name__
+
+    @property
+    def doc(self) -> str:
+        """What is true of a skill that keeps the rule, in one line."""
+        return (inspect.getdoc(self.rule) or "").partition("\n")[0]
+
+    def verdict(self) -> Verdict:
+        """Return what the check finds."""
+        try:
+            problems = tuple(self.rule(self.case))
+        except NotArranged as problem:
+            return Verdict(self.case.name, self.name, self.doc, "not run", (str(problem),))
+        return Verdict(self.case.name, self.name, self.doc, "failed" if problems else "ok", problems)
+
+    def __call__(self) -> None:
+        """Return if the skill keeps the rule.
+
+        Raises:
+            NotConforming: It does not, or nobody knows what to give it.
+        """
+        verdict = self.verdict()
+        if verdict.problems:
+            raise NotConforming("\n".join((f"{self.doc} Not so:", *verdict.problems)))

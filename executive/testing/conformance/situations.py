@@ -1,0 +1,147 @@
+"""The situations in which a skill is tried, and how each is arranged as often as wanted."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from executive.skill import ANY, EMPTY, HOLDING, Direction, Param, Port, Skill
+from executive.testing.conformance.stage import Stage, set_up
+from executive.testing.conformance.values import CannotMakeUp, made_up, others
+
+Arrange = Callable[[Stage], Mapping[str, Any]]
+"""Arranges a stage for a skill and returns values for its params and inputs, those it has an opinion on."""
+
+
+_GRIPS: Mapping[Any, tuple[bool, ...]] = {EMPTY: (False,), HOLDING: (True,), ANY: (False, True)}
+_NAMES = {False: "with an empty tool", True: "with an item in the tool"}
+
+
+class NotArranged(Exception):
+    """A skill cannot be tried, because nobody knows what to give it; the text says what to do."""
+
+
+@dataclass(frozen=True)
+class Situation:
+    """One way to begin.
+
+    Attributes:
+        name: For a sentence: `with an empty tool`.
+        holding: The tool holds an object.
+        params: Params that differ from their defaults.
+        whole: Inputs that may be left out are given, too.
+    """
+
+    name: str
+    holding: bool
+    params: Mapping[str, Any] = field(default_factory=dict)
+    whole: bool = False
+
+
+class Scene:
+    """A situation arranged for a skill on a fake cell; begins anew as often as wanted.
+
+    Args:
+        skill: Who is to act in it.
+        situation: What it is like.
+        arrange: What its author wants to be otherwise.
+
+    Attributes:
+        situation: What it is like.
+        cell: The fake cell; its parts are new with every beginning.
+        given: Names of the params and inputs that `arrange` gave.
+
+    Raises:
+        NotArranged: A value that the skill needs is given by nobody, or none can be copied.
+    """
+
+    def __init__(self, skill: type[Skill], situation: Situation, arrange: Arrange) -> None:
+        stage = set_up(skill, holding=situation.holding)
+        given = _asked(skill, arrange, stage)
+        self.situation, self.cell, self.given = situation, stage.cell, frozenset(given)
+        values = {**_made_up(skill, situation, stage, given), **situation.params, **given}
+        try:
+            self._beginning = self.copied((vars(stage.cell), values))
+        except Exception as error:
+            raise NotArranged(
+                f"the beginning cannot be kept to be repeated: {type(error).__name__}: {error}. "
+                "Give inputs that copy.deepcopy can copy."
+            ) from error
+
+    def begin(self) -> dict[str, Any]:
+        """Bring the cell back to where it began, and return the values to start the skill with."""
+        parts, values = self.copied(self._beginning)
+        vars(self.cell).clear()
+        vars(self.cell).update(parts)
+        return values
+
+    def copied(self, state: Any) -> Any:
+        """Return a copy of a state of the cell, or of values that belong to it."""
+        # The cell itself stays who it is: its parts, and whoever arranged it, reach each other through it.
+        return copy.deepcopy(state, {id(self.cell): self.cell})
+
+
+def situations(skill: type[Skill]) -> Iterator[Situation]:
+    """Yield the situations in which a skill is tried.
+
+    With what it needs the tool to hold, or both with nothing and with something where that is no matter;
+    with defaults alone, with all its inputs, and with every other choice of a param.
+
+    Raises:
+        NotArranged: It does not say what it needs.
+    """
+    if (needs := skill.tool_state[0]) not in _GRIPS:
+        raise NotArranged(f"its tool_state begins with {needs!r}; it must say ANY, EMPTY or HOLDING")
+    first, *more = _GRIPS[needs]
+    yield Situation(_NAMES[first], first)
+    yield from (Situation(_NAMES[holding], holding) for holding in more)
+    if any(not port.required for port in _inputs(skill).values()):
+        yield Situation(f"{_NAMES[first]} and every input given", first, whole=True)
+    stage = set_up(skill, holding=first)
+    for param in skill.params.values():
+        for value in others(param, stage):
+            yield Situation(f"{_NAMES[first]} and {param.name}: {value}", first, {param.name: value})
+
+
+def _asked(skill: type[Skill], arrange: Arrange, stage: Stage) -> dict[str, Any]:
+    try:
+        given = dict(arrange(stage))
+    except Exception as error:
+        raise NotArranged(f"what arranges it raised {type(error).__name__}: {error}") from error
+    known = {**skill.params, **_inputs(skill)}
+    if unknown := [name for name in given if name not in known]:
+        raise NotArranged(
+            f'what arranges it gives a value for "{unknown[0]}", which is neither a param nor an input; '
+            f"it has: {', '.join(known) or 'none'}"
+        )
+    return given
+
+
+def _made_up(
+    skill: type[Skill], situation: Situation, stage: Stage, given: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return values for what nobody has given: what has no default, and where it is wanted all inputs."""
+    values, missing = {}, {}
+    declarations: list[Param | Port] = [*skill.params.values(), *_inputs(skill).values()]
+    for declared in declarations:
+        may = situation.whole and isinstance(declared, Port)
+        if declared.name in {**given, **situation.params} or not (declared.required or may):
+            continue
+        try:
+            values[declared.name] = made_up(declared, stage)
+        except CannotMakeUp as problem:
+            if declared.required:
+                missing[declared.name] = str(problem)
+    if missing:
+        wanted = ", ".join(f'"{name}": ...' for name in missing)
+        raise NotArranged(
+            f"no value can be made up for {' and '.join(missing.values())}. Give it in a test: "
+            f"conformance({skill.__name__}, lambda stage: {{{wanted}}}), as skills/README.md shows."
+        )
+    return values
+
+
+def _inputs(skill: type[Skill]) -> dict[str, Port]:
+    return {name: port for name, port in skill.ports.items() if port.direction is Direction.IN}

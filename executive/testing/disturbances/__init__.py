@@ -1,0 +1,50 @@
+"""Fault scripts: what happens to a cell while a mission runs in it, physically, and when.
+
+A script is a list of disturbances, for `run_mission(disturbances=[...])`:
+
+* the second grasp slips: `during("*/Grasp", seal_fails(), nth=2)`
+* no answer from 4 s to 9 s: `between(4.0, 9.0, detector_hangs())`
+* at 12 s somebody takes an object away: `after(12.0, object_removed("nearest"))`
+* now and then something falls: `with_probability(0.1, "*/Transit", seal_breaks(), seed=1)`
+"""
+
+from executive.testing.disturbances.arm import arm_runs_into, no_way
+from executive.testing.disturbances.detector import (
+    detector_dead,
+    detector_hangs,
+    detector_slow,
+    detector_unsure,
+)
+from executive.testing.disturbances.disturbed_cell import DisturbedCell, disturbed
+from executive.testing.disturbances.objects import object_moved, object_removed
+from executive.testing.disturbances.operator import operator_asks_rescan, operator_quits
+from executive.testing.disturbances.script import Disturbance, after, between, during, with_probability
+from executive.testing.disturbances.sight import no_depth, workspace_hidden
+from executive.testing.disturbances.table import table_bumped
+from executive.testing.disturbances.tool import seal_breaks, seal_fails, tool_sticks
+
+__all__ = [
+    "Disturbance",
+    "DisturbedCell",
+    "after",
+    "arm_runs_into",
+    "between",
+    "detector_dead",
+    "detector_hangs",
+    "detector_slow",
+    "detector_unsure",
+    "disturbed",
+    "during",
+    "no_depth",
+    "no_way",
+    "object_moved",
+    "object_removed",
+    "operator_asks_rescan",
+    "operator_quits",
+    "seal_breaks",
+    "seal_fails",
+    "table_bumped",
+    "tool_sticks",
+    "with_probability",
+    "workspace_hidden",
+]

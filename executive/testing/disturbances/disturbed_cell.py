@@ -1,0 +1,128 @@
+"""A work cell in which a fault script happens."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from executive.cell import Cell
+from executive.errors import InputError
+from executive.events import Emit, Event, ignore
+from executive.testing.disturbances.hand import Hand
+from executive.testing.disturbances.hands import hand_of
+from executive.testing.disturbances.scene import Scene
+from executive.testing.disturbances.schedule import Schedule
+from executive.testing.disturbances.script import Disturbance, DuringNode
+from executive.testing.interception import Intercepted
+from executive.testing.wrapped_cell import WrappedCell
+from executive.workcell import Workcell
+
+
+class DisturbedCell(WrappedCell):
+    """A work cell to which things happen, physically; implements `Workcell`.
+
+    Whoever runs a mission in it lets it `hear` the run's events: it knows by them which node runs. Whenever
+    it does something to the cell, it emits a `disturbance`.
+
+    Args:
+        inner: The cell as it would be.
+        disturbances: What happens to it, and when.
+        emit: Tells the run what happens.
+        hand: Returns what reaches into a cell's world.
+    """
+
+    def __init__(
+        self,
+        inner: Workcell,
+        disturbances: Sequence[Disturbance],
+        emit: Emit = ignore,
+        hand: Callable[[Workcell], Hand] = hand_of,
+    ) -> None:
+        super().__init__(inner)
+        self._disturbances = tuple(disturbances)
+        self._scene = Scene(inner, hand, emit)
+        self._schedule = Schedule(self._disturbances, self._scene)
+        self._cell = self._between_skills_and(inner.cell)
+
+    @property
+    def cell(self) -> Cell:
+        """What skills see."""
+        return self._cell
+
+    def hear(self, event: Event) -> None:
+        """Observe the run that drives this cell."""
+        self._schedule.hear(event)
+
+    def require_nodes(self, paths: Sequence[str]) -> None:
+        """Return if every disturbance that waits for a node may find one among these `paths`.
+
+        Raises:
+            InputError: One fits none of them.
+        """
+        for one in self._disturbances:
+            if isinstance(one.when, DuringNode) and not any(map(one.when.fits, paths)):
+                raise InputError(
+                    f'{one.what.name} waits for a node that is called "{one.when.pattern}"; '
+                    f"there are: {', '.join(paths)}"
+                )
+
+    def advance(self) -> None:
+        """Let one control step pass, and what is due happen."""
+        self.inner.advance()
+        self._schedule.step()
+
+    def _between_skills_and(self, cell: Cell) -> Cell:
+        """Return the cell with everything that can be disturbed going through the schedule."""
+        through, scene = self._schedule.through, self._scene
+
+        def start(do: Callable[..., None], motion: Any) -> None:
+            do(motion)
+            scene.started(motion)
+
+        def stop(do: Callable[[], None]) -> None:
+            do()
+            scene.stopped()
+
+        def part(part: Any, *hooks: str, **others: Callable[..., Any]) -> Any:
+            return Intercepted(part, {**{hook: partial(through, hook) for hook in hooks}, **others})
+
+        return replace(
+            cell,
+            arm=part(cell.arm, "plan", start=start, stop=stop),
+            tool=part(cell.tool, "close", "open"),
+            camera=part(cell.camera, "sees_table", "capture"),
+            detectors={name: part(one, "request") for name, one in cell.detectors.items()},
+            localizer=part(cell.localizer, "locate"),
+            operator=part(cell.operator, "ask"),
+        )
+
+
+def disturbed(
+    kind: Callable[..., Workcell],
+    disturbances: Sequence[Disturbance],
+    hand: Callable[[Workcell], Hand] = hand_of,
+) -> Callable[..., DisturbedCell]:
+    """Return a kind of cell, for `Run(kind=...)`: another kind, with a fault script.
+
+    The run must be observed by its cell: `run.observe(run.workcell.hear)`, or `run.record(...)` where it
+    plays an earlier one first.
+
+    Args:
+        kind: The other kind.
+        disturbances: The script.
+        hand: Returns what reaches into the world of a cell of that kind.
+    """
+    return partial(_disturbed, kind, tuple(disturbances), hand)
+
+
+def _disturbed(
+    kind: Callable[..., Workcell],
+    disturbances: Sequence[Disturbance],
+    hand: Callable[[Workcell], Hand],
+    *args: Any,
+    emit: Emit = ignore,
+    **options: Any,
+) -> DisturbedCell:
+    return DisturbedCell(kind(*args, emit=emit, **options), disturbances, emit, hand)

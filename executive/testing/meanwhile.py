@@ -1,0 +1,35 @@
+"""Changing the world of a run that was cut off, before it is taken up again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+from executive.events import ignore
+from executive.mission.load import LoadedMission
+from executive.testing.disturbances.hand import Hand
+from executive.testing.disturbances.hands import hand_of
+from executive.testing.fake_cell import SilentOperator
+from executive.workcell import CellOptions, CellPast, Workcell
+
+
+def meanwhile(
+    log: Path, loaded: LoadedMission, seed: int, act: Callable[[Hand], None], kind: Callable[..., Workcell]
+) -> None:
+    """Rebuild the world of a cut-off run, let `act` change it, and leave it so for whoever takes the run up.
+
+    Args:
+        log: The log of its world; what is done goes there.
+        loaded: The run's mission.
+        seed: The run's.
+        act: Changes the world; the arm is at rest before, and what was moved comes to rest after.
+        kind: Makes the work cell, a fake or a simulated one.
+    """
+    options = CellOptions(SilentOperator(), base=loaded.cell_path.parent, past=CellPast(log))
+    cell = kind(loaded.cell_config, seed=seed, routes=loaded.routes, emit=ignore, options=options)
+    with closing(cell):
+        hand = hand_of(cell)
+        hand.settle()
+        act(hand)
+        hand.settle()

@@ -1,0 +1,157 @@
+"""Run a whole mission in a test, whatever goes wrong in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+from executive.control.skill_node import SkillNode
+from executive.errors import InputError
+from executive.events import Event, Observer
+from executive.mission.load import load_mission
+from executive.record.result import ledger_agrees
+from executive.runtime.outcome import Outcome
+from executive.runtime.run import Run
+from executive.skill import Skill, discover
+from executive.testing.bounded_cell import BoundedCell
+from executive.testing.disturbances.disturbed_cell import DisturbedCell, disturbed
+from executive.testing.disturbances.script import Disturbance
+from executive.testing.fake_cell import FakeCell
+from executive.testing.wrapped_cell import innermost
+from executive.workcell import Workcell
+
+LONGEST = 600.0
+"""Time on its clock after which a mission that is not done counts as one that never ends [s]."""
+
+
+@dataclass(frozen=True)
+class MissionResult(Outcome):
+    """How a mission ended, and what is to be known of it.
+
+    Attributes:
+        events: Everything the run told its observers, in order.
+        items: The ledger's balance, and a row per item under `rows`.
+        audit: What really became of the objects, or None where nobody can know.
+        cell: The cell it ran in, closed; without what was wrapped around it.
+    """
+
+    events: Sequence[Event]
+    items: Mapping[str, Any]
+    audit: Mapping[str, int] | None
+    cell: Any
+
+    @property
+    def agrees(self) -> bool:
+        """True if what the ledger believes is what the audit found."""
+        return ledger_agrees({"items": self.items, "audit": self.audit})
+
+    def entered(self, pattern: str) -> list[str]:
+        """Return the path of every node that was activated and whose path fits a pattern, in order."""
+        return [
+            event.data["node"]
+            for event in self.events
+            if event.kind == "status"
+            and event.data["status"] == "RUNNING"
+            and fnmatchcase(event.data["node"], pattern)
+        ]
+
+    def reasons(self, pattern: str = "*") -> list[str]:
+        """Return the reason of every failure of a skill whose node fits a pattern, in order."""
+        return [
+            event.data["reason"]
+            for event in self.events
+            if event.kind == "status"
+            and event.data["status"] == "FAILURE"
+            and "origin" not in event.data
+            and fnmatchcase(event.data["node"], pattern)
+        ]
+
+    def disturbances(self) -> list[Mapping[str, Any]]:
+        """Return what was done to the cell, in order: the data of every `disturbance`."""
+        return [event.data for event in self.events if event.kind == "disturbance"]
+
+
+def run_mission(
+    mission: str | Path,
+    kind: Callable[..., Workcell] = FakeCell,
+    *,
+    seed: int = 0,
+    set: Mapping[str, str] | None = None,
+    requests: Sequence[str] = (),
+    substitutes: Mapping[str, type[Skill]] | None = None,
+    disturbances: Sequence[Disturbance] = (),
+    arrange: Callable[[Any], object] | None = None,
+    observers: Sequence[Observer] = (),
+    longest: float = LONGEST,
+) -> MissionResult:
+    """Run a mission to its end and return how it went; the cell is closed.
+
+    Args:
+        mission: A mission file, or the name of a shipped mission.
+        kind: Makes the work cell, whatever kind the mission's cell file names.
+        seed: Decides everything random.
+        set: Other values for params by name, and for the cell as `cell.<key>.<key>`.
+        requests: What the operator asks for, in turn.
+        substitutes: What runs instead of a node's skill, by a pattern of the node's path.
+        disturbances: What happens to the cell, and when.
+        arrange: Gets the cell before the run, to put things on its table.
+        observers: Told of every event.
+        longest: Time on the run's clock after which the run ends as a fault [s].
+
+    Raises:
+        MissionError: Something is wrong with the mission.
+        InputError: There is no such mission, or a pattern fits no node, or one with another skill than its
+            substitute's.
+    """
+    skills = discover()
+    loaded = load_mission(mission, skills, set)
+    events: list[Event] = []
+
+    def arranged(*args: Any, **options: Any) -> BoundedCell:
+        workcell = kind(*args, **options)
+        try:
+            if arrange is not None:
+                arrange(workcell)
+        except BaseException:
+            workcell.close()
+            raise
+        return BoundedCell(workcell, longest)
+
+    run = Run(
+        loaded,
+        skills,
+        seed=seed,
+        observers=[events.append, *observers],
+        requests=requests,
+        kind=disturbed(arranged, disturbances),
+        substitutes=substitutes,
+    )
+    workcell = run.workcell
+    assert isinstance(workcell, DisturbedCell)
+    try:
+        workcell.require_nodes([getattr(node, "path", node.name) for node in run.root.iterate()])
+        _require_fitting_substitutes(run, skills)
+        run.observe(workcell.hear)
+        outcome = run.execute()
+        return MissionResult(
+            **asdict(outcome),
+            events=events,
+            items=run.items(),
+            audit=run.audit(),
+            cell=innermost(workcell),
+        )
+    finally:
+        run.close()
+
+
+def _require_fitting_substitutes(run: Run, skills: Mapping[str, type[Skill]]) -> None:
+    """Return if every node runs its own skill, or a subclass of that."""
+    for node in run.root.iterate():
+        if isinstance(node, SkillNode) and not issubclass(node.skill_type, skills[node.skill_name]):
+            raise InputError(
+                f"{node.path} runs {node.skill_name}, and {node.skill_type.__name__} is none; "
+                "give its substitute a pattern that fits nodes of its own skill only"
+            )

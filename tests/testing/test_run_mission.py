@@ -1,0 +1,159 @@
+"""A whole mission in a test: what it needs, what it says, and that it comes to an end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from executive.errors import Fault, InputError
+from executive.events import Event
+from executive.mission.load import load_mission
+from executive.runtime.run import Run
+from executive.skill import discover
+from executive.testing.bounded_cell import BoundedCell
+from executive.testing.disturbances import after, detector_dead, during, seal_fails
+from executive.testing.fake_cell import FakeCell
+from executive.testing.run_mission import run_mission
+from executive.testing.substitutes import endless
+from skills.detect import Detect
+from skills.wait import Wait
+
+LOOK = """\
+mission: look_once
+cell: cells/overhead.yaml
+params: {wait: 0.5}
+tree:
+  - Wait: {seconds: $wait}
+  - Detect
+  - Localize
+"""
+
+
+@pytest.fixture
+def look(tmp_path: Path) -> Path:
+    path = tmp_path / "look_once.yaml"
+    path.write_text(LOOK, encoding="utf-8")
+    return path
+
+
+def test_a_shipped_mission_runs_by_its_name_on_the_fake_cell() -> None:
+    result = run_mission("sort_overhead", seed=3)
+    assert (result.status, result.reason, result.message, result.node) == ("SUCCESS", "", "", "")
+    assert isinstance(result.cell, FakeCell)
+    assert result.items["placed"] == len(result.cell.world.objects) >= 3
+    assert result.agrees
+    assert result.events[0].kind == "run"
+    assert result.events[-1].kind == "end"
+    assert result.robot_time == result.events[-1].clock > 5.0
+    assert result.disturbances() == []
+
+
+def test_a_mission_file_runs_with_other_values(look: Path) -> None:
+    assert run_mission(look).robot_time == pytest.approx(0.55, abs=0.01)
+    later = run_mission(look, set={"wait": "2.0", "cell.detectors.embedded.latency": "0.5"})
+    assert later.robot_time == pytest.approx(2.5, abs=0.01)
+
+
+def test_the_cell_is_arranged_before_the_run(look: Path) -> None:
+    def arrange(cell: FakeCell) -> None:
+        cell.world.objects.clear()
+        cell.world.put("duck", 0.5, 0.1)
+
+    result = run_mission(look, arrange=arrange)
+    assert [row["item"] for row in result.items["rows"]] == ["duck-1"]
+
+
+def test_an_operator_asks_for_what_the_test_wants() -> None:
+    result = run_mission("pick_on_request", requests=["cube", "q"], seed=1)
+    assert result.status == "SUCCESS"
+    assert [e.data["wanted"] for e in result.events if e.kind == "request"] == ["cube", None]
+
+
+def test_what_was_entered_and_what_failed_is_told_in_order() -> None:
+    result = run_mission("sort_overhead", disturbances=[during("*/Grasp", seal_fails(), nth=1)])
+    assert len(result.entered("*/Grasp")) == result.items["placed"] + 1
+    assert result.entered("tree/look*")[0] == "tree/look/try"
+    assert result.reasons()[0] == "missed"
+    assert result.reasons("*/Grasp") == ["missed"]
+    assert result.reasons("*/Approach") == []
+
+
+def test_a_failure_that_only_passes_through_a_control_node_is_none_of_its_own(look: Path) -> None:
+    result = run_mission(look, disturbances=[after(0.0, detector_dead())])
+    assert (result.status, result.reason) == ("FAILURE", "Detect.unavailable")
+    assert result.reasons() == ["unavailable"]
+
+
+def test_every_event_reaches_the_observers(look: Path) -> None:
+    seen: list[Event] = []
+    assert list(run_mission(look, observers=[seen.append]).events) == seen
+
+
+def test_without_disturbances_a_mission_goes_as_it_always_goes() -> None:
+    def story(events: list[Event]) -> list[Any]:
+        return [(e.kind, e.tick, str({**e.data, "frame_object": 0})) for e in events]
+
+    events: list[Event] = []
+    run = Run(
+        load_mission("sort_overhead", discover()),
+        discover(),
+        seed=7,
+        kind=FakeCell,
+        requests=(),
+        observers=[events.append],
+    )
+    run.execute()
+    assert story(list(run_mission("sort_overhead", seed=7).events)) == story(events)
+
+
+def test_a_mission_that_never_ends_ends_as_a_fault(look: Path) -> None:
+    result = run_mission(look, substitutes={"*Detect": endless(Detect)}, longest=3.0)
+    assert (result.status, result.message) == ("FAULT", "the mission is not done after 3 s on its clock")
+    assert result.robot_time == pytest.approx(3.0, abs=0.01)
+    assert result.cell.arm.at_rest
+
+
+def test_a_cell_whose_time_is_over_says_so_once_so_that_the_arm_can_be_braked() -> None:
+    cell = BoundedCell(FakeCell(), longest=0.01)
+    cell.advance()
+    cell.advance()
+    with pytest.raises(Fault, match=r"the mission is not done after 0\.01 s on its clock"):
+        cell.advance()
+    cell.advance()
+    assert cell.steps == 4
+
+
+def test_patterns_that_fit_no_node_are_refused(look: Path) -> None:
+    sentence = 'seal_fails waits for a node that is called "*/Grasp"; there are: tree/Wait, tree/Detect, '
+    with pytest.raises(InputError, match=sentence.replace("*", r"\*")):
+        run_mission(look, disturbances=[during("*/Grasp", seal_fails())])
+    with pytest.raises(InputError, match='no node is called "Wait"; there are: tree/Wait, tree/Detect'):
+        run_mission(look, substitutes={"Wait": endless(Wait)})
+
+
+def test_a_substitute_of_another_skill_is_refused(look: Path) -> None:
+    with pytest.raises(InputError, match="tree/Detect runs Detect, and EndlessWait is none; give its subst"):
+        run_mission(look, substitutes={"tree/*": endless(Wait)})
+
+
+def test_the_cell_is_closed_whatever_happens(look: Path) -> None:
+    closed: list[str] = []
+
+    class Cell(FakeCell):
+        """Tells that it was closed."""
+
+        def close(self) -> None:
+            closed.append("closed")
+            super().close()
+
+    def broken(cell: FakeCell) -> None:
+        raise ValueError("the test is wrong")
+
+    run_mission(look, Cell)
+    with pytest.raises(ValueError, match="the test is wrong"):
+        run_mission(look, Cell, arrange=broken)
+    with pytest.raises(InputError):
+        run_mission(look, Cell, disturbances=[during("nowhere", seal_fails())])
+    assert closed == ["closed"] * 3

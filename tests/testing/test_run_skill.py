@@ -1,0 +1,218 @@
+"""One skill by itself: what it did, what it said, and how it was taken away."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, ClassVar
+
+import pytest
+
+from executive.arm import Goal
+from executive.errors import Fault, InputError
+from executive.messages import Target
+from executive.skill import In, Out, Skill, param
+from executive.testing.fake_cell import FakeCell
+from executive.testing.run_skill import run_skill
+from skills.approach import Approach
+from skills.await_request import AwaitRequest
+from skills.detect import Detect
+from skills.grasp import Grasp
+from skills.localize import Localize
+from skills.release import Release
+from skills.select_target import SelectTarget
+from skills.transit import Transit
+
+
+class Worker(Skill):
+    """Does what `way` says."""
+
+    given: In[str]
+    made: Out[str]
+    way: str = param("ok")
+    reasons: ClassVar = ("bad",)
+
+    def run(self, cell: Any) -> Iterator[Any]:
+        yield
+        if self.way == "fail":
+            raise self.failed("bad", "3 mm off")
+        if self.way == "break":
+            raise ValueError("a bug")
+        if self.way == "yield":
+            yield iter(())
+        if self.way != "forget":
+            self.made = f"made of {self.given}"
+
+
+class Plain(Skill):
+    """Does its work at once, without a yield."""
+
+    made: Out[str]
+
+    def run(self, cell: Any) -> Any:
+        cell.tool.open()
+        self.made = "at once"
+
+
+class Coaster(Skill):
+    """Sets the arm in motion and does not care."""
+
+    uses: ClassVar = ("arm",)
+
+    def run(self, cell: Any) -> Iterator[None]:
+        planning = cell.arm.plan(Goal((0.5, 0.2, 0.2)))
+        while not planning.ready:
+            yield
+        cell.arm.start(planning.result())
+        while True:
+            yield
+
+
+@pytest.fixture
+def target(fake: FakeCell) -> Target:
+    fake.world.put("cube", 0.5, 0.0)
+    detections = run_skill(Detect, fake).outputs["detections"]
+    return run_skill(Localize, fake, inputs={"detections": detections}).outputs["targets"][0]
+
+
+def test_a_class_gets_its_params_and_inputs_by_name(fake: FakeCell) -> None:
+    result = run_skill(Worker, fake, inputs={"given": "stone"})
+    assert (result.status, result.outputs, result.ticks) == ("SUCCESS", {"made": "made of stone"}, 1)
+
+
+def test_an_instance_has_its_inputs_already(fake: FakeCell) -> None:
+    assert run_skill(Worker(given="wood"), fake).outputs == {"made": "made of wood"}
+    with pytest.raises(InputError, match="this Worker has its inputs already; pass the class Worker with"):
+        run_skill(Worker(given="wood"), fake, inputs={"way": "fail"})
+
+
+def test_a_failure_tells_its_reason_and_commits_nothing(fake: FakeCell) -> None:
+    result = run_skill(Worker, fake, inputs={"given": "stone", "way": "fail"})
+    assert (result.status, result.reason, result.message) == ("FAILURE", "bad", "3 mm off")
+    assert result.outputs == {}
+
+
+@pytest.mark.parametrize(
+    ("inputs", "sentence"),
+    [
+        ({"givne": "stone"}, 'Worker has no param or input "givne"; it has: way, given'),
+        ({"made": "stone", "given": ""}, 'Worker has no param or input "made"; it has: way, given'),
+        ({}, 'Worker needs a value for "given"'),
+    ],
+)
+def test_inputs_are_checked_by_name_as_in_a_mission(
+    fake: FakeCell, inputs: dict[str, str], sentence: str
+) -> None:
+    with pytest.raises(InputError, match=sentence):
+        run_skill(Worker, fake, inputs=inputs)
+
+
+@pytest.mark.parametrize(
+    ("way", "sentence"),
+    [
+        ("forget", "Worker succeeded without setting its output made"),
+        ("yield", 'Worker yielded a tuple_iterator; to run steps of others write "yield from"'),
+    ],
+)
+def test_what_would_be_a_fault_in_a_mission_is_one_here(fake: FakeCell, way: str, sentence: str) -> None:
+    with pytest.raises(Fault, match=sentence):
+        run_skill(Worker, fake, inputs={"given": "stone", "way": way})
+
+
+def test_a_bug_comes_out_as_it_is(fake: FakeCell) -> None:
+    with pytest.raises(ValueError, match="a bug"):
+        run_skill(Worker, fake, inputs={"given": "stone", "way": "break"})
+
+
+def test_a_reason_that_is_not_declared_is_a_fault_however_it_is_raised(fake: FakeCell) -> None:
+    class Sly(Worker):
+        """Fails for a reason of its parent's that it does not declare."""
+
+        reasons: ClassVar = ()
+
+        def run(self, cell: Any) -> Iterator[None]:
+            yield
+            raise Worker(given="").failed("bad", "")
+
+    with pytest.raises(Fault, match='Sly raised the undeclared reason "bad"; it declares: none'):
+        run_skill(Sly, fake, inputs={"given": "stone"})
+
+
+def test_a_run_without_a_yield_is_done_at_once(fake: FakeCell) -> None:
+    result = run_skill(Plain, fake)
+    assert (result.outputs, result.ticks, result.commanded) == ({"made": "at once"}, 0, ["tool.open"])
+
+
+def test_what_a_look_commands_is_told_in_words(fake: FakeCell, target: Target) -> None:
+    look = run_skill(Detect, fake, inputs={"view": "full"})
+    assert look.commanded == ["camera.capture", "embedded.request frame 2 full"]
+    located = run_skill(Localize, fake, inputs={"detections": look.outputs["detections"]})
+    assert located.commanded == ["ledger.observe 1 found in frame 2"]
+    chosen = run_skill(SelectTarget, fake, inputs={"targets": located.outputs["targets"]})
+    assert chosen.commanded == ["decided cube-1 red_bin"]
+
+
+def test_what_a_pick_commands_is_told_in_words(fake: FakeCell, target: Target) -> None:
+    approach = run_skill(Approach, fake, inputs={"target": target})
+    assert approach.commanded == [
+        "arm.plan (0.5, 0.0, 0.035)", "arm.start", "arm.stop", "ledger.touched cube-1",
+    ]  # fmt: skip
+    grasp = run_skill(Grasp, fake, inputs={"target": target, "bin": "red_bin"})
+    slot = fake.cell.bins["red_bin"].slots[0]
+    over = f"({slot[0]:g}, {slot[1]:g}, 0.065)"
+    assert grasp.commanded == ["tool.close", f"arm.plan_ahead {over}", "ledger.held cube-1"]
+    transit = run_skill(Transit, fake, inputs={"held": "cube-1", "bin": "red_bin"})
+    assert transit.commanded == [f"arm.plan {over}", "arm.start", "arm.stop"]
+    release = run_skill(Release, fake, inputs={"held": "cube-1", "bin": "red_bin"})
+    assert release.commanded == ["tool.open", "ledger.placed cube-1 red_bin"]
+
+
+def test_a_named_pose_and_a_question_to_the_operator_are_told_too(fake: FakeCell) -> None:
+    class GoHome(Skill):
+        """Plan to go home, in keywords."""
+
+        def run(self, cell: Any) -> Iterator[None]:
+            yield
+            cell.arm.plan(goal="home")
+            cell.camera.next_pose()
+
+    assert run_skill(GoHome, fake).commanded == ["arm.plan home", "camera.next_pose"]
+    assert run_skill(AwaitRequest, fake).commanded == ["operator.ask"]
+
+
+def test_what_only_asks_commands_nothing(fake: FakeCell) -> None:
+    class Asks(Skill):
+        """Ask every part something."""
+
+        def run(self, cell: Any) -> Iterator[None]:
+            yield
+            assert not (cell.tool.holding or cell.tool.touching or cell.arm.met)
+            assert cell.arm.at_rest and cell.camera.sees_table() and cell.ledger.epoch == 0
+
+    assert run_skill(Asks, fake).commanded == []
+
+
+def test_a_halt_brakes_the_arm_and_tells_how_long_that_took(fake: FakeCell, target: Target) -> None:
+    result = run_skill(Approach, fake, inputs={"target": target}, halt_at=30)
+    assert (result.status, result.ticks, result.braking) == ("HALTED", 30, 0)
+    assert result.commanded == ["arm.plan (0.5, 0.0, 0.035)", "arm.start", "arm.stop"]
+    assert fake.arm.at_rest
+
+
+def test_a_halt_that_leaves_the_arm_in_motion_shows(fake: FakeCell) -> None:
+    result = run_skill(Coaster, fake, halt_at=40)
+    assert "arm.stop" not in result.commanded
+    assert result.braking is not None
+    assert result.braking > 10
+    assert fake.arm.at_rest, "the motion was over by then"
+
+
+def test_an_arm_that_never_rests_is_not_waited_for(fake: FakeCell, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(type(fake.arm), "at_rest", False)
+    result = run_skill(Coaster, fake, halt_at=5)
+    assert result.braking is None
+    assert fake.cell.clock.now == pytest.approx(5 / 240 + 2.0, abs=0.01)
+
+
+def test_a_skill_that_does_not_end_is_left_running(fake: FakeCell) -> None:
+    result = run_skill(Coaster, fake, ticks=400)
+    assert (result.status, result.ticks) == ("RUNNING", 400)

@@ -1,0 +1,143 @@
+"""What runs instead of a skill goes wrong as it was told to, and otherwise is that skill."""
+
+from __future__ import annotations
+
+import pytest
+
+from executive.errors import InputError
+from executive.messages import Target
+from executive.testing.fake_cell import FakeCell
+from executive.testing.run_mission import run_mission
+from executive.testing.run_skill import run_skill
+from executive.testing.substitutes import (
+    endless,
+    failing,
+    raising,
+    raising_when_halted,
+    succeeding,
+)
+from skills.approach import Approach
+from skills.detect import Detect
+from skills.grasp import Grasp
+from skills.localize import Localize
+from skills.release import Release
+from skills.transit import Transit
+from skills.wait import Wait
+
+
+@pytest.fixture
+def target(fake: FakeCell) -> Target:
+    fake.world.put("cube", 0.5, 0.0)
+    detections = run_skill(Detect, fake).outputs["detections"]
+    return run_skill(Localize, fake, inputs={"detections": detections}).outputs["targets"][0]
+
+
+SUBSTITUTES = {
+    "FailingGrasp": failing(Grasp, "missed"),
+    "SucceedingGrasp": succeeding(Grasp, {"held": "cube-1"}),
+    "RaisingGrasp": raising(Grasp, ValueError("a bug")),
+    "RaisingWhenHaltedGrasp": raising_when_halted(Grasp, ValueError("a bug")),
+    "EndlessGrasp": endless(Grasp),
+}
+
+
+@pytest.mark.parametrize("name", SUBSTITUTES)
+def test_a_substitute_is_declared_as_the_skill_is_and_named_after_it(name: str) -> None:
+    substitute = SUBSTITUTES[name]
+    assert substitute.__name__ == name
+    assert issubclass(substitute, Grasp)
+    for declared in ("params", "ports", "reasons", "uses", "tool_state", "tool_left"):
+        assert getattr(substitute, declared) == getattr(Grasp, declared)
+
+
+def test_it_fails_the_first_times_and_then_does_its_work(fake: FakeCell, target: Target) -> None:
+    run_skill(Approach, fake, inputs={"target": target})
+    slippery = failing(Grasp, "missed", times=2, message="it slips")
+    results = [run_skill(slippery, fake, inputs={"target": target}) for _ in range(3)]
+    assert [result.reason for result in results] == ["missed", "missed", ""]
+    assert results[0].message == "it slips"
+    assert results[0].commanded == []
+    assert results[2].outputs == {"held": "cube-1"}
+    assert fake.tool.holding
+
+
+def test_it_fails_always_unless_told_how_often(fake: FakeCell) -> None:
+    stuck = failing(Release, "stuck")
+    given = {"held": "cube-1", "bin": "red_bin"}
+    assert {run_skill(stuck, fake, inputs=given).reason for _ in range(5)} == {"stuck"}
+
+
+def test_a_reason_that_the_skill_cannot_fail_with_is_refused() -> None:
+    with pytest.raises(InputError, match='Grasp cannot fail with "dropped"; it declares: missed'):
+        failing(Grasp, "dropped")
+
+
+def test_it_succeeds_with_what_it_was_given_when_it_was_told_to(fake: FakeCell) -> None:
+    quick = succeeding(Release, {"placed": "cube-7"}, after=12)
+    result = run_skill(quick, fake, inputs={"held": "cube-7", "bin": "red_bin"})
+    assert (result.status, result.outputs, result.ticks) == ("SUCCESS", {"placed": "cube-7"}, 12)
+    assert result.commanded == []
+
+
+@pytest.mark.parametrize(
+    ("outputs", "sentence"),
+    [
+        ({}, "Grasp has the outputs held, and was given none"),
+        ({"held": "", "bin": ""}, "Grasp has the outputs held, and was given held, bin"),
+    ],
+)
+def test_it_cannot_succeed_with_other_outputs_than_the_skill_has(
+    outputs: dict[str, str], sentence: str
+) -> None:
+    with pytest.raises(InputError, match=sentence):
+        succeeding(Grasp, outputs)
+
+
+def test_a_bug_comes_up_in_mid_work_and_the_skill_cleans_up(fake: FakeCell, target: Target) -> None:
+    broken = raising(Approach, ZeroDivisionError("in the model"), after=40)
+    with pytest.raises(ZeroDivisionError, match="in the model"):
+        run_skill(broken, fake, inputs={"target": target})
+    assert fake.world.steps >= 40
+    assert fake.arm.commanded == ["start", "stop"]
+
+
+def test_a_bug_that_comes_up_too_late_does_not_come_up(fake: FakeCell) -> None:
+    late = raising(Wait, ValueError("a bug"), after=1000)
+    assert run_skill(late, fake, inputs={"seconds": 0.1}).ticks == 24
+
+
+def test_a_bug_comes_up_as_often_as_it_was_told_to(fake: FakeCell) -> None:
+    once = raising(Wait, ValueError("a bug"), times=1)
+    with pytest.raises(ValueError, match="a bug"):
+        run_skill(once, fake, inputs={"seconds": 0.1})
+    assert run_skill(once, fake, inputs={"seconds": 0.1}).ticks == 24
+
+
+def test_a_bug_in_finally_comes_up_in_a_halt_and_not_without_one(fake: FakeCell, target: Target) -> None:
+    broken = raising_when_halted(Approach, ValueError("in finally"))
+    with pytest.raises(ValueError, match="in finally"):
+        run_skill(broken, fake, inputs={"target": target}, halt_at=40)
+    assert fake.arm.commanded == ["start", "stop"], "the skill's own finally ran before"
+    assert run_skill(broken, fake, inputs={"target": target}).status == "SUCCESS"
+
+
+def test_it_never_ends_but_can_be_taken_away(fake: FakeCell) -> None:
+    waiting = endless(Wait)
+    assert run_skill(waiting, fake, inputs={"seconds": 0.1}, ticks=500).status == "RUNNING"
+    assert run_skill(waiting, fake, inputs={"seconds": 0.1}, halt_at=500).status == "HALTED"
+
+
+def test_a_mission_survives_a_skill_that_fails_now_and_then() -> None:
+    result = run_mission("sort_overhead", substitutes={"*/Grasp": failing(Grasp, "missed", times=2)})
+    assert (result.status, result.reasons("*/Grasp")) == ("SUCCESS", ["missed", "missed"])
+    assert result.agrees
+
+
+def test_a_mission_with_a_bug_ends_as_a_fault_at_that_node_with_the_arm_at_rest() -> None:
+    broken = raising(Transit, RuntimeError("a bug"), after=60)
+    result = run_mission("sort_overhead", substitutes={"*/Transit": broken})
+    assert (result.status, result.message) == ("FAULT", "Transit: RuntimeError: a bug")
+    assert result.node.endswith("/Transit")
+    assert result.cell.arm.at_rest
+    (held,) = (row for row in result.items["rows"] if row["why"] == "still in the tool when the run ended")
+    assert result.holds == held["item"]
