@@ -98,30 +98,45 @@ def carry(skill: Skill, cell: Cell, item: Item, goal: Goal, whither: str) -> Ste
             reason is the skill's `unreachable` or `blocked`. Or the seal broke, for whatever cause: then the
             arm is at rest, the tool open, the ledger told, and the reason is the skill's `dropped`.
     """
+
+    def fell() -> bool:
+        if cell.tool.holding:
+            return False
+        if cell.ledger.in_tool() == item:
+            # At once: a look that is taken while the arm still brakes shows it where it lies now.
+            cell.ledger.dropped(item)
+        return True
+
     try:
         motion = yield from planned(skill, cell.arm, lambda: (goal, carrying(cell, item)))
-        yield from follow(skill, cell, motion, until=lambda: not cell.tool.holding)
+        yield from follow(skill, cell, motion, until=fell)
     except SkillFailed:
         # Whatever else went wrong: what the tool no longer holds cannot be put down.
-        if cell.tool.holding:
+        if not fell():
             raise
-    if not cell.tool.holding:
+    if fell():
         x, y, z = cell.arm.tool_pose.position
         cell.tool.open()
-        cell.ledger.dropped(item)
         raise skill.failed(
             "dropped", f"the seal on {item} broke on the way to {whither}, near ({x:.2f}, {y:.2f}, {z:.2f}) m"
         )
 
 
-def let_go(skill: Skill, cell: Cell, item: Item, wait: float) -> Steps:
+def let_go(skill: Skill, cell: Cell, item: Item, wait: float, told: Callable[[], None]) -> Steps:
     """Switch the vacuum off and yield for `wait` [s]; afterwards the tool's sensor says that it is empty.
+
+    The ledger is `told` where the item went as soon as the tool is empty, also when the skill is taken away
+    meanwhile: what has fallen cannot be kept in the books as held.
 
     Raises:
         SkillFailed: `item` still hangs on the tool; the reason is the skill's `stuck`.
     """
     cell.tool.open()
-    yield from cell.clock.sleep(wait)
+    try:
+        yield from cell.clock.sleep(wait)
+    finally:
+        if not cell.tool.holding:
+            told()
     if cell.tool.holding:
         raise skill.failed("stuck", f"{item} hangs on the tool {wait:.2f} s after release")
 

@@ -27,7 +27,7 @@ class Approach(Skill):
     target: In[Target] = port(doc="where to go")
     overtravel: Metres = param(OVERTRAVEL, ge=0, le=0.03, doc="how far below the expected surface to feel")
     offset: Metres = param(SPACING, ge=0, le=0.02, doc="spacing of the spiral of further attempts")
-    reasons: ClassVar = ("unreachable", "blocked", "no_contact")
+    reasons: ClassVar = ("stale", "unreachable", "blocked", "no_contact")
     uses: ClassVar = ("arm", "tool")
     moves: ClassVar = True
     tool_state: ClassVar = (EMPTY, EMPTY)
@@ -41,6 +41,9 @@ class Approach(Skill):
     def run(self, cell: Cell) -> Steps:
         """Go there, down to the touch."""
         item, tool = self.target.item, cell.tool
+        if not cell.ledger.is_fresh(self.target):
+            seen = f"{item} was seen at {self.target.stamp:.2f} s"
+            raise self.failed("stale", f"{seen}, and what happened since may have moved it; look again")
 
         def ask() -> tuple[Goal, Task]:
             return approach(cell, self.target, self.overtravel, self.offset)

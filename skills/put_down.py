@@ -39,5 +39,4 @@ class PutDown(Skill):
         kind = cell.classes[cell.ledger.label(self.held)]
         goal = Goal((x, y, floor + kind.height + self.drop))
         yield from carry(self, cell, self.held, goal, "the safe place")
-        yield from let_go(self, cell, self.held, self.settle)
-        cell.ledger.returned(self.held)
+        yield from let_go(self, cell, self.held, self.settle, lambda: cell.ledger.returned(self.held))

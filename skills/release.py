@@ -12,16 +12,19 @@ from executive.skill import ANY, EMPTY, HOLDING, In, Out, Seconds, Skill, param,
 
 
 class Release(Skill):
-    """Let the held item fall into its bin and prove that the tool is empty."""
+    """Let the held item fall into its bin and prove that the tool is empty.
+
+    What fell before it was to be let go, while nobody watched the tool, is dropped and not placed.
+    """
 
     held: In[Item] = port(refers="item", doc="the item in the tool")
     bin: In[str] = port(refers="bin", doc="where it is let go")
     placed: Out[Item] = port(refers="item", doc="the item in the bin")
     settle: Seconds = param(0.10, ge=0, le=2, doc="time given to the vacuum to vanish")
-    reasons: ClassVar = ("stuck",)
+    reasons: ClassVar = ("stuck", "dropped")
     uses: ClassVar = ("tool",)
     tool_state: ClassVar = (HOLDING, EMPTY)
-    tool_left: ClassVar = {"halt": ANY}
+    tool_left: ClassVar = {"dropped": EMPTY, "halt": ANY}
 
     @classmethod
     def shortest(cls, least: LeastTimes, given: Mapping[str, Any]) -> float:
@@ -31,6 +34,10 @@ class Release(Skill):
 
     def run(self, cell: Cell) -> Steps:
         """Switch the vacuum off and ask the sensor."""
-        yield from let_go(self, cell, self.held, self.settle)
-        cell.ledger.placed(self.held, self.bin)
-        self.placed = self.held
+        item, bin = self.held, self.bin
+        if cell.ledger.in_tool() == item:
+            yield from let_go(self, cell, item, self.settle, lambda: cell.ledger.placed(item, bin))
+        elif cell.ledger.is_open(item):
+            raise self.failed("dropped", f"{item} is not in the tool any more")
+        # Else it was let go already, when this was taken away and then begun anew.
+        self.placed = item

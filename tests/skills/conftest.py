@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 
 import pytest
@@ -9,6 +10,15 @@ from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.detect import Detect
 from skills.localize import Localize
+
+
+@pytest.fixture(autouse=True)
+def no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing here can import the simulator, though tests of other folders may have done so before."""
+    for name in [*sys.modules]:
+        if name.startswith("executive.sim."):
+            monkeypatch.setitem(sys.modules, name, None)
+    monkeypatch.setitem(sys.modules, "pybullet", None)
 
 
 @pytest.fixture

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -50,9 +52,21 @@ def test_approach_to_nothing_is_no_contact_and_counts_as_an_attempt(fake: FakeCe
     assert fake.ledger.attempts("cube-1") == 1
 
 
-def test_every_further_attempt_comes_down_elsewhere(fake: FakeCell, target: Target) -> None:
+def test_it_does_not_go_where_something_may_have_moved_since(fake: FakeCell, target: Target) -> None:
+    fake.ledger.bumped()
+    result = run_skill(Approach(target=target), fake)
+    assert (result.status, result.reason, fake.arm.commanded) == ("FAILURE", "stale", [])
+    assert result.message == (
+        "cube-1 was seen at 0.00 s, and what happened since may have moved it; look again"
+    )
+
+
+def test_every_further_attempt_comes_down_elsewhere(
+    fake: FakeCell, target: Target, look: Callable[..., list[Target]]
+) -> None:
     places = []
     for _ in range(4):
+        (target,) = look()
         run_skill(Approach(target=target), fake)
         places.append(fake.arm.tool_pose.position[:2].copy())
         fake.ledger.missed("cube-1")
@@ -98,6 +112,15 @@ def test_a_halted_approach_stops_the_arm(fake: FakeCell, target: Target) -> None
     assert run_skill(Approach(target=target), fake, halt_at=30).status == "HALTED"
     assert fake.arm.at_rest
     assert fake.arm.commanded == ["start", "stop"]
+
+
+def test_what_fell_before_it_was_let_go_is_not_placed(fake: FakeCell, held: str) -> None:
+    fake.tool.open()
+    fake.ledger.dropped(held)
+    result = run_skill(Release(held=held, bin="red_bin"), fake)
+    assert (result.status, result.reason) == ("FAILURE", "dropped")
+    assert result.message == f"{held} is not in the tool any more"
+    assert fake.ledger.objects_in("red_bin") == 0
 
 
 def test_grasp_holds_and_tells_the_ledger(fake: FakeCell, held: str) -> None:
@@ -224,3 +247,36 @@ def test_an_item_is_given_up_only_after_the_failures_the_mission_grants(
     fake.ledger.missed("cube-1")
     run_skill(RejectTarget(item="cube-1", after=2), fake)
     assert not fake.ledger.is_open("cube-1")
+
+
+def test_taken_away_while_it_lets_go_it_has_placed_what_fell(fake: FakeCell, held: str) -> None:
+    result = run_skill(Release(held=held, bin="red_bin"), fake, halt_at=3)
+    assert (result.status, fake.tool.holding) == ("HALTED", False)
+    assert (fake.ledger.in_tool(), fake.ledger.objects_in("red_bin")) == (None, 1)
+    # Begun anew it has nothing more to do.
+    again = run_skill(Release(held=held, bin="red_bin"), fake)
+    assert (again.status, again.outputs, again.ticks) == ("SUCCESS", {"placed": held}, 0)
+    assert fake.ledger.objects_in("red_bin") == 1
+
+
+def test_taken_away_while_it_puts_down_it_has_returned_what_lies_there(fake: FakeCell, held: str) -> None:
+    steps = PutDown(held=held).run(fake.cell)
+    while fake.tool.holding:
+        next(steps)
+        fake.advance()
+    steps.close()
+    (row,) = fake.ledger.rows()
+    assert (fake.ledger.in_tool(), row["state"]) == (None, "dropped")
+
+
+def test_while_an_arm_brakes_after_a_drop_the_ledger_knows_of_it(fake: FakeCell, held: str) -> None:
+    steps = Transit(held=held, bin="red_bin").run(fake.cell)
+    for _ in range(60):
+        next(steps)
+        fake.advance()
+    fake.tool.open()
+    # An arm that needs a while to stop.
+    fake.arm.stop = lambda: None  # type: ignore[method-assign]
+    next(steps)
+    (row,) = fake.ledger.rows()
+    assert (fake.arm.at_rest, row["state"], row["attempts"]) == (False, "dropped", 1)
