@@ -13,7 +13,6 @@ from executive.campaign.motion_scenes import Scene, Scenes
 from executive.campaign.motion_trial import EVERY, Progress, opened, repeat, silent
 from executive.cell_config import CellConfig
 from executive.errors import Blocked, Unreachable
-from executive.events import ignore
 from executive.geometry import Pose
 from executive.motion.planner import Planner
 from executive.sim.arm import SimArm
@@ -47,7 +46,7 @@ class _Run:
 
     def __init__(self, config: CellConfig, world: World, planner: Planner, seed: int) -> None:
         self._world = world
-        self._tool = SuctionTool(world, config.tool, ignore)
+        self._tool = SuctionTool(world, config.tool)
         self._arm = SimArm(world, planner, config, SimClock(world, STEP), lambda: self._tool.held_body)
         self._scenes = Scenes(config, planner, world, seed)
         self._gauge = Gauge(world, config.motion.margin)

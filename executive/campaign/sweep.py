@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import signal
-import threading
-from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from executive.campaign.pool import do_all
 from executive.campaign.statistics import spread, wilson
 from executive.record.result import FATES, PLACES, ledger_agrees
 
@@ -57,34 +52,9 @@ def sweep(
         progress: Told how many runs of how many are done.
         work: What does one job, in a process of its own.
     """
-    jobs = deque(Job(mission, seed, dict(overrides), runs, frames) for seed in seeds)
-    results: dict[int, Result] = {}
-    running: dict[Future[Result], Job] = {}
-    pool, broken = _pool(workers), False
-    try:
-        with _halting() as halted:
-            while running or (jobs and not halted.is_set()):
-                # No job waits in the pool: one that does could not be taken back.
-                while jobs and len(running) < workers and not (broken or halted.is_set()):
-                    try:
-                        running[pool.submit(work or run_job, jobs[0])] = jobs[0]
-                    except BrokenExecutor:  # The process died since its last result was looked at.
-                        broken = True
-                    else:
-                        jobs.popleft()
-                done, _ = wait(running, return_when=FIRST_COMPLETED)
-                for future in done:
-                    job, error = running.pop(future), future.exception()
-                    results[job.seed] = future.result() if error is None else _broken(job, error)
-                    if progress is not None:
-                        progress(len(results), len(seeds))
-                    broken = broken or isinstance(error, BrokenExecutor)
-                if broken and not running:
-                    pool.shutdown()
-                    pool, broken = _pool(workers), False
-    finally:
-        pool.shutdown()
-    return [results[seed] for seed in seeds if seed in results]
+    jobs = [Job(mission, seed, dict(overrides), runs, frames) for seed in seeds]
+    results = do_all(jobs, work or run_job, _broken, workers=workers, progress=progress)
+    return [result for result in results if result is not None]
 
 
 def run_job(job: Job) -> Result:
@@ -153,34 +123,3 @@ def _broken(job: Job, error: BaseException) -> Result:
         "trace": "",
         "run": "",
     }
-
-
-def _pool(workers: int) -> ProcessPoolExecutor:
-    # A fork would share the simulator's and the inference library's threads and locks.
-    context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(workers, mp_context=context, initializer=_ignore_interrupts)
-
-
-def _ignore_interrupts() -> None:
-    """Leave Ctrl-C, which reaches every process of the terminal, to the parent and to runs under way."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-@contextmanager
-def _halting() -> Iterator[threading.Event]:
-    """Set the event at the first Ctrl-C; at the second, end the runs under way, too."""
-    halted = threading.Event()
-
-    def halt(number: int, frame: Any) -> None:
-        del number, frame
-        if halted.is_set():
-            for process in multiprocessing.active_children():
-                process.terminate()
-            raise KeyboardInterrupt
-        halted.set()
-
-    previous = signal.signal(signal.SIGINT, halt)
-    try:
-        yield halted
-    finally:
-        signal.signal(signal.SIGINT, previous)

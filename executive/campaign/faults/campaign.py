@@ -1,0 +1,174 @@
+"""All faults of a mission, each in a run of its own."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+from executive.campaign.faults.branches import branches
+from executive.campaign.faults.fault import Fault
+from executive.campaign.faults.listing import list_faults
+from executive.campaign.faults.rehearsal import Rehearsal, rehearse
+from executive.campaign.faults.trial import try_out
+from executive.campaign.pool import do_all
+from executive.campaign.subject import Subject
+from executive.errors import InputError
+from executive.view.fault_trials import FaultFigures, Trial
+
+DEEPEST = 4
+"""Most faults in a run whose last one needs the others to happen at all."""
+
+Numbers = tuple[int, ...]
+"""Faults by their numbers in the list, the one that a run is about last."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run to do."""
+
+    subject: Subject
+    rehearsal: Rehearsal
+    numbers: Numbers
+    faults: tuple[Fault, ...]
+
+
+class Campaign:
+    """A mission and everything that can go wrong in it.
+
+    Args:
+        subject: The mission.
+        workers: How many runs go on at a time, each in a process of its own.
+        progress: Told how many runs of how many are done.
+
+    Attributes:
+        subject: The mission.
+        rehearsal: How it goes undisturbed.
+        faults: Every single fault; its number is its place, from 1.
+
+    Raises:
+        ExecutiveError: The mission does not succeed undisturbed.
+        KeyboardInterrupt: The user ended it before its first run.
+    """
+
+    def __init__(
+        self, subject: Subject, *, workers: int = 2, progress: Callable[[int, int], None] | None = None
+    ) -> None:
+        self.subject = subject
+        self.rehearsal = rehearse(subject)
+        self.faults: Sequence[Fault] = list_faults(subject, self.rehearsal)
+        self._workers, self._progress = workers, progress
+
+    def fault(self, number: int) -> Fault:
+        """Return the fault with a number.
+
+        Raises:
+            InputError: There is none.
+        """
+        if not 1 <= number <= len(self.faults):
+            raise InputError(
+                f"{self.subject.name} has no fault {number}; they have the numbers 1 to {len(self.faults)}, "
+                "and --list shows them"
+            )
+        return self.faults[number - 1]
+
+    def singles(self) -> FaultFigures:
+        """Try every single fault.
+
+        What can happen only once something else has gone wrong is tried together with the first fault that
+        leads there; where a node does not come to its reason by what happens to the cell, its skill says so.
+        """
+        trials: dict[Numbers, Trial] = {}
+        complete = True
+        while complete and (wanted := self._wanted(trials)):
+            done, complete = self._tried(wanted, len(trials))
+            trials |= {trial.numbers: trial for trial in done}
+        ordered = sorted(trials.values(), key=lambda trial: (trial.numbers[-1], trial.numbers))
+        return self._figures(ordered, complete, pairs=False)
+
+    def pairs(self, count: int) -> FaultFigures:
+        """Try so many pairs of faults that chance draws; the subject's seed decides which.
+
+        What ends the run anyhow, and what happens only after something else, is in no pair.
+        """
+        numbers = [
+            number
+            for number, fault in enumerate(self.faults, 1)
+            if not (fault.behind or fault.instead_of or fault.ends_run)
+        ]
+        most = len(numbers) * (len(numbers) - 1) // 2
+        chance, drawn = random.Random(self.subject.seed), dict[Numbers, None]()
+        while len(drawn) < min(count, most):
+            first, second = sorted(chance.sample(numbers, 2))
+            drawn[(first, second)] = None
+        trials, complete = self._tried(list(drawn), 0)
+        return self._figures(trials, complete, pairs=True)
+
+    def these(self, numbers: Numbers) -> dict[int, Fault]:
+        """Return the faults with these numbers."""
+        return {number: self.fault(number) for number in numbers}
+
+    def _figures(self, trials: Iterable[Trial], complete: bool, *, pairs: bool) -> FaultFigures:
+        subject, tried = self.subject, tuple(trials)
+        return FaultFigures(
+            subject.name, subject.cell, subject.seed, self.rehearsal.robot_time, len(self.faults), tried,
+            branches(subject.loaded.tree, tried), complete, pairs,
+        )  # fmt: skip
+
+    def _wanted(self, trials: dict[Numbers, Trial]) -> list[Numbers]:
+        """Return what can be tried now and was not."""
+        ways = self._ways(trials.values())
+        last = {numbers[-1]: trial for numbers, trial in trials.items()}
+        wanted = []
+        for number, fault in enumerate(self.faults, 1):
+            if number in last:
+                continue
+            if fault.instead_of and (fault.instead_of not in last or last[fault.instead_of].raised):
+                continue
+            before = ways.get(fault.about) if fault.behind else ()
+            if before is not None and len(before) < DEEPEST:
+                wanted.append((*before, number))
+        return wanted
+
+    def _ways(self, trials: Iterable[Trial]) -> dict[str, Numbers]:
+        """Return for every node that ran the faults that led there: the fewest, and of those the first."""
+        ways: dict[str, Numbers] = {}
+        for trial in sorted(trials, key=lambda trial: (len(trial.numbers), trial.numbers)):
+            if not self.faults[trial.numbers[-1] - 1].ends_run:
+                for path in trial.entered:
+                    ways.setdefault(path, trial.numbers)
+        return ways
+
+    def _tried(self, wanted: Sequence[Numbers], before: int) -> tuple[list[Trial], bool]:
+        """Return the trials, and whether all were done; `before` is how many there are already."""
+
+        def told(done: int, all: int) -> None:
+            if self._progress is not None:
+                self._progress(before + done, before + all)
+
+        jobs = [
+            Job(self.subject, self.rehearsal, numbers, tuple(map(self.fault, numbers))) for numbers in wanted
+        ]
+        trials = do_all(jobs, do, _broken, workers=self._workers, progress=told)
+        done = [trial for trial in trials if trial is not None and not trial.cut]
+        return done, len(done) == len(wanted)
+
+
+def do(job: Job) -> Trial:
+    """Do one run."""
+    return try_out(job.subject, job.rehearsal, dict(zip(job.numbers, job.faults, strict=True)))
+
+
+def _broken(job: Job, error: BaseException) -> Trial:
+    """Return the trial of a run that told nothing."""
+    fault = job.faults[-1]
+    return Trial(
+        job.numbers,
+        tuple(map(str, job.faults)),
+        fault.name,
+        fault.place,
+        fault.what,
+        fault.when,
+        status="FAULT",
+        problems=(f"the run broke: {type(error).__name__}: {error}",),
+    )

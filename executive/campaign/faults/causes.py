@@ -1,0 +1,67 @@
+"""What in a cell makes a skill fail with a reason, by the reason's name and what the skill declares."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from executive.campaign.faults.effects import ObjectBumped
+from executive.cell_config import TableConfig
+from executive.skill import Skill
+from executive.testing.disturbances import (
+    arm_runs_into,
+    detector_dead,
+    detector_unsure,
+    no_depth,
+    no_way,
+    operator_asks_rescan,
+    operator_quits,
+    seal_breaks,
+    seal_fails,
+    table_bumped,
+    tool_sticks,
+    workspace_hidden,
+)
+from executive.testing.disturbances.effect import Effect
+
+
+@dataclass(frozen=True)
+class Cause:
+    """What makes skills fail with a reason.
+
+    Attributes:
+        effect: What happens.
+        means: That in words.
+        needs: What a skill must do for it to happen there: `moves`, `senses`, or use a part; "" for none.
+        lasts: Whether it may go on for ever; else a campaign lets it happen so often at most.
+    """
+
+    effect: Effect
+    means: str
+    needs: str = ""
+    lasts: bool = True
+
+    def can(self, skill: type[Skill]) -> bool:
+        """Tell whether this may happen to a skill at all."""
+        does = {"": True, "moves": skill.moves, "senses": skill.senses}
+        return does.get(self.needs, self.needs in skill.uses)
+
+
+def causes(table: TableConfig) -> Mapping[str, Cause]:
+    """Return what makes skills fail, by the name of the reason; of one that is missing nobody knows."""
+    aside = ObjectBumped("node", table.x, table.y)
+    return {
+        "missed": Cause(seal_fails(), "nothing seals", "tool"),
+        "dropped": Cause(seal_breaks(), "the seal breaks half-way", "moves"),
+        "no_contact": Cause(aside, "the object is bumped aside", "moves"),
+        "blocked": Cause(arm_runs_into(), "the arm runs into something", "moves"),
+        "unreachable": Cause(no_way(), "the planner finds no way", "moves"),
+        "stuck": Cause(tool_sticks(), "the tool does not let go", "tool"),
+        "unavailable": Cause(detector_dead(), "the detector is dead", "camera"),
+        "unsure": Cause(detector_unsure(), "the detector is sure of nothing", "camera"),
+        "hidden": Cause(workspace_hidden(), "the arm hides the workspace", "camera"),
+        "stale": Cause(table_bumped(), "something bumps the table", lasts=False),
+        "no_depth": Cause(no_depth(), "no detection can be localized"),
+        "quit": Cause(operator_quits(), "the operator quits", "senses"),
+        "rescan": Cause(operator_asks_rescan(), "the operator wants a look", "senses", lasts=False),
+    }

@@ -1,0 +1,107 @@
+"""What has to be true of a run in which something went wrong on purpose."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from executive.campaign.faults.fault import Fault, InjectedError
+from executive.events import Event
+from executive.mission.flow.endings import Ending
+from executive.runtime.outcome import Outcome
+
+REACHES = frozenset({"object_removed", "object_moved", "seal_breaks"})
+"""What a fault does to an object that may put it out of reach."""
+
+
+def check_end(
+    outcome: Outcome, faults: Sequence[Fault], endings: Sequence[Ending], raised: bool
+) -> Iterator[str]:
+    """Yield how the run ended as it must not; `raised` tells whether a bug that was put in came up."""
+    if outcome.status == "FAULT":
+        nodes = [fault.about for fault in faults if fault.ends_run]
+        if not raised or InjectedError.__name__ not in outcome.message:
+            yield f"it ended as FAULT at {outcome.node or 'no node'}: {outcome.message}"
+        elif not any(node == outcome.node or outcome.message.startswith(f"{node}: ") for node in nodes):
+            yield f"the bug was in {' or '.join(nodes)}, and the run names {outcome.node}: {outcome.message}"
+    elif raised:
+        yield f"a bug came up, and the run ended as {outcome.status} {outcome.reason}"
+    if outcome.status == "FAILURE" and outcome.reason != "lost":
+        known = {(ending.node, f"{ending.source}.{ending.reason}") for ending in endings}
+        if (outcome.node, outcome.reason) not in known:
+            yield f"it ended with {outcome.reason} at {outcome.node}, which the checker says cannot end it"
+
+
+def check_tree(root: Behaviour) -> Iterator[str]:
+    """Yield every node that still says it is running."""
+    for node in root.iterate():
+        if node.status is Status.RUNNING:
+            yield f"{getattr(node, 'path', node.name)} is still running"
+
+
+def check_books(
+    outcome: Outcome, items: Mapping[str, Any], audit: Mapping[str, int] | None, taken: int = 0
+) -> Iterator[str]:
+    """Yield where the ledger does not balance, something was misplaced, or the audit found something else.
+
+    What nobody had seen yet when a run ended early is on no book, and lies where it lay; what had just fallen
+    then is lost to the robot, wherever it lies. Of the `taken` objects some may have been taken where nobody
+    had to look any more.
+    """
+    told = f"the ledger says {_counts(items)}"
+    if items["seen"] != items["placed"] + items["rejected"] + items["lost"]:
+        yield f"the ledger does not balance: {told}"
+    if audit is None:
+        return
+    if audit["wrong_bin"]:
+        yield f"{audit['wrong_bin']} misplaced; {told}; the audit {_counts(audit)}"
+    unnoticed = min(max(audit["elsewhere"] - items["lost"], 0), taken)
+    left = audit["left"] + unnoticed
+    if outcome.status == "FAULT" or outcome.node:
+        agrees = items["placed"] <= audit["right"] and items["rejected"] <= left
+    else:
+        agrees = (
+            items["placed"] == audit["right"] + audit["wrong_bin"]
+            and items["rejected"] <= left <= items["rejected"] + audit["unseen"]
+            and items["lost"] == audit["elsewhere"] - unnoticed
+        )
+    if not agrees:
+        yield f"{told}; the audit {_counts(audit)}"
+
+
+def check_success(
+    outcome: Outcome, audit: Mapping[str, int] | None, events: Sequence[Event]
+) -> Iterator[str]:
+    """Yield a sentence if the run looked, says success, and never saw what lies there."""
+    looked = any(event.kind == "look" for event in events)
+    if looked and outcome.status == "SUCCESS" and audit is not None and audit["unseen"]:
+        yield f"success, and {audit['unseen']} objects were never seen; the audit {_counts(audit)}"
+
+
+def check_losses(audit: Mapping[str, int] | None, events: Sequence[Event]) -> Iterator[str]:
+    """Yield a sentence if more objects are out of reach than the faults can have put there."""
+    reached = sum(count_of(events, what) for what in REACHES)
+    if audit is not None and audit["elsewhere"] > reached:
+        yield f"{audit['elsewhere']} objects are out of reach, and the fault reached for {reached}"
+
+
+def count_of(events: Sequence[Event], what: str) -> int:
+    """Return how often something happened to the cell."""
+    return sum(event.kind == "disturbance" and event.data["what"] == what for event in events)
+
+
+def remark(outcome: Outcome, faults: Sequence[Fault]) -> str:
+    """Return a sentence if the run failed for another reason than those that were brought about, or ""."""
+    if outcome.status != "FAILURE" or outcome.reason == "lost":
+        return ""
+    meant = [fault.what for fault in faults if fault.reason]
+    if outcome.reason.rpartition(".")[2] in meant:
+        return ""
+    return f"it says {outcome.reason}" + (f", and {' and '.join(meant)} was brought about" if meant else "")
+
+
+def _counts(counts: Mapping[str, Any]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in counts.items() if isinstance(count, int))

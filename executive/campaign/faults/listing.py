@@ -1,0 +1,202 @@
+"""Every single fault of a mission, made from its tree and from what its skills declare."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from executive.campaign.faults.causes import causes
+from executive.campaign.faults.effects import (
+    DetectorGivenUp,
+    ObjectBumped,
+    ObjectRefuses,
+    ObjectTaken,
+    SealBreaksOverBin,
+)
+from executive.campaign.faults.fault import Breakage, Fault, When
+from executive.campaign.faults.rehearsal import Rehearsal
+from executive.campaign.subject import Subject
+from executive.messages import Target
+from executive.mission.model import nodes
+from executive.skill import HOLDING, Direction, Skill
+from executive.testing.disturbances import (
+    after,
+    between,
+    detector_dead,
+    detector_hangs,
+    detector_slow,
+    detector_unsure,
+    during,
+    seal_breaks,
+    seal_fails,
+)
+from executive.testing.disturbances.script import Disturbance
+
+SHORT, LONG = 0.5, 5.0
+"""How long a detector is slow, hangs or is dead [s]; the longer is also the deadline of one that hangs."""
+QUARTERS: tuple[tuple[When, float], ...] = (("first", 0.25), ("middle", 0.5), ("late", 0.75))
+"""Shares of an undisturbed run, or of a motion, at which something happens to objects."""
+LASTING = tuple(range(1, 21))
+"""Activations in which something happens again and again that nothing real would do for ever."""
+CARRIES: tuple[tuple[When, float], ...] = (
+    ("first", 0.1), ("first", 0.3), ("middle", 0.5), ("late", 0.7), ("late", 0.9),
+)  # fmt: skip
+"""Shares of a carry at which the tool lets go."""
+
+
+def list_faults(subject: Subject, rehearsal: Rehearsal) -> tuple[Fault, ...]:
+    """Return every single fault of a mission; a fault's number is its place here, from 1.
+
+    In the order of the tree each reason of each node and what its code may raise, then what goes wrong with
+    detectors, objects and tool.
+    """
+    faults = list(_Listing(subject, rehearsal).all())
+    return tuple(_linked(faults))
+
+
+class _Listing:
+    """The faults of one mission."""
+
+    def __init__(self, subject: Subject, rehearsal: Rehearsal) -> None:
+        self._skills, self._rehearsal = subject.skills, rehearsal
+        self._table = subject.loaded.cell_config.table
+        self._causes = causes(self._table)
+        self._nodes = skill_nodes(subject)
+
+    def all(self) -> Iterator[Fault]:
+        for node in self._nodes:
+            yield from self._reasons(node)
+        for node in self._nodes:
+            yield from self._errors(node)
+        yield from self._detector()
+        yield from self._objects()
+        yield from self._tool()
+
+    def _reasons(self, node: nodes.SkillNode) -> Iterator[Fault]:
+        """Yield every reason of a node: physically where that may be, and as said by the skill itself."""
+        skill = self._skills[node.skill]
+        for reason in skill.reasons:
+            cause = self._causes.get(reason)
+            for when, starts in self._starts(node):
+                base = self._fault(node, reason, when, reason=True)
+                breakage = Breakage(node.path, "fails", reason, starts or LASTING)
+                said = replace(base, means="the skill says so", breakages=(breakage,))
+                if cause is None or not cause.can(skill):
+                    yield said
+                    continue
+                nth = starts or (() if cause.lasts else LASTING)
+                happening = during(node.path, cause.effect, nth=nth)
+                yield replace(base, means=cause.means, happenings=(happening,))
+                yield replace(said, instead_of=-1)
+
+    def _starts(self, node: nodes.SkillNode) -> Iterator[tuple[When, tuple[int, ...]]]:
+        """Yield when things go wrong at a node, and in which of its activations."""
+        count = len(self._rehearsal.activations.get(node.path, ()))
+        yield "first", (1,)
+        if count >= 3:
+            yield "middle", (1 + count // 2,)
+        yield "lasting", ()
+
+    def _errors(self, node: nodes.SkillNode) -> Iterator[Fault]:
+        """Yield what the code of a skill may raise: at once, on the way, and when it is halted."""
+        ticks = self._rehearsal.activations.get(node.path, ())
+        yield self._error(node, "raises", "first", Breakage(node.path, "raises", starts=(1,)))
+        start, longest = max(enumerate(ticks, 1), key=lambda one: one[1], default=(1, 0))
+        if longest >= 2:
+            later = Breakage(node.path, "raises", starts=(start,), after=longest // 2)
+            yield self._error(node, "raises", "middle", later)
+        if longest >= 2 or not ticks:
+            halted = Breakage(node.path, "raises when halted", starts=(start,), after=longest // 2)
+            yield self._error(node, "halted", "middle", halted)
+
+    def _error(self, node: nodes.SkillNode, what: str, when: When, breakage: Breakage) -> Fault:
+        means = f"its code raises {'when it is halted ' if what == 'halted' else ''}{breakage.after} ticks on"
+        return self._fault(node, what, when, means=means, breakages=(breakage,))
+
+    def _detector(self) -> Iterator[Fault]:
+        """Yield detectors that are slow, hang or are dead, from the first look and from half-way on."""
+        half = self._rehearsal.robot_time / 2
+        starts: tuple[tuple[When, float], ...] = (("first", 0.0), ("middle", half))
+        for when, start in starts:
+            for by in (SHORT, LONG):
+                yield _other("detector", f"slow by {by:g} s", when, after(start, detector_slow(by)))
+            for lasts in (SHORT, LONG):
+                end = start + lasts
+                hangs, dead = between(start, end, detector_hangs()), between(start, end, detector_dead())
+                unsure = between(start, end, detector_unsure())
+                yield _other("detector", f"hangs for {lasts:g} s", when, hangs)
+                yield _other("detector", f"unsure for {lasts:g} s", when, unsure)
+                yield _other("detector", f"dead for {lasts:g} s", when, dead)
+            yield _other("detector", "hangs for ever", when, after(start, DetectorGivenUp(LONG)))
+            yield _other("detector", "dead for ever", when, after(start, detector_dead()))
+            yield _other("detector", "unsure for ever", when, after(start, detector_unsure()))
+
+    def _objects(self) -> Iterator[Fault]:
+        """Yield objects taken away and bumped aside, on the table and under the arm that comes for them."""
+        table = self._table
+        for when, share in QUARTERS:
+            start = share * self._rehearsal.robot_time
+            yield _other("object", "taken", when, after(start, ObjectTaken("nearest")))
+            yield _other("object", "bumped", when, after(start, ObjectBumped("nearest", table.x, table.y)))
+        for node in self._nodes:
+            if not _goes_to_target(self._skills[node.skill]) or not self._runs(node):
+                continue
+            nth = 1 + len(self._rehearsal.activations[node.path]) // 2
+            for when, share in QUARTERS:
+                bumped = ObjectBumped("node", table.x, table.y, share)
+                for what, effect in (("target taken", ObjectTaken("node", share)), ("target bumped", bumped)):
+                    happening = during(node.path, effect, nth=nth)
+                    yield self._fault(node, what, when, means=f"at {share:g}", happenings=(happening,))
+
+    def _tool(self) -> Iterator[Fault]:
+        """Yield seals that break on the way, and that do not come about."""
+        for node in self._nodes:
+            if not _carries(self._skills[node.skill]) or not self._runs(node):
+                continue
+            for when, share in CARRIES:
+                happening = during(node.path, seal_breaks(share), nth=1)
+                yield self._fault(node, "lets go", when, means=f"at {share:g}", happenings=(happening,))
+            over = during(node.path, SealBreaksOverBin())
+            yield self._fault(
+                node, "lets go over another bin", "lasting", means="every time", happenings=(over,)
+            )
+        half = self._rehearsal.robot_time / 2
+        for lasts in (SHORT, LONG):
+            happening = between(half, half + lasts, seal_fails())
+            yield _other("tool", f"no seal for {lasts:g} s", "middle", happening)
+        for number in (1, 2):
+            refuses = after(0.0, ObjectRefuses(number))
+            yield _other("tool", f"no seal on object {number}", "lasting", refuses)
+
+    def _fault(self, node: nodes.SkillNode, what: str, when: When, **more: object) -> Fault:
+        place = f"{node.mark.source.path}:{node.mark.line}"
+        fault = Fault(node.path, node.label or node.skill, place, what, when, "", behind=not self._runs(node))
+        return replace(fault, **more)  # type: ignore[arg-type]
+
+    def _runs(self, node: nodes.SkillNode) -> bool:
+        return node.path in self._rehearsal.activations
+
+
+def skill_nodes(subject: Subject) -> list[nodes.SkillNode]:
+    """Return the nodes of a mission's tree that run a skill, in its order."""
+    return [node for node in subject.loaded.tree.walk() if isinstance(node, nodes.SkillNode)]
+
+
+def _other(about: str, what: str, when: When, happening: Disturbance) -> Fault:
+    start = getattr(happening.when, "start", 0.0)
+    return Fault(about, about, "", what, when, f"from {start:.2f} s on", happenings=(happening,))
+
+
+def _goes_to_target(skill: type[Skill]) -> bool:
+    inputs = [port for port in skill.ports.values() if port.direction is Direction.IN]
+    return skill.moves and any(port.type is Target for port in inputs)
+
+
+def _carries(skill: type[Skill]) -> bool:
+    return skill.moves and skill.tool_state[0] is HOLDING
+
+
+def _linked(faults: Sequence[Fault]) -> Iterator[Fault]:
+    """Yield the faults, those that stand in for the one before them with its number."""
+    for number, fault in enumerate(faults, 1):
+        yield replace(fault, instead_of=number - 1) if fault.instead_of else fault

@@ -1,0 +1,86 @@
+"""How a mission goes when nothing goes wrong: what faults are aimed by."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping
+from contextlib import closing
+from dataclasses import dataclass
+
+from executive.campaign.subject import Subject
+from executive.errors import ExecutiveError
+from executive.events import Event
+from executive.record.result import ledger_agrees
+from executive.runtime.run import Run
+
+
+@dataclass(frozen=True)
+class Rehearsal:
+    """An undisturbed run.
+
+    Attributes:
+        robot_time: How long it took on its clock [s].
+        placed: Objects that it brought into bins.
+        activations: Control steps of every activation of each node that ran, by path.
+    """
+
+    robot_time: float
+    placed: int
+    activations: Mapping[str, tuple[int, ...]]
+
+    @property
+    def longest(self) -> float:
+        """Time on its clock after which a run counts as one that never ends [s]."""
+        return 60.0 + 10 * self.robot_time
+
+
+class _Activations:
+    """Follows how long nodes run; an observer."""
+
+    def __init__(self) -> None:
+        self.found: dict[str, list[int]] = defaultdict(list)
+        self._began: dict[str, int] = {}
+
+    def __call__(self, event: Event) -> None:
+        if event.kind != "status":
+            return
+        node = event.data["node"]
+        if event.data["status"] == "RUNNING":
+            self._began[node] = event.tick
+        elif node in self._began:
+            self.found[node].append(event.tick - self._began.pop(node))
+
+
+def rehearse(subject: Subject) -> Rehearsal:
+    """Run a mission undisturbed and return how it went.
+
+    Raises:
+        ExecutiveError: It does not succeed, or its books are wrong.
+        KeyboardInterrupt: The user ended it.
+    """
+    activations = _Activations()
+    run = Run(
+        subject.loaded,
+        subject.skills,
+        seed=subject.seed,
+        observers=[activations],
+        kind=subject.kind,
+        requests=subject.requests,
+    )
+    with closing(run):
+        outcome = run.execute()
+        if outcome.status == "HALTED":
+            raise KeyboardInterrupt
+        items, audit = run.items(), run.audit()
+    if outcome.status != "SUCCESS" or not ledger_agrees({"items": items, "audit": audit}):
+        raise ExecutiveError(
+            f"{subject.name} ended as {outcome.status} {outcome.reason} ({outcome.message}) with seed "
+            f"{subject.seed} although nothing was wrong; the ledger says {_counts(items)}; "
+            f"the audit {_counts(audit or {})}; choose another seed"
+        )
+    found = {node: tuple(ticks) for node, ticks in activations.found.items()}
+    return Rehearsal(outcome.robot_time, items["placed"], found)
+
+
+def _counts(counts: Mapping[str, object]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in counts.items() if isinstance(count, int))

@@ -1,0 +1,214 @@
+"""One run in which something goes wrong on purpose, watched and judged."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from executive.campaign.faults.breakages import WANTED, broken_skills
+from executive.campaign.faults.effects import ObjectTaken
+from executive.campaign.faults.fault import Breakage, Fault, InjectedError
+from executive.campaign.faults.judgement import (
+    check_books,
+    check_end,
+    check_losses,
+    check_success,
+    check_tree,
+    count_of,
+    remark,
+)
+from executive.campaign.faults.listing import skill_nodes
+from executive.campaign.faults.rehearsal import Rehearsal
+from executive.campaign.halt_checks import check_journal, check_rest, check_tool
+from executive.campaign.subject import Subject
+from executive.events import Event
+from executive.record.recorded_run import Recording
+from executive.record.recorder import Recorder
+from executive.record.run_directory import RunDirectory
+from executive.runtime.cells import cell_kind
+from executive.runtime.outcome import Outcome
+from executive.runtime.run import Run
+from executive.testing.bounded_cell import BoundedCell
+from executive.testing.disturbances import DisturbedCell, disturbed
+from executive.testing.wrapped_cell import WrappedCell
+from executive.view.fault_trials import Trial
+from executive.workcell import Workcell
+
+Numbered = Mapping[int, Fault]
+"""Faults by their numbers in the list, in the order in which they are told."""
+
+
+def try_out(subject: Subject, rehearsal: Rehearsal, faults: Numbered) -> Trial:
+    """Run a mission with these faults and return what came of it."""
+    trying = _Trying(subject, rehearsal, faults)
+    with closing(trying.run):
+        return trying.judged(trying.run.execute())
+
+
+def record(subject: Subject, rehearsal: Rehearsal, faults: Numbered, runs: Path) -> tuple[Trial, Path]:
+    """Do as `try_out`, and leave a run directory below `runs`; return it, too.
+
+    Raises:
+        InputError: It cannot be made.
+        ExecutiveError: The result cannot be written.
+    """
+    began, loaded = time.perf_counter(), subject.loaded
+    trying = _Trying(subject, rehearsal, faults)
+    with closing(trying.run):
+        directory = RunDirectory.create(
+            runs, mission=loaded.mission.name, seed=subject.seed, started=datetime.now()
+        )
+        directory.save_inputs(
+            mission=loaded.text,
+            params=loaded.params,
+            cell=loaded.cell_config.model_dump(mode="json", exclude_unset=True),
+            libraries=loaded.libraries,
+        )
+        trying.run.log_to(directory.world)
+        recording = Recording(trying.run, loaded, subject.skills, directory, Recorder(directory), None)
+        result = recording.execute(subject.seed, began)
+        outcome = Outcome(
+            result["status"], result["reason"], result["message"], result["node"], result["holds"],
+            result["ticks"], result["robot_time_s"],
+        )  # fmt: skip
+        return trying.judged(outcome), directory.path
+
+
+class _StoppingCell(WrappedCell):
+    """A work cell with something to do after every control step."""
+
+    def __init__(self, inner: Workcell, after: Callable[[], None]) -> None:
+        super().__init__(inner)
+        self._after = after
+
+    def advance(self) -> None:
+        """Let one control step pass, with what is to be done after it."""
+        super().advance()
+        self._after()
+
+
+class _Trying:
+    """A run and all that is seen of it."""
+
+    def __init__(self, subject: Subject, rehearsal: Rehearsal, faults: Numbered) -> None:
+        self._subject, self._rehearsal, self._faults = subject, rehearsal, faults
+        self._events: list[Event] = []
+        self._breakages = [breakage for fault in faults.values() for breakage in fault.breakages]
+        self._activations: Counter[str] = Counter()
+        self._began: dict[str, int] = {}
+        self._stopped = False
+        happenings = [happening for fault in faults.values() for happening in fault.happenings]
+        own = {node.path: subject.skills[node.skill] for node in skill_nodes(subject)}
+        self.run = Run(
+            subject.loaded,
+            subject.skills,
+            seed=subject.seed,
+            observers=[self._see],
+            requests=subject.requests,
+            kind=disturbed(self._kind, happenings),
+            substitutes=broken_skills(self._breakages, own),
+        )
+        workcell = self.run.workcell
+        assert isinstance(workcell, DisturbedCell)
+        self.run.observe(workcell.hear)
+
+    def judged(self, outcome: Outcome) -> Trial:
+        """Return what came of the run, which is over."""
+        run, last = self.run, list(self._faults.values())[-1]
+        items, audit = run.items(), run.audit()
+        raised = any(self._raised(fault) for fault in self._faults.values() if fault.ends_run)
+        faults = tuple(self._faults.values())
+        problems = [
+            *check_end(outcome, faults, self._subject.loaded.endings, raised),
+            *check_tree(run.root),
+            *check_journal([_entry(event) for event in self._events], outcome),
+            *check_books(outcome, items, audit, count_of(self._events, ObjectTaken.name)),
+            *check_success(outcome, audit, self._events),
+            *check_losses(audit, self._events),
+            *check_tool(outcome, run.workcell),
+            *check_rest(run.workcell),
+        ]
+        return Trial(
+            numbers=tuple(self._faults),
+            told=tuple(map(str, faults)),
+            name=last.name,
+            place=last.place,
+            what=last.what,
+            when=last.when,
+            happened=all(map(self._happened, faults)),
+            raised=self._raised(last),
+            cut=outcome.status == "HALTED" and not self._stopped,
+            status=outcome.status,
+            reason=outcome.reason,
+            message=outcome.message,
+            node=outcome.node,
+            missing=self._rehearsal.placed - items["placed"],
+            items={name: count for name, count in items.items() if name != "rows"},
+            audit=audit,
+            robot_time=outcome.robot_time,
+            entered=frozenset(self._entered()),
+            problems=tuple(problems),
+            remark=remark(outcome, faults),
+        )
+
+    def _kind(self, *args: Any, **options: Any) -> Workcell:
+        kind = self._subject.kind or cell_kind(self._subject.loaded.cell_config.kind)
+        bounded = BoundedCell(kind(*args, **options), self._rehearsal.longest)
+        return _StoppingCell(bounded, self._stop_if_due)
+
+    def _see(self, event: Event) -> None:
+        if event.kind != "sense":
+            self._events.append(event)
+        if event.kind == "status" and event.data["status"] == "RUNNING":
+            self._activations[event.data["node"]] += 1
+            self._began[event.data["node"]] = event.tick
+        elif event.kind == "status":
+            self._began.pop(event.data["node"], None)
+
+    def _stop_if_due(self) -> None:
+        """Wish a stop where a skill is to be halted."""
+        if any(self._due(breakage) for breakage in self._breakages if breakage.how == "raises when halted"):
+            self._stopped = True
+            self.run.control.stop()
+
+    def _due(self, breakage: Breakage) -> bool:
+        began = self._began.get(breakage.node)
+        this = self._activations[breakage.node] in breakage.starts
+        return began is not None and this and self.run.tick >= began + breakage.after
+
+    def _happened(self, fault: Fault) -> bool:
+        """Tell whether a fault found its occasion."""
+        names = {happening.what.name for happening in fault.happenings}
+        if any(event.kind == "disturbance" and event.data["what"] in names for event in self._events):
+            return True
+        return bool(fault.breakages) and self._raised(fault)
+
+    def _raised(self, fault: Fault) -> bool:
+        """Tell whether a node failed as it was to; True for a fault that is about none."""
+        if fault.ends_run:
+            name = InjectedError.__name__
+            told = (event.data.get("message", "") for event in self._of(fault, "INVALID"))
+            return any(name in message for message in told)
+        if not fault.reason:
+            return True
+        failures = [event for event in self._of(fault, "FAILURE") if event.data["reason"] == fault.what]
+        return any(not fault.breakages or event.data["message"] == WANTED for event in failures)
+
+    def _of(self, fault: Fault, status: str) -> Iterator[Event]:
+        for event in self._events:
+            if event.kind == "status" and (event.data["node"], event.data["status"]) == (fault.about, status):
+                yield event
+
+    def _entered(self) -> Iterator[str]:
+        for event in self._events:
+            if event.kind == "status" and event.data["status"] == "RUNNING":
+                yield event.data["node"]
+
+
+def _entry(event: Event) -> dict[str, Any]:
+    return {"kind": event.kind, "tick": event.tick, **event.data}

@@ -1,0 +1,20 @@
+"""A mission on the fake cell, and everything that can go wrong in it."""
+
+from __future__ import annotations
+
+import pytest
+
+from executive.campaign.faults.campaign import Campaign
+from executive.campaign.subject import Subject
+from executive.mission.load import load_mission
+from executive.skill import discover
+from executive.testing.fake_cell import FakeCell
+
+
+def subject_of(mission: str, seed: int = 0, **overrides: str) -> Subject:
+    return Subject(load_mission(mission, discover(), overrides), discover(), FakeCell, "fake", seed)
+
+
+@pytest.fixture(scope="session")
+def campaign() -> Campaign:
+    return Campaign(subject_of("sort_overhead"), workers=1)

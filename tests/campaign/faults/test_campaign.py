@@ -1,0 +1,155 @@
+"""A whole campaign on a small mission: rounds, coverage, pairs, and Ctrl-C."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from executive.campaign.faults.branches import branches
+from executive.campaign.faults.campaign import Campaign
+from executive.campaign.subject import Subject
+from executive.errors import ExecutiveError, InputError
+from executive.mission.load import load_mission
+from executive.skill import discover
+from executive.testing.fake_cell import FakeCell
+from executive.view.fault_trials import FaultFigures, Trial
+
+MISSION = """\
+mission: small
+description: One object, if there is one.
+cell: cells/fruit.yaml
+routes: {apple: premium_crate, banana: premium_crate, orange: market_crate, lemon: juice_crate}
+
+tree:
+  try:
+    - fallback:
+        - Detect
+        - Detect: {doubtful: pass}
+    - Localize
+    - try: [SelectTarget, Approach, Grasp, Transit, Release]
+      catch:
+        - on: [Grasp.missed]
+          do: RejectTarget
+        - on: [Approach.blocked]
+          do: {Wait: {seconds: 0.1}}
+  finally: MoveToScan
+"""
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Subject:
+    folder = tmp_path_factory.mktemp("small")
+    missions = Path(__file__).parents[3] / "missions"
+    (folder / "cells").mkdir()
+    shutil.copy(missions / "cells" / "fruit.yaml", folder / "cells")
+    (folder / "small.yaml").write_text(MISSION)
+    loaded = load_mission(folder / "small.yaml", discover(), {"cell.table.objects": "[1, 1]"})
+    return Subject(loaded, discover(), FakeCell, "fake", 0)
+
+
+@pytest.fixture(scope="module")
+def figures(small: Subject) -> FaultFigures:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("executive.campaign.faults.campaign.do_all", one_after_the_other)
+        return Campaign(small).singles()
+
+
+def one_after_the_other(
+    jobs: list[Any], work: Callable[[Any], Trial], broken: object, **options: object
+) -> list[Trial]:
+    """Stand for the processes that would do the jobs."""
+    return [work(job) for job in jobs]
+
+
+def test_every_fault_is_tried_once_in_the_order_of_the_list(figures: FaultFigures, small: Subject) -> None:
+    last = [trial.numbers[-1] for trial in figures.trials]
+    assert last == sorted(set(last))
+    faults = Campaign(small).faults
+    left_out = {number for number in range(1, len(faults) + 1) if number not in last}
+    # Only what the cell brought about already is not said by the skill, too.
+    raised = {trial.numbers[-1] for trial in figures.trials if trial.raised}
+    assert left_out
+    assert all(faults[number - 1].instead_of in raised for number in left_out)
+    assert (figures.complete, figures.listed) == (True, len(faults))
+
+
+def test_every_way_on_is_entered_the_one_behind_another_fault_with_it(figures: FaultFigures) -> None:
+    ways = [(branch.what, branch.place.rpartition(":")[2]) for branch in figures.branches]
+    assert ways == [
+        ("finally", "18"),
+        ("choice 2", "10"),
+        ("catch on Grasp.missed", "15"),
+        ("catch on Approach.blocked", "17"),
+    ]
+    assert figures.unentered == ()
+    behind = next(trial for trial in figures.trials if trial.name == "RejectTarget")
+    assert len(behind.numbers) == 2
+    assert behind.told[0].endswith("Grasp missed, first: nothing seals")
+
+
+def test_a_way_that_no_run_took_is_told_with_its_place(figures: FaultFigures, small: Subject) -> None:
+    without = [trial for trial in figures.trials if "Grasp missed" not in " ".join(trial.told)]
+    without = [trial for trial in without if not trial.what.startswith("no seal")]
+    assert [branch.what for branch in branches(small.loaded.tree, without) if not branch.entered] == [
+        "catch on Grasp.missed"
+    ]
+
+
+def test_pairs_are_drawn_by_the_seed_and_come_in_the_same_order_from_any_number_of_workers(
+    small: Subject, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    two = Campaign(small, workers=2).pairs(3)
+    monkeypatch.setattr("executive.campaign.faults.campaign.do_all", one_after_the_other)
+    one, other = Campaign(small).pairs(3), Campaign(replace(small, seed=3)).pairs(3)
+    assert one == two
+    assert [len(trial.numbers) for trial in one.trials] == [2] * 3
+    assert [trial.label for trial in one.trials] != [trial.label for trial in other.trials]
+
+
+@pytest.fixture
+def sigint() -> Iterator[None]:
+    """Hear SIGINT: what a shell runs in the background begins with it ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def interrupt(*progress: int) -> None:
+    """Press Ctrl-C."""
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+@pytest.mark.usefixtures("sigint")
+def test_after_ctrl_c_the_trials_so_far_are_told(small: Subject) -> None:
+    figures = Campaign(small, workers=1, progress=interrupt).singles()
+    assert (len(figures.trials), figures.complete) == (1, False)
+
+
+def test_a_number_that_there_is_not_is_told_with_those_that_there_are(campaign: Campaign) -> None:
+    with pytest.raises(InputError) as caught:
+        campaign.these((1, 9999))
+    assert str(caught.value) == (
+        f"sort_overhead has no fault 9999; they have the numbers 1 to {len(campaign.faults)}, "
+        "and --list shows them"
+    )
+
+
+def test_a_mission_that_does_not_succeed_by_itself_is_not_tried(small: Subject) -> None:
+    loaded = load_mission(small.loaded.path, discover(), {"cell.table.objects": "[0, 0]"})
+    broken = replace(small, loaded=loaded, kind=Empty)
+    with pytest.raises(ExecutiveError, match=r"small ended as FAULT .* although nothing was wrong"):
+        Campaign(broken)
+
+
+class Empty(FakeCell):
+    """A cell that breaks."""
+
+    def advance(self) -> None:
+        raise RuntimeError("broken")

@@ -1,0 +1,106 @@
+"""What must be true of a run in which something went wrong, and what is said where it is not."""
+
+from __future__ import annotations
+
+from executive.campaign.faults.fault import Breakage, Fault
+from executive.campaign.faults.judgement import check_books, check_end, check_losses, check_success, remark
+from executive.events import Event
+from executive.mission.flow.endings import Ending
+from executive.runtime.outcome import Outcome
+
+BUG = Fault("tree/Grasp", "Grasp", "", "raises", "first", "", breakages=(Breakage("tree/Grasp", "raises"),))
+MISS = Fault("tree/Grasp", "Grasp", "", "missed", "first", "", reason=True)
+ENDINGS = (Ending("Grasp", "missed", "tree/Grasp", "a.yaml", 3),)
+ITEMS = {"seen": 3, "placed": 2, "rejected": 1, "lost": 0, "phantom": 0}
+AUDIT = {"right": 2, "wrong_bin": 0, "left": 1, "elsewhere": 0, "unseen": 0}
+
+
+def outcome(status: str, reason: str = "", message: str = "", node: str = "") -> Outcome:
+    return Outcome(status, reason, message, node, "", 10, 1.0)
+
+
+def end(out: Outcome, fault: Fault, *, raised: bool = False) -> list[str]:
+    return list(check_end(out, [fault], ENDINGS, raised))
+
+
+def test_a_bug_has_to_end_the_run_and_to_be_found_at_its_node() -> None:
+    fault = outcome("FAULT", "fault", "Grasp: InjectedError: a bug", "tree/Grasp")
+    halted = outcome("FAULT", "fault", "tree/Grasp: Grasp: InjectedError while it was halted: a bug")
+    assert end(fault, BUG, raised=True) == end(halted, BUG, raised=True) == []
+    elsewhere = outcome("FAULT", "fault", "Wait: InjectedError: a bug", "tree/Wait")
+    assert end(elsewhere, BUG, raised=True) == [
+        "the bug was in tree/Grasp, and the run names tree/Wait: Wait: InjectedError: a bug"
+    ]
+    assert end(outcome("SUCCESS"), BUG, raised=True) == ["a bug came up, and the run ended as SUCCESS "]
+
+
+def test_no_other_fault_may_end_a_run() -> None:
+    own = outcome("FAULT", "fault", "Grasp: KeyError: 'cube'", "tree/Grasp")
+    problem = "it ended as FAULT at tree/Grasp: Grasp: KeyError: 'cube'"
+    assert end(own, MISS) == end(own, BUG, raised=True) == [problem]
+
+
+def test_a_failure_has_to_be_one_that_the_checker_knows_of() -> None:
+    assert end(outcome("FAILURE", "Grasp.missed", "", "tree/Grasp"), MISS) == []
+    assert end(outcome("FAILURE", "lost"), MISS) == []
+    assert end(outcome("FAILURE", "Wait.missed", "", "tree/Wait"), MISS) == [
+        "it ended with Wait.missed at tree/Wait, which the checker says cannot end it"
+    ]
+
+
+def test_the_books_have_to_be_what_the_world_is() -> None:
+    assert list(check_books(outcome("SUCCESS"), ITEMS, AUDIT)) == []
+    assert list(check_books(outcome("SUCCESS"), ITEMS, None)) == []
+    lost = {**ITEMS, "rejected": 0, "lost": 1}
+    (problem,) = check_books(outcome("SUCCESS"), lost, AUDIT)
+    assert problem.startswith("the ledger says seen 3, placed 2, rejected 0, lost 1")
+    assert "the audit right 2, wrong_bin 0, left 1" in problem
+    (problem,) = check_books(outcome("SUCCESS"), ITEMS, {**AUDIT, "right": 1, "wrong_bin": 1})
+    assert problem.startswith("1 misplaced; ")
+    (problem,) = check_books(outcome("SUCCESS"), {**ITEMS, "seen": 4}, AUDIT)
+    assert problem.startswith("the ledger does not balance: ")
+
+
+def test_what_nobody_saw_is_no_disagreement_unless_the_run_says_success() -> None:
+    unseen = {**AUDIT, "left": 2, "unseen": 1}
+    assert list(check_books(outcome("FAILURE", "Detect.unavailable"), ITEMS, unseen)) == []
+    look = Event("look", 1, 0.1, {})
+    assert list(check_books(outcome("SUCCESS"), ITEMS, unseen)) == []
+    assert list(check_success(outcome("SUCCESS"), unseen, [look])) == [
+        "success, and 1 objects were never seen; "
+        "the audit right 2, wrong_bin 0, left 2, elsewhere 0, unseen 1"
+    ]
+    # Whoever never looked does not say that nothing is there.
+    assert list(check_success(outcome("SUCCESS"), unseen, [])) == []
+    assert list(check_success(outcome("FAILURE"), unseen, [look])) == []
+
+
+def test_what_fell_just_before_a_run_ended_early_may_lie_anywhere() -> None:
+    fallen = {**ITEMS, "rejected": 0, "lost": 1}
+    for early in (outcome("FAULT"), outcome("FAILURE", "Detect.unavailable", "", "tree/Detect")):
+        assert list(check_books(early, fallen, AUDIT)) == []
+        assert list(check_books(early, fallen, {**AUDIT, "right": 3, "left": 0})) == []
+        assert len(list(check_books(early, fallen, {**AUDIT, "right": 1, "left": 2}))) == 1
+    assert len(list(check_books(outcome("FAILURE", "lost"), fallen, AUDIT))) == 1
+
+
+def test_what_was_taken_where_nobody_had_to_look_is_no_disagreement() -> None:
+    taken = {**AUDIT, "left": 0, "elsewhere": 1}
+    assert list(check_books(outcome("SUCCESS"), ITEMS, taken, 1)) == []
+    assert len(list(check_books(outcome("SUCCESS"), ITEMS, taken))) == 1
+    assert len(list(check_books(outcome("SUCCESS"), ITEMS, {**taken, "left": 1}, 1))) == 1
+
+
+def test_only_what_the_fault_reached_for_may_be_out_of_reach() -> None:
+    gone = {**AUDIT, "elsewhere": 1}
+    taken = Event("disturbance", 1, 0.1, {"what": "object_removed"})
+    slow = Event("disturbance", 1, 0.1, {"what": "detector_slow"})
+    assert list(check_losses(gone, [taken])) == list(check_losses(None, [])) == []
+    assert list(check_losses(gone, [slow])) == ["1 objects are out of reach, and the fault reached for 0"]
+
+
+def test_a_failure_for_another_reason_is_remarked() -> None:
+    assert remark(outcome("FAILURE", "Grasp.missed"), [MISS]) == ""
+    assert remark(outcome("FAILURE", "lost"), [MISS]) == remark(outcome("SUCCESS"), [MISS]) == ""
+    said = remark(outcome("FAILURE", "Transit.dropped"), [MISS])
+    assert said == "it says Transit.dropped, and missed was brought about"

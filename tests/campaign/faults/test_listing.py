@@ -1,0 +1,77 @@
+"""The list of faults: nothing that a mission's skills declare is left out."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import pytest
+
+from executive.campaign.faults.campaign import Campaign
+from executive.campaign.faults.listing import list_faults, skill_nodes
+from executive.campaign.subject import Subject
+from executive.mission.load import load_mission
+from executive.skill import discover
+from executive.testing.fake_cell import FakeCell
+
+MISSIONS = sorted((Path(__file__).parents[3] / "missions").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", MISSIONS, ids=lambda path: path.stem)
+def test_every_reason_of_every_node_is_there_once_and_lasting_and_so_is_a_bug_in_each(path: Path) -> None:
+    subject = Subject(load_mission(path, discover()), discover(), FakeCell, "fake", 0)
+    listed = {(fault.about, fault.what, fault.when) for fault in Campaign(subject).faults}
+    nodes = skill_nodes(subject)
+    assert len(nodes) >= 20
+    for node in nodes:
+        assert (node.path, "raises", "first") in listed
+        for reason in subject.skills[node.skill].reasons:
+            assert {(node.path, reason, "first"), (node.path, reason, "lasting")} <= listed
+
+
+def test_a_node_that_runs_often_goes_wrong_in_the_middle_too(campaign: Campaign) -> None:
+    middle = {
+        (fault.name, fault.what) for fault in campaign.faults if fault.when == "middle" and fault.reason
+    }
+    assert {("Grasp", "missed"), ("Transit", "dropped"), ("Approach", "no_contact")} <= middle
+
+
+def test_detectors_objects_and_the_tool_go_wrong_too(campaign: Campaign) -> None:
+    def told(name: str) -> set[str]:
+        return {fault.what for fault in campaign.faults if fault.name == name and not fault.reason}
+
+    ways = ("hangs", "dead", "unsure")
+    lasting = {f"{way} for {time}" for way in ways for time in ("0.5 s", "5 s")}
+    ever = {f"{way} for ever" for way in ways}
+    assert told("detector") == {"slow by 0.5 s", "slow by 5 s"} | lasting | ever
+    assert told("object") == {"taken", "bumped"}
+    assert told("Approach") >= {"target taken", "target bumped"}
+    assert told("Transit") >= {"lets go", "lets go over another bin"}
+    assert told("tool") >= {"no seal for 5 s", "no seal on object 1"}
+
+
+def test_a_reason_is_brought_about_in_the_cell_and_else_said_by_the_skill(campaign: Campaign) -> None:
+    for number, fault in enumerate(campaign.faults, 1):
+        if fault.instead_of:
+            physical = campaign.faults[fault.instead_of - 1]
+            assert fault.instead_of == number - 1
+            assert (physical.about, physical.what, physical.when) == (fault.about, fault.what, fault.when)
+            assert physical.happenings
+            assert fault.breakages
+    of = {fault.what: fault for fault in campaign.faults if fault.reason and not fault.instead_of}
+    assert (of["missed"].means, of["doubtful"].means) == ("nothing seals", "the skill says so")
+
+
+def test_what_runs_only_after_something_else_is_marked(campaign: Campaign) -> None:
+    behind = {fault.name for fault in campaign.faults if fault.behind}
+    always = {fault.name for fault in campaign.faults} - behind
+    assert {"PutDown", "RejectTarget"} <= behind
+    assert {"Grasp", "Transit", "Release"} <= always
+
+
+def test_the_numbers_are_always_the_same_and_faults_can_be_sent_to_another_process(
+    campaign: Campaign,
+) -> None:
+    again = list_faults(campaign.subject, campaign.rehearsal)
+    assert again == tuple(campaign.faults)
+    assert pickle.loads(pickle.dumps(again)) == again

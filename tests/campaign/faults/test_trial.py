@@ -1,0 +1,171 @@
+"""Single faults on the fake cell: what survives, and what is found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from executive.campaign.faults.breakages import broken_skills
+from executive.campaign.faults.campaign import Campaign
+from executive.campaign.faults.fault import Breakage, Fault
+from executive.campaign.faults.trial import record, try_out
+from executive.record.journal import read_journal
+from executive.skill import discover
+from executive.testing.fake_cell import FakeCell
+from executive.testing.run_mission import run_mission
+from executive.view.fault_trials import Trial
+
+
+def number_of(campaign: Campaign, name: str, what: str, when: str = "first", *, behind: bool = False) -> int:
+    """Return the number of the first fault like that."""
+    return next(
+        number
+        for number, fault in enumerate(campaign.faults, 1)
+        if (fault.name, fault.what, fault.when, fault.behind) == (name, what, when, behind)
+        and not fault.instead_of
+    )
+
+
+def tried(campaign: Campaign, *numbers: int) -> Trial:
+    return try_out(campaign.subject, campaign.rehearsal, campaign.these(numbers))
+
+
+@pytest.mark.parametrize(
+    ("name", "what", "when", "verdict"),
+    [
+        ("Grasp", "missed", "first", "ok"),
+        ("Grasp", "missed", "lasting", "ok -6"),
+        ("Approach", "no_contact", "middle", "ok"),
+        ("Approach", "blocked", "middle", "ok"),
+        ("Approach", "unreachable", "middle", "ok -1"),
+        ("Approach", "stale", "first", "ok"),
+        ("Transit", "dropped", "middle", "ok"),
+        ("Transit", "blocked", "first", "ok"),
+        ("Release", "stuck", "first", "ok"),
+        ("Release", "stuck", "lasting", "FAILURE Release.stuck"),
+        ("Detect", "unsure", "first", "ok"),
+        ("Detect", "unavailable", "lasting", "FAILURE Detect.unavailable"),
+        ("Localize", "stale", "first", "ok"),
+        ("SelectTarget", "doubtful", "middle", "ok"),
+        ("Approach", "target taken", "middle", "FAILURE lost"),
+        ("Transit", "lets go", "late", "ok"),
+        ("detector", "slow by 5 s", "first", "ok"),
+        ("detector", "dead for 0.5 s", "first", "ok"),
+        ("detector", "hangs for ever", "middle", "FAILURE Detect.unavailable"),
+        ("object", "taken", "late", "FAILURE lost"),
+        ("object", "bumped", "late", "ok"),
+        ("tool", "no seal on object 1", "lasting", "ok -1"),
+    ],
+)
+def test_a_fault_is_dealt_with(campaign: Campaign, name: str, what: str, when: str, verdict: str) -> None:
+    trial = tried(campaign, number_of(campaign, name, what, when))
+    assert trial.problems == ()
+    assert (trial.verdict, trial.happened, trial.raised) == (verdict, True, True)
+
+
+@pytest.mark.parametrize("name", ["Approach", "Grasp", "Transit", "Release", "Detect", "Wait"])
+@pytest.mark.parametrize(("what", "when"), [("raises", "first"), ("raises", "middle"), ("halted", "middle")])
+def test_a_bug_ends_the_run_as_a_fault_of_its_node(
+    campaign: Campaign, name: str, what: str, when: str
+) -> None:
+    number = number_of(campaign, name, what, when)
+    trial = tried(campaign, number)
+    assert trial.problems == ()
+    assert (trial.status, trial.happened) == ("FAULT", True)
+    assert "InjectedError" in trial.message
+    assert campaign.fault(number).about in (trial.node, trial.message.partition(": ")[0])
+
+
+def test_what_runs_only_behind_another_fault_is_reached_with_it(campaign: Campaign) -> None:
+    behind = number_of(campaign, "PutDown", "dropped", behind=True)
+    alone = tried(campaign, behind)
+    assert (alone.verdict, alone.status) == ("-", "SUCCESS")
+    both = tried(campaign, number_of(campaign, "Transit", "unreachable"), behind)
+    assert (both.verdict, both.raised, both.problems) == ("ok", True, ())
+    assert campaign.fault(behind).about in both.entered
+    assert both.label.endswith(f"+{behind}")
+
+
+def test_what_cannot_happen_there_found_no_occasion(campaign: Campaign) -> None:
+    # The camera of the cell sees the whole table: nothing moves before the first look.
+    trial = tried(campaign, number_of(campaign, "MoveToScan", "unreachable"))
+    assert (trial.verdict, trial.raised) == ("-", False)
+
+
+def test_a_run_that_never_ends_is_ended_and_found(campaign: Campaign) -> None:
+    number = number_of(campaign, "SelectTarget", "unseen", "lasting")
+    fault = campaign.fault(number)
+    ever = replace(fault, breakages=(replace(fault.breakages[0], starts=()),))
+    short = replace(campaign.rehearsal, robot_time=-5.0)
+    trial = try_out(campaign.subject, short, {number: ever})
+    assert trial.problems[0] == (
+        "it ended as FAULT at no node: the mission is not done after 10 s on its clock"
+    )
+
+
+class Liar(FakeCell):
+    """A cell whose audit finds one object in a wrong bin."""
+
+    def audit(self) -> dict[str, int]:
+        found = super().audit()
+        return {**found, "right": found["right"] - 1, "wrong_bin": 1}
+
+
+class Restless(FakeCell):
+    """A cell whose arm never says that it rests, once the run is over."""
+
+    def audit(self) -> dict[str, int]:
+        self.arm._path = [self.arm.tool_pose] * 9
+        return super().audit()
+
+
+@pytest.mark.parametrize(
+    ("kind", "problem"), [(Liar, "1 misplaced; the ledger says seen 6"), (Restless, "the arm is not at rest")]
+)
+def test_what_is_not_as_it_has_to_be_is_found(campaign: Campaign, kind: type[FakeCell], problem: str) -> None:
+    subject = replace(campaign.subject, kind=kind)
+    number = number_of(campaign, "Grasp", "missed")
+    trial = try_out(subject, campaign.rehearsal, campaign.these((number,)))
+    assert trial.verdict == "!!"
+    assert trial.problems[0].startswith(problem)
+
+
+def test_a_fault_repeated_is_recorded(campaign: Campaign, tmp_path: Path) -> None:
+    numbers = (number_of(campaign, "Grasp", "missed"),)
+    trial, path = record(campaign.subject, campaign.rehearsal, campaign.these(numbers), tmp_path)
+    assert trial == tried(campaign, *numbers)
+    kinds = [entry["kind"] for entry in read_journal(path / "journal.jsonl")]
+    assert kinds.count("disturbance") == 1
+    assert kinds[-1] == "end"
+
+
+def test_a_skill_goes_wrong_in_the_activations_named() -> None:
+    skills = discover()
+    path = "tree/2:repeat/do/try/sort_one/2:try/retry/do/1:sequence/Grasp"
+    breakages = [Breakage(path, "fails", "missed", (2, 3))]
+    result = run_mission("sort_overhead", substitutes=broken_skills(breakages, {path: skills["Grasp"]}))
+    ends = [
+        event.data["reason"]
+        for event in result.events
+        if event.kind == "status" and event.data["node"] == path and event.data["status"] != "RUNNING"
+    ]
+    assert (ends[:5], result.status) == (["", "missed", "missed", "", ""], "SUCCESS")
+
+
+def test_a_skill_that_says_that_it_dropped_something_has_let_it_fall() -> None:
+    skills = discover()
+    path = "tree/2:repeat/do/try/sort_one/2:try/retry/do/2:parallel/1:sequence/1:retry/do/Transit"
+    breakages = [Breakage(path, "fails", "dropped", (1,))]
+    result = run_mission("sort_overhead", substitutes=broken_skills(breakages, {path: skills["Transit"]}))
+    states: list[Mapping[str, Any]] = [event.data for event in result.events if event.kind == "item"]
+    assert "dropped" in {state["state"] for state in states}
+    assert (result.status, result.agrees) == ("SUCCESS", True)
+
+
+def test_a_fault_in_words_says_where_what_when_and_by_what() -> None:
+    fault = Fault("tree/Grasp", "Grasp", "a.yaml:3", "missed", "first", "nothing seals", reason=True)
+    assert str(fault) == "tree/Grasp missed, first: nothing seals"
