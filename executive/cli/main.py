@@ -18,7 +18,8 @@ BAD_INPUT, BROKEN, INTERRUPTED = 2, 3, 130
 """Exit codes of what ends a command early."""
 
 COMMANDS = (
-    "run", "check", "tree", "skills", "schema", "dataset", "train", "evaluate", "bench", "sweep", "doctor",
+    "run", "check", "tree", "skills", "schema", "dataset", "train", "evaluate", "bench", "sweep", "faults",
+    "replay", "doctor",
 )  # fmt: skip
 """Every command, each in the module of its name, in the order in which `--help` lists them."""
 
@@ -85,7 +86,7 @@ class Executive(click.Group):
 def _apology(error: Exception) -> str:
     """Keep the traceback of `error` in a file and return one sentence that says where."""
     with tempfile.NamedTemporaryFile(
-        "w", prefix="executive-", suffix=".txt", delete=False, encoding="utf-8"
+        "w", prefix="executive-", suffix=".txt", delete=False, encoding="utf-8", errors="backslashreplace"
     ) as file:
         traceback.print_exc(file=file)
     return (

@@ -4,21 +4,27 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from executive.cli.options import MISSION, json_option, overrides_option, runs_option, seed_option
+from executive.cli.options import json_option, overrides_option, runs_option, seed_option
 from executive.cli.output import print_json, stdout_kept_clean
 
 if TYPE_CHECKING:
+    from executive.skill import Skill
     from executive.view.lines import Lines
     from executive.view.terminal import Terminal
 
 
 @click.command(name="run")
-@MISSION
+@click.argument("mission", metavar="MISSION", required=False)
+@click.option(
+    "--resume", metavar="RUN",
+    help="Instead of a mission: take up again a run that was cut off, by its directory or as `latest`.",
+)  # fmt: skip
 @seed_option
 @overrides_option
 @runs_option
@@ -32,7 +38,8 @@ if TYPE_CHECKING:
 @click.pass_context
 def command(
     ctx: click.Context,
-    mission: str,
+    mission: str | None,
+    resume: str | None,
     seed: int,
     overrides: dict[str, str],
     runs: Path,
@@ -43,33 +50,87 @@ def command(
     requests: tuple[str, ...],
 ) -> None:
     """Run MISSION (a file or the name of a shipped mission) and record it."""
+    _require_sense(ctx, mission, resume)
     if gui and not os.environ.get("DISPLAY"):
         # The simulator would end the process with a line of its own.
         raise click.UsageError("--gui needs a display, and DISPLAY names none; leave it out")
     with stdout_kept_clean():
-        from executive.mission.load import load_mission
-        from executive.record.recorded_run import recorded_run
         from executive.record.result import EXIT_CODES
-        from executive.runtime.cells import cell_kind
         from executive.skill import discover
         from executive.view.summary import repeat_command, summary
 
         skills = discover()
-        loaded = load_mission(mission, skills, overrides, cell_kind)
         view = None if quiet else _view()
+        if mission is None:
+            assert resume is not None
+            result, repeat = _resumed(resume, runs, skills, view, gui=gui, realtime=realtime)
+        else:
+            result = _fresh(
+                mission, skills, overrides, view,
+                seed=seed, runs=runs, gui=gui, realtime=realtime, requests=requests or None,
+            )  # fmt: skip
+            # What was asked for at the terminal is asked for again.
+            repeat = repeat_command(
+                mission, seed=seed, overrides=overrides, requests=requests or result["requests"]
+            )
         if view is not None:
-            for warning in loaded.warnings:
-                click.echo(str(warning), err=True)
-        result = recorded_run(
-            loaded, skills, seed=seed, runs=runs, view=view, gui=gui, realtime=realtime,
-            requests=requests or None,
-        )  # fmt: skip
-        if view is not None:
-            repeat = repeat_command(mission, seed=seed, overrides=overrides, requests=requests)
             click.echo(summary(result, view.items, repeat), err=True, nl=False)
     if as_json:
         print_json(result)
     ctx.exit(EXIT_CODES[result["status"]])
+
+
+def _require_sense(ctx: click.Context, mission: str | None, resume: str | None) -> None:
+    """Refuse options that say nothing, or two things at once."""
+    if mission is None and resume is None:
+        raise click.UsageError("name a MISSION, or a run to take up again with --resume RUN")
+    if resume is None:
+        return
+    given = [
+        name
+        for name in ("mission", "seed", "overrides", "requests")
+        if ctx.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT
+    ]
+    if given:
+        raise click.UsageError(
+            "--resume takes mission, seed, params and requests from the run: leave them out here"
+        )
+
+
+def _fresh(
+    mission: str,
+    skills: Mapping[str, type[Skill]],
+    overrides: dict[str, str],
+    view: Lines | Terminal | None,
+    **options: Any,
+) -> dict[str, Any]:
+    """Run a mission from its start and return the result."""
+    from executive.mission.load import load_mission
+    from executive.record.recorded_run import recorded_run
+    from executive.runtime.cells import cell_kind
+
+    loaded = load_mission(mission, skills, overrides, cell_kind)
+    if view is not None:
+        for warning in loaded.warnings:
+            click.echo(str(warning), err=True)
+    return recorded_run(loaded, skills, view=view, **options)
+
+
+def _resumed(
+    name: str, runs: Path, skills: Mapping[str, type[Skill]], view: Lines | Terminal | None, **options: Any
+) -> tuple[dict[str, Any], str]:
+    """Take up a run again and return the result, and the command that would repeat it."""
+    from executive.record.find_run import find_run
+    from executive.record.journal import read_journal
+    from executive.record.resumed_run import resumed_run
+    from executive.view.summary import repeat_command
+
+    path = find_run(name, runs)
+    result = resumed_run(path, skills, view=view, **options)
+    start, *_ = read_journal(path / "journal.jsonl")
+    return result, repeat_command(
+        start["file"], seed=start["seed"], overrides=start["overrides"], requests=result["requests"]
+    )
 
 
 def _view() -> Lines | Terminal:
@@ -80,4 +141,6 @@ def _view() -> Lines | Terminal:
     from executive.view.terminal import Terminal
 
     console = Console(stderr=True)
-    return Terminal(console) if console.is_terminal and not console.is_dumb_terminal else Lines(sys.stderr)
+    if not console.is_terminal or console.is_dumb_terminal:
+        return Lines(sys.stderr)
+    return Terminal(console, sys.stdin.fileno() if sys.stdin is not None and sys.stdin.isatty() else None)

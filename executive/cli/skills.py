@@ -6,6 +6,7 @@ import inspect
 import json
 import textwrap
 from collections.abc import Iterator, Mapping
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, get_args
 
 import click
@@ -24,9 +25,14 @@ Facts = Mapping[str, Any]
 
 @click.command(name="skills")
 @click.argument("name", required=False)
+@click.option("--conform", is_flag=True, help="Check that NAME, or every skill, does what any skill must.")
 @json_option
-def command(name: str | None, as_json: bool) -> None:
-    """List the installed skills, or tell everything about the skill NAME."""
+@click.pass_context
+def command(ctx: click.Context, name: str | None, conform: bool, as_json: bool) -> None:
+    """List the installed skills, or tell everything about the skill NAME.
+
+    With --conform the exit code is 1 if a check fails, or cannot be run.
+    """
     with stdout_kept_clean():
         from executive.errors import InputError
         from executive.mission.findings import alternatives
@@ -35,13 +41,37 @@ def command(name: str | None, as_json: bool) -> None:
         skills = discover()
         if name is not None and name not in skills:
             raise InputError(f'no skill "{name}" is installed. {alternatives(name, skills, "There are")}')
-        known = {key: declared(key, skill) for key, skill in skills.items()}
+        if name is not None:
+            skills = {name: skills[name]}
+    if conform:
+        ctx.exit(0 if _conform(skills, as_json) else 1)
+    known = [declared(key, skill) for key, skill in skills.items()]
     if as_json:
-        print_json(list(known.values()) if name is None else known[name])
+        print_json(known if name is None else known[0])
     elif name is None:
-        click.echo("\n".join(_briefly(facts) for facts in known.values()))
+        click.echo("\n".join(_briefly(facts) for facts in known))
     else:
-        click.echo(_fully(known[name]))
+        click.echo(_fully(known[0]))
+
+
+def _conform(skills: Mapping[str, type[Skill]], as_json: bool) -> bool:
+    """Check skills, print what is found as soon as it is, and tell whether all is well."""
+    with stdout_kept_clean():
+        from executive.testing.conformance import conformance
+        from executive.view.conformance import conformance_lines, conformance_total
+
+    verdicts = []
+    for name, skill in skills.items():
+        with stdout_kept_clean():
+            found = [check.verdict() for check in conformance(skill, name=name)]
+        verdicts += found
+        if not as_json:
+            click.echo("\n".join(conformance_lines(found)))
+    if as_json:
+        print_json([asdict(verdict) for verdict in verdicts])
+    else:
+        click.echo(conformance_total(verdicts))
+    return all(verdict.status == "ok" for verdict in verdicts)
 
 
 def declared(name: str, skill: type[Skill]) -> Facts:

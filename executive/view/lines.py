@@ -9,6 +9,7 @@ from py_trees.behaviour import Behaviour
 
 from executive.events import Event
 from executive.mission.outline import outline
+from executive.runtime.run_control import RunControl
 from executive.view.items import ItemTable
 from executive.view.outline import skills
 
@@ -27,8 +28,9 @@ class Lines:
         self._skills: dict[str, str] = {}
         self.items = ItemTable()
 
-    def open(self, root: Behaviour) -> None:
-        """Learn the names of the nodes."""
+    def open(self, root: Behaviour, control: RunControl) -> None:
+        """Learn the names of the nodes; a log has no keys to want anything of the run."""
+        del control
         nodes = outline(root)
         self._names = {node.path: node.name for node in nodes}
         self._skills = skills(nodes)
@@ -51,6 +53,10 @@ class Lines:
         data = event.data
         if event.kind == "run":
             return f"{data.get('mission', 'mission')} starts, seed {data.get('seed', 0)}"
+        if event.kind == "resume":
+            return "taken up again: what was under way begins anew"
+        if event.kind == "disturbance":
+            return f"disturbance: {data['what']}"
         if event.kind == "status":
             return self._transition(data)
         if event.kind == "choice":

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from executive.view.items import ItemTable
+from executive.view.story import story_lines
 
 
 def repeat_command(
@@ -32,12 +33,16 @@ def verdict(result: Mapping[str, Any]) -> str:
 
 
 def summary(result: Mapping[str, Any], items: ItemTable, repeat: str) -> str:
-    """Return three lines, then one for each bin and for each other fate of an item."""
-    lines = [
-        verdict(result),
-        f"{result['robot_time_s']:.1f} s on the robot's clock, "
-        f"{result['wall_time_s']:.1f} s by the wall clock",
-        f"{result['run']}  (repeat: {repeat})",
-    ]
-    lines += [f"  {fate}: {', '.join(names)}" for fate, names in sorted(items.by_fate().items())]
+    """Return how it ended, how long it took, and a line for each bin and each other fate of an item.
+
+    What did not succeed ends with its story instead: what is read first stands last on a terminal.
+    """
+    robot, wall = result["robot_time_s"], result["wall_time_s"]
+    times = f"{robot:.1f} s on the robot's clock, {wall:.1f} s by the wall clock"
+    fates = [f"  {fate}: {', '.join(names)}" for fate, names in sorted(items.by_fate().items())]
+    story = result.get("story")
+    if story is None:
+        lines = [verdict(result), times, f"{result['run']}  (repeat: {repeat})", *fates]
+    else:
+        lines = [times, *fates, "", *story_lines(story, result["run"], repeat)]
     return "\n".join(lines) + "\n"

@@ -13,7 +13,9 @@ from rich.text import Text
 
 from executive.events import Event
 from executive.mission.outline import OutlineNode, outline
+from executive.runtime.run_control import RunControl
 from executive.view.items import ItemTable
+from executive.view.keys import HELP, HELP_PAUSED, Keys
 from executive.view.outline import branches, opened
 
 PAUSE = 0.1
@@ -32,10 +34,17 @@ class Terminal:
     """Redraws when something changed, at most ten times a second, from a thread of its own.
 
     The tick thread only notes what happened, so a slow terminal cannot slow the run down.
+
+    Args:
+        console: The terminal.
+        keyboard: File descriptor of the terminal's keyboard; None: keys do nothing.
     """
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, console: Console, keyboard: int | None = None) -> None:
         self._console = console
+        self._keyboard = keyboard
+        self._control: RunControl | None = None
+        self._keys: Keys | None = None
         self._outline: Sequence[OutlineNode] = ()
         self._status: dict[str, str] = {}
         self._why: dict[str, str] = {}
@@ -50,10 +59,13 @@ class Terminal:
         self._drawer: threading.Thread | None = None
         self.items = ItemTable()
 
-    def open(self, root: Behaviour) -> None:
-        """Draw the tree and begin to follow the run."""
+    def open(self, root: Behaviour, control: RunControl) -> None:
+        """Draw the tree and begin to follow the run, and to hand on what keys want of it."""
         with self._lock:
             self._outline = outline(root)
+        self._control = control
+        if self._keyboard is not None:
+            self._keys = Keys(self._keyboard, control, self._changed.set)
         self._show(True)
         self._drawer = threading.Thread(target=self._redraw, name="terminal", daemon=True)
         self._drawer.start()
@@ -96,7 +108,11 @@ class Terminal:
         with self._lock:
             page = Table.grid(padding=(0, 4))
             page.add_row(self._tree(), self._items())
-            return Group(Text(f"{self._header}  {self._clock:.1f} s", style="bold"), page)
+            head = Text(f"{self._header}  {self._clock:.1f} s", style="bold")
+            if self._keys is not None:
+                paused = self._control is not None and self._control.paused
+                head.append(f"   {HELP_PAUSED if paused else HELP}", style="yellow" if paused else "dim")
+            return Group(head, page)
 
     def _redraw(self) -> None:
         while not self._closed.is_set():
@@ -115,6 +131,11 @@ class Terminal:
             elif self._shown and not wanted:
                 self._live.stop()
             self._shown = wanted
+        if self._keys is not None:
+            if wanted:
+                self._keys.listen()
+            else:
+                self._keys.leave()
 
     def _tree(self) -> RenderableType:
         """Return the running path and its surroundings: a whole mission is taller than a terminal."""

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner, Result
 
 from executive.campaign.tick_cost import ChangeCost, SteadyCost
 from executive.cli.main import main
+from executive.view.halt_figures import Halt, HaltFigures
 from executive.view.motion_figures import ExecutionFigures, MethodFigures, MotionFigures, PlanningFigures
+from executive.view.soak_figures import Sample, SoakFigures
 
 
 def invoke(*words: str) -> Result:
@@ -36,10 +39,13 @@ def blocks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 def test_help_names_every_measurement():
-    shown = invoke("bench", "--help").stdout
-    assert "seal    Measure how suction cups" in shown
-    assert "tick    Measure what ticks and status changes cost" in shown
-    assert "motion  Measure how fast the arm of CELL moves" in shown
+    shown = " ".join(invoke("bench", "--help").stdout.split())
+    assert "seal Measure how suction cups" in shown
+    assert "tick Measure what ticks and status changes cost" in shown
+    assert "motion Measure how fast the arm of CELL moves" in shown
+    assert "halts Halt MISSION at moments all over one run" in shown
+    assert "kills Kill MISSION at random moments" in shown
+    assert "soak Run MISSION again and again in one process" in shown
 
 
 def test_tick_is_a_table_on_standard_output(blocks):
@@ -133,3 +139,76 @@ def test_motion_of_a_cell_that_is_not_there_names_those_that_are():
     assert shown.exit_code == 2
     assert 'there is no cell file "overhad"' in shown.stderr
     assert "overhead" in shown.stderr
+
+
+@pytest.fixture
+def campaigns(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """Stands for the campaigns: what they were asked for, and what they say went wrong."""
+    told = SimpleNamespace(asked=[], problems=(), done=2)
+
+    def halt_everywhere(subject, *, every, points, progress):
+        told.asked.append((subject.name, subject.cell, subject.kind is None, subject.seed, every, points))
+        halts = tuple(Halt(tick, tick / 240, problems=told.problems) for tick in range(told.done))
+        return HaltFigures(subject.name, subject.cell, subject.seed, 2400, halts, 2)
+
+    def soak(subject, runs, *, frames, progress):
+        told.asked.append((subject.name, subject.cell, subject.kind is None, subject.seed, runs, frames))
+        samples = tuple(Sample(100.0, 4, 6, 1000) for _ in range(told.done))
+        failed = tuple((subject.seed, problem) for problem in told.problems)
+        return SoakFigures(subject.name, subject.cell, subject.seed, samples, failed, 2)
+
+    monkeypatch.setattr("executive.campaign.halts.halt_everywhere", halt_everywhere)
+    monkeypatch.setattr("executive.campaign.soak.soak", soak)
+    return told
+
+
+def test_halts_are_every_tenth_step_of_a_simulated_cell_and_every_step_of_another(campaigns):
+    shown = invoke("bench", "halts", "sort_overhead", "--seed", "4")
+    assert invoke("bench", "halts", "sort_overhead", "--set", "cell.kind=fake").exit_code == 0
+    assert invoke("bench", "halts", "sort_fruit", "--every", "7", "--points", "3").exit_code == 0
+    assert shown.exit_code == 0
+    assert shown.stdout.startswith("sort_overhead (sim), seed 4: halted at 2 moments of a run of 2400 ticks")
+    assert campaigns.asked == [
+        ("sort_overhead", "sim", True, 4, 10, None),
+        ("sort_overhead", "fake", True, 0, 1, None),
+        ("sort_fruit", "fake", True, 0, 7, 3),
+    ]
+
+
+def test_an_oracle_is_for_simulated_cells(campaigns):
+    assert invoke("bench", "soak", "sort_wrist", "--oracle", "--runs", "2").exit_code == 0
+    assert campaigns.asked == [("sort_wrist", "sim, detections from the truth", False, 0, 2, False)]
+    shown = invoke("bench", "halts", "sort_fruit", "--oracle")
+    assert shown.exit_code == 2
+    assert "--oracle is for simulated cells, that of sort_fruit is of kind fake; leave it out" in shown.stderr
+
+
+@pytest.mark.parametrize("words", [("halts", "sort_fruit"), ("soak", "sort_fruit", "--runs", "2")])
+def test_a_campaign_in_which_something_went_wrong_has_exit_code_1(campaigns, words):
+    campaigns.problems = ("it took 0.6 s to rest",)
+    shown = invoke("bench", *words)
+    assert shown.exit_code == 1
+    assert "it took 0.6 s to rest" in shown.stdout
+
+
+@pytest.mark.parametrize("words", [("halts", "sort_fruit"), ("soak", "sort_fruit", "--runs", "2")])
+def test_a_campaign_that_was_ended_early_has_exit_code_130(campaigns, words):
+    campaigns.done = 1
+    shown = invoke("bench", *words)
+    assert shown.exit_code == 130
+    assert "ended by the user" in shown.stdout
+
+
+def test_campaigns_as_json_are_one_object(campaigns):
+    halts = json.loads(invoke("bench", "halts", "sort_fruit", "--json").stdout)
+    soaked = json.loads(invoke("bench", "soak", "sort_fruit", "--runs", "2", "--frames", "--json").stdout)
+    assert (halts["mission"], halts["points"], halts["failed"]) == ("sort_fruit", 2, [])
+    assert (soaked["mission"], soaked["runs"], soaked["slope_mb"]) == ("sort_fruit", 2, 0.0)
+    assert campaigns.asked[1][-1] is True
+
+
+def test_halts_are_tried_in_earnest():
+    shown = invoke("bench", "halts", "sort_overhead", "--set", "cell.kind=fake", "--points", "2")
+    assert shown.exit_code == 0, shown.output
+    assert "halted at 2 moments" in shown.stdout
+    assert "the mission was run again after 2" in shown.stdout

@@ -40,6 +40,8 @@ RESULT = {
     "items": {"seen": 1, "placed": 1, "rejected": 0, "lost": 0, "phantom": 0},
     "audit": {"right": 1, "wrong_bin": 0, "left": 0, "elsewhere": 0, "unseen": 0},
     "planning": {"motions": 3, "ahead": 2, "waited_s": 0.05},
+    "requests": [],
+    "story": None,
     "robot_time_s": 30.0,
     "wall_time_s": 6.0,
     "trace": "0123456789abcdef",

@@ -13,6 +13,7 @@ from rich.console import Console
 
 from executive.events import Event
 from executive.mission.outline import outline
+from executive.runtime.run_control import RunControl
 from executive.view.items import ItemTable
 from executive.view.lines import Lines
 from executive.view.outline import branches, drawn, opened, skills
@@ -80,7 +81,7 @@ def test_what_rests_is_folded():
 def lines():
     stream = io.StringIO()
     view = Lines(stream)
-    view.open(TREE)
+    view.open(TREE, RunControl())
     return view, stream
 
 
@@ -122,7 +123,7 @@ def test_an_item_is_told_when_its_state_changes_and_not_at_every_look(lines):
 def test_the_live_view_shows_the_running_path_the_items_and_the_clock():
     stream = io.StringIO()
     view = Terminal(Console(file=stream, force_terminal=True, width=100, color_system=None))
-    view.open(TREE)
+    view.open(TREE, RunControl())
     view(Event("run", 0, 0.0, {"mission": "sort", "seed": 7}))
     view(status("tree/sort", "RUNNING"))
     view(status("tree/sort/repeat", "RUNNING"))
@@ -143,7 +144,7 @@ def test_the_live_view_redraws_on_change_only_and_at_most_ten_times_a_second(mon
     renders = []
     render = view.render
     monkeypatch.setattr(view, "render", lambda: renders.append(time.perf_counter()) or render())
-    view.open(TREE)
+    view.open(TREE, RunControl())
     for tick in range(300):
         view(status("tree/sort/repeat/Detect", "RUNNING", tick / 240))
         time.sleep(0.001)

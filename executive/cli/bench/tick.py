@@ -1,49 +1,21 @@
-"""`executive bench`: measurements that other figures rest on."""
+"""`executive bench tick`: what ticks and status changes cost."""
 
 from __future__ import annotations
 
 import tempfile
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from executive.cli.options import json_option, seed_option
+from executive.cli.options import json_option
 from executive.cli.output import print_json, stdout_kept_clean
 
 if TYPE_CHECKING:
     from executive.campaign.tick_cost import ChangeCost, SteadyCost
 
 
-@click.group(name="bench")
-def command() -> None:
-    """Measure what other figures rest on."""
-
-
-@command.command(name="seal")
-@click.argument("cell", default="overhead")
-@click.option(
-    "--out", type=click.Path(path_type=Path, dir_okay=False), default=Path("seal_map.csv"), show_default=True,
-    help="File to write.",
-)  # fmt: skip
-def seal(cell: str, out: Path) -> None:
-    """Measure how suction cups of several sizes would seal on the objects of CELL, off-centre by how much."""
-    with stdout_kept_clean():
-        from executive.cli.cells import load_cells
-        from executive.errors import InputError
-        from executive.sim.seal_map import measure_map, write_map
-
-        (config,) = load_cells((cell,)).values()
-        rows = measure_map(config)
-        try:
-            write_map(rows, out)
-        except OSError as error:
-            raise InputError(f'cannot write "{out}": {(error.strerror or "").lower()}') from error
-        click.echo(f"{len(rows)} rows in {out}", err=True)
-
-
-@command.command(name="tick")
+@click.command(name="tick")
 @click.option(
     "--blocks", type=click.IntRange(min=1), default=50, show_default=True,
     help="Measurements of each figure, of which the best counts.",
@@ -61,39 +33,6 @@ def tick(blocks: int, as_json: bool) -> None:
         print_json(_figures(steady, changes))
     else:
         click.echo(_text(steady, changes))
-
-
-@command.command(name="motion")
-@click.argument("cell", default="overhead")
-@click.option(
-    "--pairs", type=click.IntRange(min=1), default=200, show_default=True,
-    help="Random pairs of an object and a place in a bin.",
-)  # fmt: skip
-@click.option(
-    "--execute", "executed", type=click.IntRange(min=0), default=0, show_default=True,
-    help="Pairs whose motions the simulated arm makes, watched all the way.",
-)  # fmt: skip
-@seed_option
-@json_option
-def motion(cell: str, pairs: int, executed: int, seed: int, as_json: bool) -> None:
-    """Measure how fast the arm of CELL moves from bin to object to bin, beside other ways to move."""
-    with stdout_kept_clean():
-        from executive.campaign.motion_execution import execute
-        from executive.campaign.motion_trial import measure
-        from executive.cli.cells import load_cells
-        from executive.cli.progress import bar
-        from executive.view.motion_figures import as_plain, print_figures
-
-        (config,) = load_cells((cell,)).values()
-        with bar("planned", quiet=as_json) as progress:
-            figures = measure(config, pairs, seed, progress)
-        if executed:
-            with bar("executed", quiet=as_json) as progress:
-                figures = replace(figures, execution=execute(config, executed, seed, progress))
-    if as_json:
-        print_json(as_plain(figures))
-    else:
-        print_figures(figures)
 
 
 def _figures(steady: list[SteadyCost], changes: list[ChangeCost]) -> dict[str, Any]:

@@ -1,0 +1,97 @@
+"""`executive faults`: let everything go wrong in a mission, and see what survives."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import click
+
+from executive.cli.options import MISSION, json_option, overrides_option, runs_option, seed_option
+from executive.cli.output import print_json, stdout_kept_clean
+from executive.cli.subject import load_subject, oracle_option
+
+
+class FaultNumbers(click.ParamType):
+    """`N`, or `N+M` for several at once."""
+
+    name = "N[+M]"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, ...]:
+        """Return the numbers that `value` names."""
+        if isinstance(value, tuple):
+            return value
+        if re.fullmatch(r"\d+(\+\d+)*", str(value)) is None:
+            self.fail(f'"{value}" is no fault; write it as 12, or 3+12 for two at once', param, ctx)
+        return tuple(dict.fromkeys(int(number) for number in str(value).split("+")))
+
+
+@click.command(name="faults")
+@MISSION
+@oracle_option
+@click.option(
+    "--pairs", type=click.IntRange(min=1), help="Instead, so many pairs of them, drawn by the seed."
+)
+@click.option("--fault", "numbers", type=FaultNumbers(), help="One of them only, with a record of its run.")
+@click.option(
+    "--list", "listed", is_flag=True, help="Print them, and run nothing but the undisturbed mission."
+)
+@click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Runs at a time.")
+@seed_option
+@overrides_option
+@runs_option
+@json_option
+@click.pass_context
+def command(
+    ctx: click.Context,
+    mission: str,
+    oracle: bool,
+    pairs: int | None,
+    numbers: tuple[int, ...] | None,
+    listed: bool,
+    workers: int,
+    seed: int,
+    overrides: dict[str, str],
+    runs: Path,
+    as_json: bool,
+) -> None:
+    """Let every single fault happen in MISSION, each in a run; exit code 1 if one was not dealt with.
+
+    Every reason of every node, bugs in every skill, detectors, objects and the tool: what happens is made
+    from the mission's tree. Wrong is a run that loses what the fault did not put out of reach, that misplaces
+    something, whose books are not what the world is, or that ends in any other disorder.
+    """
+    if sum((pairs is not None, numbers is not None, listed)) > 1:
+        raise click.UsageError("--pairs, --fault and --list exclude each other")
+    with stdout_kept_clean():
+        from executive.campaign.faults.campaign import Campaign
+        from executive.campaign.faults.trial import record
+        from executive.cli.progress import bar
+        from executive.view.fault_figures import fault_text, trial_text
+        from executive.view.fault_trials import as_plain, trial_as_plain
+
+        subject = load_subject(mission, overrides, oracle, seed)
+        with bar("tried", quiet=as_json or listed or numbers is not None) as progress:
+            campaign = Campaign(subject, workers=workers, progress=progress)
+            if listed:
+                figures = trial = None
+            elif numbers is not None:
+                these = campaign.these(numbers)
+                figures, (trial, path) = None, record(subject, campaign.rehearsal, these, runs)
+            else:
+                figures, trial = campaign.pairs(pairs) if pairs else campaign.singles(), None
+    if figures is not None:
+        print_json(as_plain(figures)) if as_json else click.echo(fault_text(figures))
+        ctx.exit(int(bool(figures.failed)) if figures.complete else 130)
+    if trial is not None:
+        told = {**trial_as_plain(trial), "run": str(path)}
+        print_json(told) if as_json else click.echo(f"{trial_text(trial)}\n{path}")
+        ctx.exit(int(bool(trial.problems)))
+    faults = [(number, str(fault)) for number, fault in enumerate(campaign.faults, 1)]
+    if as_json:
+        print_json([{"fault": number, "told": told} for number, told in faults])
+    else:
+        click.echo("\n".join(f"{number:4} {told}" for number, told in faults))

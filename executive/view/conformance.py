@@ -1,0 +1,27 @@
+"""What the checks of skills have found, a line each."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+
+from executive.testing.conformance.check import Verdict
+
+
+def conformance_lines(verdicts: Sequence[Verdict]) -> Iterator[str]:
+    """Yield a line per check: how it went, of which skill, and what is wrong first."""
+    for verdict in verdicts:
+        line = f"{verdict.status:7}  {verdict.skill}.{verdict.check}"
+        # Why it could not be run is told once, by the check that nothing else can do without.
+        if verdict.status == "failed":
+            more = len(verdict.problems) - 1
+            line += f": {verdict.problems[0]}" + (f" (and {more} more)" if more else "")
+        yield line
+
+
+def conformance_total(verdicts: Sequence[Verdict]) -> str:
+    """Return how many checks went how."""
+    counts = Counter(verdict.status for verdict in verdicts)
+    skills = len({verdict.skill for verdict in verdicts})
+    told = ", ".join(f"{counts[status]} {status}" for status in ("ok", "failed", "not run") if counts[status])
+    return f"{len(verdicts)} checks of {skills} skill{'s' if skills != 1 else ''}: {told}"

@@ -1,0 +1,121 @@
+"""`executive faults`: what it prints, and its exit codes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from click.testing import CliRunner, Result
+
+from executive.cli.main import main
+from executive.view.fault_trials import Branch, FaultFigures, Trial
+
+FAKE = ("sort_overhead", "--set", "cell.kind=fake")
+TRIAL = Trial(
+    (1,), ("tree/Grasp missed, first: nothing seals",), "Grasp", "sort.yaml:7", "missed", "first",
+    happened=True, status="SUCCESS",
+)  # fmt: skip
+
+
+def invoke(*words: str) -> Result:
+    return CliRunner().invoke(main, ("faults", *words))
+
+
+@pytest.fixture
+def campaigns(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """Stands for the campaign: what it was asked for, and what it says went wrong."""
+    told = SimpleNamespace(asked=[], problems=(), complete=True)
+
+    class Campaign:
+        def __init__(self, subject, *, workers, progress):
+            told.asked.append((subject.name, subject.cell, subject.seed, workers))
+            self._name = subject.name
+
+        def singles(self):
+            told.asked.append("singles")
+            return self._figures(pairs=False)
+
+        def pairs(self, count):
+            told.asked.append(("pairs", count))
+            return self._figures(pairs=True)
+
+        def _figures(self, *, pairs):
+            trial = Trial(**{**vars(TRIAL), "problems": told.problems})
+            ways = (Branch("sort.yaml:14", "recover", ("tree/retry/recover",)),)
+            return FaultFigures(self._name, "fake", 0, 11.5, 1, (trial,), ways, told.complete, pairs)
+
+    monkeypatch.setattr("executive.campaign.faults.campaign.Campaign", Campaign)
+    return told
+
+
+def test_it_prints_the_matrix_and_what_was_never_entered(campaigns):
+    shown = invoke(*FAKE, "--workers", "1", "--seed", "4")
+    assert shown.exit_code == 0
+    assert campaigns.asked == [("sort_overhead", "fake", 4, 1), "singles"]
+    assert "  Grasp  sort.yaml:7  missed  ok" in shown.stdout
+    assert "    never entered: sort.yaml:14: recover" in shown.stdout
+
+
+def test_a_fault_that_was_not_dealt_with_has_exit_code_1(campaigns):
+    campaigns.problems = ("the arm is not at rest",)
+    shown = invoke(*FAKE)
+    assert shown.exit_code == 1
+    assert "wrong: the arm is not at rest" in shown.stdout
+
+
+def test_a_campaign_that_was_ended_early_has_exit_code_130(campaigns):
+    campaigns.complete = False
+    shown = invoke(*FAKE)
+    assert shown.exit_code == 130
+    assert "ended by the user" in shown.stdout
+
+
+def test_pairs_are_tried_instead_and_an_oracle_where_one_is_wanted(campaigns):
+    shown = invoke("sort_overhead", "--oracle", "--pairs", "7", "--json")
+    assert campaigns.asked == [("sort_overhead", "sim, detections from the truth", 0, 2), ("pairs", 7)]
+    assert json.loads(shown.stdout)["pairs"] is True
+
+
+def test_the_list_runs_nothing_but_the_undisturbed_mission():
+    shown = invoke(*FAKE, "--list")
+    assert shown.exit_code == 0
+    lines = shown.stdout.splitlines()
+    assert lines[0].split(maxsplit=2)[:2] == ["1", "tree/look/try/retry/recover/MoveToScan"]
+    assert any("Grasp missed, first: nothing seals" in line for line in lines)
+    listed = json.loads(invoke(*FAKE, "--list", "--json").stdout)
+    assert [entry["fault"] for entry in listed] == list(range(1, len(lines) + 1))
+
+
+def test_one_fault_is_repeated_and_recorded(tmp_path: Path):
+    lines = invoke(*FAKE, "--list").stdout.splitlines()
+    number = next(line.split()[0] for line in lines if "Grasp missed, first: nothing seals" in line)
+    shown = invoke(*FAKE, "--fault", number, "--runs", str(tmp_path))
+    assert shown.exit_code == 0, shown.output
+    told = shown.stdout.splitlines()
+    assert told[0].startswith(f"fault {number}: tree/")
+    assert told[1] == "  SUCCESS"
+    assert (Path(told[-1]) / "result.json").is_file()
+    plain = json.loads(invoke(*FAKE, "--fault", number, "--runs", str(tmp_path), "--json").stdout)
+    assert (plain["fault"], plain["verdict"], plain["happened"]) == (number, "ok", True)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--fault", "0"), "sort_overhead has no fault 0; they have the numbers 1 to "),
+        (("--fault", "twelve"), '"twelve" is no fault; write it as 12, or 3+12 for two at once'),
+        (("--fault", "1", "--list"), "--pairs, --fault and --list exclude each other"),
+        (("--pairs", "0"), "0 is not in the range x>=1"),
+    ],
+)
+def test_what_cannot_be_tried_is_refused(words, told):
+    shown = invoke(*FAKE, *words)
+    assert shown.exit_code == 2
+    assert told in shown.stderr
+
+
+def test_it_is_one_of_the_commands():
+    assert "Let every single fault happen in MISSION" in " ".join(invoke("--help").stdout.split())
+    assert "  faults " in CliRunner().invoke(main, ["--help"]).stdout

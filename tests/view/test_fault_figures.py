@@ -1,0 +1,99 @@
+"""What is told of fault campaigns: the matrix, what went wrong, and what no run entered."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from executive.view.fault_figures import fault_text, trial_text
+from executive.view.fault_trials import Branch, FaultFigures, Trial, as_plain
+
+MISSED = Trial(
+    (1,), ("tree/Grasp missed, first: nothing seals",), "Grasp", "sort.yaml:7", "missed", "first",
+    happened=True, status="SUCCESS",
+)  # fmt: skip
+LASTING = replace(MISSED, numbers=(2,), when="lasting", missing=3)
+AGAIN = replace(MISSED, numbers=(3,), missing=0)
+STUCK = replace(
+    MISSED, numbers=(4,), name="Release", place="sort.yaml:9", what="stuck", status="FAILURE",
+    reason="Release.stuck", message="it hangs", node="tree/Release",
+)  # fmt: skip
+NOWHERE = replace(MISSED, numbers=(1, 5), name="Wait", place="sort.yaml:9", what="raises", happened=False)
+WRONG = replace(
+    STUCK, numbers=(6,), problems=("the arm is not at rest",), remark="it says Release.stuck",
+    name="object", place="", what="taken", when="late", told=("object taken, late: from 8.00 s on",),
+)  # fmt: skip
+BRANCHES = (
+    Branch("sort.yaml:12", "catch on Grasp.missed", ("tree/try/catch/1",), 2),
+    Branch("sort.yaml:14", "recover", ("tree/retry/recover",)),
+)
+TRIALS = (MISSED, LASTING, AGAIN, STUCK, NOWHERE, WRONG)
+FIGURES = FaultFigures("sort", "fake", 3, 11.5, 6, TRIALS, BRANCHES, True)
+
+
+def test_the_matrix_has_a_row_per_node_and_fault_and_a_column_per_occasion() -> None:
+    assert fault_text(FIGURES).splitlines()[:8] == [
+        "sort (fake), seed 3: 6 runs with faults; undisturbed it takes 11.5 s",
+        "",
+        "  node     place        fault   first                  middle  late  lasting",
+        "  Grasp    sort.yaml:7  missed  ok 2/2                               ok -3",
+        "  Release  sort.yaml:9  stuck   FAILURE Release.stuck",
+        "  Wait     sort.yaml:9  raises  -",
+        "  object                taken                                  !!",
+        "",
+    ]
+
+
+def test_a_cell_of_several_runs_tells_how_many_were_ok_and_the_worst_of_the_others() -> None:
+    def cell(*trials: Trial) -> str:
+        row = fault_text(replace(FIGURES, trials=trials)).splitlines()[3]
+        return row.removeprefix("  Grasp  sort.yaml:7  missed  ")
+
+    failed = replace(MISSED, status="FAILURE", reason="Grasp.missed")
+    assert cell(MISSED, failed, failed) == "ok 1/3, FAILURE Grasp.missed"
+    assert cell(MISSED, failed, replace(MISSED, problems=("bad",))) == "ok 1/3, !!"
+    # What found no occasion was tried otherwise, too.
+    assert cell(MISSED, replace(MISSED, happened=False)) == "ok"
+
+
+def test_what_went_wrong_and_what_was_never_entered_is_told_with_its_place() -> None:
+    assert fault_text(FIGURES).splitlines()[8:] == [
+        "  as undisturbed: 2; fewer objects sorted: 1; ended as a failure: 1; a bug came up: 0; "
+        "no occasion: 1; wrong: 1",
+        "  failures: Release.stuck 1",
+        "  not as it has to be: 1",
+        "    fault 6: object taken, late: from 8.00 s on",
+        "      FAILURE Release.stuck at tree/Release: it hangs",
+        "      wrong: the arm is not at rest",
+        "  failed for another reason than was brought about:",
+        "    it says Release.stuck: fault 6",
+        "  ways on after a failure: 1 of 2 entered",
+        "    never entered: sort.yaml:14: recover",
+    ]
+
+
+def test_pairs_have_no_matrix_and_a_campaign_cut_short_says_so() -> None:
+    lines = fault_text(replace(FIGURES, pairs=True, complete=False, trials=(NOWHERE,))).splitlines()
+    assert lines[:3] == [
+        "sort (fake), seed 3: 1 runs with pairs of faults; undisturbed it takes 11.5 s",
+        "  ended by the user; there was more to try",
+        "  as undisturbed: 0; fewer objects sorted: 0; ended as a failure: 0; a bug came up: 0; "
+        "no occasion: 1; wrong: 0",
+    ]
+
+
+def test_one_run_is_told_in_a_few_lines() -> None:
+    assert trial_text(NOWHERE).splitlines() == [
+        "fault 1+5: tree/Grasp missed, first: nothing seals",
+        "  it found no occasion",
+        "  SUCCESS",
+    ]
+
+
+def test_as_plain_values_nothing_is_left_out() -> None:
+    plain = as_plain(FIGURES)
+    assert (plain["runs"], plain["failed"], plain["listed"], plain["complete"]) == (6, 1, 6, True)
+    assert [trial["verdict"] for trial in plain["trials"]] == [
+        "ok", "ok -3", "ok", "FAILURE Release.stuck", "-", "!!",
+    ]  # fmt: skip
+    assert plain["trials"][4]["fault"] == "1+5"
+    assert plain["branches"][1] == {"place": "sort.yaml:14", "what": "recover", "entered": 0}

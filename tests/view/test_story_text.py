@@ -1,0 +1,331 @@
+"""The last lines on a terminal after runs that went wrong, whole."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+
+import pytest
+
+from executive.events import Event
+from executive.record.requests import Requests
+from executive.view.items import ItemTable
+from executive.view.story import WIDTH, story_lines
+from executive.view.summary import repeat_command, summary
+from tests.record.failed_runs import PICK, FailedRun
+
+CUBE = [("cube", 0.5, 0.1)]
+DUCK = [("duck", 0.4, -0.1)]
+TIMED = "  timeout:\n    seconds: $patience\n    do:\n" + "".join(
+    f"    {line}\n" for line in PICK.splitlines()
+)
+
+
+@pytest.fixture
+def abroad(tmp_path, monkeypatch):
+    """Missions of a test's own are written to a folder of their own."""
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def at_home(missions, monkeypatch):
+    """Shipped missions are called as in the project's folder."""
+    monkeypatch.chdir(missions.parent)
+
+
+def text(run: FailedRun, *, numbered: bool = True) -> str:
+    """Execute a run and return its story; lines of code and of shipped missions go without their numbers."""
+    story = run.tell()
+    assert story is not None
+    told = "\n".join(story_lines(story, "runs/latest", "executive run trial")) + "\n"
+    told = re.sub(r"py:\d+", "py:N", told)
+    return told if numbered else re.sub(r"\bline \d+", "line N", told)
+
+
+def gone(look: int, true: object) -> str:
+    return "the server is gone"
+
+
+def test_a_cup_that_never_seals(abroad) -> None:
+    run = FailedRun(PICK, objects=CUBE)
+    run.fake.tool.seals = lambda: False
+    expected = """\
+FAILURE after 1.70 s: Grasp of cube-1 failed (missed) on the last of 3 attempts: no seal on cube-1 0.10 s
+  after contact
+why nothing in trial.yaml stopped it, from the root down:
+  retry            all 3 attempts failed: 3 x Grasp.missed (line 11)
+  Grasp of cube-1  tree/5:retry/do/Grasp (line 15)
+the cell    tool.touching = True (1.60 s), tool.holding = False (0.57 s)
+last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 3, camera overhead, by embedded, at 1.24 s;
+            3 looks, 3 failed attempts in all
+now         the arm is at rest, the tool is empty
+left to do  1: cube-1
+next        to let the mission go on after Grasp.missed: put a try with a catch for it around line 15, or
+            allow more than 3 attempts with --set attempts=...
+record      runs/latest
+repeat      executive run trial
+"""
+    assert text(run) == expected
+
+
+def test_an_object_that_slips_out_of_the_cup_every_time(abroad) -> None:
+    run = FailedRun(PICK, objects=CUBE)
+    seals = iter([False])
+    run.fake.tool.seals = lambda: next(seals, True)
+    run.slip()
+    expected = """\
+FAILURE after 1.77 s: Transit of cube-1 failed (dropped) on the last of 3 attempts: the seal on cube-1 broke
+  on the way to red_bin, near (0.50, 0.10, 0.12) m
+why nothing in trial.yaml stopped it, from the root down:
+  retry              all 3 attempts failed: 1 x Grasp.missed, 2 x Transit.dropped (line 11)
+  Transit of cube-1  tree/5:retry/do/Transit (line 15)
+the cell    tool.holding = False (1.77 s), tool.touching = True (1.60 s), tool.bears = 7.9 (1.09 s)
+last look   cube-1 as cube 0.90 at (0.498, 0.102, 0.025) m: frame 3, camera overhead, by embedded, at 1.31 s;
+            3 looks, 3 failed attempts in all
+now         the arm is at rest, the tool is empty
+left to do  1: cube-1
+next        to let the mission go on after Transit.dropped: put a try with a catch for it around line 15, or
+            allow more than 3 attempts with --set attempts=...
+record      runs/latest
+repeat      executive run trial
+"""
+    assert text(run) == expected
+
+
+def test_an_object_that_falls_and_is_not_found_again_by_the_recovery(abroad) -> None:
+    run = FailedRun(PICK, objects=CUBE)
+    run.slip(vanish=True)
+    expected = """\
+FAILURE after 0.80 s: Transit of cube-1 failed (dropped): the seal on cube-1 broke on the way to red_bin, near
+  (0.50, 0.10, 0.12) m
+why nothing in trial.yaml stopped it, from the root down:
+  retry              gave up after attempt 1 of 3: its recovery failed with SelectTarget.unseen: no cube-1 is
+                     in sight, and the table is not known to be empty (line 11)
+  Transit of cube-1  tree/5:retry/do/Transit (line 15)
+the cell    tool.holding = False (0.75 s), tool.bears = 7.9 (0.57 s), tool.touching = True (0.57 s)
+last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera overhead, by embedded, at 0.05 s;
+            1 look, 1 failed attempt in all
+now         the arm is at rest, the tool is empty
+left to do  1: cube-1
+next        to let the mission go on after Transit.dropped: put a try with a catch for it around line 15, or
+            deal with SelectTarget.unseen in the recovery at line 14
+record      runs/latest
+repeat      executive run trial
+"""
+    assert text(run) == expected
+
+
+def test_a_time_that_is_over(abroad) -> None:
+    run = FailedRun(TIMED, objects=CUBE, overrides={"patience": "1.0"})
+    expected = """\
+FAILURE after 1.00 s: timeout: not done after 1 s during Transit of cube-1
+where       tree/timeout (trial.yaml:7)
+last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera overhead, by embedded, at 0.05 s;
+            1 look, 0 failed attempts in all
+now         the arm is at rest, the tool holds cube-1
+left to do  1: cube-1
+next        take cube-1 out of the tool before another run
+next        to let the mission go on after timeout.timeout: put a try with a catch for it around line 7, or
+            allow more than 1 s with --set patience=...
+record      runs/latest
+repeat      executive run trial
+"""
+    assert text(run) == expected
+
+
+def test_an_exception_in_a_part(abroad) -> None:
+    run = FailedRun(PICK, objects=CUBE)
+
+    def broken() -> bool:
+        raise ZeroDivisionError("vacuum gauge")
+
+    run.fake.tool.seals = broken
+    expected = """\
+FAULT after 0.57 s: Grasp: ZeroDivisionError: vacuum gauge
+where       tree/5:retry/do/Grasp (trial.yaml:15)
+raised at   view/test_story_text.py:N, in broken; the whole traceback is in the journal, event "fault"
+the cell    command raised ZeroDivisionError (0.57 s)
+last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera overhead, by embedded, at 0.05 s;
+            1 look, 0 failed attempts in all
+now         the arm is at rest, the tool is empty
+left to do  1: cube-1
+next        mend what is broken, in the code or in the cell: a fault is never tried again
+record      runs/latest
+repeat      executive run trial
+go on       executive run --resume runs/latest
+"""
+    assert text(run) == expected
+
+
+def test_a_detector_that_gives_no_answer(at_home) -> None:
+    run = FailedRun("sort_overhead", objects=CUBE)
+    run.fake.detector.answers = gone
+    expected = """\
+FAILURE after 7.40 s: Detect failed (unavailable) on the last of 8 attempts: detector embedded: the server is
+  gone
+why nothing in missions/sort_overhead.yaml stopped it, from the root down:
+  look: try    catches only Detect.unsure (line N)
+  look: retry  tries again only after Detect.unsure, Detect.hidden, Localize.stale, Localize.no_depth,
+               MoveToScan.unreachable, MoveToScan.blocked (line N)
+  look: retry  all 8 attempts failed: 8 x Detect.unavailable (line N)
+  Detect       tree/look/try/retry/do/2:retry/do/Detect (line N)
+the cell    detector.embedded raised Unavailable (7.40 s)
+last look   none so far
+now         the arm is at rest, the tool is empty
+next        see to it that detector.embedded answers again
+next        to let the mission go on after Detect.unavailable: catch it in the try at line N, or allow more
+            than 8 attempts at line N
+record      runs/latest
+repeat      executive run trial
+"""
+    assert text(run, numbered=False) == expected
+
+
+def test_a_halt_while_something_hangs_on_the_tool(at_home) -> None:
+    run = FailedRun("sort_overhead", objects=[*CUBE, *DUCK])
+    run.at_every_step(lambda: run.run.control.stop() if run.fake.world.held and run.height > 0.1 else None)
+    expected = """\
+HALTED after 0.72 s: halted by the user during Transit of cube-1 and Wait
+last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera overhead, by embedded, at 0.05 s;
+            1 look, 0 failed attempts in all
+now         the arm is at rest, the tool holds cube-1
+left to do  2: cube-1, duck-1
+next        to go on with this run leave cube-1 in the tool; take cube-1 out of the tool before another run
+record      runs/latest
+repeat      executive run trial
+go on       executive run --resume runs/latest
+"""
+    assert text(run, numbered=False) == expected
+
+
+def test_an_object_that_is_lost(at_home) -> None:
+    run = FailedRun("sort_overhead", objects=CUBE)
+    run.slip(1, vanish=True)
+    expected = """\
+FAILURE after 1.43 s: 1 object was lost: cube-1
+lost        cube-1 seen last at (0.500, 0.100, 0.025) m at 0.05 s, not in the 3 looks since; Transit.dropped
+            at 0.75 s: the seal on cube-1 broke on the way to red_bin, near (0.50, 0.10, 0.12) m
+now         the arm is at rest, the tool is empty
+next        look for cube-1 by hand, below where it was dropped
+record      runs/latest
+repeat      executive run trial
+"""
+    assert text(run, numbered=False) == expected
+
+
+def test_an_arm_whose_way_is_barred_whenever_it_carries(at_home) -> None:
+    run = FailedRun("sort_overhead", objects=CUBE)
+
+    def bar_the_way() -> None:
+        run.fake.arm.runs_into = "link 5 met a wrench" if run.fake.world.held else None
+
+    run.at_every_step(bar_the_way)
+    expected = """\
+FAILURE after 1.91 s: PutDown of cube-1 failed (blocked): link 5 met a wrench
+why nothing in missions/sort_overhead.yaml stopped it, from the root down:
+  repeat             ends well only with SelectTarget.no_candidate (line N)
+  try                catches only SelectTarget.unseen, SelectTarget.doubtful (line N)
+  sort_one: try      caught Transit.blocked (link 5 met a wrench), but what it did instead failed (line N)
+  sort_one: try      catches only PutDown.dropped (line N)
+  PutDown of cube-1  tree/2:repeat/do/try/sort_one/2:try/catch/4/try/do/PutDown (line N)
+the cell    arm.met = link 5 met a wrench (1.15 s), tool.bears = 7.9 (0.57 s), tool.holding = True (0.57 s)
+last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera overhead, by embedded, at 0.05 s;
+            1 look, 0 failed attempts in all
+now         the arm is at rest, the tool holds cube-1
+left to do  1: cube-1
+next        take cube-1 out of the tool before another run
+next        see what is in the arm's way: link 5 met a wrench
+next        to let the mission go on after PutDown.blocked: catch it in the try at line N
+record      runs/latest
+repeat      executive run trial
+"""
+    assert text(run, numbered=False) == expected
+
+
+def test_the_command_repeats_what_was_asked_for_at_the_terminal(at_home, monkeypatch) -> None:
+    reading, writing = os.pipe()
+    typed = iter(["cube", "s", "duck"])
+
+    def answer(event: Event) -> None:
+        if event.kind == "asking":
+            os.write(writing, f"{next(typed)}\n".encode())
+
+    with os.fdopen(reading) as keyboard:
+        monkeypatch.setattr(sys, "stdin", keyboard)
+        run = FailedRun("pick_on_request", objects=[*CUBE, *DUCK], requests=None)
+        requests = Requests()
+        for observer in (requests, answer):
+            run.run.observe(observer)
+        run.at_every_step(lambda: setattr(run.fake.detector, "answers", gone) if requests.words else None)
+        story = run.tell()
+    os.close(writing)
+    assert story is not None
+    repeat = repeat_command("pick_on_request", seed=3, overrides={}, requests=requests.words)
+    assert story_lines(story, "runs/latest", repeat)[-1] == (
+        "repeat      executive run pick_on_request --seed 3 --request cube --request rescan"
+    )
+
+
+def test_the_summary_ends_with_the_story(abroad) -> None:
+    run = FailedRun(PICK, objects=CUBE)
+    items = ItemTable()
+    run.run.observe(lambda event: items(event) if event.kind == "item" else None)
+    run.fake.tool.seals = lambda: False
+    story = run.tell()
+    assert story is not None
+    result = {"robot_time_s": 1.7, "wall_time_s": 0.42, "run": "runs/latest", "story": story}
+    lines = summary(result, items, "executive run trial").splitlines()
+    assert lines[:3] == [
+        "1.7 s on the robot's clock, 0.4 s by the wall clock",
+        "  rejected: cube-1 (the run ended before its turn)",
+        "",
+    ]
+    assert lines[3:] == story_lines(story, "runs/latest", "executive run trial")
+
+
+STORY = {
+    "status": "FAILURE", "reason": "Grasp.missed", "clock": 1.0, "mission": "trial.yaml", "item": "",
+    "verdict": "Grasp failed (missed): no seal", "chain": [], "reads": [], "look": None, "lost": [],
+    "node": {"path": "tree/Grasp", "name": "Grasp", "place": "trial.yaml:7"}, "running": [], "left": [],
+    "arm": "at rest", "holds": "", "raised_at": "", "picture": "", "next": [],
+}  # fmt: skip
+
+
+def test_long_texts_are_wrapped_and_cut_but_a_command_is_neither() -> None:
+    names = [f"some_subtree_{index}: retry" for index in range(9)]
+    chain = [{"name": name, "path": name, "place": "a.yaml:1", "why": "w" + " why" * 99} for name in names]
+    look = {"item": "cube-1", "frame": 1, "camera": "c", "detector": "d", "clock": 1.0, "label": "cube"}
+    story = {
+        **STORY,
+        "verdict": "Grasp failed: " + "no seal, " * 90,
+        "chain": [*chain, {"name": "Grasp", "path": "tree/Grasp", "place": "trial.yaml:7", "why": ""}],
+        "look": {**look, "confidence": 0.5, "position": [0.1, 0.2, 0.3], "looks": 1, "attempts": 0},
+        "left": [f"cube-{index}" for index in range(400)],
+        "next": ["do this " * 60],
+        "picture": "frames/000001_cube-1_missed.jpg",
+    }
+    repeat = "executive run trial" + " --set a=b" * 30
+    lines = story_lines(story, "runs/latest", repeat)
+    assert lines[-1] == f"repeat      {repeat}"
+    assert max(map(len, lines[:-1])) <= WIDTH
+    assert lines[3] == "why nothing in trial.yaml stopped it, from the root down, 4 nodes above left out:"
+    assert lines[4].startswith("  some_subtree_4: retry  w why")
+    assert "picture     frames/000001_cube-1_missed.jpg" in lines
+
+
+@pytest.mark.parametrize(
+    ("arm", "holds", "line"),
+    [
+        ("at rest", "", "now         the arm is at rest, the tool is empty"),
+        ("at rest", "cube-1", "now         the arm is at rest, the tool holds cube-1"),
+        (
+            "at rest",
+            "something",
+            "now         the arm is at rest, the tool holds something that nobody knows",
+        ),
+        ("it was told to brake", "", "now         the arm: it was told to brake, the tool is empty"),
+    ],
+)
+def test_what_is_known_of_arm_and_tool_is_said_in_words(arm, holds, line) -> None:
+    assert line in story_lines({**STORY, "arm": arm, "holds": holds}, "runs/latest", "executive run trial")
