@@ -20,6 +20,7 @@ from executive.messages import (
     Detection,
     Detections,
     Frame,
+    Glimpse,
     Item,
     ObjectClass,
     Target,
@@ -136,11 +137,14 @@ class Ledger(Protocol):
     def is_current(self, frame: Frame) -> bool:
         """Tell whether nothing has put the whole table in doubt since the frame was taken."""
 
-    def observe(self, detections: Detections, positions: Sequence[Array]) -> Sequence[Target]:
+    def observe(
+        self, detections: Detections, positions: Sequence[Array], glimpses: Sequence[Glimpse] = ()
+    ) -> Sequence[Target]:
         """Record a look and return one target per open item on the table whose place is known now.
 
-        `positions` `(3,)` [m] belong to `detections.found` one to one. What earlier looks have shown, and
-        nothing has disturbed since, is known too.
+        `positions` `(3,)` [m] belong to `detections.found` one to one; `glimpses` are those of
+        `detections.doubtful` whose place is known. What earlier looks have shown, and nothing has disturbed
+        since, is known too.
         """
 
     def is_fresh(self, target: Target) -> bool:
@@ -173,7 +177,7 @@ class Ledger(Protocol):
     def placed(self, item: Item, bin: str) -> None:
         """Record that the item was let go in a bin."""
 
-    def returned(self, item: Item) -> None:
+    def returned(self, item: Item, position: Array) -> None:
         """Record that the item was put back on the table."""
 
     def rejected(self, item: Item, why: str) -> None:

@@ -134,6 +134,7 @@ class Detections:
         reliability: How that detector errs.
         view: Name of the part of the frame that was searched: `table` or `full`.
         area: That part [pixel].
+        doubtful: Detections below the threshold, most confident first: something may be there.
     """
 
     frame: Frame
@@ -142,6 +143,7 @@ class Detections:
     reliability: Reliability
     view: str
     area: Box
+    doubtful: tuple[Detection, ...] = ()
 
     def shows(self, points: Array, inset: float = 0.0) -> NDArray[np.bool_]:
         """Tell `(N,)` which points `(N, 3)` [m] of the world lie in the searched part of the image.
@@ -168,6 +170,14 @@ class Detections:
         in_camera = self.frame.X_WC.inverse().apply(points) @ self.frame.matrix.T
         depth = in_camera[:, 2:]
         return in_camera[:, :2] / np.where(depth > 0, depth, np.inf), depth[:, 0] > 0
+
+
+@dataclass(frozen=True, eq=False)
+class Glimpse:
+    """A detection below the threshold, and where `(3,)` [m] its object would be."""
+
+    detection: Detection
+    position: Array
 
 
 Item = str

@@ -18,7 +18,8 @@ IN_VIEW = 0.7
 class Detect(Skill):
     """Know which objects a fresh image shows, beside the running tick loop.
 
-    Succeeds with everything at or above the detector's threshold; an empty list is a result, not a failure.
+    Succeeds with everything at or above the detector's threshold, and what is below it as in doubt; an empty
+    list is a result, not a failure.
     What the arm hides is not believed: neither that nothing is there, nor what is seen of it.
     """
 
@@ -30,7 +31,7 @@ class Detect(Skill):
     doubtful: str = param(
         "fail",
         choices=("fail", "pass"),
-        doc="boxes only below the threshold: `fail` as unsure, or `pass` as nothing found",
+        doc="boxes only below the threshold: `fail` as unsure, or `pass` with nothing found for sure",
     )
     hidden: str = param(
         "fail",
@@ -74,15 +75,22 @@ class Detect(Skill):
         ]
         threshold = answer.reliability.threshold
         found = tuple(detection for detection in known if detection.confidence >= threshold)
-        if not found and known and self.doubtful == "fail":
-            best = known[0]
+        doubtful = tuple(detection for detection in known if detection.confidence < threshold)
+        if not found and doubtful and self.doubtful == "fail":
+            best = doubtful[0]
             raise self.failed(
                 "unsure",
                 f"detector {answer.detector} saw nothing it is sure of: at best a {best.label} "
                 f"at {best.confidence:.2f} < {threshold:.2f}",
             )
         self.detections = Detections(
-            frame, found, answer.detector, answer.reliability, self.view, cell.camera.area(self.view)
+            frame,
+            found,
+            answer.detector,
+            answer.reliability,
+            self.view,
+            cell.camera.area(self.view),
+            doubtful,
         )
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import ClassVar
 
 from executive.cell import Cell, Steps
 from executive.errors import NoDepth
-from executive.messages import Detections, Target
+from executive.messages import Detections, Glimpse, Target
 from executive.skill import In, Out, Skill, port
 
 
@@ -35,4 +36,13 @@ class Localize(Skill):
             positions = [cell.localizer.locate(detection, frame) for detection in self.detections.found]
         except NoDepth as error:
             raise self.failed("no_depth", str(error)) from error
-        self.targets = list(cell.ledger.observe(self.detections, positions))
+        self.targets = list(cell.ledger.observe(self.detections, positions, self._glimpses(cell)))
+
+    def _glimpses(self, cell: Cell) -> list[Glimpse]:
+        """Return where what is in doubt seems to be; what has no depth is nowhere."""
+        glimpses = []
+        for detection in self.detections.doubtful:
+            with suppress(NoDepth):
+                place = cell.localizer.locate(detection, self.detections.frame)
+                glimpses.append(Glimpse(detection, place))
+        return glimpses

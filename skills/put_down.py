@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
+import numpy as np
+
 from executive.arm import Goal
 from executive.cell import Cell, LeastTimes, Steps
 from executive.messages import Item
@@ -39,4 +41,5 @@ class PutDown(Skill):
         kind = cell.classes[cell.ledger.label(self.held)]
         goal = Goal((x, y, floor + kind.height + self.drop))
         yield from carry(self, cell, self.held, goal, "the safe place")
-        yield from let_go(self, cell, self.held, self.settle, lambda: cell.ledger.returned(self.held))
+        place = np.array((x, y, floor + kind.height / 2))
+        yield from let_go(self, cell, self.held, self.settle, lambda: cell.ledger.returned(self.held, place))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 
-from executive.ledger.item import NOTHING, ON_TABLE, Record, State
+from executive.ledger.item import NOTHING, ON_TABLE, UNSURE, Record, State
 from executive.messages import Target
 
 
@@ -52,7 +52,7 @@ def fate_of(record: Record, *, gone: bool, routed: bool) -> tuple[State, str] | 
     if record.state not in ON_TABLE:
         return None
     if record.probability < 0.5:
-        return State.PHANTOM, NOTHING
+        return State.PHANTOM, NOTHING if record.looks else UNSURE
     if record.state is State.DROPPED or gone:
         return State.LOST, "known to exist, not found again"
     if record.state is State.REJECTED:

@@ -10,12 +10,14 @@ from enum import Enum
 import numpy as np
 
 from executive.geometry import Array
-from executive.messages import Reliability
+from executive.messages import Detection, Frame, Reliability
 
 LIKELY = 0.9
 """Probability of its existence from which an item is worth a grasp, and may be one missed elsewhere."""
 NOTHING = "more looks missed it than saw it"
 """Why an item is a phantom."""
+UNSURE = "no look is sure of it"
+"""Why an item is given up that a detector is unsure of time and again."""
 NEARBY = 0.02
 """Share of the searched area in which an invented box would be taken for a given item."""
 INSIDE = 0.04
@@ -48,7 +50,9 @@ class State(Enum):
 
 
 OPEN = (State.SEEN, State.DROPPED)
-ON_TABLE = (State.SEEN, State.DROPPED, State.REJECTED)
+LYING = (State.SEEN, State.REJECTED)
+"""States of what lies on the table where it was seen."""
+ON_TABLE = (*LYING, State.DROPPED)
 
 
 @dataclass(eq=False)
@@ -57,13 +61,16 @@ class Record:
 
     Attributes:
         item: Its name, unique in the run.
+        suspected: Class that it was first taken for.
         first: Where it was before it may have been moved for the first time `(3,)` [m].
         position: Mean of where it was seen since it may last have been moved `(3,)` [m].
         spread: Standard error of that along each axis [m].
         entered: Change count of the table when it was seen first.
+        since: When it was seen first [s].
         epoch: Change count of the table when it was seen last.
         existence: Log odds that it is an object and no invention of a detector.
         overlooked: Chance that it is still where it was seen last, after all that has been searched since.
+        glimpses: In how many looks since it was seen last a detector was unsure of something there.
         confidence: Of the last detection.
         frame: Id of the frame it was seen in last.
         stamp: When that was [s].
@@ -81,13 +88,16 @@ class Record:
     """
 
     item: str
+    suspected: str
     first: Array
     existence: float
     position: Array = field(init=False)
     spread: float = math.inf
     entered: int = 0
+    since: float = -math.inf
     epoch: int = 0
     overlooked: float = 1.0
+    glimpses: int = 0
     confidence: float = 0.0
     frame: int = 0
     stamp: float = 0.0
@@ -108,7 +118,9 @@ class Record:
 
     @property
     def label(self) -> str:
-        """The likeliest class; the first in the alphabet among equals."""
+        """The likeliest class, the first in the alphabet among equals; a guess before any look is sure."""
+        if not self.votes:
+            return self.suspected
         return min(self.votes, key=lambda label: (-self.votes[label], label))
 
     @property
@@ -117,6 +129,8 @@ class Record:
 
         By Bayes' rule over the classes it was taken for and, as one, all others.
         """
+        if not self.votes:
+            return 1.0
         best = self.label
         rivals = [0.0, *(vote for label, vote in self.votes.items() if label != best)]
         odds = sum(math.exp(vote - self.votes[best]) for vote in rivals)
@@ -147,9 +161,9 @@ class Record:
         self.expected = max(self.expected, by.confused)
         if not alone:
             self.existence = min(self.existence, DOUBTFUL) if not self.looks else self.existence
-        elif self.looks:
+        elif self.looks or self.glimpses:
             self.existence += math.log((1.0 - by.misses) / (by.invented * NEARBY))
-        self.looks += 1
+        self.looks, self.glimpses = self.looks + 1, 0
         self.exists = self.exists or self.existence >= CONFIRMED
 
     def locate(self, position: Array, spread: float, *, settled: bool) -> None:
@@ -168,6 +182,18 @@ class Record:
         if not self.moved:
             self.first = self.position
         self.overlooked = 1.0
+
+    def shown(self, frame: Frame, detection: Detection) -> None:
+        """Remember the look that saw it last."""
+        if self.since == -math.inf:
+            self.entered, self.since = frame.epoch, frame.stamp
+        self.epoch, self.frame, self.stamp = frame.epoch, frame.id, frame.stamp
+        self.confidence = detection.confidence
+
+    def give_up_as_unsure(self) -> None:
+        """Reject it: looks agree that something is there, and none is sure that it is an object."""
+        self.state, self.why = State.REJECTED, UNSURE
+        self.existence = max(self.existence, 0.0)
 
     def miss(self, by: Reliability) -> None:
         """Count one look that searched its place without seeing it."""

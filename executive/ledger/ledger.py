@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -15,17 +14,19 @@ from executive.errors import Fault
 from executive.events import Emit
 from executive.geometry import Array
 from executive.ledger.accounts import balance, fate_of, row_of, target_of
-from executive.ledger.binding import SURE
+from executive.ledger.bins import Bins
 from executive.ledger.coverage import Coverage
 from executive.ledger.freshness import Freshness
 from executive.ledger.item import LIKELY, OPEN, Record, State
 from executive.ledger.looks import Looks, spread_of
-from executive.messages import Bin, Detections, Frame, Item, Reliability, Target
+from executive.messages import Bin, Detections, Frame, Glimpse, Item, Target
 
 CREDIBLE, CONTRADICTED = 0.01, 0.001
 """Chance of as much disagreement about its class, above which an item is sorted, and under which given up."""
 ENOUGH = 40
 """Looks after which an item whose class they contradict each other about is given up."""
+GLIMPSES = 12
+"""Looks in a row with a detector unsure of it, after which an item that is not known well is given up."""
 SHARPER = 2 / 3
 """How much smaller the standard error of its position must be for another attempt at an item."""
 PRESENT = 0.1
@@ -47,10 +48,10 @@ class ItemLedger:
         emit: Emit,
     ) -> None:
         self._config = config
-        self._bins = bins
         self._routes = routes
         self._emit = emit
         self._records: dict[Item, Record] = {}
+        self._in_bins = Bins(config, bins, routes, self._records)
         self._freshness = Freshness()
         self._coverage = Coverage(table)
         self._looks = Looks(config, self._coverage, self._freshness)
@@ -70,7 +71,9 @@ class ItemLedger:
         """Tell whether nothing has put the whole table in doubt since the frame was taken."""
         return self._freshness.anywhere_holds(frame.epoch)
 
-    def observe(self, detections: Detections, positions: Sequence[Array]) -> Sequence[Target]:
+    def observe(
+        self, detections: Detections, positions: Sequence[Array], glimpses: Sequence[Glimpse] = ()
+    ) -> Sequence[Target]:
         """Record a look and return one target per item that is open and whose place is known now.
 
         What lies in a bin is no target. A detection where the robot has changed the table since the frame
@@ -80,7 +83,7 @@ class ItemLedger:
         frame = detections.frame
         if frame.id != self._frame:
             self._frame = frame.id
-            self._take(detections, positions)
+            self._take(detections, positions, glimpses)
         self._emit_look(detections, positions)
         return [
             target_of(record)
@@ -117,7 +120,7 @@ class ItemLedger:
             for record in self._records.values()
             if self._may_wait(record)
             and self._coverage.in_workspace(record.position)
-            and not (self.is_sure(record.item) and self._looks.settled(record))
+            and not self._is_known(record)
         ]
 
     def believes_empty(self) -> bool:
@@ -159,10 +162,12 @@ class ItemLedger:
         self._record(item).bin = bin
         self._change(item, State.PLACED)
 
-    def returned(self, item: Item) -> None:
-        """Record that the item was put back on the table, where the next look will find it."""
-        record = self._change(item, State.DROPPED)
+    def returned(self, item: Item, position: Array) -> None:
+        """Record that the item was put back on the table at a place `(3,)` [m]; a look has to confirm it."""
+        record = self._record(item)
+        record.locate(position, self._config.gate, settled=False)
         record.epoch = self.epoch
+        self._change(item, State.SEEN)
         self._disturb(record.position, math.inf)
 
     def rejected(self, item: Item, why: str) -> None:
@@ -180,7 +185,7 @@ class ItemLedger:
 
     def objects_in(self, bin: str) -> int:
         """Return how many objects were let go in `bin` so far: the number of its next free slot."""
-        return sum(record.bin == bin for record in self._records.values())
+        return self._in_bins.objects_in(bin)
 
     def standing(self) -> Sequence[Target]:
         """Return where everything is that is believed to stand on the table, to be sorted or not."""
@@ -216,29 +221,35 @@ class ItemLedger:
         """Return a plain row per item, in the order of first sight."""
         return [row_of(record) for record in self._records.values()]
 
-    def _take(self, detections: Detections, positions: Sequence[Array]) -> None:
+    def _take(self, detections: Detections, positions: Sequence[Array], glimpses: Sequence[Glimpse]) -> None:
         frame, jitter = detections.frame, detections.reliability.jitter
-        inside = [self._bin_at(position, spread_of(frame, position, jitter)) for position in positions]
+        inside = [self._in_bins.at(position, spread_of(frame, position, jitter)) for position in positions]
         outside = [number for number, bin in enumerate(inside) if bin is None]
         found = tuple(detections.found[number] for number in outside)
         places = [positions[number] for number in outside]
-        for record in self._looks.take(self._records, replace(detections, found=found), places):
+        unsure = [
+            glimpse
+            for glimpse in glimpses
+            if self._in_bins.at(glimpse.position, spread_of(frame, glimpse.position, jitter)) is None
+        ]
+        for record in self._looks.take(self._records, replace(detections, found=found), places, unsure):
             if record.state is State.SEEN and record.looks >= ENOUGH and record.consistency < CONTRADICTED:
                 told = ", ".join(f"{count} {label}" for label, count in record.tally.most_common())
                 record.state, record.why = State.REJECTED, f"its class is in doubt: {told}"
+            if record.state is State.SEEN and record.glimpses >= GLIMPSES and not self._is_known(record):
+                record.give_up_as_unsure()
             self._report(record)
         if detections.view == "full":
-            shown = Counter(
-                (detection.label, bin)
-                for detection, bin, position in zip(detections.found, inside, positions, strict=True)
-                if bin is not None and self._bins[bin].contains(position)
-            )
-            self._find_fallen(shown, detections.reliability)
+            for record, bin in self._in_bins.fallen(detections, positions, inside):
+                self.placed(record.item, bin)
 
     def _may_wait(self, record: Record) -> bool:
         """Tell whether an item may be an object that lies on the table to be sorted."""
         likely = record.probability > self._config.overlooked
         return record.state is State.SEEN and likely and not self._is_gone(record)
+
+    def _is_known(self, record: Record) -> bool:
+        return self.is_sure(record.item) and self._looks.settled(record)
 
     def _is_gone(self, record: Record) -> bool:
         return record.overlooked <= self._config.overlooked
@@ -259,33 +270,6 @@ class ItemLedger:
     def _disturb(self, centre: Array, radius: float) -> None:
         self._freshness.disturb(np.asarray(centre, dtype=float), radius)
         self._coverage.disturb(centre, radius, self.epoch)
-
-    def _bin_at(self, position: Array, spread: float) -> str | None:
-        """Return the bin that something measured with a standard deviation of `spread` [m] lies in, if any.
-
-        What seems to lie just beside a bin is in it, if something was let go there.
-        """
-        for name, bin in self._bins.items():
-            if bin.contains(position, SURE * spread if self.objects_in(name) else 0.0):
-                return name
-        return None
-
-    def _find_fallen(self, shown: Mapping[tuple[str, str], int], by: Reliability) -> None:
-        """Find dropped items again that fell into a bin that is right for them.
-
-        More objects of a class in one of its bins than were let go there can only be ones that fell, once
-        it is as good as certain that the detector did not invent them.
-        """
-        for record in self._records.values():
-            if record.state is not State.DROPPED:
-                continue
-            label = record.label
-            for bin in self._routes.get(label, ()):
-                there = sum(r.bin == bin and r.label == label for r in self._records.values())
-                record.fell(bin, shown.get((label, bin), 0) > there, by)
-                if record.fallen[bin] >= -math.log(self._config.overlooked):
-                    self.placed(record.item, bin)
-                    break
 
     def _emit_look(self, detections: Detections, positions: Sequence[Array]) -> None:
         frame = detections.frame

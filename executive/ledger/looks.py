@@ -13,13 +13,15 @@ from executive.geometry import Array
 from executive.ledger.binding import bind, reach
 from executive.ledger.coverage import Coverage
 from executive.ledger.freshness import Freshness
-from executive.ledger.item import LIKELY, NOTHING, ON_TABLE, Record, State
-from executive.messages import Detections, Frame, Item
+from executive.ledger.item import LIKELY, LYING, NEARBY, NOTHING, UNSURE, Record, State
+from executive.messages import Detections, Frame, Glimpse, Item
 
 EXPECTED = 3.0
 """Objects on a table before anybody has looked: the order of magnitude is what counts."""
 FAR_OFF = 1.5
 """How many times as far as it may be for certain an item may still be off, now and then."""
+NUDGED = 0.12
+"""How far from its place somebody may push an item, for what turns up there to be taken for it [m]."""
 GONE = 0.05
 """Chance of having been overlooked under which an item that may have been pushed is sought elsewhere."""
 
@@ -44,7 +46,11 @@ class Looks:
         return self._freshness.holds(record.position, record.epoch)
 
     def take(
-        self, records: dict[Item, Record], detections: Detections, positions: Sequence[Array]
+        self,
+        records: dict[Item, Record],
+        detections: Detections,
+        positions: Sequence[Array],
+        glimpses: Sequence[Glimpse],
     ) -> list[Record]:
         """Take a look into the books and return the items that changed by it.
 
@@ -52,33 +58,39 @@ class Looks:
             records: All items by name; new ones are entered.
             detections: The look.
             positions: Where `detections.found` are `(3,)` [m], one to one.
+            glimpses: What the detector is not sure of.
         """
         frame, by = detections.frame, detections.reliability
         current = [i for i, p in enumerate(positions) if self._freshness.holds(p, frame.epoch)]
         found = [detections.found[i] for i in current]
         places = [positions[i] for i in current]
         spreads = [spread_of(frame, place, by.jitter) for place in places]
-        known = [r for r in records.values() if r.state in ON_TABLE and r.state is not State.DROPPED]
+        known = [record for record in records.values() if record.state in LYING]
+        # What may have been an invention all along, and pushed since, is not what lies there now.
+        trusted = [record for record in known if self.settled(record) or record.probability >= 0.5]
         bound = bind(
-            known, [detection.label for detection in found], places, spreads,
+            trusted, [detection.label for detection in found], places, spreads,
             gate=self._config.gate, settled=self.settled,
         )  # fmt: skip
-        absent = [record for record in known if record not in bound.values()]
+        absent = [record for record in trusted if record not in bound.values()]
         seen: list[Record] = []
         for index, (detection, place) in enumerate(zip(found, places, strict=True)):
             record = bound.get(index)
             if record is None:
-                record = self._enter(records, detection.label, place, by.invented)
-                record.entered = frame.epoch
+                # The less likely an object was overlooked there, the likelier it is invented.
+                odds = EXPECTED * self._coverage.overlooked(place) / by.invented
+                record = self._enter(records, detection.label, place, odds)
+            if record.why == UNSURE:
+                record.state, record.why = State.SEEN, ""
             record.vote(detection.label, by, alone=not self._explained(place, spreads[index], absent))
             record.locate(place, spreads[index], settled=self.settled(record))
-            record.epoch, record.frame, record.stamp = frame.epoch, frame.id, frame.stamp
-            record.confidence = detection.confidence
+            record.shown(frame, detection)
             seen.append(record)
-        missed = self._missed(known, seen, detections)
+        glimpsed = self._glimpsed(records, seen, detections, glimpses)
+        missed = self._missed(known, [*seen, *glimpsed], detections)
         self._coverage.look(detections)
         self._recognize(records, seen)
-        changed = [*seen, *missed, *self._one_of_two(records, seen)]
+        changed = [*seen, *glimpsed, *missed, *self._one_of_two(records, seen)]
         return list({id(record): record for record in changed}.values())
 
     def _explained(self, place: Array, spread: float, absent: Sequence[Record]) -> bool:
@@ -89,13 +101,44 @@ class Looks:
             for record in absent
         )
 
-    def _enter(self, records: dict[Item, Record], label: str, place: Array, invented: float) -> Record:
-        """Enter something new: the less likely an object was overlooked there, the likelier an invention."""
+    def _enter(self, records: dict[Item, Record], label: str, place: Array, odds: float) -> Record:
+        """Enter something new, with the odds that it is an object."""
         self._counts[label] += 1
-        odds = EXPECTED * self._coverage.overlooked(place) / invented
-        record = Record(f"{label}-{self._counts[label]}", place, math.log(odds))
+        record = Record(f"{label}-{self._counts[label]}", label, place, math.log(odds))
         records[record.item] = record
         return record
+
+    def _glimpsed(
+        self,
+        records: dict[Item, Record],
+        seen: Sequence[Record],
+        look: Detections,
+        glimpses: Sequence[Glimpse],
+    ) -> list[Record]:
+        """Count what the detector is not sure of, and return the items that it may be.
+
+        It may be any item at that place, which the look did not miss then, or a new one, if something may
+        have been overlooked there. A second, weaker box on what was seen for sure is nothing.
+        """
+        frame, jitter = look.frame, look.reliability.jitter
+        counted: list[Record] = []
+        for glimpse in glimpses:
+            place, spread = glimpse.position, spread_of(look.frame, glimpse.position, jitter)
+            if not self._freshness.holds(place, frame.epoch) or self._explained(place, spread, seen):
+                continue
+            there = [r for r in records.values() if r.state in LYING and self._explained(place, spread, [r])]
+            record = min(there, key=lambda r: float(np.linalg.norm(r.position - place)), default=None)
+            if record is None:
+                odds = EXPECTED * NEARBY * self._coverage.overlooked(place)
+                if odds <= self._config.overlooked:
+                    continue
+                record = self._enter(records, glimpse.detection.label, place, odds)
+                record.locate(place, spread, settled=True)
+                record.shown(frame, glimpse.detection)
+            if record not in counted:
+                record.glimpses += 1
+                counted.append(record)
+        return counted
 
     def _missed(self, known: Sequence[Record], seen: Sequence[Record], look: Detections) -> list[Record]:
         """Weigh that items were not seen where the look searched, and return those that proved phantoms."""
@@ -151,14 +194,20 @@ class Looks:
         return doubles
 
     def _may_be(self, old: Record, new: Record) -> bool:
-        """Tell whether a new item may be one that is not where it was before the robot changed the table."""
+        """Tell whether a new item may be one that is not where it was.
+
+        The robot may have pushed it anywhere; somebody else, not far.
+        """
         if old is new or old.label != new.label:
             return False
         if old.state is State.DROPPED:
             return new.entered > old.epoch
         pushed = self._freshness.disturbed(old.position, old.epoch)
-        missing = old.state in (State.SEEN, State.REJECTED) and old.overlooked <= GONE
-        return missing and old.probability >= 0.5 and pushed is not None and new.entered >= pushed
+        apart = float(np.linalg.norm((old.position - new.position)[:2]))
+        moved = new.entered >= pushed if pushed is not None else False
+        nudged = apart <= NUDGED and new.since > old.stamp
+        missing = old.state in LYING and old.overlooked <= GONE and old.probability >= 0.5
+        return missing and (moved or nudged)
 
 
 def spread_of(frame: Frame, position: Array, jitter: float) -> float:

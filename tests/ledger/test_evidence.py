@@ -19,7 +19,7 @@ HERE = np.array([0.5, 0.0, 0.025])
 
 
 def record(existence: float = 0.0) -> Record:
-    return Record("cube-1", HERE, existence)
+    return Record("cube-1", "cube", HERE, existence)
 
 
 def test_one_vote_of_a_good_detector_is_enough_for_a_class_and_three_of_a_bad_one() -> None:

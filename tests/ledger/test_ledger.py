@@ -1,74 +1,11 @@
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import pytest
+from ledger_bench import Bench
 
-from executive.cell_config import LedgerConfig, TableConfig
 from executive.errors import Fault
-from executive.geometry import looking_down
-from executive.ledger.ledger import ItemLedger
-from executive.messages import Bin, Detection, Detections, Frame, Reliability, Target
-
-EYE = Reliability(threshold=0.5, misses=0.03, confused=0.004, invented=0.02, jitter=1.0)
-
-Thing = tuple[str, float, float]
-
-
-class Bench:
-    """A ledger with a camera above it that sees exactly what a test says."""
-
-    def __init__(self) -> None:
-        self.events: list[tuple[str, dict]] = []
-        size, slots = np.array([0.22, 0.24, 0.06]), np.zeros((6, 2))
-        bins = {
-            "red_bin": Bin("red_bin", np.array([0.2, -0.44, 0]), size, slots),
-            "pink_bin": Bin("pink_bin", np.array([0.2, 0.44, 0]), size, slots),
-            "grey_bin": Bin("grey_bin", np.array([-0.2, 0.44, 0]), size, slots),
-        }
-        self.ledger = ItemLedger(
-            LedgerConfig(),
-            TableConfig(),
-            bins,
-            {"cube": ("red_bin", "pink_bin")},
-            lambda kind, **data: self.events.append((kind, data)),
-        )
-        self.frames = 0
-
-    def look(
-        self,
-        *things: Thing,
-        view: str = "table",
-        epoch: int | None = None,
-        by: Reliability = EYE,
-        hidden: slice = slice(0, 0),
-    ) -> Sequence[Target]:
-        """Look; the columns `hidden` of the image are behind the arm."""
-        self.frames += 1
-        visible = np.ones((480, 640), bool)
-        visible[:, hidden] = False
-        area = (192.0, 100.0, 448.0, 356.0) if view == "table" else (0.0, 0.0, 640.0, 480.0)
-        frame = Frame(
-            self.frames,
-            "camera",
-            np.zeros((1, 1, 3), np.uint8),
-            None,
-            np.array([[461.0, 0, 320.0], [0, 461.0, 240.0], [0, 0, 1.0]]),
-            looking_down((0.5, 0.0, 1.2)),
-            0.0,
-            visible,
-            self.ledger.epoch if epoch is None else epoch,
-        )
-        found = tuple(Detection(label, 0.9, (0, 0, 1, 1)) for label, _, _ in things)
-        return self.ledger.observe(
-            Detections(frame, found, "eye", by, view, area), [np.array([x, y, 0.025]) for _, x, y in things]
-        )
-
-
-@pytest.fixture
-def bench() -> Bench:
-    return Bench()
+from executive.messages import Reliability
 
 
 def test_an_object_seen_twice_is_one_item(bench: Bench) -> None:
@@ -373,7 +310,7 @@ def test_what_is_believed_on_the_table_stands_there_given_up_or_not(bench: Bench
     assert bench.ledger.standing()[2].position[:2] == pytest.approx([0.6, -0.1])
 
 
-def test_what_is_held_placed_dropped_or_put_down_stands_nowhere_one_knows(bench: Bench) -> None:
+def test_what_is_held_placed_or_dropped_stands_nowhere_one_knows(bench: Bench) -> None:
     bench.look(("cube", 0.50, 0.0))
     bench.ledger.held("cube-1")
     assert bench.ledger.standing() == []
@@ -381,11 +318,27 @@ def test_what_is_held_placed_dropped_or_put_down_stands_nowhere_one_knows(bench:
     assert bench.ledger.standing() == []
     bench.look(("cube", 0.55, 0.1))
     assert [target.item for target in bench.ledger.standing()] == ["cube-1"]
-    bench.ledger.held("cube-1")
-    bench.ledger.returned("cube-1")
-    assert bench.ledger.standing() == []
     bench.ledger.placed("cube-1", "red_bin")
     assert bench.ledger.standing() == []
+
+
+def test_what_is_put_down_stands_there_and_waits_for_a_look(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0))
+    bench.ledger.held("cube-1")
+    bench.ledger.returned("cube-1", np.array((0.6, 0.2, 0.025)))
+    (target,) = bench.ledger.standing()
+    assert (target.item, target.position.tolist()) == ("cube-1", [0.6, 0.2, 0.025])
+    assert not bench.ledger.is_fresh(target)
+    assert bench.ledger.in_doubt() == ["cube-1"]
+    assert [target.item for target in bench.look(("cube", 0.603, 0.198))] == ["cube-1"]
+
+
+def test_what_was_put_down_and_not_looked_at_again_is_still_there_in_the_end(bench: Bench) -> None:
+    bench.look(("cube", 0.50, 0.0))
+    bench.ledger.held("cube-1")
+    bench.ledger.returned("cube-1", np.array((0.6, 0.2, 0.025)))
+    bench.ledger.close()
+    assert (bench.ledger.balance()["lost"], bench.ledger.balance()["rejected"]) == (0, 1)
 
 
 def test_what_is_likelier_an_invention_or_gone_stands_nowhere(bench: Bench) -> None:
@@ -427,3 +380,47 @@ def test_what_lies_at_the_rim_of_the_workspace_is_looked_for_though_the_arm_hide
     for _ in range(12):
         bench.look(view="full", hidden=slice(0, 230))
     assert bench.ledger.in_doubt() == ["cube-1"]
+
+
+def test_an_object_somebody_pushes_aside_is_the_same_item_once_that_is_clear(bench: Bench) -> None:
+    for _ in range(3):
+        bench.look(("cube", 0.50, 0.0), ("duck", 0.6, 0.1))
+    for _ in range(3):
+        bench.look(("cube", 0.56, 0.0), ("duck", 0.6, 0.1))
+    states = {row["item"]: (row["state"], row["why"]) for row in bench.ledger.rows()}
+    assert states == {"cube-1": ("seen", ""), "duck-1": ("seen", ""), "cube-2": ("phantom", "it is cube-1")}
+    assert bench.ledger.is_sure("cube-1")
+
+
+@pytest.mark.parametrize(
+    ("label", "x"), [("duck", 0.56), ("cube", 0.64)], ids=["another class", "too far away to be pushed"]
+)
+def test_what_turns_up_elsewhere_without_the_robots_doing_is_another_object(
+    bench: Bench, label: str, x: float
+) -> None:
+    for _ in range(3):
+        bench.look(("cube", 0.50, 0.0))
+    for _ in range(5):
+        bench.look((label, x, 0.0))
+    assert bench.ledger.balance()["phantom"] == 0
+
+
+def test_what_stood_there_before_the_other_vanished_is_not_that_one(bench: Bench) -> None:
+    for _ in range(3):
+        bench.look(("cube", 0.50, 0.0), ("cube", 0.56, 0.0))
+    for _ in range(5):
+        bench.look(("cube", 0.56, 0.0))
+    bench.ledger.close()
+    assert [row["state"] for row in bench.ledger.rows()] == ["lost", "rejected"]
+
+
+def test_what_lies_where_something_was_invented_before_the_table_changed_is_new(bench: Bench) -> None:
+    for _ in range(4):
+        bench.look(("cube", 0.6, 0.1))
+    bench.look(("cube", 0.6, 0.1), ("duck", 0.5, 0.0))
+    assert bench.ledger.records[1].probability < 0.5, "nothing was there in four looks"
+    bench.ledger.held("cube-1")
+    bench.ledger.dropped("cube-1")
+    for _ in range(3):
+        bench.look(("cube", 0.5, 0.02))
+    assert [record.item for record in bench.ledger.records if record.state.value == "seen"] == ["cube-1"]

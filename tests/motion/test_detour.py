@@ -70,13 +70,13 @@ def test_it_is_clear_and_much_faster_than_the_way_that_stops_at_every_corner(ove
 
 
 def test_a_weak_seal_is_part_of_the_search(over_the_post, kinematics) -> None:
-    """What is found takes less time than the fastest way, slowed until the seal bears it."""
+    """What is found is faster than the fastest way slowed until the seal bears it."""
     weak = Load(KIND, 2.4)
     fastest, gentle = (Trajectory(improved(*over_the_post(load)).fly(exactly=True)) for load in (CUBE, weak))
     share, wanted = (Hold(weak, kinematics).share(motion) for motion in (fastest, gentle))
     assert share < 0.85
     assert wanted > 0.95
-    assert fastest.duration < gentle.duration < fastest.duration / math.sqrt(share)
+    assert fastest.duration - 1e-9 < gentle.duration < fastest.duration / math.sqrt(share)
 
 
 def test_flown_exactly_it_takes_as_long_as_it_costs(over_the_post) -> None:

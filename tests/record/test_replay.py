@@ -88,7 +88,9 @@ def test_another_word_for_the_same_is_no_difference(missions: Path, tmp_path: Pa
 
 def test_another_tree_around_the_same_skills_is_no_difference(missions: Path, tmp_path: Path) -> None:
     path = recorded(missions, tmp_path, "sort_fruit")
-    done = again(path, edited(path, missions, "do: {use: carry}", "do: {sequence: [{use: carry}, succeed]}"))
+    done = again(
+        path, edited(path, missions, "do: [{use: carry},", "do: [{sequence: [{use: carry}, succeed]},")
+    )
     assert (done.edited, done.same, done.difference) == (True, True, "")
 
 

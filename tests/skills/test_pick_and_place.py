@@ -266,7 +266,8 @@ def test_taken_away_while_it_puts_down_it_has_returned_what_lies_there(fake: Fak
         fake.advance()
     steps.close()
     (row,) = fake.ledger.rows()
-    assert (fake.ledger.in_tool(), row["state"]) == (None, "dropped")
+    assert (fake.ledger.in_tool(), row["state"]) == (None, "seen")
+    assert row["position"][:2] == list(fake.cell.safe_place[:2])
 
 
 def test_while_an_arm_brakes_after_a_drop_the_ledger_knows_of_it(fake: FakeCell, held: str) -> None:

@@ -94,7 +94,7 @@ def test_what_falls_or_is_put_down_is_not_taken_for_something_else(effect: Effec
 
 
 def test_what_sticks_hangs_at_the_tool_to_the_end(watched: Watched) -> None:
-    result = watched.run(during("*/Release", tool_sticks(), nth=2), holding)
+    result = watched.run(during("*/Release", tool_sticks(), nth=(2, 3, 4)), holding)
     assert (result.status, result.reason) == ("FAILURE", "Release.stuck")
     assert watched.seen["stuck"] is watched.seen["end"] is True
     assert result.holds == result.disturbances()[0]["item"]
@@ -138,7 +138,7 @@ def test_an_arm_that_runs_into_something_brakes(watched: Watched) -> None:
     assert failed.data["message"] == "the arm ran into a hand"
     told = next(event for event in result.events if event.kind == "disturbance")
     assert 10 < failed.tick - told.tick < 120, "it brakes along its path"
-    assert (result.status, result.items["rejected"], result.agrees) == ("SUCCESS", 1, True)
+    assert (result.status, result.items["rejected"], result.agrees) == ("SUCCESS", 0, True)
 
 
 def test_the_world_goes_on_without_what_was_removed_before_anybody_looked(watched: Watched) -> None:

@@ -1,0 +1,69 @@
+"""A ledger with a camera above it, for tests."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from executive.cell_config import LedgerConfig, TableConfig
+from executive.geometry import looking_down
+from executive.ledger.ledger import ItemLedger
+from executive.messages import Bin, Detection, Detections, Frame, Glimpse, Reliability, Target
+
+EYE = Reliability(threshold=0.5, misses=0.03, confused=0.004, invented=0.02, jitter=1.0)
+
+Thing = tuple[str, float, float]
+
+
+class Bench:
+    """A ledger with a camera above it that sees exactly what a test says."""
+
+    def __init__(self) -> None:
+        self.events: list[tuple[str, dict]] = []
+        size, slots = np.array([0.22, 0.24, 0.06]), np.zeros((6, 2))
+        bins = {
+            "red_bin": Bin("red_bin", np.array([0.2, -0.44, 0]), size, slots),
+            "pink_bin": Bin("pink_bin", np.array([0.2, 0.44, 0]), size, slots),
+            "grey_bin": Bin("grey_bin", np.array([-0.2, 0.44, 0]), size, slots),
+        }
+        self.ledger = ItemLedger(
+            LedgerConfig(),
+            TableConfig(),
+            bins,
+            {"cube": ("red_bin", "pink_bin")},
+            lambda kind, **data: self.events.append((kind, data)),
+        )
+        self.frames = 0
+
+    def look(
+        self,
+        *things: Thing,
+        view: str = "table",
+        epoch: int | None = None,
+        by: Reliability = EYE,
+        hidden: slice = slice(0, 0),
+        unsure: Sequence[Thing] = (),
+    ) -> Sequence[Target]:
+        """Look; the columns `hidden` of the image are behind the arm, and of some things it is `unsure`."""
+        self.frames += 1
+        visible = np.ones((480, 640), bool)
+        visible[:, hidden] = False
+        area = (192.0, 100.0, 448.0, 356.0) if view == "table" else (0.0, 0.0, 640.0, 480.0)
+        frame = Frame(
+            self.frames,
+            "camera",
+            np.zeros((1, 1, 3), np.uint8),
+            None,
+            np.array([[461.0, 0, 320.0], [0, 461.0, 240.0], [0, 0, 1.0]]),
+            looking_down((0.5, 0.0, 1.2)),
+            float(self.frames),
+            visible,
+            self.ledger.epoch if epoch is None else epoch,
+        )
+        found = tuple(Detection(label, 0.9, (0, 0, 1, 1)) for label, _, _ in things)
+        return self.ledger.observe(
+            Detections(frame, found, "eye", by, view, area),
+            [np.array([x, y, 0.025]) for _, x, y in things],
+            [Glimpse(Detection(label, 0.4, (0, 0, 1, 1)), np.array([x, y, 0.025])) for label, x, y in unsure],
+        )
