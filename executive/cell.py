@@ -171,7 +171,7 @@ class Ledger(Protocol):
     def held(self, item: Item) -> None:
         """Record that the tool holds the item; its neighbours may have moved."""
 
-    def dropped(self, item: Item) -> None:
+    def dropped(self, item: Item, landing: Array | None = None) -> None:
         """Record that the tool lost the item on the way; the whole table is in doubt now."""
 
     def placed(self, item: Item, bin: str) -> None:

@@ -7,8 +7,9 @@ from typing import Any, ClassVar
 
 from executive.arm import Goal, Task
 from executive.cell import Cell, LeastTimes, Steps, Tool
+from executive.goals import OVERTRAVEL, SPACING, approach
 from executive.messages import Target
-from executive.moving import OVERTRAVEL, SPACING, approach, follow, planned
+from executive.moving import follow, planned
 from executive.skill import EMPTY, In, Metres, Skill, param, port
 
 EARLY = 0.001

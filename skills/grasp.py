@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from executive.cell import Cell, LeastTimes, Steps
+from executive.goals import into
 from executive.messages import Item, Target
-from executive.moving import carrying, into
+from executive.moving import carrying
 from executive.skill import EMPTY, HOLDING, In, Out, Seconds, Skill, param, port
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import ClassVar
 
 from executive.cell import Cell, Steps
+from executive.goals import approach
 from executive.messages import Target
-from executive.moving import approach
 from executive.skill import In, Skill, port
 
 

@@ -7,15 +7,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from executive.arm import Goal
 from executive.cell import Cell, LeastTimes, Steps
+from executive.goals import aside
 from executive.messages import Item
 from executive.moving import carry, let_go
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, param, port
 
 
 class PutDown(Skill):
-    """Put the held item down on the cell's safe place, where the next look finds it.
+    """Put the held item down on the cell's safe place, or beside what stands there, where a look finds it.
 
     The tool's sensor is watched all the way.
     """
@@ -37,9 +37,8 @@ class PutDown(Skill):
 
     def run(self, cell: Cell) -> Steps:
         """Carry it there, come down, let go."""
-        x, y, floor = (float(value) for value in cell.safe_place)
-        kind = cell.classes[cell.ledger.label(self.held)]
-        goal = Goal((x, y, floor + kind.height + self.drop))
+        goal = aside(cell, self.held, self.drop)
         yield from carry(self, cell, self.held, goal, "the safe place")
-        place = np.array((x, y, floor + kind.height / 2))
+        height = cell.classes[cell.ledger.label(self.held)].height
+        place = np.array(goal.position) - (0.0, 0.0, self.drop + height / 2)
         yield from let_go(self, cell, self.held, self.settle, lambda: cell.ledger.returned(self.held, place))

@@ -8,8 +8,8 @@ import numpy as np
 
 from executive.cell import Cell, Steps
 from executive.messages import Item, Target
-from executive.moving import slots_taken
 from executive.skill import In, Out, Skill, SkillFailed, param, port
+from executive.surroundings import slots_taken
 
 
 class SelectTarget(Skill):

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from executive.cell import Cell, LeastTimes, Steps
+from executive.goals import DROP, into
 from executive.messages import Item
-from executive.moving import DROP, carry, into
+from executive.moving import carry
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Skill, param, port
 
 

@@ -6,19 +6,10 @@ import numpy as np
 import pytest
 
 from executive.arm import Goal, Task
+from executive.goals import DROP, approach, into, onto, over
 from executive.messages import BIN_THICKNESS, ObjectClass, Obstacle, Target
-from executive.moving import (
-    DROP,
-    approach,
-    around,
-    carrying,
-    heeding,
-    into,
-    onto,
-    over,
-    planned,
-    slots_taken,
-)
+from executive.moving import carrying, heeding, planned
+from executive.surroundings import around, slots_taken
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach

@@ -10,10 +10,10 @@ from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
 from executive.errors import InputError, Unreachable
 from executive.geometry import tool_down
+from executive.goals import onto, over
 from executive.layout import as_bin
 from executive.messages import Bin, Load, ObjectClass, Obstacle
 from executive.motion.planner import Planner
-from executive.moving import onto, over
 from executive.sim.models import load_mesh, weighed
 from executive.sim.seal import breakaway, measure
 from executive.sim.spawn import spawn
@@ -36,8 +36,8 @@ class Scene:
         bears: Pull that a seal there bears [N].
         target: The object to pick, where it really is.
         others: What else stands on the table, where it really is.
-        approach: Goal of the motion onto it, as `executive.moving.approach` makes it.
-        drop: Goal of the motion into the bin, as `executive.moving.into` makes it for an empty one.
+        approach: Goal of the motion onto it, as `executive.goals.approach` makes it.
+        drop: Goal of the motion into the bin, as `executive.goals.into` makes it for an empty one.
     """
 
     body: int

@@ -6,12 +6,21 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+import numpy as np
+
 from executive.cell import Routes
 from executive.cell_config import LedgerConfig
 from executive.geometry import Array
 from executive.ledger.binding import SURE
 from executive.ledger.item import Record, State
 from executive.messages import Bin, Detections, Item
+
+WALL = 0.02
+"""How far from a bin's wall something has to come down to be in it for sure [m]."""
+FELL = math.log(0.95 / 0.05)
+"""Log odds that something is in a bin that it fell into by all one knows of its fall."""
+CORNERS = np.array([(0, 0, 0), (1, 1, 0), (1, -1, 0), (-1, 1, 0), (-1, -1, 0)])
+"""Places on a bin's floor that a look has to search, in halves of its length and width."""
 
 
 class Bins:
@@ -50,6 +59,17 @@ class Bins:
                 return name
         return None
 
+    def let_fall(self, record: Record, landing: Array | None) -> None:
+        """Note where something fell that the tool lost; None: nobody knows."""
+        record.fallen.clear()
+        for bin in self._routes.get(record.label, ()):
+            if landing is not None and self._bins[bin].contains(landing, -WALL):
+                record.fallen[bin] = FELL
+
+    def believed(self, record: Record) -> str | None:
+        """Return the bin that a dropped item must have fallen into, or None where that is not sure enough."""
+        return next((bin for bin, odds in record.fallen.items() if odds >= FELL), None)
+
     def fallen(
         self, look: Detections, positions: Sequence[Array], inside: Iterable[str | None]
     ) -> Iterator[tuple[Record, str]]:
@@ -74,7 +94,15 @@ class Bins:
             label = record.label
             for bin in self._routes.get(label, ()):
                 there = sum(r.bin == bin and r.label == label for r in self._records.values())
-                record.fell(bin, shown[label, bin] > there, look.reliability)
+                more = shown[label, bin] > there
+                if more or self._is_searched(bin, look):
+                    record.fell(bin, more, look.reliability)
                 if record.fallen[bin] >= -math.log(self._config.overlooked):
                     yield record, bin
                     break
+
+    def _is_searched(self, name: str, look: Detections) -> bool:
+        """Tell whether a look shows the whole floor of a bin."""
+        bin = self._bins[name]
+        reach = np.append(bin.size[:2] / 2 - WALL, 0.0)
+        return bool(look.searched(bin.position + reach * CORNERS).all())

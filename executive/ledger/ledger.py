@@ -25,7 +25,7 @@ CREDIBLE, CONTRADICTED = 0.01, 0.001
 """Chance of as much disagreement about its class, above which an item is sorted, and under which given up."""
 ENOUGH = 40
 """Looks after which an item whose class they contradict each other about is given up."""
-GLIMPSES = 12
+GLIMPSES = 20
 """Looks in a row with a detector unsure of it, after which an item that is not known well is given up."""
 SHARPER = 2 / 3
 """How much smaller the standard error of its position must be for another attempt at an item."""
@@ -150,9 +150,13 @@ class ItemLedger:
         record.exists = True
         self._disturb(record.position, self._config.neighbourhood)
 
-    def dropped(self, item: Item) -> None:
-        """Record that the tool lost the item on the way; the whole table is in doubt now."""
+    def dropped(self, item: Item, landing: Array | None = None) -> None:
+        """Record that the tool lost the item on the way; the whole table is in doubt now.
+
+        It is sought everywhere; `landing` `(3,)` [m] is where it must have come down, if one knows.
+        """
         record = self._change(item, State.DROPPED)
+        self._in_bins.let_fall(record, landing)
         record.attempts += 1
         record.epoch = self.epoch
         self._disturb(record.position, math.inf)
@@ -208,6 +212,9 @@ class ItemLedger:
     def close(self) -> None:
         """Decide what became of everything still open (`fate_of`): the run is over."""
         for record in self._records.values():
+            if record.state is State.DROPPED and (bin := self._in_bins.believed(record)):
+                record.why = "it fell there"
+                self.placed(record.item, bin)
             fate = fate_of(record, gone=self._is_gone(record), routed=record.label in self._routes)
             if fate is not None:
                 state, record.why = fate

@@ -15,11 +15,11 @@ from executive.campaign.motion_scenes import Scenes
 from executive.campaign.motion_trial import opened
 from executive.cell_config import CellConfig
 from executive.errors import InputError
+from executive.goals import approach, into
 from executive.layout import as_bin, as_class
 from executive.messages import Load, ObjectClass, Obstacle, Target
 from executive.mission.parse.cell_file import load_cell
 from executive.motion.planner import Planner
-from executive.moving import approach, into
 from executive.sim.world import World
 
 

@@ -224,11 +224,10 @@ def test_an_arm_whose_way_is_barred_whenever_it_carries(at_home) -> None:
     expected = """\
 FAILURE after 1.91 s: PutDown of cube-1 failed (blocked): link 5 met a wrench
 why nothing in missions/sort_overhead.yaml stopped it, from the root down:
-  repeat             ends well only with SelectTarget.no_candidate (line N)
-  try                catches only SelectTarget.unseen, SelectTarget.doubtful (line N)
-  sort_one: try      caught Transit.blocked (link 5 met a wrench), but what it did instead failed (line N)
-  sort_one: try      catches only PutDown.dropped (line N)
-  PutDown of cube-1  tree/2:repeat/do/try/sort_one/2:try/catch/4/try/do/PutDown (line N)
+  repeat             ends well only with choice.no_candidate (line N)
+  carry: try         caught Transit.blocked (link 5 met a wrench), but what it did instead failed (line N)
+  carry: try         catches only PutDown.dropped (line N)
+  PutDown of cube-1  tree/2:repeat/do/carry/try/catch/4/try/do/PutDown (line N)
 the cell    arm.met = link 5 met a wrench (1.15 s), tool.bears = 7.9 (0.57 s), tool.holding = True (0.57 s)
 last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera overhead, by embedded, at 0.05 s;
             1 look, 0 failed attempts in all

@@ -42,7 +42,7 @@ def _failing(skill: type[Skill], reason: str) -> type[Skill]:
         if empties:
             cell.tool.open()
             if (item := cell.ledger.in_tool()) is not None:
-                cell.ledger.dropped(item)
+                cell.ledger.dropped(item, cell.arm.tool_pose.position)
         raise self.failed(reason, WANTED)
 
     return _subclass(skill, run)
