@@ -78,6 +78,10 @@ class Arm(Protocol):
         """Pose of the tool centre point in the world, from the joint positions."""
 
     @property
+    def tool_velocity(self) -> Array:
+        """Velocity of the tool centre point in the world `(3,)` [m/s]."""
+
+    @property
     def destination(self) -> Array:
         """Where the tool will be when the running motion is over, or is now `(3,)` [m]."""
 

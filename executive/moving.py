@@ -8,8 +8,8 @@ from executive.arm import Arm, Goal, Motion, Task
 from executive.cell import Cell, Steps
 from executive.errors import Blocked, Unreachable
 from executive.messages import Item, Load
-from executive.seal import Seal
 from executive.skill import Skill, SkillFailed
+from executive.slip import slipped
 from executive.surroundings import around
 
 PLANS = 3
@@ -86,15 +86,14 @@ def carry(skill: Skill, cell: Cell, item: Item, goal: Goal, whither: str) -> Ste
             reason is the skill's `unreachable` or `blocked`. Or the seal broke, for whatever cause: then the
             arm is at rest, the tool open, the ledger told, and the reason is the skill's `dropped`.
     """
-    seal = Seal(cell, item)
     try:
         motion = yield from planned(skill, cell.arm, lambda: (goal, carrying(cell, item)))
-        yield from follow(skill, cell, motion, until=seal.broken)
+        yield from follow(skill, cell, motion, until=lambda: slipped(cell, item))
     except SkillFailed:
         # Whatever else went wrong: what the tool no longer holds cannot be put down.
-        if not seal.broken():
+        if not slipped(cell, item):
             raise
-    if seal.broken():
+    if slipped(cell, item):
         x, y, z = cell.arm.tool_pose.position
         cell.tool.open()
         raise skill.failed(

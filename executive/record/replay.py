@@ -132,15 +132,19 @@ class _Comparison:
             self.same += 1
             return
         self._over = True
-        if recorded is not None or self._whole:
+        if self._whole or (recorded is not None and self._counts(recorded)):
             self.difference = (recorded, decision)
         self.stop()
 
     def _end(self) -> None:
         """The replay is at its end: is the record, too?"""
-        if self.same < len(self._to_come) and self._to_come[self.same]["tick"] < self._past.last_tick:
+        if self.same < len(self._to_come) and self._counts(self._to_come[self.same]):
             self._over = True
             self.difference = (self._to_come[self.same], None)
+
+    def _counts(self, recorded: Decision) -> bool:
+        """Tell whether the step of a decision was ended; what was still under way is no decision yet."""
+        return bool(recorded["tick"] < self._past.last_tick)
 
 
 def _decision(entry: Entry, edited: bool) -> Decision | None:

@@ -23,6 +23,8 @@ from executive.sim.contacts import Contacts
 from executive.sim.rebuild import UnderWay
 from executive.sim.world import STEP, World
 
+MOMENT = 1e-4
+"""Time over which a tool velocity is taken [s]: too short for the arm to bend the way."""
 START_TOLERANCE = math.radians(0.2)
 """Largest joint difference between the arm and the start of a motion [rad]."""
 TRACKING_TOLERANCE = math.radians(0.5)
@@ -88,6 +90,14 @@ class SimArm:
     def tool_pose(self) -> Pose:
         """Pose of the tool centre point in the world, from the measured joint positions."""
         return self.planner.kinematics.forward(self.q)
+
+    @property
+    def tool_velocity(self) -> Array:
+        """Velocity of the tool centre point in the world `(3,)` [m/s], from the measured joint velocities."""
+        states = self._world.client.getJointStates(self._world.arm, range(JOINTS))
+        q, turned = np.array([(state[0], state[1] * MOMENT) for state in states]).T
+        forward = self.planner.kinematics.forward
+        return (forward(q + turned).position - forward(q).position) / MOMENT
 
     @property
     def destination(self) -> Array:

@@ -88,6 +88,11 @@ class TapedArm:
         return self.tape.sense("arm.tool_pose", lambda: self.arm.tool_pose, write_pose, read_pose)
 
     @property
+    def tool_velocity(self) -> Array:
+        """Velocity of the tool centre point in the world `(3,)` [m/s]."""
+        return self.tape.sense("arm.tool_velocity", lambda: self.arm.tool_velocity, write_array, read_array)
+
+    @property
     def destination(self) -> Array:
         """Where the tool will be when the running motion is over, or is now `(3,)` [m]."""
         return self.tape.sense("arm.destination", lambda: self.arm.destination, write_array, read_array)

@@ -83,6 +83,11 @@ class FakeArm:
         return self._tool
 
     @property
+    def tool_velocity(self) -> Array:
+        """Velocity of the tool centre point `(3,)` [m/s]."""
+        return self._world.velocity
+
+    @property
     def destination(self) -> Array:
         """Where the tool will be when the running motion is over, or is now `(3,)` [m]."""
         return (self._path[-1] if self._path else self._tool).position
@@ -136,11 +141,13 @@ class FakeArm:
 
     def advance(self) -> None:
         """Go one step along the path, with what the tool holds."""
+        before = self._tool.position
         if self._path:
             self._tool = self._path.pop(0)
             if self.runs_into is not None and len(self._path) <= self._half:
                 self._met, self.runs_into = self.runs_into, None
                 self.stop()
+        self._world.velocity = (self._tool.position - before) / STEP
         if self._world.held is not None:
             thing = self._world.held
             height = self._world.classes[thing.label].height
@@ -203,21 +210,15 @@ class FakeTool:
             self._world.held, thing.fell = thing, False
 
     def open(self) -> None:
-        """Let go; the object falls straight down."""
+        """Let go; the object falls."""
         if not self.sticks:
-            self._let_go()
+            self._world.let_go()
 
     def part(self) -> None:
-        """Let the seal give way; what hung there falls straight down."""
+        """Let the seal give way; what hung there falls."""
         if self._world.held is not None:
             self._world.held.fell = True
-        self._let_go()
-
-    def _let_go(self) -> None:
-        thing, self._world.held = self._world.held, None
-        if thing is not None:
-            thing.position[2] = self._world.classes[thing.label].height / 2
-            thing.stood.append(thing.position.copy())
+        self._world.let_go()
 
 
 def named_poses(config: CellConfig) -> dict[str, Pose]:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import HealthCheck, Phase, example, given, settings
 from hypothesis import strategies as st
 
 from executive.errors import InputError
@@ -139,6 +139,7 @@ def test_it_ends_as_if_nothing_had_happened(missions: Path, tmp_path: Path, name
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(st.integers(0, 2700), st.integers(1, 12))
+@example(444, 7)
 def test_in_the_middle_of_a_control_step_it_may_be_cut_off_too(
     missions: Path, tmp_path_factory: pytest.TempPathFactory, tick: int, nth: int
 ) -> None:

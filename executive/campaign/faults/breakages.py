@@ -9,6 +9,7 @@ from typing import cast
 from executive.campaign.faults.fault import Breakage, InjectedError
 from executive.cell import Cell, Steps
 from executive.skill import EMPTY, Skill
+from executive.slip import slipped
 from executive.testing.substitutes import raising, raising_when_halted
 
 WANTED = "as the campaign wants it"
@@ -42,7 +43,7 @@ def _failing(skill: type[Skill], reason: str) -> type[Skill]:
         if empties:
             cell.tool.open()
             if (item := cell.ledger.in_tool()) is not None:
-                cell.ledger.dropped(item, cell.arm.tool_pose.position)
+                slipped(cell, item)
         raise self.failed(reason, WANTED)
 
     return _subclass(skill, run)
