@@ -84,8 +84,8 @@ class FakeArm:
 
     @property
     def tool_velocity(self) -> Array:
-        """Velocity of the tool centre point `(3,)` [m/s]."""
-        return self._world.velocity
+        """Zero `(3,)` [m/s]: it stops dead, and what it lets go falls straight down."""
+        return np.zeros(3)
 
     @property
     def destination(self) -> Array:
@@ -141,13 +141,11 @@ class FakeArm:
 
     def advance(self) -> None:
         """Go one step along the path, with what the tool holds."""
-        before = self._tool.position
         if self._path:
             self._tool = self._path.pop(0)
             if self.runs_into is not None and len(self._path) <= self._half:
                 self._met, self.runs_into = self.runs_into, None
                 self.stop()
-        self._world.velocity = (self._tool.position - before) / STEP
         if self._world.held is not None:
             thing = self._world.held
             height = self._world.classes[thing.label].height
@@ -210,15 +208,21 @@ class FakeTool:
             self._world.held, thing.fell = thing, False
 
     def open(self) -> None:
-        """Let go; the object falls."""
+        """Let go; the object falls straight down."""
         if not self.sticks:
-            self._world.let_go()
+            self._let_go()
 
     def part(self) -> None:
-        """Let the seal give way; what hung there falls."""
+        """Let the seal give way; what hung there falls straight down."""
         if self._world.held is not None:
             self._world.held.fell = True
-        self._world.let_go()
+        self._let_go()
+
+    def _let_go(self) -> None:
+        thing, self._world.held = self._world.held, None
+        if thing is not None:
+            thing.position[2] = self._world.classes[thing.label].height / 2
+            thing.stood.append(thing.position.copy())
 
 
 def named_poses(config: CellConfig) -> dict[str, Pose]:

@@ -1,4 +1,4 @@
-"""A table with as little physics as can be: objects are points that are picked, carried, and fall."""
+"""A table without physics: objects are points that are picked, carried and let go."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 from executive.cell import Steps
 from executive.geometry import Array
 from executive.messages import ObjectClass
-from executive.slip import landing
 
 STEP = 1 / 240
 """Length of one control step [s]."""
@@ -51,7 +50,6 @@ class FakeWorld:
         objects: The objects, in the order they were put down.
         removed: Those that somebody took away.
         held: The object at the tool, or None.
-        velocity: Of the tool `(3,)` [m/s].
         steps: Control steps since the run began.
     """
 
@@ -59,7 +57,6 @@ class FakeWorld:
     objects: list[FakeObject] = field(default_factory=list)
     removed: list[FakeObject] = field(default_factory=list)
     held: FakeObject | None = None
-    velocity: Array = field(default_factory=lambda: np.zeros(3))
     steps: int = 0
 
     @property
@@ -77,14 +74,6 @@ class FakeWorld:
         """Take an object away that is not held."""
         self.objects.remove(thing)
         self.removed.append(thing)
-
-    def let_go(self) -> None:
-        """Let what is at the tool fall, as fast as the tool moves; it lies where it comes down."""
-        thing, self.held = self.held, None
-        if thing is not None:
-            height = self.classes[thing.label].height
-            thing.position = landing(thing.position + np.array((0, 0, height / 2)), self.velocity, height)
-            thing.stood.append(thing.position.copy())
 
     def top(self, thing: FakeObject) -> float:
         """Return the height of an object's upper side [m]."""

@@ -5,7 +5,6 @@ import signal
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from py_trees.common import Status
 
@@ -84,7 +83,6 @@ def test_an_object_dropped_outside_the_workspace_is_found_by_the_full_look(missi
         tip = fake.arm.tool_pose.position
         if not dropped and fake.tool.holding and abs(tip[1]) > 0.28 and tip[2] > 0.12:
             dropped.append(1)
-            fake.world.velocity = np.zeros(3)
             fake.tool.open()
 
     dropped: list[int] = []
