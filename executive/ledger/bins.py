@@ -13,7 +13,7 @@ from executive.cell_config import LedgerConfig
 from executive.geometry import Array
 from executive.ledger.binding import SURE
 from executive.ledger.item import Record, State
-from executive.messages import Bin, Detections, Item
+from executive.messages import BIN_THICKNESS, Bin, Detections, Item
 
 WALL = 0.02
 """How far from a bin's wall something has to come down to be in it for sure [m]."""
@@ -81,12 +81,13 @@ class Bins:
         Args:
             look: A look at everything the camera sees.
             positions: Where what it found is `(3,)` [m], one to one.
-            inside: The bins that these are in or just beside.
+            inside: The bin that each detection is in, as `at` says it, or None.
         """
+        # What leans on a wall from inside may have its middle over it.
         shown = Counter(
             (detection.label, bin)
             for detection, bin, position in zip(look.found, inside, positions, strict=True)
-            if bin is not None and self._bins[bin].contains(position)
+            if bin is not None and self._bins[bin].contains(position, BIN_THICKNESS)
         )
         for record in self._records.values():
             if record.state is not State.DROPPED:

@@ -16,7 +16,7 @@ from executive.geometry import Pose
 from executive.layout import as_bin, as_class
 from executive.ledger.item import State
 from executive.ledger.ledger import ItemLedger
-from executive.messages import Target
+from executive.messages import BIN_THICKNESS, Target
 from executive.mission.parse.cell_file import load_cell
 from executive.mission.text.files import shipped_folder
 from executive.testing.fake_arm import FakeArm, FakeTool, out_of_reach
@@ -183,7 +183,8 @@ class FakeCell:
         """
         counts = {"right": 0, "wrong_bin": 0, "left": 0, "elsewhere": 0, "unseen": 0}
         for thing in self.world.objects:
-            inside = next((n for n, bin in self._cell.bins.items() if bin.contains(thing.position)), None)
+            bins = self._cell.bins.items()
+            inside = next((n for n, bin in bins if bin.contains(thing.position, BIN_THICKNESS)), None)
             if inside is None or thing is self.world.held:
                 counts["left"] += 1
             elif inside in self.routes.get(thing.label, ()):

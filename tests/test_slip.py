@@ -1,0 +1,52 @@
+"""What slips from the tool comes down where physics says, and the ledger knows at once."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from executive.slip import GRAVITY, landing, slipped
+from executive.testing.fake_cell import FakeCell
+from executive.testing.run_skill import run_skill
+from skills.approach import Approach
+from skills.detect import Detect
+from skills.grasp import Grasp
+from skills.localize import Localize
+
+
+def test_from_rest_it_falls_straight_down() -> None:
+    assert np.allclose(landing(np.array((0.4, 0.1, 0.3)), np.zeros(3), 0.05), (0.4, 0.1, 0.025))
+
+
+def test_thrown_it_comes_down_farther_on() -> None:
+    """A parabola: 0.2 m down take sqrt(2 * 0.2 / g)."""
+    x = landing(np.array((0.4, 0.1, 0.25)), np.array((1.0, 0.0, 0.0)), 0.05)[0]
+    assert x == pytest.approx(0.4 + np.sqrt(0.4 / GRAVITY))
+
+
+@pytest.mark.parametrize("up", [-0.5, 0.0, 0.5])
+def test_its_flight_begins_with_the_velocity_of_the_tool(up: float) -> None:
+    place, velocity, height = np.array((0.0, 0.0, 0.4)), np.array((0.3, -0.2, up)), 0.06
+    x, y, z = landing(place, velocity, height)
+    time = x / 0.3
+    assert y == pytest.approx(-0.2 * time)
+    assert 0.4 + up * time - GRAVITY * time**2 / 2 == pytest.approx(height)
+    assert z == height / 2
+
+
+def test_what_touches_the_ground_already_stays_where_it_is() -> None:
+    assert np.allclose(landing(np.array((0.4, 0.1, 0.04)), np.array((1.0, 0, 0)), 0.05)[:2], (0.4, 0.1))
+
+
+def test_the_ledger_is_told_once_where_it_fell(fake: FakeCell) -> None:
+    fake.world.put("cube", 0.5, 0.0)
+    detections = run_skill(Detect(), fake).outputs["detections"]
+    (target,) = run_skill(Localize(detections=detections), fake).outputs["targets"]
+    run_skill(Approach(target=target), fake)
+    run_skill(Grasp(target=target, bin="red_bin"), fake)
+    assert not slipped(fake.cell, target.item)
+    fake.tool.part()
+    assert slipped(fake.cell, target.item)
+    assert slipped(fake.cell, target.item)
+    (row,) = fake.ledger.rows()
+    assert (row["state"], row["attempts"]) == ("dropped", 1)
