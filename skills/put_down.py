@@ -11,12 +11,13 @@ from executive.cell import Cell, LeastTimes, Steps
 from executive.goals import aside
 from executive.messages import Item
 from executive.moving import carry, let_go
-from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, param, port
+from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, SkillFailed, param, port
 
 
 class PutDown(Skill):
     """Put the held item down on the cell's safe place, or beside what stands there, where a look finds it.
 
+    What was not lifted yet, and whose way is blocked, is left where it is.
     The tool's sensor is watched all the way.
     """
 
@@ -38,7 +39,13 @@ class PutDown(Skill):
     def run(self, cell: Cell) -> Steps:
         """Carry it there, come down, let go."""
         goal = aside(cell, self.held, self.drop)
-        yield from carry(self, cell, self.held, goal, "the safe place")
         height = cell.classes[cell.ledger.label(self.held)].height
-        place = np.array(goal.position) - (0.0, 0.0, self.drop + height / 2)
+        try:
+            yield from carry(self, cell, self.held, goal, "the safe place")
+        except SkillFailed as failure:
+            # What was not lifted yet stands where it stood, as well as anywhere.
+            if failure.reason != "blocked" or cell.arm.tool_pose.position[2] > goal.position[2]:
+                raise
+        x, y, _ = cell.arm.tool_pose.position
+        place = np.array((x, y, goal.position[2] - self.drop - height / 2))
         yield from let_go(self, cell, self.held, self.settle, lambda: cell.ledger.returned(self.held, place))

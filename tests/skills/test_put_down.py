@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from executive.arm import Goal, Task
-from executive.errors import Unreachable
+from executive.errors import Blocked, Unreachable
 from executive.events import Event
 from executive.mission.load import load_mission
 from executive.motion.plans import Plan
@@ -132,3 +132,25 @@ def test_a_sorting_mission_finds_again_what_fell_and_places_it(
     failed = [event.data["reason"] for event in events if event.data.get("status") == "FAILURE"]
     assert [failed.count(reason) for reason in ("unreachable", "dropped")] == [1, 1]
     assert (outcome.status, items["placed"], run.audit()["right"]) == ("SUCCESS", *[items["seen"]] * 2)
+
+
+def test_what_cannot_be_carried_away_and_was_not_lifted_is_left_where_it_stood(
+    fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan, nothing = fake.arm.plan, Blocked("bolt-2 is too near")
+    monkeypatch.setattr(fake.arm, "plan", lambda *asked: replace(plan(*asked), outcome=nothing))
+    result = run_skill(PutDown(held=held), fake)
+    assert (result.status, fake.tool.holding, fake.ledger.in_tool()) == ("SUCCESS", False, None)
+    (row,) = fake.ledger.rows()
+    assert (row["state"], row["position"][:2]) == ("seen", [0.5, 0.0])
+
+
+def test_what_hangs_in_the_air_and_cannot_be_carried_on_is_not_let_fall(fake: FakeCell, held: str) -> None:
+    steps = PutDown(held=held).run(fake.cell)
+    with pytest.raises(SkillFailed) as failure:
+        while True:
+            next(steps)
+            fake.advance()
+            if fake.arm.tool_pose.position[2] > 0.1:
+                fake.arm.run_into("a hand")
+    assert (failure.value.reason, fake.tool.holding) == ("blocked", True)
