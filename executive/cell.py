@@ -142,9 +142,8 @@ class Ledger(Protocol):
     ) -> Sequence[Target]:
         """Record a look and return one target per open item on the table whose place is known now.
 
-        `positions` `(3,)` [m] belong to `detections.found` one to one; `glimpses` are those of
-        `detections.doubtful` whose place is known. What earlier looks have shown, and nothing has disturbed
-        since, is known too.
+        `positions` `(3,)` [m] belong to `detections.found` one to one, `glimpses` to `detections.doubtful`.
+        What earlier looks have shown, and nothing has disturbed since, is known too.
         """
 
     def is_fresh(self, target: Target) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from typing import ClassVar
 
 from executive.cell import Cell, Steps
@@ -34,15 +33,10 @@ class Localize(Skill):
             )
         try:
             positions = [cell.localizer.locate(detection, frame) for detection in self.detections.found]
+            glimpses = [
+                Glimpse(detection, cell.localizer.locate(detection, frame))
+                for detection in self.detections.doubtful
+            ]
         except NoDepth as error:
             raise self.failed("no_depth", str(error)) from error
-        self.targets = list(cell.ledger.observe(self.detections, positions, self._glimpses(cell)))
-
-    def _glimpses(self, cell: Cell) -> list[Glimpse]:
-        """Return where what is in doubt seems to be; what has no depth is nowhere."""
-        glimpses = []
-        for detection in self.detections.doubtful:
-            with suppress(NoDepth):
-                place = cell.localizer.locate(detection, self.detections.frame)
-                glimpses.append(Glimpse(detection, place))
-        return glimpses
+        self.targets = list(cell.ledger.observe(self.detections, positions, glimpses))

@@ -30,10 +30,13 @@ def test_boxes_below_the_threshold_alone_are_unsure(fake: FakeCell) -> None:
     assert result.message == "detector embedded saw nothing it is sure of: at best a duck at 0.40 < 0.50"
 
 
-def test_a_weak_box_beside_a_sure_one_is_left_out(fake: FakeCell) -> None:
+def test_a_weak_box_beside_a_sure_one_is_in_doubt(fake: FakeCell) -> None:
     fake.world.put("cube", 0.5, 0.0)
-    fake.detector.answers = lambda look, true: [*true, Detection("duck", 0.4, (0, 0, 9, 9))]
-    assert [d.label for d in run_skill(Detect(), fake).outputs["detections"].found] == ["cube"]
+    weak = Detection("duck", 0.4, (0, 0, 9, 9))
+    fake.detector.answers = lambda look, true: [*true, weak]
+    detections = run_skill(Detect(), fake).outputs["detections"]
+    assert [d.label for d in detections.found] == ["cube"]
+    assert detections.doubtful == (weak,)
 
 
 def test_an_arm_in_the_way_is_hidden_and_nothing_is_photographed(fake: FakeCell) -> None:
@@ -49,10 +52,11 @@ def test_a_detector_without_an_answer_is_unavailable_with_its_sentence(fake: Fak
     assert (result.reason, result.message) == ("unavailable", "detector embedded: no answer within 1.0 s")
 
 
-def test_doubtful_boxes_pass_as_nothing_found_where_the_mission_says_so(fake: FakeCell) -> None:
+def test_doubtful_boxes_pass_with_nothing_found_for_sure_where_the_mission_says_so(fake: FakeCell) -> None:
     fake.detector.answers = lambda look, true: [Detection("duck", 0.4, (0, 0, 9, 9))]
     result = run_skill(Detect(doubtful="pass"), fake)
-    assert (result.status, result.outputs["detections"].found) == ("SUCCESS", ())
+    detections = result.outputs["detections"]
+    assert (result.status, detections.found, len(detections.doubtful)) == ("SUCCESS", (), 1)
 
 
 def test_an_arm_in_the_way_may_be_looked_past(fake: FakeCell) -> None:

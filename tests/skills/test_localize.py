@@ -1,7 +1,12 @@
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
 
+import numpy as np
+import pytest
+
+from executive.errors import NoDepth
+from executive.messages import Detection, Frame
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.detect import Detect
@@ -34,3 +39,29 @@ def test_a_frame_stays_good_after_a_pick_elsewhere(fake: FakeCell, look) -> None
     old = run_skill(Detect(), fake).outputs["detections"]
     fake.ledger.held("cube-1")
     assert run_skill(Localize(detections=old), fake).status == "SUCCESS"
+
+
+def unsure(fake: FakeCell):
+    """A look whose detector is unsure of a cube on the table."""
+    fake.world.put("cube", 0.5, 0.0)
+    fake.detector.answers = lambda look, true: [replace(one, confidence=0.4) for one in true]
+    return run_skill(Detect(doubtful="pass"), fake).outputs["detections"]
+
+
+def test_what_the_detector_is_unsure_of_is_an_item_in_doubt_where_it_seems_to_be(fake: FakeCell) -> None:
+    run_skill(Localize(detections=unsure(fake)), fake)
+    (row,) = fake.ledger.rows()
+    assert (row["item"], row["position"], fake.ledger.in_doubt()) == ("cube-1", [0.5, 0.0, 0.025], ["cube-1"])
+
+
+def test_a_box_in_doubt_without_a_place_is_not_passed_over(
+    fake: FakeCell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def locate(detection: Detection, frame: Frame) -> None:
+        raise NoDepth(f"no depth at the {detection.label}")
+
+    detections = unsure(fake)
+    monkeypatch.setattr(type(fake.cell.localizer), "locate", staticmethod(locate))
+    result = run_skill(Localize(detections=detections), fake)
+    assert (result.reason, result.message) == ("no_depth", "no depth at the cube")
+    assert fake.ledger.rows() == []
