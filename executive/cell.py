@@ -171,13 +171,16 @@ class Ledger(Protocol):
         """Record that the tool holds the item; its neighbours may have moved."""
 
     def dropped(self, item: Item, landing: Array | None = None) -> None:
-        """Record that the tool lost the item on the way; the whole table is in doubt now."""
+        """Record that the tool lost the item on the way; the whole table is in doubt now.
+
+        `landing` `(3,)` [m] is where it must have come down, None where nobody can tell.
+        """
 
     def placed(self, item: Item, bin: str) -> None:
         """Record that the item was let go in a bin."""
 
     def returned(self, item: Item, position: Array) -> None:
-        """Record that the item was put back on the table."""
+        """Record that the item was put back on the table, its middle at `position` `(3,)` [m]."""
 
     def rejected(self, item: Item, why: str) -> None:
         """Record that the item is given up; it is reported and not tried again."""

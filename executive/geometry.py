@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+GRAVITY = 9.81
+"""[m/s²]"""
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ SPACING = 0.0025
 """Spacing of the spiral on which further attempts come down, unless a mission says otherwise [m]."""
 SIDE_BY_SIDE = 0.02
 """Room between the outlines of what is put down and what stands beside it [m]."""
-ROWS = 3
+ROWS = 2
 """How many places on each side of the safe one are considered for putting something down."""
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 

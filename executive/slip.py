@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from executive.cell import Cell
-from executive.geometry import Array
+from executive.geometry import GRAVITY, Array
 from executive.messages import Item
 
-GRAVITY = 9.81
-"""[m/s²]"""
+CALM = 0.2
+"""Tool speed up to which one can tell where something comes down [m/s]; thrown faster, it rolls."""
 
 
 def slipped(cell: Cell, item: Item) -> bool:
@@ -22,8 +22,9 @@ def slipped(cell: Cell, item: Item) -> bool:
     if cell.tool.holding:
         return False
     if cell.ledger.in_tool() == item:
-        height = cell.classes[cell.ledger.label(item)].height
-        cell.ledger.dropped(item, landing(cell.arm.tool_pose.position, cell.arm.tool_velocity, height))
+        velocity, height = cell.arm.tool_velocity, cell.classes[cell.ledger.label(item)].height
+        calm = float(np.linalg.norm(velocity)) <= CALM
+        cell.ledger.dropped(item, landing(cell.arm.tool_pose.position, velocity, height) if calm else None)
     return True
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import ClassVar
 
 from executive.cell import Cell, Steps
@@ -33,10 +34,22 @@ class Localize(Skill):
             )
         try:
             positions = [cell.localizer.locate(detection, frame) for detection in self.detections.found]
-            glimpses = [
-                Glimpse(detection, cell.localizer.locate(detection, frame))
-                for detection in self.detections.doubtful
-            ]
+            glimpses = list(self._glimpses(cell))
         except NoDepth as error:
             raise self.failed("no_depth", str(error)) from error
         self.targets = list(cell.ledger.observe(self.detections, positions, glimpses))
+
+    def _glimpses(self, cell: Cell) -> Iterator[Glimpse]:
+        """Yield where what is in doubt seems to be.
+
+        Raises:
+            NoDepth: That is nowhere, and nothing was found for sure, either.
+        """
+        for detection in self.detections.doubtful:
+            try:
+                place = cell.localizer.locate(detection, self.detections.frame)
+            except NoDepth:
+                if not self.detections.found:
+                    raise
+            else:
+                yield Glimpse(detection, place)

@@ -13,11 +13,14 @@ from executive.messages import Item
 from executive.moving import carry, let_go
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, SkillFailed, param, port
 
+LIFTED = 0.003
+"""How high above the table something hangs that was lifted from it [m]."""
+
 
 class PutDown(Skill):
     """Put the held item down on the cell's safe place, or beside what stands there, where a look finds it.
 
-    What was not lifted yet, and whose way is blocked, is left where it is.
+    What was not lifted from the table yet, and whose way is blocked, is left where it is.
     The tool's sensor is watched all the way.
     """
 
@@ -40,12 +43,13 @@ class PutDown(Skill):
         """Carry it there, come down, let go."""
         goal = aside(cell, self.held, self.drop)
         height = cell.classes[cell.ledger.label(self.held)].height
+        lying = float(cell.safe_place[2]) + height
         try:
             yield from carry(self, cell, self.held, goal, "the safe place")
         except SkillFailed as failure:
             # What was not lifted yet stands where it stood, as well as anywhere.
-            if failure.reason != "blocked" or cell.arm.tool_pose.position[2] > goal.position[2]:
+            if failure.reason != "blocked" or cell.arm.tool_pose.position[2] > lying + LIFTED:
                 raise
         x, y, _ = cell.arm.tool_pose.position
-        place = np.array((x, y, goal.position[2] - self.drop - height / 2))
+        place = np.array((x, y, lying - height / 2))
         yield from let_go(self, cell, self.held, self.settle, lambda: cell.ledger.returned(self.held, place))

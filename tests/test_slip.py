@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from executive.slip import GRAVITY, landing, slipped
+from executive.geometry import GRAVITY
+from executive.slip import CALM, landing, slipped
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
 from skills.detect import Detect
 from skills.grasp import Grasp
 from skills.localize import Localize
+from skills.transit import Transit
 
 
 def test_from_rest_it_falls_straight_down() -> None:
@@ -38,15 +40,35 @@ def test_what_touches_the_ground_already_stays_where_it_is() -> None:
     assert np.allclose(landing(np.array((0.4, 0.1, 0.04)), np.array((1.0, 0, 0)), 0.05)[:2], (0.4, 0.1))
 
 
-def test_the_ledger_is_told_once_where_it_fell(fake: FakeCell) -> None:
+@pytest.fixture
+def held(fake: FakeCell) -> str:
+    """A cube in the tool."""
     fake.world.put("cube", 0.5, 0.0)
     detections = run_skill(Detect(), fake).outputs["detections"]
     (target,) = run_skill(Localize(detections=detections), fake).outputs["targets"]
     run_skill(Approach(target=target), fake)
     run_skill(Grasp(target=target, bin="red_bin"), fake)
-    assert not slipped(fake.cell, target.item)
+    return target.item
+
+
+def test_the_ledger_is_told_once(fake: FakeCell, held: str) -> None:
+    assert not slipped(fake.cell, held)
     fake.tool.part()
-    assert slipped(fake.cell, target.item)
-    assert slipped(fake.cell, target.item)
+    assert slipped(fake.cell, held)
+    assert slipped(fake.cell, held)
     (row,) = fake.ledger.rows()
     assert (row["state"], row["attempts"]) == ("dropped", 1)
+
+
+@pytest.mark.parametrize(
+    ("speed", "state"), [(0.0, "placed"), (CALM - 0.01, "placed"), (CALM + 0.01, "lost")]
+)
+def test_what_slips_away_over_its_bin_is_believed_there_unless_it_was_thrown(
+    fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch, speed: float, state: str
+) -> None:
+    run_skill(Transit(held=held, bin="red_bin"), fake)
+    monkeypatch.setattr(type(fake.arm), "tool_velocity", np.array((0.0, speed, 0.0)))
+    fake.tool.part()
+    assert slipped(fake.cell, held)
+    fake.ledger.close()
+    assert [row["state"] for row in fake.ledger.rows()] == [state]

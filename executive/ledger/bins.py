@@ -15,8 +15,8 @@ from executive.ledger.binding import SURE
 from executive.ledger.item import Record, State
 from executive.messages import BIN_THICKNESS, Bin, Detections, Item
 
-WALL = 0.02
-"""How far from a bin's wall something has to come down to be in it for sure [m]."""
+WALL = 0.035
+"""How far from a bin's wall the middle of something has to come down to be in it for sure [m]: its radius."""
 FELL = math.log(0.95 / 0.05)
 """Log odds that something is in a bin that it fell into by all one knows of its fall."""
 CORNERS = np.array([(0, 0, 0), (1, 1, 0), (1, -1, 0), (-1, 1, 0), (-1, -1, 0)])

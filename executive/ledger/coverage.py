@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -54,9 +56,14 @@ class Coverage:
         self._full_looks = 0
         self._shown = np.full(len(self._points), -RECENT)
 
-    def look(self, detections: Detections) -> None:
-        """Take account of a look: what it did find is known, and no longer overlooked, either."""
+    def look(self, detections: Detections, unsure: Sequence[Array] = ()) -> None:
+        """Take account of a look: what it did find is known, and no longer overlooked, either.
+
+        Where its detector is `unsure` `(3,)` [m] whether something is there, nothing was searched.
+        """
         searched = detections.searched(self._points)
+        for place in unsure:
+            searched &= np.hypot(*(self._points - place)[:, :2].T) > PITCH
         current = self._changed <= detections.frame.epoch
         self._overlooked[current & searched] *= detections.reliability.misses
         self._overlooked = self._overlooked.clip(LEAST)

@@ -34,7 +34,7 @@ class State(Enum):
     """What became of an item so far."""
 
     SEEN = "seen"
-    """On the table, waiting."""
+    """On the table, waiting; or in doubt, where no look has been sure of it yet."""
     HELD = "held"
     """Sealed to the tool."""
     DROPPED = "dropped"
@@ -80,7 +80,7 @@ class Record:
         exists: True once it is known to exist: enough looks agree, or the tool has touched it.
         attempts: Failed grasps so far.
         bin: Where it was placed, or "".
-        why: Why it was rejected or is lost, or "".
+        why: Why it was rejected, is lost, a phantom or believed to be in its bin, or "".
         votes: Log likelihood of each class, up to a constant.
         tally: In how many looks it was taken for each class.
         expected: Share of them in which a detector as it says of itself is wrong.

@@ -19,14 +19,14 @@ from executive.ledger.coverage import Coverage
 from executive.ledger.freshness import Freshness
 from executive.ledger.item import LIKELY, OPEN, Record, State
 from executive.ledger.looks import Looks, spread_of
-from executive.messages import Bin, Detections, Frame, Glimpse, Item, Target
+from executive.messages import Bin, Detection, Detections, Frame, Glimpse, Item, Target
 
 CREDIBLE, CONTRADICTED = 0.01, 0.001
 """Chance of as much disagreement about its class, above which an item is sorted, and under which given up."""
 ENOUGH = 40
 """Looks after which an item whose class they contradict each other about is given up."""
 GLIMPSES = 20
-"""Looks in a row with a detector unsure of it, after which an item that is not known well is given up."""
+"""Looks with a detector unsure of it, since one was sure, after which an item not known well is given up."""
 SHARPER = 2 / 3
 """How much smaller the standard error of its position must be for another attempt at an item."""
 PRESENT = 0.1
@@ -84,7 +84,7 @@ class ItemLedger:
         if frame.id != self._frame:
             self._frame = frame.id
             self._take(detections, positions, glimpses)
-        self._emit_look(detections, positions)
+        self._emit_look(detections, positions, glimpses)
         return [
             target_of(record)
             for record in self._records.values()
@@ -126,7 +126,8 @@ class ItemLedger:
     def believes_empty(self) -> bool:
         """Tell whether it is as good as certain that nothing with a route is left where one can look."""
         waiting = any(
-            record.label in self._routes
+            # Before any look is sure, its class is a guess.
+            (record.label in self._routes or not record.votes)
             and self._may_wait(record)
             and self._coverage.in_sight(record.position)
             for record in self._records.values()
@@ -243,7 +244,9 @@ class ItemLedger:
             if record.state is State.SEEN and record.looks >= ENOUGH and record.consistency < CONTRADICTED:
                 told = ", ".join(f"{count} {label}" for label, count in record.tally.most_common())
                 record.state, record.why = State.REJECTED, f"its class is in doubt: {told}"
-            if record.state is State.SEEN and record.glimpses >= GLIMPSES and not self._is_known(record):
+            if self._is_known(record):
+                record.glimpses = 0
+            elif record.state is State.SEEN and record.glimpses >= GLIMPSES:
                 record.give_up_as_unsure()
             self._report(record)
         if detections.view == "full":
@@ -278,26 +281,29 @@ class ItemLedger:
         self._freshness.disturb(np.asarray(centre, dtype=float), radius)
         self._coverage.disturb(centre, radius, self.epoch)
 
-    def _emit_look(self, detections: Detections, positions: Sequence[Array]) -> None:
+    def _emit_look(
+        self, detections: Detections, positions: Sequence[Array], glimpses: Sequence[Glimpse]
+    ) -> None:
         frame = detections.frame
-        found = [
-            {
-                "label": detection.label,
-                "confidence": round(detection.confidence, 4),
-                "box": [round(float(edge), 2) for edge in detection.box],
-                "position": [round(float(value), 4) for value in position],
-            }
-            for detection, position in zip(detections.found, positions, strict=True)
-        ]
         self._emit(
             "look",
             frame=frame.id,
             camera=frame.camera,
             detector=detections.detector,
             view=detections.view,
-            found=found,
+            found=[_told(*pair) for pair in zip(detections.found, positions, strict=True)],
+            unsure=[_told(glimpse.detection, glimpse.position) for glimpse in glimpses],
             frame_object=frame,
         )
 
     def _report(self, record: Record) -> None:
         self._emit("item", **row_of(record))
+
+
+def _told(detection: Detection, position: Array) -> dict[str, object]:
+    return {
+        "label": detection.label,
+        "confidence": round(detection.confidence, 4),
+        "box": [round(float(edge), 2) for edge in detection.box],
+        "position": [round(float(value), 4) for value in position],
+    }

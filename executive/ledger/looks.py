@@ -82,23 +82,23 @@ class Looks:
                 record = self._enter(records, detection.label, place, odds)
             if record.why == UNSURE:
                 record.state, record.why = State.SEEN, ""
-            record.vote(detection.label, by, alone=not self._explained(place, spreads[index], absent))
+            record.vote(detection.label, by, alone=not self._may_be_of(absent, place, spreads[index]))
             record.locate(place, spreads[index], settled=self.settled(record))
             record.shown(frame, detection)
             seen.append(record)
         glimpsed = self._glimpsed(records, seen, detections, glimpses)
         missed = self._missed(known, [*seen, *glimpsed], detections)
-        self._coverage.look(detections)
-        self._recognize(records, seen)
-        changed = [*seen, *glimpsed, *missed, *self._one_of_two(records, seen)]
+        self._coverage.look(detections, [glimpse.position for glimpse in glimpses])
+        recognized = self._recognize(records, seen)
+        changed = [*seen, *glimpsed, *missed, *recognized, *self._one_of_two(records, seen)]
         return list({id(record): record for record in changed}.values())
 
-    def _explained(self, place: Array, spread: float, absent: Sequence[Record]) -> bool:
-        """Tell whether what was seen at a place may as well be an item that was not seen nearby."""
+    def _may_be_of(self, records: Sequence[Record], place: Array, spread: float) -> bool:
+        """Tell whether what seems to be at a place may be one of these items, seen a little off."""
         return any(
             float(np.linalg.norm(record.position - place))
             <= FAR_OFF * reach(record, spread, self._config.gate)
-            for record in absent
+            for record in records
         )
 
     def _enter(self, records: dict[Item, Record], label: str, place: Array, odds: float) -> Record:
@@ -124,9 +124,14 @@ class Looks:
         counted: list[Record] = []
         for glimpse in glimpses:
             place, spread = glimpse.position, spread_of(look.frame, glimpse.position, jitter)
-            if not self._freshness.holds(place, frame.epoch) or self._explained(place, spread, seen):
+            if not self._freshness.holds(place, frame.epoch) or self._may_be_of(seen, place, spread):
                 continue
-            there = [r for r in records.values() if r.state in LYING and self._explained(place, spread, [r])]
+            lying = [
+                record
+                for record in records.values()
+                if record.state in LYING and record.overlooked > self._config.overlooked
+            ]
+            there = [record for record in lying if self._may_be_of([record], place, spread)]
             record = min(there, key=lambda r: float(np.linalg.norm(r.position - place)), default=None)
             if record is None:
                 odds = EXPECTED * NEARBY * self._coverage.overlooked(place)
@@ -159,8 +164,12 @@ class Looks:
                 phantoms.append(record)
         return phantoms
 
-    def _recognize(self, records: dict[Item, Record], seen: list[Record]) -> None:
-        """Recognize items that were dropped or pushed away in new ones of their class, the nearest first."""
+    def _recognize(self, records: dict[Item, Record], seen: list[Record]) -> list[Record]:
+        """Recognize items that were dropped or pushed away in new ones of their class, the nearest first.
+
+        They take the places of the new ones in `seen`; the new ones that were known before are returned.
+        """
+        doubles = []
         for place, new in enumerate(seen):
             if new.state is not State.SEEN or new.attempts or new.probability < LIKELY:
                 continue
@@ -172,10 +181,12 @@ class Looks:
                 old = min(missing, key=lambda r: float(np.linalg.norm((r.position - new.position)[:2])))
                 old.become(new)
                 seen[place] = old
-                if new.looks == 1:
+                if new.since == new.stamp:
                     del records[new.item]
                 else:
                     new.state, new.why = State.PHANTOM, f"it is {old.item}"
+                    doubles.append(new)
+        return doubles
 
     def _one_of_two(self, records: dict[Item, Record], seen: list[Record]) -> list[Record]:
         """Make one of every two items closer than two objects can be; return those that were none."""
@@ -187,7 +198,7 @@ class Looks:
                 near = float(np.linalg.norm(other.position - record.position)) < self._config.gate
                 if other is record or other.state is not State.SEEN or not near:
                     continue
-                less, more = sorted((record, other), key=lambda r: (r.exists, r.looks))
+                less, more = sorted((record, other), key=lambda r: (r.exists, self.settled(r), r.looks))
                 less.state, less.why = State.PHANTOM, f"it is {more.item}"
                 doubles.append(less)
                 break
@@ -205,7 +216,7 @@ class Looks:
         pushed = self._freshness.disturbed(old.position, old.epoch)
         apart = float(np.linalg.norm((old.position - new.position)[:2]))
         moved = new.entered >= pushed if pushed is not None else False
-        nudged = apart <= NUDGED and new.since > old.stamp
+        nudged = apart <= NUDGED and new.since > old.stamp and old.overlooked <= self._config.overlooked
         missing = old.state in LYING and old.overlooked <= GONE and old.probability >= 0.5
         return missing and (moved or nudged)
 

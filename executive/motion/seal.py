@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from executive.geometry import Array
+from executive.geometry import GRAVITY, Array
 from executive.messages import Load
 from executive.motion.kinematics import Kinematics
 from executive.motion.state import JOINTS
@@ -15,8 +15,6 @@ from executive.motion.transcription import SAMPLES, Demand
 
 SAFETY = 2.0
 """Factor between what a seal bears and what it is asked to bear."""
-GRAVITY = 9.81
-"""[m/s²]"""
 METRES = 0.02
 """What a demand counts for an acceleration of 1 m/s² too much [m]."""
 STRIDE = 4

@@ -132,7 +132,7 @@ class _Comparison:
             self.same += 1
             return
         self._over = True
-        if self._whole or (recorded is not None and self._counts(recorded)):
+        if self._whole or self._counts(decision) or (recorded is not None and self._counts(recorded)):
             self.difference = (recorded, decision)
         self.stop()
 
@@ -142,9 +142,9 @@ class _Comparison:
             self._over = True
             self.difference = (self._to_come[self.same], None)
 
-    def _counts(self, recorded: Decision) -> bool:
+    def _counts(self, decision: Decision) -> bool:
         """Tell whether the step of a decision was ended; what was still under way is no decision yet."""
-        return bool(recorded["tick"] < self._past.last_tick)
+        return bool(decision["tick"] < self._past.last_tick)
 
 
 def _decision(entry: Entry, edited: bool) -> Decision | None:

@@ -118,3 +118,50 @@ def test_what_the_run_ends_before_is_sure_of_was_no_object(bench: Bench) -> None
 def test_what_is_unsure_in_a_bin_is_no_item(bench: Bench) -> None:
     bench.look(view="full", unsure=[("cube", 0.2, -0.44)])
     assert bench.ledger.rows() == []
+
+
+def test_the_journal_is_told_what_an_item_in_doubt_rests_on(bench: Bench) -> None:
+    bench.look(unsure=[THERE])
+    look = next(data for kind, data in bench.events if kind == "look")
+    assert (look["found"], [told["label"] for told in look["unsure"]]) == ([], ["cube"])
+
+
+def test_glimpses_of_an_item_that_waits_are_forgotten_when_its_neighbour_is_picked(bench: Bench) -> None:
+    for _ in range(3):
+        bench.look(THERE, ("cube", 0.55, 0.0))
+    for _ in range(GLIMPSES + 5):
+        bench.look(("cube", 0.55, 0.0), unsure=[THERE])
+    bench.ledger.held("cube-2")
+    bench.look(unsure=[THERE])
+    assert bench.ledger.rows()[0]["state"] == "seen"
+
+
+def test_what_is_gone_is_not_what_a_look_is_unsure_of_later(bench: Bench) -> None:
+    for _ in range(3):
+        bench.look(THERE, ("cube", 0.6, 0.15))
+    for _ in range(3):
+        bench.look(("cube", 0.6, 0.15))
+    bench.ledger.held("cube-2")
+    bench.ledger.dropped("cube-2")
+    for _ in range(3):
+        bench.look(view="full", unsure=[THERE])
+    assert "cube-3" in bench.ledger.in_doubt()
+    assert not bench.ledger.believes_empty()
+
+
+def test_a_guess_at_a_class_without_a_route_leaves_the_table_in_doubt(bench: Bench) -> None:
+    for _ in range(4):
+        bench.look(view="full", unsure=[("duck", 0.5, 0.0)])
+    assert not bench.ledger.believes_empty()
+
+
+def test_a_new_item_that_proves_to_be_one_that_fell_is_reported_as_none(bench: Bench) -> None:
+    """It was told of in doubt already: whoever follows the events has to hear what became of it."""
+    bench.look(THERE)
+    bench.ledger.held("cube-1")
+    bench.ledger.dropped("cube-1")
+    bench.look(unsure=[("cube", 0.6, 0.1)])
+    bench.look(("cube", 0.6, 0.1))
+    states = {data["item"]: (data["state"], data["why"]) for kind, data in bench.events if kind == "item"}
+    assert states == {"cube-1": ("seen", ""), "cube-2": ("phantom", "it is cube-1")}
+    assert not bench.ledger.is_open("cube-2")

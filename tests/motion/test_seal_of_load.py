@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from executive.geometry import GRAVITY
 from executive.messages import Load, ObjectClass
-from executive.motion.seal import GRAVITY, METRES, SAFETY, STRIDE, Hold
+from executive.motion.seal import METRES, SAFETY, STRIDE, Hold
 from executive.motion.state import State
 from executive.motion.trajectory import Trajectory
 from executive.motion.transcription import PLACES, SAMPLES, STEPS

@@ -108,3 +108,17 @@ def test_a_directory_without_answers_cannot_be_replayed(missions: Path, tmp_path
     path = recorded(missions, tmp_path, "sort_fruit")
     with pytest.raises(InputError, match=r"no run that can be replayed: its journal tells of no answers"):
         replay(path, [], discover())
+
+
+def test_a_decision_too_many_is_a_difference_in_a_run_that_was_cut_off_too(missions: Path) -> None:
+    """What the record did not decide in a step that it ended was not decided."""
+    file, skills = missions / "sort_overhead.yaml", discover()
+    entries = [entry_of(event) for event in run_mission(file, seed=3).events]
+    cut = [entry for entry in entries if entry["tick"] <= 600]
+    missing = next(n for n, entry in enumerate(cut) if entry["kind"] == "intent")
+    decided = ("status", "choice", "decision", "item", "intent")
+    without = [e for n, e in enumerate(cut) if n < missing or e["kind"] not in decided]
+    loaded = load_mission(file, skills)
+    assert compare(loaded, skills, Past.of(cut), 3).same
+    done = compare(loaded, skills, Past.of(without), 3)
+    assert (done.recorded, done.replayed and done.replayed["kind"]) == (None, "intent")

@@ -20,6 +20,7 @@ from executive.testing.run_skill import run_skill
 from skills.approach import Approach
 from skills.grasp import Grasp
 from skills.put_down import PutDown
+from skills.transit import Transit
 
 
 @pytest.fixture
@@ -154,3 +155,13 @@ def test_what_hangs_in_the_air_and_cannot_be_carried_on_is_not_let_fall(fake: Fa
             if fake.arm.tool_pose.position[2] > 0.1:
                 fake.arm.run_into("a hand")
     assert (failure.value.reason, fake.tool.holding) == ("blocked", True)
+
+
+def test_what_hangs_in_a_bin_is_not_left_there(
+    fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run_skill(Transit(held=held, bin="red_bin"), fake)
+    plan, nothing = fake.arm.plan, Blocked("something is too near")
+    monkeypatch.setattr(fake.arm, "plan", lambda *asked: replace(plan(*asked), outcome=nothing))
+    result = run_skill(PutDown(held=held, drop=0.05), fake)
+    assert (result.reason, fake.tool.holding) == ("blocked", True)
