@@ -14,6 +14,12 @@ Box = tuple[float, float, float, float]
 """Left, top, right, bottom [pixel] in a frame's image; pixel i covers [i, i + 1)."""
 
 
+REACH = 0.03
+"""How far an object extends around its centre [m], about."""
+SURROUNDINGS = REACH * np.array([(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)], dtype=float)
+"""Steps from the centre of an object to places on it that must be in view for it to be found."""
+
+
 @dataclass(frozen=True, eq=False)
 class Frame:
     """One camera image with everything needed to use it later, wherever the camera is then.
@@ -48,6 +54,32 @@ class Frame:
         top, bottom = (min(max(round(y), 0), height) for y in box[1::2])
         part = self.visible[top:bottom, left:right]
         return float(part.mean()) if part.size else 0.0
+
+    def shows(self, points: Array, area: Box, inset: float = 0.0) -> NDArray[np.bool_]:
+        """Tell `(N,)` which points `(N, 3)` [m] of the world lie in a part of the image [pixel].
+
+        `inset` is how far from its border they must lie [pixel].
+        """
+        pixels, ahead = self._pixels(points)
+        left, top, right, bottom = area
+        inside = (pixels >= (left + inset, top + inset)) & (pixels < (right - inset, bottom - inset))
+        return np.asarray(ahead & inside.all(axis=1))
+
+    def bares(self, points: Array) -> NDArray[np.bool_]:
+        """Tell `(N,)` before which points `(N, 3)` [m], and an object there, there is nothing of the arm."""
+        bare = np.ones(len(points), dtype=bool)
+        height, width = self.visible.shape
+        for step in SURROUNDINGS:
+            pixels, ahead = self._pixels(points + step)
+            columns, rows = pixels.astype(int).clip(0, (width - 1, height - 1)).T
+            bare &= ahead & self.visible[rows, columns]
+        return bare
+
+    def _pixels(self, points: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Return where points appear `(N, 2)` [pixel], and which lie before the camera."""
+        in_camera = self.X_WC.inverse().apply(points) @ self.matrix.T
+        depth = in_camera[:, 2:]
+        return in_camera[:, :2] / np.where(depth > 0, depth, np.inf), depth[:, 0] > 0
 
     def opencv(self) -> tuple[Array, Array, Array]:
         """Return the camera as OpenCV takes it: matrix `(3, 3)`, rvec `(3,)` [rad] and tvec `(3,)` [m].
@@ -117,12 +149,6 @@ class Answer:
     reliability: Reliability
 
 
-REACH = 0.03
-"""How far an object extends around its centre [m], about."""
-SURROUNDINGS = REACH * np.array([(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)], dtype=float)
-"""Steps from the centre of an object to places on it that must be in view for it to be found."""
-
-
 @dataclass(frozen=True, eq=False)
 class Detections:
     """What one look found; an empty one is a look too.
@@ -150,26 +176,11 @@ class Detections:
 
         `inset` is how far from its border they must lie [pixel].
         """
-        pixels, ahead = self._pixels(points)
-        left, top, right, bottom = self.area
-        inside = (pixels >= (left + inset, top + inset)) & (pixels < (right - inset, bottom - inset))
-        return np.asarray(ahead & inside.all(axis=1))
+        return self.frame.shows(points, self.area, inset)
 
     def searched(self, points: Array) -> NDArray[np.bool_]:
         """Tell `(N,)` which points `(N, 3)` [m] it shows with nothing of the arm before an object there."""
-        seen = self.shows(points)
-        height, width = self.frame.visible.shape
-        for step in SURROUNDINGS:
-            pixels, ahead = self._pixels(points + step)
-            columns, rows = pixels.astype(int).clip(0, (width - 1, height - 1)).T
-            seen &= ahead & self.frame.visible[rows, columns]
-        return seen
-
-    def _pixels(self, points: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Return where points appear `(N, 2)` [pixel], and which lie before the camera."""
-        in_camera = self.frame.X_WC.inverse().apply(points) @ self.frame.matrix.T
-        depth = in_camera[:, 2:]
-        return in_camera[:, :2] / np.where(depth > 0, depth, np.inf), depth[:, 0] > 0
+        return self.shows(points) & self.frame.bares(points)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,19 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.campaign.faults.fault import Fault, InjectedError
 from executive.events import Event
+from executive.ledger.item import State
+from executive.messages import BIN_THICKNESS, Bin, Frame
 from executive.mission.flow.endings import Ending
 from executive.runtime.outcome import Outcome
+from executive.testing.disturbances.hand import Thing
 
 REACHES = frozenset({"object_removed", "object_moved", "seal_breaks"})
 """What a fault does to an object that may put it out of reach."""
+EDGE = 30.0
+"""How near the border of an image an object's middle lies where not enough of it is shown [pixel]."""
+
+
+class Hidden(NamedTuple):
+    """How many objects lie where nobody looked, `outside` and `inside` of bins."""
+
+    outside: int
+    inside: int
+
+
+NOTHING_HIDDEN = Hidden(0, 0)
 
 
 def check_end(
@@ -42,14 +57,29 @@ def check_tree(root: Behaviour) -> Iterator[str]:
             yield f"{getattr(node, 'path', node.name)} is still running"
 
 
+def out_of_sight(things: Sequence[Thing], bins: Collection[Bin], events: Sequence[Event]) -> Hidden:
+    """Return how many things lie where no look has shown a place since the tool last dropped anything."""
+    dropped = [e.tick for e in events if e.kind == "item" and e.data["state"] == State.DROPPED.value]
+    if not dropped:
+        return NOTHING_HIDDEN
+    looks = [e.data["frame_object"] for e in events if e.kind == "look" and e.tick > dropped[-1]]
+    hidden = [thing for thing in things if not any(_is_shown(thing, frame) for frame in looks)]
+    inside = sum(any(bin.contains(thing.position, BIN_THICKNESS) for bin in bins) for thing in hidden)
+    return Hidden(len(hidden) - inside, inside)
+
+
 def check_books(
-    outcome: Outcome, items: Mapping[str, Any], audit: Mapping[str, int] | None, taken: int = 0
+    outcome: Outcome,
+    items: Mapping[str, Any],
+    audit: Mapping[str, int] | None,
+    taken: int = 0,
+    hidden: Hidden = NOTHING_HIDDEN,
 ) -> Iterator[str]:
     """Yield where the ledger does not balance, something was misplaced, or the audit found something else.
 
     What nobody had seen yet when a run ended early is on no book, and lies where it lay; what had just fallen
-    then is lost to the robot, wherever it lies. Of the `taken` objects some may have been taken where nobody
-    had to look any more.
+    then is lost to the robot, wherever it lies, and so is what fell where no look shows it. Of the `taken`
+    objects some may have been taken where nobody had to look any more.
     """
     told = f"the ledger says {_counts(items)}"
     if items["seen"] != items["placed"] + items["rejected"] + items["lost"]:
@@ -63,10 +93,12 @@ def check_books(
     if outcome.status == "FAULT" or outcome.node:
         agrees = items["placed"] <= audit["right"] and items["rejected"] <= left
     else:
-        agrees = (
-            items["placed"] == audit["right"] + audit["wrong_bin"]
-            and items["rejected"] <= left <= items["rejected"] + audit["unseen"]
-            and items["lost"] == audit["elsewhere"] - unnoticed
+        agrees = any(
+            items["placed"] == audit["right"] + audit["wrong_bin"] - inside
+            and items["rejected"] <= left - outside <= items["rejected"] + audit["unseen"]
+            and items["lost"] == audit["elsewhere"] - unnoticed + outside + inside
+            for outside in range(hidden.outside + 1)
+            for inside in range(hidden.inside + 1)
         )
     if not agrees:
         yield f"{told}; the audit {_counts(audit)}"
@@ -86,6 +118,12 @@ def check_losses(audit: Mapping[str, int] | None, events: Sequence[Event]) -> It
     reached = sum(count_of(events, what) for what in REACHES)
     if audit is not None and audit["elsewhere"] > reached:
         yield f"{audit['elsewhere']} objects are out of reach, and the fault reached for {reached}"
+
+
+def _is_shown(thing: Thing, frame: Frame) -> bool:
+    height, width = frame.visible.shape
+    place = thing.position[None]
+    return bool((frame.shows(place, (0, 0, width, height), EDGE) & frame.bares(place))[0])
 
 
 def count_of(events: Sequence[Event], what: str) -> int:

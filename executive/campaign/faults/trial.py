@@ -14,12 +14,14 @@ from executive.campaign.faults.breakages import WANTED, broken_skills
 from executive.campaign.faults.effects import ObjectTaken
 from executive.campaign.faults.fault import Breakage, Fault, InjectedError
 from executive.campaign.faults.judgement import (
+    Hidden,
     check_books,
     check_end,
     check_losses,
     check_success,
     check_tree,
     count_of,
+    out_of_sight,
     remark,
 )
 from executive.campaign.faults.listing import skill_nodes
@@ -127,7 +129,7 @@ class _Trying:
             *check_end(outcome, faults, self._subject.loaded.endings, raised),
             *check_tree(run.root),
             *check_journal([_entry(event) for event in self._events], outcome),
-            *check_books(outcome, items, audit, count_of(self._events, ObjectTaken.name)),
+            *check_books(outcome, items, audit, count_of(self._events, ObjectTaken.name), self._hidden()),
             *check_success(outcome, audit, self._events),
             *check_losses(audit, self._events),
             *check_tool(outcome, run.workcell),
@@ -180,6 +182,11 @@ class _Trying:
         began = self._began.get(breakage.node)
         this = self._activations[breakage.node] in breakage.starts
         return began is not None and this and self.run.tick >= began + breakage.after
+
+    def _hidden(self) -> Hidden:
+        workcell = self.run.workcell
+        assert isinstance(workcell, DisturbedCell)
+        return out_of_sight(workcell.hand.things, workcell.cell.bins.values(), self._events)
 
     def _happened(self, fault: Fault) -> bool:
         """Tell whether a fault found its occasion."""

@@ -51,6 +51,11 @@ class DisturbedCell(WrappedCell):
         """What skills see."""
         return self._cell
 
+    @property
+    def hand(self) -> Hand:
+        """What reaches into its world."""
+        return self._scene.hand
+
     def hear(self, event: Event) -> None:
         """Observe the run that drives this cell."""
         self._schedule.hear(event)
