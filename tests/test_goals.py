@@ -1,4 +1,4 @@
-"""Where something is put down: on the safe place, or beside what stands there."""
+"""Where the arm goes to: onto an object, into a bin, to a free place."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from executive.goals import SIDE_BY_SIDE, aside
+from executive.arm import Goal
+from executive.goals import DROP, SIDE_BY_SIDE, approach, aside, onto, over
+from executive.messages import BIN_THICKNESS, ObjectClass, Target
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
@@ -25,11 +27,14 @@ def held(fake: FakeCell) -> str:
     return picked(fake, fake.world.put("cube", 0.5, 0.0).label)
 
 
+def seen(fake: FakeCell) -> list[Target]:
+    detections = run_skill(Detect(view="full"), fake).outputs["detections"]
+    return run_skill(Localize(detections=detections), fake).outputs["targets"]
+
+
 def picked(fake: FakeCell, label: str) -> str:
     """Pick the first object of that class that a look shows in the workspace; return its item."""
-    detections = run_skill(Detect(view="full"), fake).outputs["detections"]
-    targets = run_skill(Localize(detections=detections), fake).outputs["targets"]
-    target = next(one for one in targets if one.label == label and one.position[1] > -0.2)
+    target = next(one for one in seen(fake) if one.label == label and one.position[1] > -0.2)
     run_skill(Approach(target=target), fake)
     return run_skill(Grasp(target=target, bin="red_bin"), fake).outputs["held"]
 
@@ -61,3 +66,32 @@ def test_where_nothing_is_free_it_is_the_safe_place_all_the_same(
     run_skill(PutDown(held=held), fake)
     fake.world.put("cube", 0.5, 0.1)
     assert aside(fake.cell, picked(fake, "cube"), 0.01).position[:2] == pytest.approx(SAFE)
+
+
+def test_the_goal_of_an_approach_lies_below_the_surface_and_the_last_part_is_slow(fake: FakeCell) -> None:
+    fake.world.put("cube", 0.5, 0.0)
+    goal, _ = approach(fake.cell, seen(fake)[0])
+    assert goal.position == pytest.approx((0.5, 0.0, 0.035))
+    assert goal.position[2] + goal.guarded == pytest.approx(0.05 + fake.cell.descent)
+    assert goal.speed == fake.cell.descent_speed
+
+
+def test_an_approach_never_feels_below_the_middle_of_what_it_is_to_touch() -> None:
+    washer = ObjectClass("washer", 0.006, 0.025, ring=0.017)
+    goal = onto(washer, np.array([0.5, 0.1, 0.013]), 0.02, 0.05)  # on another one
+    assert goal.position == pytest.approx((0.517, 0.1, 0.013))
+    assert (goal.guarded, goal.speed) == pytest.approx((0.003 + 0.02, 0.05))
+    further = onto(washer, np.array([0.5, 0.1, 0.013]), 0.02, 0.05, attempt=1, overtravel=0.001)
+    assert further.position[2] == pytest.approx(0.015)
+    assert np.hypot(further.position[0] - 0.5, further.position[1] - 0.1) == pytest.approx(0.017)
+
+
+def test_what_goes_onto_a_layer_hangs_as_far_above_it_as_the_first_ones_above_the_floor(
+    fake: FakeCell,
+) -> None:
+    box = fake.cell.bins["red_bin"]
+    first, second = (over(box, number, 0.05, tallest=0.07) for number in (1, len(box.slots) + 1))
+    floor = float(box.position[2]) + BIN_THICKNESS
+    assert first == Goal((*map(float, box.slots[1]), floor + 0.05 + DROP))
+    assert second.position == pytest.approx((*box.slots[1], floor + 0.07 + 0.05 + DROP))
+    assert over(box, 1, 0.05, 0.07, drop=0.03).position[2] == pytest.approx(floor + 0.05 + 0.03)

@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from executive.campaign.faults.fault import Breakage, Fault
-from executive.campaign.faults.judgement import check_books, check_end, check_losses, check_success, remark
+from executive.campaign.faults.judgement import (
+    Hidden,
+    check_books,
+    check_end,
+    check_losses,
+    check_success,
+    out_of_sight,
+    remark,
+)
 from executive.events import Event
 from executive.mission.flow.endings import Ending
 from executive.runtime.outcome import Outcome
+from executive.testing.disturbances.hand import Thing
+from executive.testing.fake_cell import FakeCell
 
 BUG = Fault("tree/Grasp", "Grasp", "", "raises", "first", "", breakages=(Breakage("tree/Grasp", "raises"),))
 MISS = Fault("tree/Grasp", "Grasp", "", "missed", "first", "", reason=True)
 ENDINGS = (Ending("Grasp", "missed", "tree/Grasp", "a.yaml", 3),)
 ITEMS = {"seen": 3, "placed": 2, "rejected": 1, "lost": 0, "phantom": 0}
 AUDIT = {"right": 2, "wrong_bin": 0, "left": 1, "elsewhere": 0, "unseen": 0}
+
+PLACES = ((0.5, 0.0, 0.025), (1.6, 0.0, 0.025), (0.24, -0.48, 0.025))
+"""In the workspace, far beside it, and in a bin that the camera shows."""
 
 
 def outcome(status: str, reason: str = "", message: str = "", node: str = "") -> Outcome:
@@ -104,3 +119,28 @@ def test_a_failure_for_another_reason_is_remarked() -> None:
     assert remark(outcome("FAILURE", "lost"), [MISS]) == remark(outcome("SUCCESS"), [MISS]) == ""
     said = remark(outcome("FAILURE", "Transit.dropped"), [MISS])
     assert said == "it says Transit.dropped, and missed was brought about"
+
+
+def test_what_fell_where_no_look_shows_it_is_out_of_reach_wherever_it_lies() -> None:
+    lost = {"seen": 3, "placed": 2, "rejected": 0, "lost": 1, "phantom": 0}
+    in_its_bin = {**AUDIT, "right": 3, "left": 0}
+    failed = outcome("FAILURE", "lost")
+    assert list(check_books(failed, lost, AUDIT, 0, Hidden(1, 0))) == []
+    assert list(check_books(failed, lost, in_its_bin, 0, Hidden(0, 1))) == []
+    for hidden in (Hidden(0, 0), Hidden(0, 1)):
+        assert len(list(check_books(failed, lost, AUDIT, 0, hidden))) == 1
+    two = {**AUDIT, "right": 1, "left": 2}
+    assert len(list(check_books(failed, lost, two, 0, Hidden(1, 0)))) == 1, "only one of them is hidden"
+
+
+def test_an_object_is_out_of_sight_if_no_look_since_the_last_fall_shows_its_place(fake: FakeCell) -> None:
+    camera, bins = fake.cell.camera, fake.cell.bins.values()
+    seen, beside = (Thing(body, "cube", np.array(place)) for body, place in enumerate(PLACES[:2]))
+    inside = Thing(2, "cube", np.array(PLACES[2]))
+    fall = Event("item", 10, 0.0, {"item": "cube-1", "state": "dropped"})
+    look = Event("look", 20, 0.0, {"frame_object": camera.capture()})
+    before = Event("look", 5, 0.0, look.data)
+    things = [seen, beside, inside]
+    assert out_of_sight(things, bins, [fall, look]) == Hidden(1, 0)
+    assert out_of_sight(things, bins, [before, fall]) == Hidden(2, 1), "what was seen before it fell is old"
+    assert out_of_sight(things, bins, [look]) == Hidden(0, 0), "nothing fell"
