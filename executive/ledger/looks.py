@@ -88,7 +88,8 @@ class Looks:
             seen.append(record)
         glimpsed = self._glimpsed(records, seen, detections, glimpses)
         missed = self._missed(known, [*seen, *glimpsed], detections)
-        self._coverage.look(detections, [glimpse.position for glimpse in glimpses])
+        # Once it is given up, what lies there is known as well as it will ever be.
+        self._coverage.look(detections, [r.position for r in glimpsed if r.state is State.SEEN])
         recognized = self._recognize(records, seen)
         changed = [*seen, *glimpsed, *missed, *recognized, *self._one_of_two(records, seen)]
         return list({id(record): record for record in changed}.values())

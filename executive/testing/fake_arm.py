@@ -213,10 +213,13 @@ class FakeTool:
             self._let_go()
 
     def part(self) -> None:
-        """Let the seal give way; what hung there falls straight down."""
-        if self._world.held is not None:
-            self._world.held.fell = True
+        """Let the seal give way; what hung there falls straight down, and off what it falls on."""
+        thing = self._world.held
         self._let_go()
+        if thing is not None:
+            thing.fell = True
+            self._world.roll_off(thing)
+            thing.stood[-1] = thing.position.copy()
 
     def _let_go(self) -> None:
         thing, self._world.held = self._world.held, None

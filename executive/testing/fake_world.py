@@ -75,6 +75,17 @@ class FakeWorld:
         self.objects.remove(thing)
         self.removed.append(thing)
 
+    def roll_off(self, thing: FakeObject) -> None:
+        """Move what fell on another object off it, so that they touch at most: one after another, once."""
+        radius = self.classes[thing.label].radius
+        for other in self.objects:
+            apart = radius + self.classes[other.label].radius
+            way = thing.position[:2] - other.position[:2]
+            distance = float(np.linalg.norm(way))
+            if other is not thing and distance < apart:
+                way = way / distance if distance else np.array((1.0, 0.0))
+                thing.position[:2] = other.position[:2] + apart * way
+
     def top(self, thing: FakeObject) -> float:
         """Return the height of an object's upper side [m]."""
         return float(thing.position[2]) + self.classes[thing.label].height / 2
