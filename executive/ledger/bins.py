@@ -46,8 +46,8 @@ class Bins:
         self._records = records
 
     def objects_in(self, bin: str) -> int:
-        """Return how many objects were let go in `bin` so far."""
-        return sum(record.bin == bin for record in self._records.values())
+        """Return how many objects were let go in `bin` so far, or must have fallen into it."""
+        return sum(bin in (record.bin, self.believed(record)) for record in self._records.values())
 
     def at(self, position: Array, spread: float) -> str | None:
         """Return the bin that something measured with a standard deviation of `spread` [m] lies in, if any.
@@ -68,6 +68,8 @@ class Bins:
 
     def believed(self, record: Record) -> str | None:
         """Return the bin that a dropped item must have fallen into, or None where that is not sure enough."""
+        if record.state is not State.DROPPED:
+            return None
         return next((bin for bin, odds in record.fallen.items() if odds >= FELL), None)
 
     def fallen(

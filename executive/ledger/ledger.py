@@ -213,7 +213,7 @@ class ItemLedger:
     def close(self) -> None:
         """Decide what became of everything still open (`fate_of`): the run is over."""
         for record in self._records.values():
-            if record.state is State.DROPPED and (bin := self._in_bins.believed(record)):
+            if bin := self._in_bins.believed(record):
                 record.why = "it fell there"
                 self.placed(record.item, bin)
             fate = fate_of(record, gone=self._is_gone(record), routed=record.label in self._routes)

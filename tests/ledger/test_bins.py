@@ -77,3 +77,14 @@ def test_what_leans_on_the_wall_of_its_bin_is_in_it(bench: Bench) -> None:
     bench.ledger.dropped("cube-2", OVER)
     bench.look(("cube", 0.2, -0.44), ("cube", 0.2, -0.44 + 0.12 + 0.003), view="full")
     assert bench.ledger.balance()["placed"] == 2
+
+
+def test_what_must_have_fallen_into_a_bin_takes_a_place_there(bench: Bench) -> None:
+    bench.look(("cube", 0.5, 0.0))
+    bench.ledger.held("cube-1")
+    bench.ledger.dropped("cube-1", OVER)
+    assert bench.ledger.objects_in("red_bin") == 1
+    bench.look(view="full")
+    assert bench.ledger.objects_in("red_bin") == 0, "a look shows that it is not there"
+    bench.look(("cube", 0.2, -0.44), view="full")
+    assert bench.ledger.objects_in("red_bin") == 1
