@@ -38,7 +38,7 @@ class State(Enum):
     HELD = "held"
     """Sealed to the tool."""
     DROPPED = "dropped"
-    """Lost by the tool on the way, not found again yet."""
+    """Lost by the tool on the way, not found again yet; given up already if it says why."""
     PLACED = "placed"
     """Let go in a bin."""
     REJECTED = "rejected"
@@ -217,4 +217,4 @@ class Record:
         # Where it was first, it was before it fell or was pushed.
         self.moved = True
         if self.state is State.DROPPED:
-            self.state = State.SEEN
+            self.state = State.REJECTED if self.why else State.SEEN

@@ -97,7 +97,8 @@ class ItemLedger:
 
     def is_open(self, item: Item) -> bool:
         """Tell whether the item still waits to be sorted."""
-        return self._record(item).state in OPEN
+        record = self._record(item)
+        return record.state in OPEN and not record.why
 
     def is_sure(self, item: Item) -> bool:
         """Tell whether enough looks agree that the item exists, of which class it is, and where.
@@ -176,9 +177,13 @@ class ItemLedger:
         self._disturb(record.position, math.inf)
 
     def rejected(self, item: Item, why: str) -> None:
-        """Record that the item is given up; it is reported and not tried again."""
-        self._record(item).why = why
-        self._change(item, State.REJECTED)
+        """Record that the item is given up; it is reported and not tried again.
+
+        One that was dropped is sought on, so that the books end with where it is.
+        """
+        record = self._record(item)
+        record.why = why
+        self._change(item, State.DROPPED if record.state is State.DROPPED else State.REJECTED)
 
     def label(self, item: Item) -> str:
         """Return the class the item is believed to be of."""
@@ -251,6 +256,7 @@ class ItemLedger:
             self._report(record)
         if detections.view == "full":
             for record, bin in self._in_bins.fallen(detections, positions, inside):
+                record.why = ""
                 self.placed(record.item, bin)
 
     def _may_wait(self, record: Record) -> bool:

@@ -88,3 +88,33 @@ def test_what_must_have_fallen_into_a_bin_takes_a_place_there(bench: Bench) -> N
     assert bench.ledger.objects_in("red_bin") == 0, "a look shows that it is not there"
     bench.look(("cube", 0.2, -0.44), view="full")
     assert bench.ledger.objects_in("red_bin") == 1
+
+
+def test_what_was_given_up_where_nobody_knows_is_found_in_its_bin_all_the_same(bench: Bench) -> None:
+    bench.look(("cube", 0.5, 0.0))
+    bench.ledger.held("cube-1")
+    bench.ledger.dropped("cube-1")
+    bench.ledger.rejected("cube-1", "12 attempts failed")
+    assert not bench.ledger.is_open("cube-1")
+    bench.look(("cube", 0.2, -0.44), view="full")
+    (row,) = bench.ledger.rows()
+    assert (row["state"], row["bin"], row["why"]) == ("placed", "red_bin", "")
+
+
+def test_found_on_the_table_it_stays_given_up(bench: Bench) -> None:
+    bench.look(("cube", 0.5, 0.0))
+    bench.ledger.held("cube-1")
+    bench.ledger.dropped("cube-1")
+    bench.ledger.rejected("cube-1", "12 attempts failed")
+    assert bench.look(("cube", 0.55, 0.1)) == []
+    (row,) = bench.ledger.rows()
+    assert (row["state"], row["position"][:2], row["why"]) == ("rejected", [0.55, 0.1], "12 attempts failed")
+
+
+def test_given_up_and_never_found_it_is_lost(bench: Bench) -> None:
+    bench.look(("cube", 0.5, 0.0))
+    bench.ledger.held("cube-1")
+    bench.ledger.dropped("cube-1")
+    bench.ledger.rejected("cube-1", "12 attempts failed")
+    bench.ledger.close()
+    assert bench.ledger.rows()[0]["state"] == "lost"
