@@ -184,7 +184,9 @@ class FakeCell:
         counts = {"right": 0, "wrong_bin": 0, "left": 0, "elsewhere": 0, "unseen": 0}
         for thing in self.world.objects:
             bins = self._cell.bins.items()
-            inside = next((n for n, bin in bins if bin.contains(thing.position, BIN_THICKNESS)), None)
+            # Nothing stands on a wall: what does here would have fallen in.
+            wall = BIN_THICKNESS + self._cell.classes[thing.label].radius / 2
+            inside = next((n for n, bin in bins if bin.contains(thing.position, wall)), None)
             if inside is None or thing is self.world.held:
                 counts["left"] += 1
             elif inside in self.routes.get(thing.label, ()):
