@@ -40,7 +40,8 @@ def fate_of(record: Record, *, gone: bool, routed: bool) -> tuple[State, str] | 
     """Return what became of an item and why, now that the run is over; None where it is settled already.
 
     An item seen where it was left is rejected, one that is known to exist and was not found again is lost,
-    given up or not, and one that is likelier an invention than an object is a phantom.
+    given up or not, and one that is likelier an invention than an object is a phantom. What looks were unsure
+    of, and none has missed, may be an object: it is rejected.
 
     Args:
         record: The item.
@@ -51,8 +52,10 @@ def fate_of(record: Record, *, gone: bool, routed: bool) -> tuple[State, str] | 
         return State.REJECTED, "still in the tool when the run ended"
     if record.state not in ON_TABLE:
         return None
+    if record.state is State.SEEN and not record.looks and record.overlooked == 1.0:
+        return State.REJECTED, UNSURE
     if record.probability < 0.5:
-        return State.PHANTOM, NOTHING if record.looks else UNSURE
+        return State.PHANTOM, NOTHING
     if record.state is State.DROPPED or gone:
         return State.LOST, "known to exist, not found again"
     if record.state is State.REJECTED:

@@ -109,10 +109,17 @@ def test_a_known_item_that_waits_its_turn_is_not_given_up_for_glimpses(bench: Be
     assert bench.ledger.is_sure("cube-1")
 
 
-def test_what_the_run_ends_before_is_sure_of_was_no_object(bench: Bench) -> None:
+def test_what_no_look_was_sure_of_when_the_run_ended_is_reported(bench: Bench) -> None:
     bench.look(unsure=[THERE])
     bench.ledger.close()
-    assert (row(bench)["state"], row(bench)["why"]) == ("phantom", "no look is sure of it")
+    assert (row(bench)["state"], row(bench)["why"]) == ("rejected", "no look is sure of it")
+
+
+def test_what_a_look_missed_before_the_run_ended_was_no_object(bench: Bench) -> None:
+    bench.look(unsure=[THERE])
+    bench.look()
+    bench.ledger.close()
+    assert row(bench)["state"] == "phantom"
 
 
 def test_what_is_unsure_in_a_bin_is_no_item(bench: Bench) -> None:
