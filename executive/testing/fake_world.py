@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from executive.cell import Steps
 from executive.geometry import Array
-from executive.messages import ObjectClass
+from executive.messages import BIN_THICKNESS, Bin, ObjectClass
 
 STEP = 1 / 240
 """Length of one control step [s]."""
@@ -49,6 +49,7 @@ class FakeWorld:
         classes: What objects there may be.
         objects: The objects, in the order they were put down.
         removed: Those that somebody took away.
+        bins: What objects may lie in.
         held: The object at the tool, or None.
         steps: Control steps since the run began.
     """
@@ -56,6 +57,7 @@ class FakeWorld:
     classes: Mapping[str, ObjectClass]
     objects: list[FakeObject] = field(default_factory=list)
     removed: list[FakeObject] = field(default_factory=list)
+    bins: Collection[Bin] = ()
     held: FakeObject | None = None
     steps: int = 0
 
@@ -76,7 +78,12 @@ class FakeWorld:
         self.removed.append(thing)
 
     def roll_off(self, thing: FakeObject) -> None:
-        """Move what fell on another object off it, so that they touch at most: one after another, once."""
+        """Move what fell on another object off it, so that they touch at most: one after another, once.
+
+        What fell into a bin stays there.
+        """
+        if any(bin.contains(thing.position, BIN_THICKNESS) for bin in self.bins):
+            return
         radius = self.classes[thing.label].radius
         for other in self.objects:
             apart = radius + self.classes[other.label].radius
