@@ -88,7 +88,7 @@ class FakeCell:
         self.arm = FakeArm(self.world, config, clock, emit)
         self.tool = FakeTool(self.world, lambda: self.arm.tool_pose.position)
         bins = {name: as_bin(name, bin) for name, bin in config.bins.items()}
-        self.world.bins = bins.values()
+        self.world.bins = tuple(bins.values())
         self.ledger = ItemLedger(config.ledger, config.table, bins, self.routes, emit)
         name, camera = next(iter(config.cameras.items()))
         X_TF = Pose.of((0.0, 0.0, -config.tool.length))
