@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from at_hand import look
 
+from executive.messages import Target
 from executive.testing.fake_cell import FakeCell
 
 
@@ -13,6 +15,14 @@ from executive.testing.fake_cell import FakeCell
 def fake() -> FakeCell:
     """A fake cell with an empty table."""
     return FakeCell()
+
+
+@pytest.fixture
+def targets(fake: FakeCell) -> list[Target]:
+    """A cube and a duck on the fake table, seen once."""
+    fake.world.put("cube", 0.5, 0.0)
+    fake.world.put("duck", 0.6, 0.15)
+    return look(fake)
 
 
 @pytest.fixture(scope="session")

@@ -6,16 +6,13 @@ import math
 
 import numpy as np
 import pytest
+from at_hand import look, pick
 
 from executive.arm import Goal
 from executive.goals import DROP, SIDE_BY_SIDE, approach, aside, onto, over
-from executive.messages import BIN_THICKNESS, ObjectClass, Target
+from executive.messages import BIN_THICKNESS, ObjectClass
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
-from skills.approach import Approach
-from skills.detect import Detect
-from skills.grasp import Grasp
-from skills.localize import Localize
 from skills.put_down import PutDown
 
 SAFE = (0.45, -0.30)
@@ -27,16 +24,10 @@ def held(fake: FakeCell) -> str:
     return picked(fake, fake.world.put("cube", 0.5, 0.0).label)
 
 
-def seen(fake: FakeCell) -> list[Target]:
-    detections = run_skill(Detect(view="full"), fake).outputs["detections"]
-    return run_skill(Localize(detections=detections), fake).outputs["targets"]
-
-
 def picked(fake: FakeCell, label: str) -> str:
     """Pick the first object of that class that a look shows in the workspace; return its item."""
-    target = next(one for one in seen(fake) if one.label == label and one.position[1] > -0.2)
-    run_skill(Approach(target=target), fake)
-    return run_skill(Grasp(target=target, bin="red_bin"), fake).outputs["held"]
+    target = next(one for one in look(fake, "full") if one.label == label and one.position[1] > -0.2)
+    return pick(fake, target, "red_bin")
 
 
 def test_it_is_the_safe_place_if_that_is_free(fake: FakeCell, held: str) -> None:
@@ -70,7 +61,7 @@ def test_where_nothing_is_free_it_is_the_safe_place_all_the_same(
 
 def test_the_goal_of_an_approach_lies_below_the_surface_and_the_last_part_is_slow(fake: FakeCell) -> None:
     fake.world.put("cube", 0.5, 0.0)
-    goal, _ = approach(fake.cell, seen(fake)[0])
+    goal, _ = approach(fake.cell, look(fake, "full")[0])
     assert goal.position == pytest.approx((0.5, 0.0, 0.035))
     assert goal.position[2] + goal.guarded == pytest.approx(0.05 + fake.cell.descent)
     assert goal.speed == fake.cell.descent_speed

@@ -9,22 +9,7 @@ from executive.messages import Obstacle, Target
 from executive.moving import planned
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
-from skills.detect import Detect
-from skills.localize import Localize
 from skills.move_to_scan import MoveToScan
-
-
-@pytest.fixture
-def targets(fake: FakeCell) -> list[Target]:
-    """A cube and a duck on the fake table, seen once."""
-    fake.world.put("cube", 0.5, 0.0)
-    fake.world.put("duck", 0.6, 0.15)
-    return look(fake)
-
-
-def look(fake: FakeCell) -> list[Target]:
-    detections = run_skill(Detect(), fake).outputs["detections"]
-    return run_skill(Localize(detections=detections), fake).outputs["targets"]
 
 
 def test_an_arm_that_runs_into_something_stops_and_the_whole_table_is_in_doubt(

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from at_hand import look, pick
 
 from executive.geometry import GRAVITY
 from executive.slip import CALM, landing, slipped
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
-from skills.approach import Approach
-from skills.detect import Detect
-from skills.grasp import Grasp
-from skills.localize import Localize
 from skills.transit import Transit
 
 
@@ -44,11 +41,8 @@ def test_what_touches_the_ground_already_stays_where_it_is() -> None:
 def held(fake: FakeCell) -> str:
     """A cube in the tool."""
     fake.world.put("cube", 0.5, 0.0)
-    detections = run_skill(Detect(), fake).outputs["detections"]
-    (target,) = run_skill(Localize(detections=detections), fake).outputs["targets"]
-    run_skill(Approach(target=target), fake)
-    run_skill(Grasp(target=target, bin="red_bin"), fake)
-    return target.item
+    (target,) = look(fake)
+    return pick(fake, target, "red_bin")
 
 
 def test_the_ledger_is_told_once(fake: FakeCell, held: str) -> None:

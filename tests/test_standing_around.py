@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from at_hand import look, pick
 
 from executive.goals import approach, into
 from executive.messages import BIN_THICKNESS, Target
@@ -11,30 +12,8 @@ from executive.moving import carrying, heeding
 from executive.surroundings import around, slots_taken
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
-from skills.approach import Approach
-from skills.detect import Detect
-from skills.grasp import Grasp
-from skills.localize import Localize
 from skills.release import Release
 from skills.transit import Transit
-
-
-@pytest.fixture
-def targets(fake: FakeCell) -> list[Target]:
-    """A cube and a duck on the fake table, seen once."""
-    fake.world.put("cube", 0.5, 0.0)
-    fake.world.put("duck", 0.6, 0.15)
-    return look(fake)
-
-
-def look(fake: FakeCell) -> list[Target]:
-    detections = run_skill(Detect(), fake).outputs["detections"]
-    return run_skill(Localize(detections=detections), fake).outputs["targets"]
-
-
-def pick(fake: FakeCell, target: Target) -> None:
-    run_skill(Approach(target=target), fake)
-    run_skill(Grasp(target=target), fake)
 
 
 def names(fake: FakeCell, but: str | None = None) -> list[str]:

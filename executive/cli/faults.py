@@ -8,7 +8,14 @@ from typing import Any
 
 import click
 
-from executive.cli.options import MISSION, json_option, overrides_option, runs_option, seed_option
+from executive.cli.options import (
+    MISSION,
+    json_option,
+    overrides_option,
+    runs_option,
+    seed_option,
+    workers_option,
+)
 from executive.cli.output import print_json, stdout_kept_clean
 from executive.cli.subject import load_subject, oracle_option
 
@@ -39,7 +46,7 @@ class FaultNumbers(click.ParamType):
 @click.option(
     "--list", "listed", is_flag=True, help="Print them, and run nothing but the undisturbed mission."
 )
-@click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Runs at a time.")
+@workers_option
 @seed_option
 @overrides_option
 @runs_option

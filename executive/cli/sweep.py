@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from executive.cli.options import MISSION, json_option, overrides_option, runs_option
+from executive.cli.options import MISSION, json_option, overrides_option, runs_option, workers_option
 from executive.cli.output import print_json, stdout_kept_clean
 
 
@@ -33,7 +33,7 @@ class SeedRange(click.ParamType):
 @click.command(name="sweep")
 @MISSION
 @click.option("--seeds", type=SeedRange(), required=True, help="First and last seed, for instance 0-99.")
-@click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Runs at a time.")
+@workers_option
 @click.option("--frames", is_flag=True, help="Save the pictures behind every decision.")
 @overrides_option
 @runs_option

@@ -17,13 +17,6 @@ from executive.record.pictures.drawer import Drawer
 from executive.record.recorder import Recorder
 from executive.testing.fake_cell import FakeCell
 
-MISSION = """\
-mission: bring_one
-description: Bring one object.
-cell: cells/overhead.yaml
-routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}
-tree: [MoveToScan, Detect, Localize, SelectTarget, Approach, Grasp, Transit, Release]
-"""
 RECORD = ("write", "fsync", "replace", "rename")
 WORLD = ("pwrite",)
 
@@ -53,29 +46,14 @@ class Disk:
 
 
 @pytest.fixture
-def cells(monkeypatch):
-    """The cells that runs were made on."""
-    made = []
-
-    class Cell(FakeCell):
-        def __init__(self, *args, **options):
-            super().__init__(*args, **options)
-            made.append(self)
-
-    monkeypatch.setattr("executive.runtime.run.cell_kind", lambda name: Cell)
-    return made
-
-
-@pytest.fixture
-def run(tmp_path, monkeypatch, cells):
+def run(bring_one, tmp_path, monkeypatch, cells):
     """Run the command once, without pictures; the result, and the directory that it left, if any."""
-    (tmp_path / "bring_one.yaml").write_text(MISSION)
     monkeypatch.setattr(Drawer, "draw", lambda self, name, scene: True)
 
     def once() -> tuple[Result, Path | None]:
         before = set(tmp_path.glob("runs/[0-9]*/*"))
         few = ("--set", "cell.kind=fake", "--set", "cell.table.objects=[1, 1]")
-        words = ["run", str(tmp_path / "bring_one.yaml"), "--runs", str(tmp_path / "runs"), *few, "--json"]
+        words = ["run", bring_one, "--runs", str(tmp_path / "runs"), *few, "--json"]
         shown = CliRunner().invoke(main, words)
         (left,) = set(tmp_path.glob("runs/[0-9]*/*")) - before or {None}
         return shown, left

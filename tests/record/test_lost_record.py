@@ -19,15 +19,7 @@ from executive.record.recorder import Recorder
 from executive.record.run_directory import RunDirectory
 from executive.runtime.cells import cell_kind
 from executive.skill import discover
-from executive.testing.fake_cell import FakeCell
 
-MISSION = """\
-mission: bring_one
-description: Bring one object.
-cell: cells/overhead.yaml
-routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}
-tree: [MoveToScan, Detect, Localize, SelectTarget, Approach, Grasp, Transit, Release]
-"""
 SMALL = {"cell.kind": "fake", "cell.table.objects": "[1, 1]"}
 
 
@@ -56,27 +48,12 @@ class Thief:
 
 
 @pytest.fixture
-def cells(monkeypatch):
-    """The cells that runs were made on."""
-    made = []
-
-    class Cell(FakeCell):
-        def __init__(self, *args, **options):
-            super().__init__(*args, **options)
-            made.append(self)
-
-    monkeypatch.setattr("executive.runtime.run.cell_kind", lambda name: Cell)
-    return made
-
-
-@pytest.fixture
-def run(tmp_path, cells):
+def run(bring_one, tmp_path, cells):
     """Run the mission once, with something done to its directory before the grasp."""
-    (tmp_path / "bring_one.yaml").write_text(MISSION)
     skills = discover()
 
     def once(does=None, *, frames=False):
-        loaded = load_mission(str(tmp_path / "bring_one.yaml"), skills, SMALL, cell_kind)
+        loaded = load_mission(bring_one, skills, SMALL, cell_kind)
         view = Thief(does)
         runs = tmp_path / "runs"
         return recorded_run(loaded, skills, seed=1, runs=runs, view=view, frames=frames), view.notes
@@ -154,19 +131,18 @@ def test_whoever_may_not_write_there_is_told(tmp_path):
     assert read_journal(directory.journal) == [{}]
 
 
-def limited(folder: Path, size: int, *words: str) -> subprocess.CompletedProcess[str]:
+def limited(mission: str, size: int, *words: str) -> subprocess.CompletedProcess[str]:
     """Run the command where no file may be longer than so many bytes."""
-    (folder / "bring_one.yaml").write_text(MISSION)
     settings = [word for key, value in SMALL.items() for word in ("--set", f"{key}={value}")]
     return subprocess.run(
-        [sys.executable, "-m", "executive.cli.main", "run", "bring_one.yaml", "--json", *settings, *words],
-        cwd=folder, capture_output=True, text=True,
+        [sys.executable, "-m", "executive.cli.main", "run", mission, "--json", *settings, *words],
+        cwd=Path(mission).parent, capture_output=True, text=True,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)),
     )  # fmt: skip
 
 
-def test_a_journal_for_which_there_is_no_more_room_ends_the_run_on_the_command_line(tmp_path):
-    shown = limited(tmp_path, 6000)
+def test_a_journal_for_which_there_is_no_more_room_ends_the_run_on_the_command_line(bring_one, tmp_path):
+    shown = limited(bring_one, 6000)
     assert shown.returncode == 3
     result = json.loads(shown.stdout)
     assert result["status"] == "FAULT"
@@ -180,8 +156,8 @@ def test_a_journal_for_which_there_is_no_more_room_ends_the_run_on_the_command_l
     assert ending_of(entries) is None
 
 
-def test_a_cell_for_which_there_is_no_room_is_bad_input_on_the_command_line(tmp_path):
-    shown = limited(tmp_path, 2000)
+def test_a_cell_for_which_there_is_no_room_is_bad_input_on_the_command_line(bring_one, tmp_path):
+    shown = limited(bring_one, 2000)
     assert (shown.returncode, shown.stdout) == (2, "")
     assert 'cannot write to the run directory "runs/' in shown.stderr
     assert "file too large; free some space or name another place with --runs DIR" in shown.stderr
@@ -190,8 +166,8 @@ def test_a_cell_for_which_there_is_no_room_is_bad_input_on_the_command_line(tmp_
     assert sorted(path.name for path in tmp_path.glob("runs/*/*/*")) == ["mission.yaml", "params.yaml"]
 
 
-def test_a_picture_for_which_there_is_no_room_ends_nothing_on_the_command_line(tmp_path):
-    shown = limited(tmp_path, 12_000)
+def test_a_picture_for_which_there_is_no_room_ends_nothing_on_the_command_line(bring_one, tmp_path):
+    shown = limited(bring_one, 12_000)
     assert shown.returncode == 0
     assert json.loads(shown.stdout)["status"] == "SUCCESS"
     assert "note: not every picture was drawn: " in shown.stderr

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import pytest
+from at_hand import look
 
 from executive.runtime.take_up import reconcile
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
-from skills.detect import Detect
-from skills.localize import Localize
 
 
 @pytest.fixture
 def item(fake: FakeCell) -> str:
     """An object that the cup is on."""
     fake.world.put("cube", 0.5, 0.0)
-    detections = run_skill(Detect(), fake).outputs["detections"]
-    (target,) = run_skill(Localize(detections=detections), fake).outputs["targets"]
+    (target,) = look(fake)
     run_skill(Approach(target=target), fake)
     return str(target.item)
 
@@ -51,8 +49,7 @@ def test_what_the_run_itself_let_go_is_for_the_skill_to_say(fake: FakeCell, item
 
 def test_everything_on_the_table_is_in_doubt(fake: FakeCell) -> None:
     fake.world.put("cube", 0.5, 0.0)
-    detections = run_skill(Detect(), fake).outputs["detections"]
-    (target,) = run_skill(Localize(detections=detections), fake).outputs["targets"]
+    (target,) = look(fake)
     assert fake.ledger.is_fresh(target)
     reconcile(fake.cell, "")
     assert not fake.ledger.is_fresh(target)

@@ -1,0 +1,23 @@
+"""What tests do with a cell by hand before that which they test: look at it, and pick from it."""
+
+from __future__ import annotations
+
+from executive.messages import Target
+from executive.testing.fake_cell import FakeCell
+from executive.testing.run_skill import run_skill
+from skills.approach import Approach
+from skills.detect import Detect
+from skills.grasp import Grasp
+from skills.localize import Localize
+
+
+def look(fake: FakeCell, view: str = "table") -> list[Target]:
+    """Look once, and return what was localized."""
+    detections = run_skill(Detect(view=view), fake).outputs["detections"]
+    return run_skill(Localize(detections=detections), fake).outputs["targets"]
+
+
+def pick(fake: FakeCell, target: Target, bin: str | None = None) -> str:
+    """Grasp an object that was localized; return its item."""
+    run_skill(Approach(target=target), fake)
+    return run_skill(Grasp(target=target, bin=bin), fake).outputs["held"]

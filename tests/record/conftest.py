@@ -1,0 +1,39 @@
+"""One short mission, and the cells that runs were made on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from executive.testing.fake_cell import FakeCell
+
+MISSION = """\
+mission: bring_one
+description: Bring one object.
+cell: cells/overhead.yaml
+routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}
+tree: [MoveToScan, Detect, Localize, SelectTarget, Approach, Grasp, Transit, Release]
+"""
+
+
+@pytest.fixture
+def bring_one(tmp_path: Path) -> str:
+    """The file of a mission that brings one object."""
+    file = tmp_path / "bring_one.yaml"
+    file.write_text(MISSION)
+    return str(file)
+
+
+@pytest.fixture
+def cells(monkeypatch: pytest.MonkeyPatch) -> list[FakeCell]:
+    """The cells that runs were made on."""
+    made: list[FakeCell] = []
+
+    class Cell(FakeCell):
+        def __init__(self, *args, **options) -> None:
+            super().__init__(*args, **options)
+            made.append(self)
+
+    monkeypatch.setattr("executive.runtime.run.cell_kind", lambda name: Cell)
+    return made
