@@ -49,7 +49,7 @@ class Cause:
 
 def causes(table: TableConfig) -> Mapping[str, Cause]:
     """Return what makes skills fail, by the name of the reason; of one that is missing nobody knows."""
-    aside = ObjectBumped("node", table.x, table.y)
+    aside = ObjectBumped("node", 0.0, table.x, table.y)
     return {
         "missed": Cause(seal_fails(), "nothing seals", "tool"),
         "dropped": Cause(seal_breaks(), "the seal breaks half-way", "moves"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -14,7 +15,8 @@ from executive.errors import Unavailable
 from executive.messages import Answer
 from executive.testing.disturbances.effect import Effect, Occasion
 from executive.testing.disturbances.hand import Thing
-from executive.testing.disturbances.scene import Scene, Which
+from executive.testing.disturbances.objects import ObjectDisturbed
+from executive.testing.disturbances.scene import Scene
 
 ASIDE = 0.06
 """How far an object is bumped aside [m]."""
@@ -25,48 +27,21 @@ UNDER = 0.03
 
 
 @dataclass(frozen=True)
-class ObjectTaken(Effect):
-    """Somebody takes an object away once the arm has gone so far."""
-
-    name: ClassVar = "object_removed"
-    which: Which
-    share: float = 0.0
-
-    def act(self, now: Occasion) -> bool:
-        """Take it, as soon as there is such an object."""
-        thing = now.scene.find(self.which, now.item) if now.scene.progress >= self.share else None
-        if thing is None:
-            return False
-        now.tell(thing)
-        now.scene.hand.remove(thing)
-        return True
-
-
-@dataclass(frozen=True)
-class ObjectBumped(Effect):
-    """Something bumps an object aside, to where it is free, once the arm has gone so far.
+class ObjectBumped(ObjectDisturbed):
+    """Something bumps an object aside, to where it is free.
 
     Attributes:
-        which: Which one.
         x, y: Where on the table it stays [m].
-        share: Of the arm's motion.
     """
 
     name: ClassVar = "object_moved"
-    which: Which
     x: tuple[float, float]
     y: tuple[float, float]
-    share: float = 0.0
 
-    def act(self, now: Occasion) -> bool:
-        """Bump it, as soon as there is such an object with room beside it."""
-        thing = now.scene.find(self.which, now.item) if now.scene.progress >= self.share else None
-        way = None if thing is None else self._way(now.scene, thing)
-        if thing is None or way is None:
-            return False
-        now.tell(thing)
-        now.scene.hand.move(thing, way)
-        return True
+    def deed(self, scene: Scene, thing: Thing) -> Callable[[], None] | None:
+        """Return what bumps it, if there is room beside it."""
+        way = self._way(scene, thing)
+        return None if way is None else partial(scene.hand.move, thing, way)
 
     def _way(self, scene: Scene, thing: Thing) -> tuple[float, float] | None:
         radius = scene.cell.classes[thing.label].radius

@@ -10,7 +10,6 @@ from executive.campaign.faults.effects import (
     DetectorGivenUp,
     ObjectBumped,
     ObjectRefuses,
-    ObjectTaken,
     SealBreaksOverBin,
 )
 from executive.campaign.faults.fault import Breakage, Fault, When
@@ -27,6 +26,7 @@ from executive.testing.disturbances import (
     detector_slow,
     detector_unsure,
     during,
+    object_removed,
     seal_breaks,
     seal_fails,
 )
@@ -136,15 +136,20 @@ class _Listing:
         table = self._table
         for when, share in QUARTERS:
             start = share * self._rehearsal.robot_time
-            yield _other("object", "taken", when, after(start, ObjectTaken("nearest")))
-            yield _other("object", "bumped", when, after(start, ObjectBumped("nearest", table.x, table.y)))
+            yield _other("object", "taken", when, after(start, object_removed("nearest")))
+            yield _other(
+                "object", "bumped", when, after(start, ObjectBumped("nearest", 0.0, table.x, table.y))
+            )
         for node in self._nodes:
             if not _goes_to_target(self._skills[node.skill]) or not self._runs(node):
                 continue
             nth = 1 + len(self._rehearsal.activations[node.path]) // 2
             for when, share in QUARTERS:
-                bumped = ObjectBumped("node", table.x, table.y, share)
-                for what, effect in (("target taken", ObjectTaken("node", share)), ("target bumped", bumped)):
+                bumped = ObjectBumped("node", share, table.x, table.y)
+                for what, effect in (
+                    ("target taken", object_removed("node", share)),
+                    ("target bumped", bumped),
+                ):
                     happening = during(node.path, effect, nth=nth)
                     yield self._fault(node, what, when, means=f"at {share:g}", happenings=(happening,))
 

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from executive.campaign.faults.breakages import WANTED, broken_skills
-from executive.campaign.faults.effects import ObjectTaken
 from executive.campaign.faults.fault import Breakage, Fault, InjectedError
 from executive.campaign.faults.judgement import (
     Hidden,
@@ -37,6 +36,7 @@ from executive.runtime.outcome import Outcome
 from executive.runtime.run import Run
 from executive.testing.bounded_cell import BoundedCell
 from executive.testing.disturbances import DisturbedCell, disturbed
+from executive.testing.disturbances.objects import ObjectRemoved
 from executive.testing.wrapped_cell import WrappedCell
 from executive.view.fault_trials import Trial
 from executive.workcell import Workcell
@@ -129,7 +129,7 @@ class _Trying:
             *check_end(outcome, faults, self._subject.loaded.endings, raised),
             *check_tree(run.root),
             *check_journal([_entry(event) for event in self._events], outcome),
-            *check_books(outcome, items, audit, count_of(self._events, ObjectTaken.name), self._hidden()),
+            *check_books(outcome, items, audit, count_of(self._events, ObjectRemoved.name), self._hidden()),
             *check_success(outcome, audit, self._events),
             *check_losses(audit, self._events),
             *check_tool(outcome, run.workcell),

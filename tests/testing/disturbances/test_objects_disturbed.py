@@ -36,6 +36,17 @@ def test_what_is_taken_away_under_the_tool_is_lost_and_the_audit_knows_it() -> N
     assert result.agrees
 
 
+def test_with_a_share_it_waits_until_the_arm_is_so_far() -> None:
+    begins, half = (
+        run_mission("sort_overhead", arrange=three, disturbances=[during("*/Approach", effect, nth=2)])
+        for effect in (object_removed(), object_removed(share=0.5))
+    )
+    (at_once,), (later,) = (
+        [event.clock for event in result.events if event.kind == "disturbance"] for result in (begins, half)
+    )
+    assert later > at_once + 0.1
+
+
 def test_what_is_taken_out_of_the_tool_was_dropped_nowhere() -> None:
     result = run_mission(
         "sort_overhead", arrange=three, disturbances=[during("*/Transit", object_removed(), nth=2)]

@@ -127,6 +127,7 @@ def test_a_script_that_does_not_come_to_act_tells_nothing() -> None:
         (lambda: with_probability(1.5, "*", SLIPS, seed=0), "a probability is 0 to 1, not 1.5"),
         (lambda: seal_breaks(1.0), "a share of a motion is more than 0 and less than 1, not 1"),
         (lambda: arm_runs_into(share=0.0), "a share of a motion is more than 0 and less than 1, not 0"),
+        (lambda: object_removed(share=1.0), "a share of a motion is more than 0 and less than 1, not 1"),
         (lambda: object_removed(0), "objects are counted from 1, and which is 0"),
         (lambda: object_moved((0.1, 0.0), -1), "objects are counted from 1, and which is -1"),
         (lambda: detector_slow(-0.5), "a slow detector answers later, not by -0.5 s"),
