@@ -147,7 +147,16 @@ class ItemLedger:
         self._report(record)
 
     def held(self, item: Item) -> None:
-        """Record that the tool holds the item; its neighbours may have moved."""
+        """Record that the tool holds the item; its neighbours may have moved.
+
+        Raises:
+            Fault: It holds another already, and no skill has said that this one left it.
+        """
+        if (other := self.in_tool()) not in (None, item):
+            raise Fault(
+                f"the tool cannot hold {item}: it holds {other}; the skill that ended this must say so to the "
+                "ledger, by placed, dropped or returned"
+            )
         record = self._change(item, State.HELD)
         record.exists = True
         self._disturb(record.position, self._config.neighbourhood)

@@ -185,9 +185,10 @@ class FakeCell:
         counts = {"right": 0, "wrong_bin": 0, "left": 0, "elsewhere": 0, "unseen": 0}
         for thing in self.world.objects:
             bins = self._cell.bins.items()
-            # Nothing stands on a wall: what does here would have fallen in.
+            # Nothing stands on a wall: what does here would have fallen in, if not into the next bin.
             wall = BIN_THICKNESS + self._cell.classes[thing.label].radius / 2
-            inside = next((n for n, bin in bins if bin.contains(thing.position, wall)), None)
+            within = (n for beside in (0.0, wall) for n, bin in bins if bin.contains(thing.position, beside))
+            inside = next(within, None)
             if inside is None or thing is self.world.held:
                 counts["left"] += 1
             elif inside in self.routes.get(thing.label, ()):

@@ -80,10 +80,11 @@ def test_a_dropped_item_that_fell_into_its_bin_is_placed(bench: Bench) -> None:
 
 
 def test_a_dropped_item_that_fell_into_any_bin_of_its_class_is_placed_there(bench: Bench) -> None:
-    for number, x in enumerate((0.45, 0.60), start=1):
-        bench.look(("cube", x, 0.0))
-        bench.ledger.held(f"cube-{number}")
+    bench.look(("cube", 0.45, 0.0))
+    bench.ledger.held("cube-1")
     bench.ledger.placed("cube-1", "red_bin")
+    bench.look(("cube", 0.60, 0.0))
+    bench.ledger.held("cube-2")
     bench.ledger.dropped("cube-2")
     bench.look(("cube", 0.2, -0.44), view="full")
     assert bench.ledger.balance()["placed"] == 1, "the cube in the red bin is the one that was let go there"
@@ -217,6 +218,17 @@ def test_an_item_nobody_entered_is_a_fault(bench: Bench) -> None:
     bench.look(("cube", 0.5, 0.0))
     with pytest.raises(Fault, match='the ledger knows no item "cube-9"; it knows: cube-1'):
         bench.ledger.held("cube-9")
+
+
+def test_the_tool_holds_one_item_at_a_time(bench: Bench) -> None:
+    bench.look(("cube", 0.5, 0.0), ("duck", 0.6, 0.1))
+    bench.ledger.held("cube-1")
+    bench.ledger.held("cube-1")
+    with pytest.raises(Fault, match="the tool cannot hold duck-1: it holds cube-1; the skill"):
+        bench.ledger.held("duck-1")
+    bench.ledger.dropped("cube-1")
+    bench.ledger.held("duck-1")
+    assert bench.ledger.in_tool() == "duck-1"
 
 
 def test_a_rejected_item_that_is_nowhere_to_be_found_is_lost(bench: Bench) -> None:

@@ -187,3 +187,13 @@ def test_a_mission_is_rehearsed_in_a_cell_of_kind_fake_and_its_trays_fill_evenly
     bins = [row["bin"] for row in run.items()["rows"] if row["bin"]]
     assert sorted(bins) == ["tray_1", "tray_1", "tray_2", "tray_2"]
     assert dict(run.audit() or {})["right"] == 4
+
+
+@pytest.mark.parametrize(
+    ("x", "what"), [(0.362, "right"), (0.374, "elsewhere"), (0.39, "elsewhere"), (0.34, "right")]
+)
+def test_what_fell_between_two_bins_is_in_the_nearer(load: Load, x: float, what: str) -> None:
+    """The premium crate ends at 0.36 m, and the market crate begins at 0.37 m."""
+    cell = FakeCell(load("fruit", table__objects="[0, 0]"), routes={"banana": ("premium_crate",)})
+    cell.world.put("banana", x, 0.4).fell = True
+    assert {count: n for count, n in cell.audit().items() if count != "unseen" and n} == {what: 1}

@@ -35,13 +35,18 @@ def _broken(skill: type[Skill], breakage: Breakage) -> type[Skill]:
 
 
 def _failing(skill: type[Skill], reason: str) -> type[Skill]:
-    """Return the skill that fails at its start; where that leaves the tool empty, what it held has fallen."""
+    """Return the skill that fails at its start; where that leaves the tool empty, what it held has fallen.
+
+    Where the tool sticks besides, that cannot be: the skill does what it does.
+    """
     empties = skill.tool_left.get(reason) is EMPTY
 
     def run(self: Skill, cell: Cell) -> Steps:
-        yield from ()
         if empties:
             cell.tool.open()
+            if cell.tool.holding:
+                yield from skill.run(self, cell) or ()
+                return
             if (item := cell.ledger.in_tool()) is not None:
                 slipped(cell, item)
         raise self.failed(reason, WANTED)

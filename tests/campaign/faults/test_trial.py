@@ -90,6 +90,12 @@ def test_what_runs_only_behind_another_fault_is_reached_with_it(campaign: Campai
     assert both.label.endswith(f"+{behind}")
 
 
+def test_no_skill_says_that_it_dropped_what_sticks(campaign: Campaign) -> None:
+    numbers = [number_of(campaign, "Release", what, "lasting") for what in ("stuck", "dropped")]
+    trial = tried(campaign, *numbers)
+    assert (trial.status, trial.reason, trial.problems) == ("FAILURE", "Release.stuck", ())
+
+
 def test_what_cannot_happen_there_found_no_occasion(campaign: Campaign) -> None:
     # The camera of the cell sees the whole table: nothing moves before the first look.
     trial = tried(campaign, number_of(campaign, "MoveToScan", "unreachable"))
