@@ -154,8 +154,8 @@ class ItemLedger:
         """
         if (other := self.in_tool()) not in (None, item):
             raise Fault(
-                f"the tool cannot hold {item}: it holds {other}; the skill that ended this must say so to the "
-                "ledger, by placed, dropped or returned"
+                f"the tool cannot hold {item}: it holds {other}; the skill that ended this must say so to "
+                "the ledger, by placed, dropped or returned"
             )
         record = self._change(item, State.HELD)
         record.exists = True
