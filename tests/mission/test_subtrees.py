@@ -104,6 +104,28 @@ def test_closed_subtrees_nest(load: Load, skills: dict[str, type[Skill]]) -> Non
     ]
 
 
+KEEPS = (
+    "trees:\n"
+    "  outer: {returns: [], do: [use: inner, Pick, {Drop: {bin: red_bin}}]}\n"
+    "  inner: {returns: [seen], do: Look}\n"
+)
+
+
+def test_a_closed_subtree_keeps_what_another_returns_to_it(
+    load: Load, skills: dict[str, type[Skill]]
+) -> None:
+    assert wiring(load(HEAD + "tree: {use: outer}\n" + KEEPS), skills) == [
+        "Look seen->$outer.seen",
+        "Pick seen<-$outer.seen only<-$only held->$outer.held",
+        "Drop held<-$outer.held",
+    ]
+
+
+def test_what_it_keeps_is_not_written_outside(load: Load) -> None:
+    with pytest.raises(MissionError, match=r"Pick.seen reads \$seen, which nothing writes\n"):
+        load(HEAD + "tree: [use: outer, Pick, {Drop: {bin: red_bin}}]\n" + KEEPS)
+
+
 def test_an_argument_may_stand_for_a_variable_by_default(load: Load, skills: dict[str, type[Skill]]) -> None:
     loaded = load(
         HEAD + "tree: [Look, Pick, use: drop]\n"

@@ -119,9 +119,7 @@ def broken_promises(case: Case) -> Iterator[Finding]:
         if after is None or after.written is None:
             continue
         written = written_below(use.body, case.skills)
-        for name, mark in (subtree.returns or {}).items():
-            outside = use.returns.get(name)
-            variable = outside.value.name if outside and isinstance(outside.value, Reference) else name
+        for (name, mark), variable in zip((subtree.returns or {}).items(), use.promised, strict=True):
             if variable not in written:
                 message = f'the subtree "{use.name}" returns ${name}, which nothing in it writes'
                 shown = sorted(word.rpartition(".")[2] for word in written)
