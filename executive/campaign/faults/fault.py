@@ -48,6 +48,7 @@ class Fault:
         happenings: What happens to the cell.
         breakages: What goes wrong by itself.
         reason: True where `what` is a reason of the node.
+        leads_to: Reason that skills fail with because of it, where `what` is none; "" where there is no one.
         behind: True where the node runs only once something else has gone wrong.
         instead_of: Number of the fault that this one is tried for, if that one does not come to its reason.
     """
@@ -61,6 +62,7 @@ class Fault:
     happenings: tuple[Disturbance, ...] = ()
     breakages: tuple[Breakage, ...] = ()
     reason: bool = False
+    leads_to: str = ""
     behind: bool = False
     instead_of: int = 0
 

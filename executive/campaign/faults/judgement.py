@@ -135,7 +135,8 @@ def remark(outcome: Outcome, faults: Sequence[Fault]) -> str:
     """Return a sentence if the run failed for another reason than those that were brought about, or ""."""
     if outcome.status != "FAILURE" or outcome.reason == "lost":
         return ""
-    meant = [fault.what for fault in faults if fault.reason]
+    reasons = [fault.what if fault.reason else fault.leads_to for fault in faults]
+    meant = [reason for reason in reasons if reason]
     if outcome.reason.rpartition(".")[2] in meant:
         return ""
     return f"it says {outcome.reason}" + (f", and {' and '.join(meant)} was brought about" if meant else "")

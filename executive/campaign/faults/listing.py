@@ -119,37 +119,34 @@ class _Listing:
         starts: tuple[tuple[When, float], ...] = (("first", 0.0), ("middle", half))
         for when, start in starts:
             for by in (SHORT, LONG):
-                yield _other("detector", f"slow by {by:g} s", when, after(start, detector_slow(by)))
+                yield _detector(f"slow by {by:g} s", when, after(start, detector_slow(by)))
             for lasts in (SHORT, LONG):
                 end = start + lasts
                 hangs, dead = between(start, end, detector_hangs()), between(start, end, detector_dead())
                 unsure = between(start, end, detector_unsure())
-                yield _other("detector", f"hangs for {lasts:g} s", when, hangs)
-                yield _other("detector", f"unsure for {lasts:g} s", when, unsure)
-                yield _other("detector", f"dead for {lasts:g} s", when, dead)
-            yield _other("detector", "hangs for ever", when, after(start, DetectorGivenUp(LONG)))
-            yield _other("detector", "dead for ever", when, after(start, detector_dead()))
-            yield _other("detector", "unsure for ever", when, after(start, detector_unsure()))
+                yield _detector(f"hangs for {lasts:g} s", when, hangs)
+                yield _detector(f"unsure for {lasts:g} s", when, unsure, "unsure")
+                yield _detector(f"dead for {lasts:g} s", when, dead)
+            yield _detector("hangs for ever", when, after(start, DetectorGivenUp(LONG)))
+            yield _detector("dead for ever", when, after(start, detector_dead()))
+            yield _detector("unsure for ever", when, after(start, detector_unsure()), "unsure")
 
     def _objects(self) -> Iterator[Fault]:
         """Yield objects taken away and bumped aside, on the table and under the arm that comes for them."""
         table = self._table
         for when, share in QUARTERS:
             start = share * self._rehearsal.robot_time
+            bumped = ObjectBumped("nearest", 0.0, table.x, table.y)
             yield _other("object", "taken", when, after(start, object_removed("nearest")))
-            yield _other(
-                "object", "bumped", when, after(start, ObjectBumped("nearest", 0.0, table.x, table.y))
-            )
+            yield _other("object", "bumped", when, after(start, bumped))
         for node in self._nodes:
             if not _goes_to_target(self._skills[node.skill]) or not self._runs(node):
                 continue
             nth = 1 + len(self._rehearsal.activations[node.path]) // 2
             for when, share in QUARTERS:
+                taken = object_removed("node", share)
                 bumped = ObjectBumped("node", share, table.x, table.y)
-                for what, effect in (
-                    ("target taken", object_removed("node", share)),
-                    ("target bumped", bumped),
-                ):
+                for what, effect in (("target taken", taken), ("target bumped", bumped)):
                     happening = during(node.path, effect, nth=nth)
                     yield self._fault(node, what, when, means=f"at {share:g}", happenings=(happening,))
 
@@ -190,6 +187,10 @@ def skill_nodes(subject: Subject) -> list[nodes.SkillNode]:
 def _other(about: str, what: str, when: When, happening: Disturbance) -> Fault:
     start = getattr(happening.when, "start", 0.0)
     return Fault(about, about, "", what, when, f"from {start:.2f} s on", happenings=(happening,))
+
+
+def _detector(what: str, when: When, happening: Disturbance, leads_to: str = "unavailable") -> Fault:
+    return replace(_other("detector", what, when, happening), leads_to=leads_to)
 
 
 def _goes_to_target(skill: type[Skill]) -> bool:

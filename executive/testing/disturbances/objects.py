@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -16,7 +16,7 @@ from executive.testing.disturbances.share import checked_share
 
 
 @dataclass(frozen=True)
-class ObjectDisturbed(Effect):
+class ObjectDisturbed(Effect, ABC):
     """Something is done to an object, once; a subclass says what.
 
     Attributes:

@@ -119,6 +119,11 @@ def test_a_failure_for_another_reason_is_remarked() -> None:
     assert remark(outcome("FAILURE", "lost"), [MISS]) == remark(outcome("SUCCESS"), [MISS]) == ""
     said = remark(outcome("FAILURE", "Transit.dropped"), [MISS])
     assert said == "it says Transit.dropped, and missed was brought about"
+    dead = Fault("detector", "detector", "", "dead for ever", "first", "", leads_to="unavailable")
+    assert remark(outcome("FAILURE", "Detect.unavailable"), [MISS, dead]) == ""
+    assert remark(outcome("FAILURE", "SelectTarget.unseen"), [dead]) == (
+        "it says SelectTarget.unseen, and unavailable was brought about"
+    )
 
 
 def test_what_fell_where_no_look_shows_it_is_out_of_reach_wherever_it_lies() -> None:
