@@ -36,7 +36,10 @@ class Sampled:
 
     @cached_property
     def _curves(self) -> tuple[BPoly, BPoly, BPoly]:
-        q = BPoly.from_derivatives(self._times, np.stack(self._states, axis=1))
+        if len(self._times) == 1:  # a motion to where the arm is: it takes no time
+            q = BPoly(self._states.q[None], [0.0, 1.0])
+        else:
+            q = BPoly.from_derivatives(self._times, np.stack(self._states, axis=1))
         return q, q.derivative(), q.derivative(2)
 
 

@@ -31,3 +31,13 @@ def test_a_stop_on_it_is_the_same_stop(planner, home, limits) -> None:
         one, other = (brake(each, float(s), limits, STEP) for each in (motion, again))
         assert len(one) == len(other)
         assert np.abs(one - other).max() < 1e-9
+
+
+def test_a_motion_to_where_the_arm_is_stays_there(planner, home) -> None:
+    goal = Goal((0.5, -0.1, 0.2))
+    whole = planner.plan(planner.plan(home, goal).end, goal)
+    same = sampled(whole.samples, whole.duration)
+    assert (whole.duration, same.duration) == (0.0, 0.0)
+    for time in (0.0, 1.0):
+        for mine, theirs in zip(same.at(time), whole.at(time), strict=True):
+            assert np.array_equal(mine, theirs)
