@@ -68,7 +68,7 @@ def resumed_run(
         past, seed = _past(directory)
         assert past.start is not None, "a past to take up has begun"
         loaded = recorded_mission(path, past.start, skills)
-        _require_same(compare(loaded, skills, past, seed), path)
+        _require_same(compare(loaded, skills, _taken_up(past), seed), path)
         run = Run(
             loaded, skills, seed=seed, gui=gui, realtime=realtime, requests=past.start["requests"],
             kind=kind, past=past, takes_up=directory.world,
@@ -102,6 +102,14 @@ def _past(directory: RunDirectory) -> tuple[Past, int]:
             f'the run in "{directory.path}" had not begun when it was cut off; run the mission anew'
         )
     return past, int(past.start["seed"])
+
+
+def _taken_up(past: Past) -> Past:
+    """Return what of a past is taken up: not the step in which it was halted, or in which a skill broke.
+
+    So a skill that was mended since may go on where it went wrong.
+    """
+    return past if past.halt is None else past.before(int(past.halt["tick"]))
 
 
 def _events(past: Past) -> Iterator[Event]:

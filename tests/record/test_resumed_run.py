@@ -28,6 +28,7 @@ from executive.skill import discover
 from executive.testing.disturbances.hand import Hand
 from executive.testing.fake_cell import FakeCell
 from executive.testing.meanwhile import meanwhile
+from executive.testing.substitutes import raising
 
 SEED = 3
 
@@ -245,6 +246,23 @@ def test_a_run_that_was_halted_goes_on(missions: Path, tmp_path: Path) -> None:
     assert (result["status"], result["items"]["placed"]) == ("SUCCESS", 6)
     assert set(placed(path).values()) == {1}
     assert replay(path, read_journal(path / "journal.jsonl"), discover()).difference == ""
+
+
+@pytest.mark.parametrize("name", ["Detect", "Approach", "Grasp", "Transit", "Release"])
+def test_a_run_that_a_bug_has_ended_goes_on_once_it_is_mended(
+    missions: Path, tmp_path: Path, name: str
+) -> None:
+    skills = discover()
+    buggy = {**skills, name: raising(skills[name], ZeroDivisionError("a bug"), after=3)}
+    loaded = load_mission(missions / "sort_overhead.yaml", buggy)
+    first = recorded_run(loaded, buggy, seed=SEED, runs=tmp_path, kind=FakeCell, frames=False)
+    assert (first["status"], "a bug" in first["message"]) == ("FAULT", True)
+    run = Path(first["run"])
+    again = resumed_run(run, buggy, frames=False, kind=FakeCell)
+    assert again["message"] == first["message"], "it is not mended yet"
+    result = resumed(run)
+    assert (result["status"], result["audit"]["right"]) == ("SUCCESS", result["items"]["seen"])
+    assert max(placed(run).values()) == 1
 
 
 def test_the_trace_is_that_of_the_whole_run(missions: Path, tmp_path: Path) -> None:
