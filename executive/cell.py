@@ -211,6 +211,9 @@ class Operator(Protocol):
         """Return the next thing asked for, one of `choices`, `rescan`, or None to quit.
 
         The run's clock stands still while the person thinks.
+
+        Raises:
+            Stopped: The run is to end.
         """
 
 

@@ -45,3 +45,10 @@ class DeadlinePassed(Unavailable):
 
 class NoDepth(ExecutiveError):
     """A detection could not be localized because the frame has no usable depth there."""
+
+
+class Stopped(BaseException):
+    """Somebody wanted the run to end while the operator was being asked, and there will be no answer.
+
+    No `except Exception` of a skill catches it: the run is halted, and nothing failed.
+    """

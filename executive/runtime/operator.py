@@ -6,7 +6,7 @@ import select
 import sys
 from collections.abc import Callable, Sequence
 
-from executive.errors import InputError
+from executive.errors import InputError, Stopped
 from executive.events import Emit
 
 RESCAN = "rescan"
@@ -49,10 +49,14 @@ class TerminalOperator:
         self._interrupted = interrupted
 
     def ask(self, choices: Sequence[str]) -> str | None:
-        """Return the class typed, `rescan`, or None for `q`, end of input or Ctrl-C."""
+        """Return the class typed, `rescan`, or None for `q` or the end of the input.
+
+        Raises:
+            Stopped: The run is to end.
+        """
         self._emit("asking", choices=list(choices))
         numbered = "  ".join(f"{number} {label}" for number, label in enumerate(choices))
-        while not self._interrupted():
+        while True:
             sys.stderr.write(f"pick what?  {numbered}  s rescan  q quit > ")
             sys.stderr.flush()
             line = self._line()
@@ -61,13 +65,12 @@ class TerminalOperator:
                 self._emit("request", wanted=answer)
                 return answer
             sys.stderr.write(f'cannot pick "{line.strip()}"\n')
-        return None
 
     def _line(self) -> str:
         while not self._interrupted():
             if select.select([sys.stdin], [], [], SLICE)[0]:
                 return sys.stdin.readline()
-        return ""
+        raise Stopped("the run is to end, and nothing was asked for")
 
 
 def understood(word: str, choices: Sequence[str]) -> str | None:

@@ -20,6 +20,10 @@ class Ending:
     traceback: str = ""
 
 
+HALTED = Ending("HALTED", "halted", "halted by the user")
+"""Somebody wanted the run to end."""
+
+
 @dataclass(frozen=True)
 class Outcome:
     """How a run ended.

@@ -15,13 +15,13 @@ from executive.cell import Operator
 from executive.control.failure import Failure
 from executive.control.halting import halt
 from executive.control.scope import Scope
-from executive.errors import ExecutiveError, Fault
+from executive.errors import ExecutiveError, Fault, Stopped
 from executive.events import Exact, Observer
 from executive.mission.build import build
 from executive.mission.load import LoadedMission
 from executive.runtime.cells import cell_kind
 from executive.runtime.operator import ScriptedOperator, TerminalOperator
-from executive.runtime.outcome import Ending, Outcome
+from executive.runtime.outcome import HALTED, Ending, Outcome
 from executive.runtime.plant import Plant
 from executive.runtime.run_control import RunControl
 from executive.runtime.signals import stopped_by_signals
@@ -191,7 +191,6 @@ class Run:
                 ticked = True
                 self.root.tick_once()
                 if self.control.stopped or self._halted(before=False):
-                    # At a question to the operator Ctrl-C looks like their wish to quit: it is none.
                     break
                 if self.root.status is not Status.RUNNING:
                     return self._verdict()
@@ -199,7 +198,9 @@ class Run:
                 if self._realtime:
                     time.sleep(max(0.0, began + self._plant.tape.now - time.monotonic()))
                 self.control.wait()
-            ending = Ending("HALTED", "halted", "halted by the user")
+            ending = HALTED
+        except Stopped:
+            ending = HALTED
         except Exception as error:
             named = str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"
             node = error.node if isinstance(error, Fault) else ""

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from executive import errors
-from executive.errors import Fault
+from executive.errors import Fault, Stopped
 from executive.events import Emit, Exact
 from executive.tape.past import Past, Sense
 
@@ -102,7 +102,7 @@ class Tape:
             return self._play(name, nth, read)
         try:
             answer = ask()
-        except Exception as error:
+        except (Exception, Stopped) as error:
             self._emit("sense", name=name, nth=nth, value=str(error), raised=type(error).__name__)
             raise
         value = write(answer)
@@ -126,7 +126,7 @@ class Tape:
         return self._now() - self._tick * self.step
 
 
-def _error(sense: Sense) -> Exception:
+def _error(sense: Sense) -> BaseException:
     """Return an exception like the one recorded."""
     kind = getattr(errors, sense.raised, None) or type(sense.raised, (Exception,), {})
     return kind(sense.value)

@@ -10,12 +10,15 @@ from typing import Any
 
 import pytest
 
-from executive.errors import InputError
+from executive.errors import InputError, Stopped
 from executive.events import Event
 from executive.mission.load import load_mission
+from executive.record.entry import entry_of
+from executive.record.replay import compare
 from executive.runtime.operator import ScriptedOperator, TerminalOperator, understood
 from executive.runtime.run import Run
 from executive.skill import discover
+from executive.tape.past import Past
 from executive.testing.fake_cell import FakeCell
 
 CHOICES = ("cube", "sphere", "duck")
@@ -124,7 +127,8 @@ def test_ctrl_c_ends_the_wait_for_the_keyboard(type_in: Any) -> None:
     type_in("")
     looks = iter([False, False, False, True])
     operator = TerminalOperator(Heard(), interrupted=lambda: next(looks, True))
-    assert operator.ask(CHOICES) is None
+    with pytest.raises(Stopped):
+        operator.ask(CHOICES)
 
 
 def test_ctrl_c_at_the_question_halts_the_run_instead_of_ending_it_well(missions: Path, type_in: Any) -> None:
@@ -134,6 +138,13 @@ def test_ctrl_c_at_the_question_halts_the_run_instead_of_ending_it_well(missions
 
     type_in("")
     loaded = load_mission(missions / "pick_on_request.yaml", discover())
-    run = Run(loaded, discover(), seed=1, kind=FakeCell, observers=[interrupt])
+    events: list[Event] = []
+    run = Run(loaded, discover(), seed=1, kind=FakeCell, observers=[events.append, interrupt])
     outcome = run.execute()
     assert (outcome.status, outcome.message) == ("HALTED", "halted by the user")
+    ends = {event.data["status"] for event in events if event.kind == "status"}
+    assert ends == {"RUNNING", "INVALID"}, "nothing failed, and nobody quit"
+    entries = [entry_of(event) for event in events]
+    again = compare(loaded, discover(), Past.of(entries), 1)
+    assert again.difference == ""
+    assert again.decisions == sum(entry["kind"] == "status" for entry in entries) > 0
