@@ -27,6 +27,10 @@ class Fault(ExecutiveError):
         self.node = node
 
 
+class RecordLost(Fault):
+    """The disk does not take the record, or somebody deleted it: the run stops, as nobody could explain it."""
+
+
 class Unreachable(ExecutiveError):
     """No joint configuration inside the limits brings the tool to a goal; the text says how far off it is."""
 

@@ -9,7 +9,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from executive.errors import Fault, InputError
+from executive.errors import Fault, InputError, RecordLost
 from executive.events import Event
 from executive.record.entry import Entry, entry_of
 from executive.record.lock import lock
@@ -58,9 +58,9 @@ class Journal:
         """Append `entry`.
 
         Raises:
-            Fault: The disk does not take it, or the file was deleted: the run must not go on unrecorded.
+            RecordLost: The disk does not take it, or the file was deleted: the run must not go on unrecorded.
                 Later events are dropped without another fault, so that the arm can be brought to rest.
-                Or JSON has no words for it: then only this entry is missing.
+            Fault: JSON has no words for it; only this entry is missing.
         """
         if self._file is None or self._broken:
             return
@@ -74,7 +74,7 @@ class Journal:
             # A part of the line is of no use to anybody.
             with contextlib.suppress(OSError):
                 os.ftruncate(self._file, self._length)
-            raise Fault(
+            raise RecordLost(
                 f'the journal "{self._path}" cannot be written: {_reason(error)}; '
                 "the run stops because it could not be explained afterwards"
             ) from error

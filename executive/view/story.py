@@ -8,8 +8,6 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from executive.record.result import ENDED
-
 WIDTH = 110
 """Where long lines are wrapped [columns]."""
 
@@ -36,7 +34,7 @@ def story_lines(story: Mapping[str, Any], run: str, repeat: str) -> list[str]:
     for label, text in _rows(story):
         lines += _wrapped(text, f"{label:{_LABEL}}", " " * _LABEL, most=3)
     commands = {"record": run, "repeat": repeat}
-    if story["status"] not in ENDED:
+    if story["resumes"]:
         commands["go on"] = shlex.join(["executive", "run", "--resume", run])
     return lines + [f"{label:{_LABEL}}{command}" for label, command in commands.items()]
 
@@ -65,7 +63,8 @@ def _rows(story: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if node is not None and not any(link["why"] for link in story["chain"]):
         yield "where", f"{node['path']} ({node['place']})"
     if story["raised_at"]:
-        yield "raised at", f'{story["raised_at"]}; the whole traceback is in the journal, event "fault"'
+        whole = '; the whole traceback is in the journal, event "fault"' if story["recorded"] else ""
+        yield "raised at", story["raised_at"] + whole
     if story["reads"]:
         yield "the cell", ", ".join(_read(sense, story["verdict"]) for sense in story["reads"][:_READS])
     for lost in story["lost"][:_LOST]:

@@ -147,6 +147,12 @@ def test_a_journal_for_which_there_is_no_more_room_ends_the_run_on_the_command_l
     result = json.loads(shown.stdout)
     assert result["status"] == "FAULT"
     assert "file too large; the run stops because it could not be explained afterwards" in result["message"]
+    assert (
+        "next        free some space on the disk of the run directory, or name another place" in shown.stderr
+    )
+    assert "whole traceback" not in shown.stderr
+    assert "mend what is broken" not in shown.stderr
+    assert "go on       executive run --resume" in shown.stderr
     assert "Traceback" not in shown.stderr
     latest = tmp_path / "runs" / "latest"
     assert json.loads((latest / "result.json").read_text()) == result

@@ -288,6 +288,7 @@ STORY = {
     "verdict": "Grasp failed (missed): no seal", "chain": [], "reads": [], "look": None, "lost": [],
     "node": {"path": "tree/Grasp", "name": "Grasp", "place": "trial.yaml:7"}, "running": [], "left": [],
     "arm": "at rest", "holds": "", "raised_at": "", "picture": "", "next": [],
+    "recorded": True, "resumes": False,
 }  # fmt: skip
 
 

@@ -37,7 +37,9 @@ def advice(case: Case, arm: str, reads: Sequence[Sense]) -> Iterator[str]:
             yield f"see to it that {sense.name} answers again"
         elif sense.name == "arm.met":
             yield f"see what is in the arm's way: {sense.value}"
-    if case.outcome.status == "FAULT":
+    if case.course.unrecorded:
+        yield "free some space on the disk of the run directory, or name another place with --runs DIR"
+    elif case.outcome.status == "FAULT":
         yield "mend what is broken, in the code or in the cell: a fault is never tried again"
     if ways := list(_ways_on(case)):
         yield f"to let the mission go on after {case.outcome.reason}: {', or '.join(ways)}"

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import PurePath
 from typing import Any
 
+from executive.errors import RecordLost
 from executive.events import Event, Exact
 from executive.record.progress import is_skill
 from executive.record.story.items import ItemCourses
@@ -74,12 +75,14 @@ class Course:
         items: What happened to the items.
         asking: True while the operator is being asked something.
         raised_at: Where the exception behind a fault was raised, or "".
+        unrecorded: True where that was that the record could not be kept.
     """
 
     def __init__(self) -> None:
         self.items = ItemCourses()
         self.asking = False
         self.raised_at = ""
+        self.unrecorded = False
         self._root = ""
         self._count = 0
         self._nodes: dict[str, Activation] = {}
@@ -98,7 +101,8 @@ class Course:
         elif event.kind in ("asking", "request"):
             self.asking = event.kind == "asking"
         elif event.kind == "fault":
-            self.raised_at = _place(str(data.get("traceback", "")))
+            self.raised_at = _place(str(data["traceback"]))
+            self.unrecorded = f".{RecordLost.__name__}: " in data["traceback"]
         else:
             self.items(event)
 

@@ -13,6 +13,8 @@ from executive.mission.model.nodes import Node
 from executive.mission.model.paths import name_of
 from executive.record.frames import picture_of
 from executive.record.plain import plain
+from executive.record.result import ENDED
+from executive.record.run_directory import RunDirectory
 from executive.record.story.advice import advice
 from executive.record.story.case import Case
 from executive.record.story.chain import why
@@ -72,6 +74,7 @@ class Story:
             * `running`: the skills that were halted, in words. `left`: items that were not dealt with.
             * `arm`: `at rest`, or in words what is not known. `holds`: what is in the tool, or "".
             * `raised_at`: file, line and function where the exception behind a fault was raised, or "".
+            * `recorded`: whether the journal has everything, and `resumes`: whether it can be taken up again.
             * `picture`: a file below `run`, or "".
             * `next`: what can be done now, in sentences.
         """
@@ -106,6 +109,8 @@ class Story:
             "arm": arm,
             "holds": outcome.holds,
             "raised_at": case.course.raised_at,
+            "recorded": not case.course.unrecorded,
+            "resumes": outcome.status not in ENDED and not (case.course.unrecorded and _is_empty(run)),
             "picture": _picture(case, run),
             "next": list(advice(case, arm, reads)),
         }
@@ -120,6 +125,11 @@ class Story:
         names = [name for part in self._skills[node.skill].uses for name in DECIDING.get(part, ())]
         read = [sense for sense in ran.senses if sense.name in names and not sense.raised]
         yield from reversed(refused or read)
+
+
+def _is_empty(run: Path) -> bool:
+    journal = RunDirectory(run).journal
+    return not journal.exists() or journal.stat().st_size == 0
 
 
 def _node(case: Case) -> dict[str, str] | None:
