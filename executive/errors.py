@@ -28,7 +28,7 @@ class Fault(ExecutiveError):
 
 
 class RecordLost(Fault):
-    """The disk does not take the record, or somebody deleted it: the run stops, as nobody could explain it."""
+    """The disk does not take the record, or somebody deleted it: the run stops, unexplained otherwise."""
 
 
 class Unreachable(ExecutiveError):

@@ -68,8 +68,10 @@ def command(
     """Let every single fault happen in MISSION, each in a run; exit code 1 if one was not dealt with.
 
     Every reason of every node, bugs in every skill, detectors, objects and the tool: what happens is made
-    from the mission's tree. Wrong is a run that loses what the fault did not put out of reach, that misplaces
-    something, whose books are not what the world is, or that ends in any other disorder.
+    from the mission's tree. Where something in the cell makes a node fail, its skill need not say so by
+    itself: not all that --list shows is run then. Wrong is a run that loses what the fault did not put out
+    of reach, that misplaces something, whose books are not what the world is, or that ends in any other
+    disorder.
     """
     if sum((pairs is not None, numbers is not None, listed)) > 1:
         raise click.UsageError("--pairs, --fault and --list exclude each other")

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 @overrides_option
 @runs_option
 @json_option
-@click.option("--quiet", is_flag=True, help="Show nothing while running.")
+@click.option("--quiet", is_flag=True, help="Show nothing, unless the run does not succeed.")
 @click.option("--gui", is_flag=True, help="Open the simulator's window.")
 @click.option("--realtime", is_flag=True, help="Run on the wall clock instead of as fast as possible.")
 @click.option(
@@ -57,6 +57,7 @@ def command(
     with stdout_kept_clean():
         from executive.record.result import EXIT_CODES
         from executive.skill import discover
+        from executive.view.story import story_lines
         from executive.view.summary import repeat_command, summary
 
         skills = discover()
@@ -75,6 +76,8 @@ def command(
             )
         if view is not None:
             click.echo(summary(result, view.items, repeat), err=True, nl=False)
+        elif result["story"] is not None:
+            click.echo("\n".join(story_lines(result["story"], result["run"], repeat)), err=True)
     if as_json:
         print_json(result)
     ctx.exit(EXIT_CODES[result["status"]])

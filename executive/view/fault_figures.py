@@ -116,7 +116,7 @@ def _coverage(figures: FaultFigures) -> Iterator[str]:
 def _trial(trial: Trial) -> Iterator[str]:
     yield f"fault {trial.label}: {'; and '.join(trial.told)}"
     if not trial.happened:
-        yield "  it found no occasion"
+        yield "  one of them found no occasion" if len(trial.told) > 1 else "  it found no occasion"
     ended = " ".join(filter(None, (trial.status, trial.reason)))
     where = f" at {trial.node}" if trial.node else ""
     yield f"  {ended}{where}{f': {trial.message}' if trial.message else ''}"

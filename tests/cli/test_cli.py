@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from types import ModuleType, SimpleNamespace
@@ -150,6 +151,21 @@ def test_quiet_is_silent(project):
     shown = invoke("run", "sort", "--quiet")
     assert shown.output == ""
     assert project.run[0]["view"] is None
+
+
+def test_quiet_tells_the_story_of_a_run_that_does_not_succeed(missions, tmp_path):
+    nothing = ("--set", "cell.kind=fake", "--set", "cell.table.objects=[0, 0]")
+    mission = tmp_path / "look.yaml"
+    shutil.copytree(missions / "cells", tmp_path / "cells")
+    mission.write_text(
+        "mission: look\ndescription: Look.\ncell: cells/overhead.yaml\n"
+        "routes: {cube: red_bin}\ntree: [MoveToScan, Detect, Localize, SelectTarget]\n"
+    )
+    shown = invoke("run", str(mission), "--quiet", "--runs", str(tmp_path), *nothing)
+    assert (shown.exit_code, shown.stdout) == (1, "")
+    lines = shown.stderr.splitlines()
+    assert lines[0].startswith("FAILURE after ")
+    assert lines[-1].startswith(f"repeat      executive run {mission} ")
 
 
 def test_what_libraries_print_does_not_reach_standard_output():

@@ -8,7 +8,7 @@ from contextlib import closing
 from dataclasses import dataclass
 
 from executive.campaign.subject import Subject
-from executive.errors import ExecutiveError
+from executive.errors import InputError
 from executive.events import Event
 from executive.record.result import ledger_agrees
 from executive.runtime.run import Run
@@ -55,7 +55,7 @@ def rehearse(subject: Subject) -> Rehearsal:
     """Run a mission undisturbed and return how it went.
 
     Raises:
-        ExecutiveError: It does not succeed, or its books are wrong.
+        InputError: It does not succeed, or its books are wrong.
         KeyboardInterrupt: The user ended it.
     """
     activations = _Activations()
@@ -72,11 +72,16 @@ def rehearse(subject: Subject) -> Rehearsal:
         if outcome.status == "HALTED":
             raise KeyboardInterrupt
         items, audit = run.items(), run.audit()
-    if outcome.status != "SUCCESS" or not ledger_agrees({"items": items, "audit": audit}):
-        raise ExecutiveError(
-            f"{subject.name} ended as {outcome.status} {outcome.reason} ({outcome.message}) with seed "
-            f"{subject.seed} although nothing was wrong; the ledger says {_counts(items)}; "
-            f"the audit {_counts(audit or {})}; choose another seed"
+    undisturbed = f"undisturbed, {subject.name} with seed {subject.seed}"
+    if outcome.status != "SUCCESS":
+        raise InputError(
+            f"{undisturbed} ends as {outcome.status} {outcome.reason}: {outcome.message}; "
+            "faults are judged by what they change in a run that succeeds: choose another seed"
+        )
+    if not ledger_agrees({"items": items, "audit": audit}):
+        raise InputError(
+            f"{undisturbed} leaves books that are not the world: the ledger says {_counts(items)}; the audit "
+            f"{_counts(audit or {})}; choose another seed, or a mission that looks at the whole table"
         )
     found = {node: tuple(ticks) for node, ticks in activations.found.items()}
     return Rehearsal(outcome.robot_time, items["placed"], found)
