@@ -17,6 +17,7 @@ from executive.runtime.run import Run
 from executive.skill import Skill
 from executive.tape.past import Entry, Past
 from executive.tape.played_cell import PlayedCell
+from executive.tape.tape import Unrecorded
 
 Decision = Mapping[str, Any]
 """What was decided in a control step, as plain values: its `tick`, `clock` and `kind`, and what it says."""
@@ -41,6 +42,7 @@ class Replay:
         recorded: The first decision of the record that was not made again, or None.
         replayed: What was decided instead, or None for nothing.
         edited: Whether the mission is another one than that of the record.
+        unanswered: What was asked that the record has no answer to, which ended the replay; or "".
     """
 
     decisions: int
@@ -48,6 +50,7 @@ class Replay:
     recorded: Decision | None
     replayed: Decision | None
     edited: bool
+    unanswered: str = ""
 
     @property
     def same(self) -> bool:
@@ -59,7 +62,10 @@ class Replay:
         """What differs first, in words; "" where nothing does."""
         if self.same:
             return ""
-        return f"the record says {_told(self.recorded)}, and now it is {_told(self.replayed)}"
+        said = f"the record says {_told(self.recorded)}, and now it is {_told(self.replayed)}"
+        if not self.unanswered:
+            return said
+        return f"{said}: {self.unanswered}; what would come of it only a run can tell"
 
 
 def replay(
@@ -101,7 +107,7 @@ def compare(
     comparison.stop = run.control.stop
     run.execute()
     recorded, replayed = comparison.difference
-    return Replay(comparison.same, run.tick, recorded, replayed, edited)
+    return Replay(comparison.same, run.tick, recorded, replayed, edited, comparison.unanswered)
 
 
 class _Comparison:
@@ -116,9 +122,13 @@ class _Comparison:
         self._over = False
         self.same = 0
         self.difference: tuple[Decision | None, Decision | None] = (None, None)
+        self.unanswered = ""
         self.stop = lambda: None
 
     def __call__(self, event: Event) -> None:
+        if event.kind == "fault":
+            _, asked, said = event.data["traceback"].partition(f".{Unrecorded.__name__}: ")
+            self.unanswered = said.partition("\n")[0] if asked else ""
         if self._over:
             return
         if event.kind == "end":

@@ -104,6 +104,17 @@ def test_a_mission_that_gives_up_sooner_says_where(missions: Path) -> None:
     assert done.replayed["node"] == "RejectTarget"
 
 
+def test_where_the_record_has_no_answer_it_says_so(missions: Path, tmp_path: Path) -> None:
+    path = recorded(missions, tmp_path, "sort_fruit")
+    done = again(path, edited(path, missions, "  - use: take_stock\n", "  - {MoveToScan: {pose: aside}}\n  - use: take_stock\n"))
+    assert done.replayed is not None
+    assert (done.replayed["node"], done.replayed["status"]) == ("MoveToScan", "INVALID")
+    assert done.difference.endswith(
+        "reason fault: the record holds no answer to what is asked here first: plan.ready; "
+        "what would come of it only a run can tell"
+    )
+
+
 def test_a_directory_without_answers_cannot_be_replayed(missions: Path, tmp_path: Path) -> None:
     path = recorded(missions, tmp_path, "sort_fruit")
     with pytest.raises(InputError, match=r"no run that can be replayed: its journal tells of no answers"):
