@@ -10,13 +10,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from executive.errors import InputError
 from executive.events import Event
 from executive.mission.load import LoadedMission
 from executive.record.entry import Entry
 from executive.record.journal import Journal
 from executive.record.recorder import Recorder
-from executive.record.run_directory import RunDirectory
+from executive.record.run_directory import RunDirectory, refused
 from executive.runtime.run import Run
 from executive.skill import Skill
 
@@ -137,10 +136,7 @@ def measure(
         runs.mkdir(parents=True, exist_ok=True)
         folder = TemporaryDirectory(prefix=".bench-", dir=runs, ignore_cleanup_errors=True)
     except OSError as error:
-        raise InputError(
-            f'cannot record a run below "{runs}": {(error.strerror or str(error)).lower()}; '
-            "free some space or name another place with --runs DIR"
-        ) from error
+        raise refused(f'record a run below "{runs}"', error) from error
     with folder as name:
         return _measured(loaded, skills, seed, RunDirectory(Path(name)))
 

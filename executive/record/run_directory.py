@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,6 +15,9 @@ import yaml
 
 from executive.errors import InputError
 from executive.record.whole_file import write_whole
+
+NO_ROOM = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
+"""What the system says where more space would help."""
 
 
 @dataclass(frozen=True)
@@ -61,10 +65,7 @@ class RunDirectory:
             day.mkdir(parents=True, exist_ok=True)
             path = _make_unique(day, name)
         except OSError as error:
-            raise InputError(
-                f'cannot make a run directory below "{runs}": {_reason(error)}; '
-                "free some space or name another place with --runs DIR"
-            ) from error
+            raise refused(f'make a run directory below "{runs}"', error) from error
         return RunDirectory(path)
 
     def save_inputs(
@@ -96,11 +97,15 @@ class RunDirectory:
                 text = yaml.safe_dump(dict(content), sort_keys=False, allow_unicode=True)
                 write_whole(self.path / name, text)
         except OSError as error:
-            raise InputError(
-                f'cannot write to the run directory "{self.path}": {_reason(error)}; '
-                "free some space or name another place with --runs DIR"
-            ) from error
+            raise refused(f'write to the run directory "{self.path}"', error) from error
         _point_latest(self.path.parents[1], self.path)
+
+
+def refused(what: str, error: OSError) -> InputError:
+    """Return the sentence for what the file system did not let be done, with what may help."""
+    reason = (error.strerror or str(error)).lower()
+    space = "free some space or " if error.errno in NO_ROOM else ""
+    return InputError(f"cannot {what}: {reason}; {space}name another place with --runs DIR")
 
 
 def _make_unique(day: Path, name: str) -> Path:
@@ -123,7 +128,3 @@ def _point_latest(runs: Path, path: Path) -> None:
     with contextlib.suppress(OSError):
         fresh.symlink_to(path.relative_to(runs), target_is_directory=True)
         fresh.replace(runs / "latest")
-
-
-def _reason(error: OSError) -> str:
-    return (error.strerror or str(error)).lower()

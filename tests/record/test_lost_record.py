@@ -123,7 +123,7 @@ def test_whoever_may_not_write_there_is_told(tmp_path):
     inputs = {"mission": "", "params": {}, "cell": {}}
     assert forbidden(lambda: directory.save_inputs(**inputs)) == (
         f'cannot write to the run directory "{directory.path}": permission denied; '
-        "free some space or name another place with --runs DIR"
+        "name another place with --runs DIR"
     )
     assert forbidden(lambda: Recorder(directory, again=True)) == (
         f'cannot open the journal "{directory.journal}": permission denied'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from datetime import datetime
 from pathlib import Path
@@ -10,7 +11,7 @@ import pytest
 import yaml
 
 from executive.errors import InputError
-from executive.record.run_directory import RunDirectory
+from executive.record.run_directory import RunDirectory, refused
 
 STARTED = datetime(2026, 11, 21, 3, 15, 42)
 
@@ -78,8 +79,18 @@ def test_a_place_that_cannot_be_written_to_is_a_sentence(tmp_path):
     (tmp_path / "runs").write_text("a file, no folder")
     with pytest.raises(InputError) as raised:
         create(tmp_path / "runs")
-    assert "cannot make a run directory below" in str(raised.value)
-    assert "--runs DIR" in str(raised.value)
+    assert str(raised.value) == (
+        f'cannot make a run directory below "{tmp_path}/runs": not a directory; '
+        "name another place with --runs DIR"
+    )
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT, errno.EFBIG])
+def test_space_is_spoken_of_where_it_is_what_is_missing(number):
+    reason = os.strerror(number)
+    assert str(refused("write", OSError(number, reason))) == (
+        f"cannot write: {reason.lower()}; free some space or name another place with --runs DIR"
+    )
 
 
 @pytest.mark.parametrize("room", range(3))
