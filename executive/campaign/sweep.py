@@ -9,6 +9,7 @@ from typing import Any
 
 from executive.campaign.pool import do_all
 from executive.campaign.statistics import spread, wilson
+from executive.errors import ExecutiveError
 from executive.record.result import FATES, PLACES, ledger_agrees
 
 Result = Mapping[str, Any]
@@ -111,7 +112,7 @@ def _broken(job: Job, error: BaseException) -> Result:
         "mission": job.mission,
         "status": "FAULT",
         "reason": "fault",
-        "message": f"{type(error).__name__}: {error}",
+        "message": str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}",
         "node": "",
         "seed": job.seed,
         "items": dict.fromkeys(FATES, 0),

@@ -54,11 +54,13 @@ def command(
         from executive.campaign.sweep import summarize, sweep
         from executive.cli.progress import bar
         from executive.mission.load import load_mission
+        from executive.record.run_directory import check_place
         from executive.runtime.cells import cell_kind
         from executive.skill import discover
 
-        # What is wrong with the mission is told once, not for every seed.
+        # What is wrong with the mission, or with the place, is told once and not for every seed.
         load_mission(mission, discover(), overrides, cell_kind)
+        check_place(runs)
         with bar(mission) as progress:
             results = sweep(
                 mission, seeds, overrides=overrides, runs=runs, workers=workers, frames=frames,
@@ -93,7 +95,11 @@ def _text(figures: dict[str, Any]) -> str:
     ]
     if figures["failures"]:
         lines.append(f"{len(figures['failures'])} runs did not succeed:")
-    lines += [f"  seed {entry['seed']}: {verdict(entry)}; {entry['run']}" for entry in figures["failures"]]
+    # A run that took its process down, or found no place for its record, has no directory to be told.
+    lines += [
+        "; ".join(filter(None, [f"  seed {entry['seed']}: {verdict(entry)}", entry["run"]]))
+        for entry in figures["failures"]
+    ]
     return "\n".join(lines)
 
 

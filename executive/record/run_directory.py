@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import yaml
@@ -99,6 +100,21 @@ class RunDirectory:
         except OSError as error:
             raise refused(f'write to the run directory "{self.path}"', error) from error
         _point_latest(self.path.parents[1], self.path)
+
+
+def check_place(runs: Path) -> None:
+    """Make `runs` if need be, and see that something can be made in it.
+
+    Raises:
+        InputError: Nothing can.
+    """
+    try:
+        runs.mkdir(parents=True, exist_ok=True)
+        # Trying tells more than the permissions do: the whole file system may be read-only.
+        with TemporaryDirectory(prefix=".try-", dir=runs):
+            pass
+    except OSError as error:
+        raise refused(f'make a run directory below "{runs}"', error) from error
 
 
 def refused(what: str, error: OSError) -> InputError:

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from executive.campaign.statistics import spread, wilson
 from executive.campaign.sweep import Job, summarize, sweep
+from executive.errors import InputError
 
 
 def result(seed: int, status: str = "SUCCESS", right: int = 4, left: int = 0, **more) -> dict:
@@ -38,6 +39,8 @@ def work(job: Job) -> dict:
     """Do a run in another process, in a way that the seed says."""
     if job.seed == 3:
         raise ValueError("seed three")
+    if job.seed == 4:
+        raise InputError("there is no place for seed four")
     return result(job.seed, process=os.getpid(), overrides=dict(job.overrides))
 
 
@@ -52,6 +55,7 @@ def test_every_seed_is_run_once_in_another_process():
     assert results[0]["overrides"] == {"a": "1"}
     assert results[2]["status"] == "FAULT"
     assert results[2]["message"] == "ValueError: seed three"
+    assert (results[3]["status"], results[3]["message"]) == ("FAULT", "there is no place for seed four")
     assert results[2]["planning"] == {"motions": 0, "ahead": 0, "waited_s": 0.0}
     assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
 

@@ -316,12 +316,30 @@ def test_a_range_of_seeds_is_checked(project, seeds, words):
 @pytest.mark.parametrize(
     ("statuses", "code"), [(["SUCCESS"], 0), (["SUCCESS", "FAILURE"], 1), (["HALTED"], 130)]
 )
-def test_a_sweep_ends_by_its_worst_run(project, monkeypatch, statuses, code):
+def test_a_sweep_ends_by_its_worst_run(project, monkeypatch, tmp_path, statuses, code):
     results = [{**RESULT, "seed": seed, "status": status} for seed, status in enumerate(statuses)]
     monkeypatch.setattr("executive.campaign.sweep.sweep", lambda *args, **options: results)
-    shown = invoke("sweep", "sort", "--seeds", f"0-{len(statuses) - 1}", "--json")
+    shown = invoke("sweep", "sort", "--seeds", f"0-{len(statuses) - 1}", "--json", "--runs", str(tmp_path))
     assert shown.exit_code == code
     assert json.loads(shown.stdout)["results"] == results
+
+
+def test_a_sweep_into_a_place_that_takes_nothing_is_bad_input(project, monkeypatch, tmp_path):
+    (tmp_path / "file").touch()
+    monkeypatch.setattr("executive.campaign.sweep.sweep", lambda *args, **options: pytest.fail("it began"))
+    shown = invoke("sweep", "sort", "--seeds", "0-9", "--runs", str(tmp_path / "file" / "runs"))
+    assert shown.exit_code == 2
+    assert shown.stderr == (
+        f'cannot make a run directory below "{tmp_path}/file/runs": not a directory; '
+        "name another place with --runs DIR\n"
+    )
+
+
+def test_a_run_without_a_directory_is_told_without_one(project, monkeypatch, tmp_path):
+    broken = {**RESULT, "status": "FAULT", "reason": "fault", "message": "it broke", "run": ""}
+    monkeypatch.setattr("executive.campaign.sweep.sweep", lambda *args, **options: [broken, RESULT])
+    shown = invoke("sweep", "sort", "--seeds", "7-8", "--runs", str(tmp_path))
+    assert "1 runs did not succeed:\n  seed 7: FAULT: it broke\n" in shown.stderr
 
 
 def test_an_unknown_cell_is_recognized():

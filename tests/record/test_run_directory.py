@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from executive.errors import InputError
-from executive.record.run_directory import RunDirectory, refused
+from executive.record.run_directory import RunDirectory, check_place, refused
 
 STARTED = datetime(2026, 11, 21, 3, 15, 42)
 
@@ -81,6 +81,21 @@ def test_a_place_that_cannot_be_written_to_is_a_sentence(tmp_path):
         create(tmp_path / "runs")
     assert str(raised.value) == (
         f'cannot make a run directory below "{tmp_path}/runs": not a directory; '
+        "name another place with --runs DIR"
+    )
+
+
+def test_a_place_is_tried_and_left_as_it_was(tmp_path):
+    check_place(tmp_path / "new" / "runs")
+    assert list((tmp_path / "new" / "runs").iterdir()) == []
+
+
+def test_a_place_that_takes_no_folder_is_a_sentence(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError) as raised:
+        check_place(tmp_path / "file" / "runs")
+    assert str(raised.value) == (
+        f'cannot make a run directory below "{tmp_path}/file/runs": not a directory; '
         "name another place with --runs DIR"
     )
 
