@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
+import os
 import signal
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager
-from typing import Any, TypeVar
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
+from types import FrameType
+from typing import TypeVar
+
+from executive.runtime.signals import SIGNALS
+from executive.workers import Workers, kill_workers
 
 J = TypeVar("J")
 R = TypeVar("R")
+
+PROMPT = 0.1
+"""Longest time after which a wish to halt is heeded [s]."""
 
 
 def do_all(
@@ -22,10 +30,12 @@ def do_all(
     *,
     workers: int,
     progress: Callable[[int, int], None] | None = None,
+    halting: Callable[[], None] | None = None,
 ) -> list[R | None]:
     """Do every job in some process and return the results in the order of the jobs.
 
-    After Ctrl-C no further job begins, and None is what those have that were not done.
+    After Ctrl-C or SIGTERM no further job begins, runs under way halt, and None is what those jobs have that
+    were not done. A second one ends the processes at once.
 
     Args:
         jobs: What is to be done.
@@ -33,16 +43,20 @@ def do_all(
         broken: Returns the result of a job whose work raised, or that took its process down.
         workers: How many processes work at a time.
         progress: Told how many jobs of how many are done.
+        halting: Told that somebody wished to halt, as soon as they do.
+
+    Raises:
+        KeyboardInterrupt: Somebody did not want to wait until the jobs under way have halted.
     """
     to_do = deque(enumerate(jobs))
     results: dict[int, R] = {}
     running: dict[Future[R], int] = {}
-    pool, torn = new_pool(workers), False
+    pool, torn, halted = Workers(workers), False, False
     try:
-        with _halting() as halted:
-            while running or (to_do and not halted.is_set()):
+        with _wishes() as wished:
+            while running or (to_do and not halted):
                 # No job waits in the pool: one that does could not be taken back.
-                while to_do and len(running) < workers and not (torn or halted.is_set()):
+                while to_do and len(running) < workers and not (torn or halted or wished.is_set()):
                     number, job = to_do[0]
                     try:
                         running[pool.submit(work, job)] = number
@@ -50,47 +64,54 @@ def do_all(
                         torn = True
                     else:
                         to_do.popleft()
-                done, _ = wait(running, return_when=FIRST_COMPLETED)
+                done, _ = wait(running, PROMPT, FIRST_COMPLETED)
+                # What comes at once, as from `timeout`, which tells the process and then its group, is one.
+                if wished.is_set():
+                    wished.clear()
+                    if halted:
+                        kill_workers()
+                        raise KeyboardInterrupt
+                    halted = True
+                    if halting is not None:
+                        halting()
+                if halted:
+                    _halt_runs()
                 for future in done:
                     number, error = running.pop(future), future.exception()
+                    torn = torn or isinstance(error, BrokenExecutor)
+                    if halted and isinstance(error, BrokenExecutor):
+                        continue  # Whoever halted this process halted its workers, too.
                     results[number] = future.result() if error is None else broken(jobs[number], error)
                     if progress is not None:
                         progress(len(results), len(jobs))
-                    torn = torn or isinstance(error, BrokenExecutor)
                 if torn and not running:
                     pool.shutdown()
-                    pool, torn = new_pool(workers), False
+                    pool, torn = Workers(workers), False
     finally:
         pool.shutdown()
     return [results.get(number) for number in range(len(jobs))]
 
 
-def new_pool(workers: int) -> ProcessPoolExecutor:
-    """Return a pool of fresh processes that leave Ctrl-C to their parent and to runs under way."""
-    # A fork would share the simulator's and the inference library's threads and locks.
-    context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(workers, mp_context=context, initializer=_ignore_interrupts)
+def _halt_runs() -> None:
+    """Ask every worker's run to halt; one that is still being made does not hear it and is asked again."""
+    for process in multiprocessing.active_children():
+        assert process.pid is not None
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(process.pid, signal.SIGINT)
 
 
-def _ignore_interrupts() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+@contextlib.contextmanager
+def _wishes() -> Iterator[threading.Event]:
+    """Set the event whenever somebody wishes to halt, instead of what the signal did before."""
+    wished = threading.Event()
 
-
-@contextmanager
-def _halting() -> Iterator[threading.Event]:
-    """Set the event at the first Ctrl-C; at the second, end the jobs under way, too."""
-    halted = threading.Event()
-
-    def halt(number: int, frame: Any) -> None:
+    def wish(number: int, frame: FrameType | None) -> None:
         del number, frame
-        if halted.is_set():
-            for process in multiprocessing.active_children():
-                process.terminate()
-            raise KeyboardInterrupt
-        halted.set()
+        wished.set()
 
-    previous = signal.signal(signal.SIGINT, halt)
+    previous = {number: signal.signal(number, wish) for number in SIGNALS}
     try:
-        yield halted
+        yield wished
     finally:
-        signal.signal(signal.SIGINT, previous)
+        for number, handler in previous.items():
+            signal.signal(number, handler)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from concurrent.futures import as_completed
 from pathlib import Path
 
 import cv2
@@ -17,6 +16,7 @@ from executive.messages import Box
 from executive.sim.models import missing_models
 from executive.sim.scenes import SIZE, Sample, SceneRenderer
 from executive.vision.dataset import Entry, image_path, save_image, write_annotations
+from executive.workers import Workers
 
 BLOCK = 40
 """Samples that a worker makes before it reports, with one world per cell."""
@@ -63,7 +63,7 @@ def generate(
     splits = ["train" if number < first_valid else "valid" for number in range(images)]
     write_annotations(out, layout, [], classes)
     entries: dict[int, Entry] = {}
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with Workers(workers) as pool:
         blocks = [
             pool.submit(_render_block, cells, out, layout, seed, first, splits[first : first + BLOCK])
             for first in range(0, images, BLOCK)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from concurrent.futures import as_completed
 
 import cv2
 import numpy as np
@@ -13,6 +12,7 @@ from executive.cell_config import CellConfig
 from executive.messages import Box
 from executive.sim.scenes import SIZE, Sample, SceneRenderer
 from executive.vision.samples import LabelledImage
+from executive.workers import Workers
 
 BLOCK = 20
 """Frames that a worker takes before it reports, in one world."""
@@ -36,7 +36,7 @@ def run_frames(
         progress: Told (frames taken, frames in all) now and then.
     """
     frames: dict[int, LabelledImage] = {}
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with Workers(workers) as pool:
         blocks = [
             pool.submit(_take, config, seed, range(first, min(first + BLOCK, images)))
             for first in range(0, images, BLOCK)

@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import os
+import signal
+import time
+from collections.abc import Iterator
+
+import pytest
+
 from executive.campaign.pool import do_all
+from executive.runtime.run_control import RunControl
+from executive.runtime.signals import SIGNALS, stopped_by_signals
 
 
 def half(number: int) -> float:
@@ -25,3 +35,59 @@ def test_every_job_is_done_and_the_results_are_in_their_order() -> None:
 
 def test_without_jobs_there_is_nothing_to_do() -> None:
     assert do_all([], half, why, workers=2) == []
+
+
+def halt(how: signal.Signals) -> str:
+    """Do a job during which somebody wishes to halt, and which goes on until it is asked to halt itself."""
+    control = RunControl()
+    with stopped_by_signals(control):
+        os.kill(os.getppid(), how)
+        while not control.stopped:
+            time.sleep(0.01)
+    return "halted in good order"
+
+
+@pytest.fixture
+def heard() -> Iterator[None]:
+    """Hear SIGINT: what a shell runs in the background begins with it ignored."""
+    before = {number: signal.signal(number, signal.default_int_handler) for number in SIGNALS}
+    yield
+    assert all(signal.getsignal(number) is signal.default_int_handler for number in SIGNALS)
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("heard")
+@pytest.mark.parametrize("how", SIGNALS)
+def test_who_halts_this_process_alone_halts_the_runs_under_way(how: signal.Signals) -> None:
+    told: list[str] = []
+    results = do_all([how] * 3, halt, why, workers=1, halting=lambda: told.append("halting"))
+    assert results == ["halted in good order", None, None]
+    assert told == ["halting"]
+
+
+def deaf(how: signal.Signals) -> str:
+    """Do a job during which somebody wishes to halt, and which never does."""
+    os.kill(os.getppid(), how)
+    signal.pause()
+    return "was not to be waited for"
+
+
+@pytest.mark.usefixtures("heard")
+@pytest.mark.parametrize("how", SIGNALS)
+def test_a_second_wish_ends_the_jobs_under_way_at_once(how: signal.Signals) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        do_all([how] * 3, deaf, why, workers=1, halting=lambda: os.kill(os.getpid(), how))
+    assert multiprocessing.active_children() == []
+
+
+def die_with_it(how: signal.Signals) -> str:
+    """Do a job whose process is told to end, as that of its parent is."""
+    os.kill(os.getppid(), how)
+    os.kill(os.getpid(), signal.SIGTERM)
+    return "dead"
+
+
+@pytest.mark.usefixtures("heard")
+def test_a_job_whose_process_was_ended_with_this_one_has_no_result() -> None:
+    assert do_all([signal.SIGTERM] * 2, die_with_it, why, workers=1) == [None, None]

@@ -111,7 +111,7 @@ class Torn:
 
 def test_a_pool_found_broken_is_replaced_and_no_run_is_lost(monkeypatch):
     pools = iter([Torn(), ThreadPoolExecutor(1)])
-    monkeypatch.setattr("executive.campaign.pool.new_pool", lambda workers: next(pools))
+    monkeypatch.setattr("executive.campaign.pool.Workers", lambda count: next(pools))
     results = sweep(
         "sort", range(2), overrides={}, runs=Path("runs"), workers=1, work=lambda job: result(job.seed)
     )
