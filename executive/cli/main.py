@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
+import signal
 import sys
 import tempfile
+import threading
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib import import_module
 from typing import Any
 
@@ -62,7 +65,8 @@ class Executive(click.Group):
         args = list(sys.argv[1:] if args is None else args)
         debug = "--debug" in args
         try:
-            code = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
+            with _sigterm_as_ctrl_c():
+                code = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
             sys.exit(code if isinstance(code, int) else 0)
         except click.ClickException as error:
             error.show()
@@ -81,6 +85,24 @@ class Executive(click.Group):
             else:
                 click.echo(_apology(error), err=True)
             sys.exit(BROKEN)
+
+
+@contextlib.contextmanager
+def _sigterm_as_ctrl_c() -> Iterator[None]:
+    """Let SIGTERM interrupt what is done here as Ctrl-C does, where nothing else listens to it.
+
+    A signal that whoever started the process has it ignore stays ignored. Outside the main thread signals
+    are left alone: Python allows nothing else.
+    """
+    heard = signal.getsignal(signal.SIGTERM)
+    if heard is signal.SIG_IGN or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, heard)
 
 
 def _apology(error: Exception) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from types import ModuleType, SimpleNamespace
@@ -81,6 +82,24 @@ def project(monkeypatch):
 
 def invoke(*words: str):
     return CliRunner().invoke(main, words)
+
+
+def test_sigterm_ends_a_command_with_a_word_as_ctrl_c_does(project, monkeypatch):
+    before = signal.getsignal(signal.SIGTERM)
+    # While it still loads what it needs, long before a run listens.
+    monkeypatch.setattr("executive.skill.discover", lambda: os.kill(os.getpid(), signal.SIGTERM))
+    shown = invoke("run", "sort")
+    assert (shown.exit_code, shown.stdout, shown.stderr) == (130, "", "\nhalted\n")
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_sigterm_that_is_to_be_ignored_is_ignored(project, monkeypatch):
+    before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    try:
+        monkeypatch.setattr("executive.skill.discover", lambda: os.kill(os.getpid(), signal.SIGTERM) or {})
+        assert invoke("run", "sort").exit_code == 0
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def test_help_names_every_command_and_every_exit_code():
