@@ -35,12 +35,13 @@ def sweep(
     workers: int = 2,
     frames: bool = False,
     progress: Callable[[int, int], None] | None = None,
+    halting: Callable[[], None] | None = None,
     work: Callable[[Job], Result] | None = None,
 ) -> list[Result]:
     """Run `mission` once for every seed and return the results in the order of the seeds.
 
-    A run that breaks its process is a result too, with status `FAULT`. After Ctrl-C no further run
-    begins, those under way halt or end, and the results so far are returned.
+    A run that breaks its process is a result too, with status `FAULT`. After Ctrl-C or SIGTERM no further
+    run begins, those under way halt or end, and the results so far are returned.
 
     Args:
         mission: File or shipped name.
@@ -51,10 +52,11 @@ def sweep(
         frames: Whether the runs save the pictures behind their decisions; a failing seed can be
             repeated with them, so a sweep does without.
         progress: Told how many runs of how many are done.
+        halting: Told that somebody wished to halt, as soon as they do.
         work: What does one job, in a process of its own.
     """
     jobs = [Job(mission, seed, dict(overrides), runs, frames) for seed in seeds]
-    results = do_all(jobs, work or run_job, _broken, workers=workers, progress=progress)
+    results = do_all(jobs, work or run_job, _broken, workers=workers, progress=progress, halting=halting)
     return [result for result in results if result is not None]
 
 
@@ -69,13 +71,19 @@ def run_job(job: Job) -> Result:
     return recorded_run(loaded, skills, seed=job.seed, runs=job.runs, frames=job.frames)
 
 
-def summarize(results: Sequence[Result]) -> dict[str, Any]:
-    """Return the figures of a sweep: objects sorted right, disagreements, times, and every failure."""
+def summarize(results: Sequence[Result], asked: int) -> dict[str, Any]:
+    """Return the figures of a sweep: objects sorted right, disagreements, times, and every failure.
+
+    Runs that were halted count as cut off, and in nothing else. `asked` is how many runs were wanted.
+    """
+    results = [result for result in results if result["status"] != "HALTED"]
     audits = [result["audit"] for result in results if result["audit"] is not None]
     right = sum(audit["right"] for audit in audits)
     total = sum(audit[place] for audit in audits for place in ("right", "wrong_bin", "left", "elsewhere"))
     low, high = wilson(right, total)
     return {
+        "asked": asked,
+        "cut_off": len(results) < asked,
         "runs": len(results),
         "succeeded": sum(result["status"] == "SUCCESS" for result in results),
         "objects": {

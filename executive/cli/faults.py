@@ -78,13 +78,13 @@ def command(
     with stdout_kept_clean():
         from executive.campaign.faults.campaign import Campaign
         from executive.campaign.faults.trial import record
-        from executive.cli.progress import bar
+        from executive.cli.progress import bar, say_halting
         from executive.view.fault_figures import fault_text, trial_text
         from executive.view.fault_trials import as_plain, trial_as_plain
 
         subject = load_subject(mission, overrides, oracle, seed)
         with bar("tried", quiet=as_json or listed or numbers is not None) as progress:
-            campaign = Campaign(subject, workers=workers, progress=progress)
+            campaign = Campaign(subject, workers=workers, progress=progress, halting=say_halting)
             if listed:
                 figures = trial = None
             elif numbers is not None:

@@ -1,9 +1,11 @@
-"""A progress bar on stderr."""
+"""How far a command is, on stderr."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+
+import click
 
 
 @contextmanager
@@ -16,3 +18,10 @@ def bar(what: str, *, quiet: bool = False) -> Iterator[Callable[[int, int], None
     with Progress(*columns, console=Console(stderr=True), disable=quiet) as progress:
         task = progress.add_task(what, total=None)
         yield lambda done, total: progress.update(task, completed=done, total=total)
+
+
+def say_halting() -> None:
+    """Say that Ctrl-C or SIGTERM was heard, and what comes of it."""
+    click.echo(
+        "halting: no further run begins, and those under way are cut; once more ends at once", err=True
+    )

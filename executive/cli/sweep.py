@@ -49,10 +49,13 @@ def command(
     runs: Path,
     as_json: bool,
 ) -> None:
-    """Run MISSION once for every seed; exit code 1 if any run did not succeed."""
+    """Run MISSION once for every seed; exit code 1 if any run did not succeed.
+
+    Ctrl-C halts the runs under way and tells of those that were done; a second one ends at once.
+    """
     with stdout_kept_clean():
         from executive.campaign.sweep import summarize, sweep
-        from executive.cli.progress import bar
+        from executive.cli.progress import bar, say_halting
         from executive.mission.load import load_mission
         from executive.record.run_directory import check_place
         from executive.runtime.cells import cell_kind
@@ -64,14 +67,13 @@ def command(
         with bar(mission) as progress:
             results = sweep(
                 mission, seeds, overrides=overrides, runs=runs, workers=workers, frames=frames,
-                progress=progress,
+                progress=progress, halting=say_halting,
             )  # fmt: skip
-        figures = summarize(results)
+        figures = summarize(results, len(seeds))
         click.echo(_text(figures), err=True)
     if as_json:
         print_json({"mission": mission, "seeds": [seeds[0], seeds[-1]], **figures, "results": results})
-    halted = len(results) < len(seeds) or any(result["status"] == "HALTED" for result in results)
-    ctx.exit(130 if halted else int(figures["succeeded"] < figures["runs"]))
+    ctx.exit(130 if figures["cut_off"] else int(figures["succeeded"] < figures["runs"]))
 
 
 def _text(figures: dict[str, Any]) -> str:
@@ -79,8 +81,10 @@ def _text(figures: dict[str, Any]) -> str:
 
     objects, robot, wall = figures["objects"], figures["robot_time_s"], figures["wall_time_s"]
     low, high = objects["interval_95"]
+    if not figures["runs"]:
+        return _headline(figures)
     lines = [
-        f"{figures['succeeded']} of {figures['runs']} runs succeeded",
+        _headline(figures),
         f"{objects['right']} of {objects['total']} objects right: {objects['share']:.2%} "
         f"(95 % interval {low:.2%} to {high:.2%})",
         f"robot time {robot['median']:.1f} s (median; {robot['least']:.1f} to {robot['most']:.1f}), "
@@ -101,6 +105,15 @@ def _text(figures: dict[str, Any]) -> str:
         for entry in figures["failures"]
     ]
     return "\n".join(lines)
+
+
+def _headline(figures: dict[str, Any]) -> str:
+    """Return how many runs succeeded, and whether there were to be more."""
+    done, succeeded = figures["runs"], figures["succeeded"]
+    if figures["cut_off"]:
+        cut = f"{done} of {figures['asked']} runs, cut off"
+        return f"{cut}; {succeeded} of them succeeded" if done else cut
+    return f"{succeeded} of {done} runs succeeded"
 
 
 def _pace(figures: dict[str, Any]) -> list[str]:

@@ -77,8 +77,13 @@ def sigint():
 
 @pytest.mark.usefixtures("sigint")
 def test_after_ctrl_c_no_further_run_begins_and_the_results_so_far_are_kept():
-    results = sweep("sort", range(9), overrides={}, runs=Path("runs"), workers=1, work=interrupt)
+    told = []
+    results = sweep(
+        "sort", range(9), overrides={}, runs=Path("runs"), workers=1, work=interrupt,
+        halting=lambda: told.append("halting"),
+    )  # fmt: skip
     assert [entry["seed"] for entry in results] == [0]
+    assert told == ["halting"]
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
@@ -121,7 +126,8 @@ def test_a_pool_found_broken_is_replaced_and_no_run_is_lost(monkeypatch):
 def test_the_summary_counts_objects_and_lists_what_went_wrong():
     wrong = result(2, right=3)
     wrong["audit"] = {"right": 2, "wrong_bin": 1, "left": 0, "elsewhere": 0, "unseen": 0}
-    figures = summarize([result(0), result(1, "FAILURE", right=3, left=1), wrong])
+    figures = summarize([result(0), result(1, "FAILURE", right=3, left=1), wrong], asked=3)
+    assert (figures["asked"], figures["cut_off"]) == (3, False)
     assert (figures["runs"], figures["succeeded"]) == (3, 2)
     assert figures["objects"]["right"] == 9
     assert figures["objects"]["total"] == 11
@@ -132,8 +138,15 @@ def test_the_summary_counts_objects_and_lists_what_went_wrong():
     assert figures["planning"] == {"motions": 30, "ahead": 24, "waited_s": 0.3}
 
 
+def test_runs_that_were_halted_or_never_began_make_it_cut_off_and_count_in_nothing_else():
+    whole, halted = result(0), result(1, "HALTED", right=1, left=3)
+    figures = summarize([whole, halted], asked=6)
+    assert (figures["asked"], figures["cut_off"]) == (6, True)
+    assert summarize([whole], asked=1) == {**figures, "asked": 1, "cut_off": False}
+
+
 def test_a_run_without_an_audit_counts_no_objects():
-    figures = summarize([result(0, audit=None)])
+    figures = summarize([result(0, audit=None)], asked=1)
     assert figures["objects"]["total"] == 0
     assert figures["disagreements"] == []
     assert figures["robot_time_per_object_s"] is None

@@ -343,6 +343,24 @@ def test_a_sweep_ends_by_its_worst_run(project, monkeypatch, tmp_path, statuses,
     assert json.loads(shown.stdout)["results"] == results
 
 
+@pytest.mark.parametrize(
+    ("statuses", "told"),
+    [
+        (["SUCCESS", "FAILURE"], "2 of 6 runs, cut off; 1 of them succeeded\n"),
+        (["SUCCESS", "HALTED"], "1 of 6 runs, cut off; 1 of them succeeded\n"),
+        ([], "0 of 6 runs, cut off\n"),
+    ],
+)
+def test_a_sweep_that_was_cut_off_says_so(project, monkeypatch, tmp_path, statuses, told):
+    results = [{**RESULT, "seed": seed, "status": status} for seed, status in enumerate(statuses)]
+    monkeypatch.setattr("executive.campaign.sweep.sweep", lambda *args, **options: results)
+    shown = invoke("sweep", "sort", "--seeds", "0-5", "--json", "--runs", str(tmp_path))
+    assert shown.exit_code == 130
+    assert told in shown.stderr
+    figures = json.loads(shown.stdout)
+    assert (figures["asked"], figures["cut_off"]) == (6, True)
+
+
 def test_a_sweep_into_a_place_that_takes_nothing_is_bad_input(project, monkeypatch, tmp_path):
     (tmp_path / "file").touch()
     monkeypatch.setattr("executive.campaign.sweep.sweep", lambda *args, **options: pytest.fail("it began"))

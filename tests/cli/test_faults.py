@@ -29,7 +29,7 @@ def campaigns(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     told = SimpleNamespace(asked=[], problems=(), complete=True)
 
     class Campaign:
-        def __init__(self, subject, *, workers, progress):
+        def __init__(self, subject, *, workers, progress, halting):
             told.asked.append((subject.name, subject.cell, subject.seed, workers))
             self._name = subject.name
 

@@ -40,6 +40,7 @@ class Campaign:
         subject: The mission.
         workers: How many runs go on at a time, each in a process of its own.
         progress: Told how many runs of how many are done.
+        halting: Told that somebody wished to halt, as soon as they do.
 
     Attributes:
         subject: The mission.
@@ -52,12 +53,17 @@ class Campaign:
     """
 
     def __init__(
-        self, subject: Subject, *, workers: int = 2, progress: Callable[[int, int], None] | None = None
+        self,
+        subject: Subject,
+        *,
+        workers: int = 2,
+        progress: Callable[[int, int], None] | None = None,
+        halting: Callable[[], None] | None = None,
     ) -> None:
         self.subject = subject
         self.rehearsal = rehearse(subject)
         self.faults: Sequence[Fault] = list_faults(subject, self.rehearsal)
-        self._workers, self._progress = workers, progress
+        self._workers, self._progress, self._halting = workers, progress, halting
 
     def fault(self, number: int) -> Fault:
         """Return the fault with a number.
@@ -149,7 +155,7 @@ class Campaign:
         jobs = [
             Job(self.subject, self.rehearsal, numbers, tuple(map(self.fault, numbers))) for numbers in wanted
         ]
-        trials = do_all(jobs, do, _broken, workers=self._workers, progress=told)
+        trials = do_all(jobs, do, _broken, workers=self._workers, progress=told, halting=self._halting)
         done = [trial for trial in trials if trial is not None and not trial.cut]
         return done, len(done) == len(wanted)
 

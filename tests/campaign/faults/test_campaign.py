@@ -128,8 +128,10 @@ def interrupt(*progress: int) -> None:
 
 @pytest.mark.usefixtures("sigint")
 def test_after_ctrl_c_the_trials_so_far_are_told(small: Subject) -> None:
-    figures = Campaign(small, workers=1, progress=interrupt).singles()
-    assert (len(figures.trials), figures.complete) == (1, False)
+    told: list[str] = []
+    campaign = Campaign(small, workers=1, progress=interrupt, halting=lambda: told.append("halting"))
+    figures = campaign.singles()
+    assert (len(figures.trials), figures.complete, told) == (1, False, ["halting"])
 
 
 def test_a_number_that_there_is_not_is_told_with_those_that_there_are(campaign: Campaign) -> None:
