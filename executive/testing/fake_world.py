@@ -8,8 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from executive.cell import Steps
+from executive.errors import InputError
 from executive.geometry import Array
 from executive.messages import BIN_THICKNESS, Bin, ObjectClass
+from executive.mission.findings import alternatives
 
 STEP = 1 / 240
 """Length of one control step [s]."""
@@ -67,7 +69,21 @@ class FakeWorld:
         return self.steps * STEP
 
     def put(self, label: str, x: float, y: float) -> FakeObject:
-        """Stand an object on the table and return it."""
+        """Stand an object on the table and return it.
+
+        Args:
+            label: Its class.
+            x: Where its centre is [m].
+            y: Where its centre is [m].
+
+        Raises:
+            InputError: The cell knows no such class.
+        """
+        if label not in self.classes:
+            raise InputError(
+                f'nothing of the class "{label}" can be put on the fake table. '
+                f"{alternatives(label, self.classes, 'The cell file has the classes')}"
+            )
         added = FakeObject(label, np.array([x, y, self.classes[label].height / 2]))
         self.objects.append(added)
         return added

@@ -197,3 +197,13 @@ def test_what_fell_between_two_bins_is_in_the_nearer(load: Load, x: float, what:
     cell = FakeCell(load("fruit", table__objects="[0, 0]"), routes={"banana": ("premium_crate",)})
     cell.world.put("banana", x, 0.4).fell = True
     assert {count: n for count, n in cell.audit().items() if count != "unseen" and n} == {what: 1}
+
+
+def test_what_no_class_of_the_cell_is_cannot_be_put_on_the_table(fake: FakeCell) -> None:
+    with pytest.raises(InputError) as raised:
+        fake.world.put("cub", 0.5, 0.0)
+    assert str(raised.value) == (
+        'nothing of the class "cub" can be put on the fake table. '
+        'Did you mean "cube"? The cell file has the classes: cube, sphere, duck.'
+    )
+    assert not fake.world.objects
