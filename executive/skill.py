@@ -175,6 +175,7 @@ class Skill:
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
+        _require_annotations(cls)
         params, ports = dict(cls.params), dict(cls.ports)
         hints = get_type_hints(cls, include_extras=True)
         for name in cls.__annotations__:
@@ -243,6 +244,23 @@ class Skill:
                 f"it declares: {', '.join(self.reasons) or 'none'}"
             )
         return SkillFailed(reason, message)
+
+
+def _require_annotations(skill: type[Skill]) -> None:
+    """Return if everything that a class body declares by `param` or `port` says of what type it is.
+
+    Raises:
+        TypeError: A declaration has no annotation.
+    """
+    for name, declared in vars(skill).items():
+        if isinstance(declared, _Declared) and name not in skill.__annotations__:
+            plain = isinstance(declared.default, bool | int | float | str)
+            kind = type(declared.default).__name__ if plain else "int"
+            raise TypeError(
+                f"{skill.__qualname__}.{name} has no annotation, so nobody knows its type; "
+                f'write, for instance, "{name}: {kind} = param(...)" for a param, '
+                f'"{name}: In[...] = port(...)" for an input, "{name}: Out[...] = port(...)" for an output'
+            )
 
 
 def discover() -> dict[str, type[Skill]]:
