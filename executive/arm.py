@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from types import GeneratorType
 from typing import Protocol
 
+from executive.errors import Fault
 from executive.geometry import Array, Pose
 from executive.messages import Load, Obstacle
 
@@ -107,3 +109,16 @@ class Arm(Protocol):
 
     def stop(self) -> None:
         """Brake along the running motion's path; returns at once, also when nothing runs."""
+
+
+def refuse_steps(motion: object) -> None:
+    """Return unless what an arm is to follow are the steps that would plan a motion, none of them made.
+
+    Raises:
+        Fault: They are.
+    """
+    if isinstance(motion, GeneratorType):
+        raise Fault(
+            f"the generator {motion.__name__}(...) was passed to the arm where a motion is expected: "
+            f'"yield from" is missing. Write "motion = yield from {motion.__name__}(...)"'
+        )

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from executive.arm import Goal, Motion, Task
+from executive.arm import Goal, Motion, Task, refuse_steps
 from executive.cell import Clock
 from executive.cell_config import CellConfig
 from executive.errors import Fault
@@ -146,6 +146,7 @@ class SimArm:
             Fault: The arm is moving, or is elsewhere, or `motion` was not planned by this arm.
         """
         self._require_rest("start a motion")
+        refuse_steps(motion)
         if not isinstance(motion, Trajectory):
             raise Fault(f"the simulated arm follows its own planned motions, not a {type(motion).__name__}")
         self._require_near(motion.start, START_TOLERANCE, "the motion starts")

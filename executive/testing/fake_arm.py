@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from executive.arm import Goal, Motion, Task
+from executive.arm import Goal, Motion, Task, refuse_steps
 from executive.cell import Clock
 from executive.cell_config import CellConfig
 from executive.errors import Fault, Unreachable
@@ -114,10 +114,16 @@ class FakeArm:
         self._plans.ahead(self.destination, goal, task)
 
     def start(self, motion: Motion) -> None:
-        """Begin to follow `motion`."""
+        """Begin to follow `motion`.
+
+        Raises:
+            Fault: The arm is moving, or `motion` was not planned by this arm.
+        """
         if not self.at_rest:
             raise Fault("the arm was started while it moves")
-        assert isinstance(motion, FakeMotion), "the fake arm follows the motions it planned"
+        refuse_steps(motion)
+        if not isinstance(motion, FakeMotion):
+            raise Fault(f"the fake arm follows its own planned motions, not a {type(motion).__name__}")
         self.commanded.append("start")
         self._path = list(motion.path)
         self._half = len(self._path) // 2

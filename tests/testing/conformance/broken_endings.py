@@ -9,7 +9,7 @@ from conforming_skills import Pause, Push, Speed
 
 from executive.cell import Cell, Steps
 from executive.messages import Target
-from executive.moving import heeding, planned
+from executive.moving import follow, heeding, planned
 from executive.skill import ANY, EMPTY, HOLDING, In, Skill, SkillFailed, port
 
 
@@ -202,3 +202,12 @@ class Clinging(Skill):
             cell.tool.open()
             raise self.failed("missed", "no seal")
         cell.ledger.held(self.target.item)
+
+
+class Unplanned(Push):
+    """Push the target aside."""
+
+    def run(self, cell: Cell) -> Steps:
+        """Forget to wait for the plan."""
+        motion = planned(self, cell.arm, lambda: ("aside", heeding(cell)))
+        yield from follow(self, cell, motion)  # type: ignore[arg-type]

@@ -96,6 +96,29 @@ BROKEN: list[tuple[type[Skill], Said]] = [
         "with an empty tool it succeeded while the arm still moves. Wait until it is at rest, or call "
         "cell.arm.stop() in finally, as follow of executive.moving does."
     )}),
+    (broken.Unplanned, {
+        "ends_as_declared": (
+            "with an empty tool at tick 0 Fault in broken_endings.py:{line}: the generator planned(...) was "
+            'passed to the arm where a motion is expected: "yield from" is missing. '
+            'Write "motion = yield from planned(...)". That is a fault, which ends the run: fail with a '
+            "declared reason where this can happen, or mend it."
+        ),
+        "adversity_ends_as_declared": (
+            "with an empty tool while everything on the table is gone at tick 0 Fault in "
+            "broken_endings.py:{line}: the generator planned(...) was "
+            'passed to the arm where a motion is expected: "yield from" is missing. '
+            'Write "motion = yield from planned(...)". That is a fault, which ends the run: fail with a '
+            "declared reason where this can happen, or mend it."
+        ),
+        "succeeds_somewhere": (
+            "Unplanned never succeeded; with an empty tool it ended as a fault: Fault in "
+            "broken_endings.py:{line}: the generator planned(...) was "
+            'passed to the arm where a motion is expected: "yield from" is missing. '
+            'Write "motion = yield from planned(...)". '
+            "Arrange a stage on which it can: conformance(Unplanned, lambda stage: ...), as skills/README.md "
+            "shows."
+        ),
+    }),
     (broken.Lingering, {"halts_at_once": (
         'with an empty tool it was halted at tick 1: it yielded in "finally". '
         "What finally does must be done at once and cannot fail. (So after 1 of 2 halts.)"
