@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from executive.skill import Skill
-from executive.testing.conformance import conduct, declarations, effects, endings, halting, refusals
+from executive.testing.conformance import conduct, declarations, dropped, effects, endings, halting, refusals
 from executive.testing.conformance.case import Case
 from executive.testing.conformance.check import Check, Rule
 from executive.testing.conformance.situations import Arrange
@@ -22,6 +22,7 @@ RULES: tuple[Rule, ...] = (
     declarations.resources_declared,
     declarations.tool_declared,
     declarations.imports_allowed,
+    dropped.calls_take_effect,
     refusals.mistakes_refused,
     refusals.unknown_keywords_refused,
     endings.arranged,
@@ -40,6 +41,7 @@ RULES: tuple[Rule, ...] = (
     effects.writes_only_outputs,
     effects.inputs_unchanged,
     effects.uses_only_what_it_declares,
+    effects.moves_if_it_says_so,
     conduct.repeats_itself,
     conduct.ticks_are_quick,
     conduct.never_sooner_than_shortest,

@@ -84,6 +84,18 @@ def uses_only_what_it_declares(case: Case) -> Iterator[str]:
             yield f"{case.name} calls cell.{name} and does not say that it senses. Add senses = True."
 
 
+def moves_if_it_says_so(case: Case) -> Iterator[str]:
+    """Where it says that it moves and succeeds at all, it starts the arm in one situation at least."""
+    succeeds = any(rehearsal.ending.status == "SUCCESS" for rehearsal in case.ended)
+    if case.skill.moves and succeeds and not any(rehearsal.moved for rehearsal in case.ended):
+        yield (
+            f"{case.name} says that it moves, and succeeds without starting the arm in any situation. "
+            'Write "yield from" before follow or carry of executive.moving, leave moves out, or arrange a '
+            f"stage on which it moves: conformance({case.skill.__name__}, lambda stage: ...), as "
+            "skills/README.md shows."
+        )
+
+
 def _outputs(case: Case) -> list[Port]:
     return [port for port in case.skill.ports.values() if port.direction is Direction.OUT]
 

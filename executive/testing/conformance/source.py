@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import ast
-import inspect
 from collections.abc import Iterator
 from pathlib import Path
-from types import CodeType
+from types import FunctionType
 
 from executive.skill import Skill
 
 
+def functions_of(skill: type[Skill]) -> list[FunctionType]:
+    """Return the functions of a skill's class and of the skills that it derives from, its own first."""
+    return [function for _, function in _members(skill)]
+
+
 def files_of(skill: type[Skill]) -> list[Path]:
     """Return the files of a skill's class and of the skills that it derives from, its own first."""
-    return [*dict.fromkeys(Path(code.co_filename) for _, code in _functions(skill))]
+    return [*dict.fromkeys(Path(f.__code__.co_filename) for f in functions_of(skill))]
 
 
 def trees_of(skill: type[Skill]) -> Iterator[tuple[Path, ast.Module]]:
@@ -25,7 +29,8 @@ def trees_of(skill: type[Skill]) -> Iterator[tuple[Path, ast.Module]]:
 
 def class_trees_of(skill: type[Skill]) -> Iterator[tuple[Path, ast.ClassDef]]:
     """Yield the trees of the class and of the skills it derives from, with their files."""
-    written = {(name, code.co_filename, code.co_firstlineno) for name, code in _functions(skill)}
+    codes = [(name, function.__code__) for name, function in _members(skill)]
+    written = {(name, code.co_filename, code.co_firstlineno) for name, code in codes}
     for path, tree in trees_of(skill):
         for node in ast.walk(tree):
             if isinstance(node, ast.ClassDef):
@@ -34,10 +39,10 @@ def class_trees_of(skill: type[Skill]) -> Iterator[tuple[Path, ast.ClassDef]]:
                     yield path, node
 
 
-def _functions(skill: type[Skill]) -> Iterator[tuple[str, CodeType]]:
-    """Yield the name of the class and the code of every function of a skill."""
+def _members(skill: type[Skill]) -> Iterator[tuple[str, FunctionType]]:
+    """Yield every function of a skill, with the name of its class."""
     for parent in skill.__mro__:
         if issubclass(parent, Skill) and parent is not Skill:
             for member in vars(parent).values():
-                if inspect.isfunction(member):
-                    yield parent.__name__, member.__code__
+                if isinstance(member, FunctionType):
+                    yield parent.__name__, member

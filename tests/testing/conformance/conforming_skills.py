@@ -9,7 +9,7 @@ from executive.arm import Goal
 from executive.cell import Cell, Steps
 from executive.messages import Target
 from executive.moving import follow, heeding, planned
-from executive.skill import EMPTY, In, Metres, Skill, param, port
+from executive.skill import EMPTY, In, Metres, Skill, SkillFailed, param, port
 
 
 class Push(Skill):
@@ -38,6 +38,25 @@ class Pause(Skill):
         """Wait."""
         yield
         yield
+
+
+class Careful(Pause):
+    """Wait."""
+
+    def run(self, cell: Cell) -> Steps:
+        """Keep steps and a failure until they are wanted; `follow` is another one here."""
+        steps, waiting, follow = cell.clock.sleep(0.01), self._rest(cell), list[int].append
+        failure = self.failed("tired", "after 1 step")
+        follow([], 1)
+        yield from steps
+        yield from waiting
+        try:
+            raise failure
+        except SkillFailed:
+            return
+
+    def _rest(self, cell: Cell) -> Steps:
+        return cell.clock.sleep(0.01)
 
 
 class Speed(Enum):

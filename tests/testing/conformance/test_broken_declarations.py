@@ -41,9 +41,16 @@ BROKEN: list[tuple[type[Skill], Said]] = [
     (broken.Gripping, {"resources_declared": (
         'Gripping uses "gripper", which no cell has. There are: arm, tool, camera.'
     )}),
-    (broken.Floating, {"resources_declared": (
-        'Floating moves the arm but does not use it. Add "arm" to uses, or leave moves out.'
-    )}),
+    (broken.Floating, {
+        "resources_declared": (
+            'Floating moves the arm but does not use it. Add "arm" to uses, or leave moves out.'
+        ),
+        "moves_if_it_says_so": (
+            "Floating says that it moves, and succeeds without starting the arm in any situation. "
+            'Write "yield from" before follow or carry of executive.moving, leave moves out, or arrange a '
+            "stage on which it moves: conformance(Floating, lambda stage: ...), as skills/README.md shows."
+        ),
+    }),
     (broken.Confused, {"tool_declared": (
         'Confused.tool_left tells of "dropped", which is no ending of it. There are: tired, halt.'
     )}),
