@@ -16,6 +16,7 @@ from executive.cli.output import print_json, stdout_kept_clean
 
 if TYPE_CHECKING:
     from executive.skill import Param, Port, Skill
+    from executive.testing.conformance.check import Verdict
 
 _WIDTH = 100
 
@@ -58,15 +59,23 @@ def _conform(skills: Mapping[str, type[Skill]], as_json: bool) -> bool:
     """Check skills, print what is found as soon as it is, and tell whether all is well."""
     with stdout_kept_clean():
         from executive.testing.conformance import conformance
+        from executive.testing.conformance.check import Interrupted
         from executive.view.conformance import conformance_lines, conformance_total
 
     verdicts = []
     for name, skill in skills.items():
-        with stdout_kept_clean():
-            found = [check.verdict() for check in conformance(skill, name=name)]
+        found: list[Verdict] = []
+        try:
+            with stdout_kept_clean():
+                for check in conformance(skill, name=name):
+                    found.append(check.verdict())
+        except Interrupted as interrupt:
+            click.echo(str(interrupt), err=True)
+            raise
+        finally:
+            if found and not as_json:
+                click.echo("\n".join(conformance_lines(found)))
         verdicts += found
-        if not as_json:
-            click.echo("\n".join(conformance_lines(found)))
     if as_json:
         print_json([asdict(verdict) for verdict in verdicts])
     else:

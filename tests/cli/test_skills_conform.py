@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import ClassVar
 
 import pytest
@@ -35,6 +36,15 @@ class Dream(Rest):
 
     story: In[str] = port(doc="what about")
     reasons: ClassVar = ("awake",)
+
+
+class Called(Rest):
+    """Do nothing."""
+
+    def run(self, cell: Cell) -> Steps:
+        """Be called away, as by Ctrl-C."""
+        yield
+        raise KeyboardInterrupt
 
 
 @pytest.fixture(autouse=True)
@@ -73,7 +83,7 @@ def test_what_cannot_be_made_up_is_told_once_and_what_needs_it_is_not_run() -> N
         '(a text). Give it in a test: conformance(Dream, lambda stage: {"story": ...}), '
         "as skills/README.md shows."
     )
-    assert told[1] == "not run  Dream.hands_back_steps"
+    assert told[1] == "not run  Dream.ticks_come_back"
     assert told[-1].endswith(f"1 failed, {len(told) - 2} not run")
     assert result.exit_code == 1
 
@@ -104,3 +114,16 @@ def test_a_skill_that_is_not_installed_is_bad_input() -> None:
     result = conform("Rets")
     assert (result.exit_code, result.stdout) == (2, "")
     assert 'no skill "Rets" is installed. Did you mean "Rest"?' in result.stderr
+
+
+def test_ctrl_c_tells_what_was_found_and_which_check_was_under_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("executive.skill.discover", lambda: {"Called": Called})
+    result = conform("Called")
+    *_, last = result.stdout.splitlines()
+    assert last == "ok       Called.arranged"
+    told, halted = result.stderr.split("\n", 1)
+    assert re.sub(r":\d+$", ":{line}", told) == (
+        "Called.ticks_come_back was under way, at test_skills_conform.py:{line}"
+    )
+    assert halted.strip() == "halted"
+    assert result.exit_code == 130

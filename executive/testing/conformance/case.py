@@ -9,12 +9,16 @@ from typing import Any
 import numpy as np
 
 from executive.skill import Skill
-from executive.testing.conformance.adversities import adversities
+from executive.testing.conformance.adversities import NOTHING, Adversity, adversities
 from executive.testing.conformance.rehearsal import Rehearsal, rehearse
-from executive.testing.conformance.situations import Arrange, NotArranged, Scene, situations
+from executive.testing.conformance.situations import Arrange, NotArranged, NotTried, Scene, situations
 
 BUDGET = 100_000
 """Control steps that the halts of one scene may take together: up to 440 ticks that is one halt at each."""
+
+
+class GotStuck(NotTried):
+    """A tick of a skill did not come back, so that it was not tried any further; the text says where."""
 
 
 class Case:
@@ -24,10 +28,15 @@ class Case:
         name: What the skill is called.
         skill: Its class.
         arrange: What its author wants to be otherwise on the stage.
+
+    Attributes:
+        tries: Runs that were begun.
     """
 
     def __init__(self, name: str, skill: type[Skill], arrange: Arrange) -> None:
         self.name, self.skill, self._arrange = name, skill, arrange
+        self.tries = 0
+        self._stuck = ""
 
     @cached_property
     def _stages(self) -> list[Scene] | NotArranged:
@@ -52,7 +61,7 @@ class Case:
     @cached_property
     def twice(self) -> list[tuple[Rehearsal, Rehearsal]]:
         """Two runs to the end in every scene, nothing going wrong."""
-        return [(rehearse(self.skill, scene), rehearse(self.skill, scene)) for scene in self.scenes]
+        return [(self._tried(scene), self._tried(scene)) for scene in self.scenes]
 
     @property
     def plain(self) -> list[Rehearsal]:
@@ -63,7 +72,7 @@ class Case:
     def hard(self) -> list[Rehearsal]:
         """A run to the end in every scene for everything that may go wrong."""
         return [
-            rehearse(self.skill, scene, adversity).lean()
+            self._tried(scene, adversity).lean()
             for scene, plain in zip(self.scenes, self.plain, strict=True)
             # What never ends where all is well would not end here, either.
             if plain.ending.status != "RUNNING"
@@ -74,7 +83,7 @@ class Case:
     def halted(self) -> list[Rehearsal]:
         """A run for every moment of every scene at which the skill may be taken away."""
         return [
-            rehearse(self.skill, scene, halt_at=tick).lean()
+            self._tried(scene, halt_at=tick).lean()
             for scene, plain in zip(self.scenes, self.plain, strict=True)
             for tick in _moments(plain)
         ]
@@ -88,6 +97,26 @@ class Case:
     def defaults(self) -> Mapping[str, Any]:
         """The params that a mission need not say."""
         return {name: param.default for name, param in self.skill.params.items() if not param.required}
+
+    def _tried(self, scene: Scene, adversity: Adversity = NOTHING, halt_at: int | None = None) -> Rehearsal:
+        """Return what a run was like.
+
+        Raises:
+            GotStuck: It did not come back, or one before it: to wait once is enough.
+        """
+        if self._stuck:
+            raise GotStuck(self._stuck)
+        self.tries += 1
+        rehearsal = rehearse(self.skill, scene, adversity, halt_at)
+        if rehearsal.ending.status == "STUCK":
+            halted = ", halted there," if rehearsal.ticks == halt_at else ""
+            self._stuck = (
+                f"{rehearsal.where} at tick {rehearsal.ticks}{halted} {self.name} "
+                f"{rehearsal.ending.message}. The arm waits for every tick: yield in each loop that waits, "
+                "and leave long work to a detector."
+            )
+            raise GotStuck(self._stuck)
+        return rehearsal
 
 
 def _moments(plain: Rehearsal) -> list[int]:

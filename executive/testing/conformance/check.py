@@ -5,9 +5,12 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from traceback import extract_tb
 
 from executive.testing.conformance.case import Case
-from executive.testing.conformance.situations import NotArranged
+from executive.testing.conformance.patience import Stuck, patience
+from executive.testing.conformance.situations import NotTried
+from executive.testing.conformance.source import place_in
 
 Rule = Callable[[Case], Iterator[str]]
 """Yields what is wrong with a skill: what happened, where, what to do. Its docstring says what is true."""
@@ -15,6 +18,10 @@ Rule = Callable[[Case], Iterator[str]]
 
 class NotConforming(AssertionError):
     """A skill does not do what every skill must; the text says what, where, and what to do."""
+
+
+class Interrupted(KeyboardInterrupt):
+    """Somebody did not want to wait any longer; the text says which check was under way, and where."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +32,7 @@ class Verdict:
         skill: Name of the skill.
         check: Name of the check.
         doc: What is true where it passes.
-        status: `ok`, `failed`, or `not run` where nobody knows what to give the skill.
+        status: `ok`, `failed`, or `not run` where what it looks at cannot be found out.
         problems: What is wrong, a text each.
     """
 
@@ -62,18 +69,29 @@ class Check:
         return (inspect.getdoc(self.rule) or "").partition("\n")[0]
 
     def verdict(self) -> Verdict:
-        """Return what the check finds."""
+        """Return what the check finds.
+
+        Raises:
+            Interrupted: Somebody pressed Ctrl-C meanwhile.
+        """
         try:
-            problems = tuple(self.rule(self.case))
-        except NotArranged as problem:
+            with patience(self.case.skill, lambda: self.case.tries):
+                problems = tuple(self.rule(self.case))
+        except NotTried as problem:
             return Verdict(self.case.name, self.name, self.doc, "not run", (str(problem),))
+        except Stuck as stuck:
+            problems = (f"what {self} asks of it {stuck}. Whatever is asked of a skill is answered at once.",)
+        except KeyboardInterrupt as interrupt:
+            trace = reversed(extract_tb(interrupt.__traceback__))
+            place = place_in(self.case.skill, ((frame.filename, frame.lineno or 0) for frame in trace))
+            raise Interrupted(f"{self} was under way{place and f', at {place}'}") from interrupt
         return Verdict(self.case.name, self.name, self.doc, "failed" if problems else "ok", problems)
 
     def __call__(self) -> None:
         """Return if the skill keeps the rule.
 
         Raises:
-            NotConforming: It does not, or nobody knows what to give it.
+            NotConforming: It does not, or this cannot be found out.
         """
         verdict = self.verdict()
         if verdict.problems:

@@ -26,6 +26,7 @@ RULES: tuple[Rule, ...] = (
     refusals.mistakes_refused,
     refusals.unknown_keywords_refused,
     endings.arranged,
+    conduct.ticks_come_back,
     endings.hands_back_steps,
     endings.comes_to_an_end,
     endings.ends_as_declared,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from executive.testing.conformance.case import Case
+from executive.testing.conformance.case import Case, GotStuck
 from executive.testing.conformance.rehearsal import Rehearsal
 from executive.testing.conformance.same import same
 from executive.testing.fake_cell import FakeCell, bare_table
@@ -22,6 +22,14 @@ def repeats_itself(case: Case) -> Iterator[str]:
                 f"{first.where}, twice the same, {difference}. Nothing may depend on chance, on time, on an "
                 "object's address, or on what an earlier run has left; a seed may be a param."
             )
+
+
+def ticks_come_back(case: Case) -> Iterator[str]:
+    """Every tick comes back, whatever goes wrong and wherever it is halted: none loops or waits for ever."""
+    try:
+        _ = case.ended, case.halted
+    except GotStuck as problem:
+        yield str(problem)
 
 
 def ticks_are_quick(case: Case) -> Iterator[str]:

@@ -12,9 +12,10 @@ from executive.messages import Item
 from executive.skill import Direction, Skill, SkillFailed
 from executive.testing.conformance.adversities import NOTHING, Adversity
 from executive.testing.conformance.outside import clocks_watched, open_things
+from executive.testing.conformance.patience import Stuck, patience
 from executive.testing.conformance.same import same
 from executive.testing.conformance.situations import Scene
-from executive.testing.conformance.source import files_of
+from executive.testing.conformance.source import place_in
 from executive.testing.conformance.watch import Call, Watch
 from executive.testing.fake_world import STEP
 
@@ -27,9 +28,10 @@ class Ending:
     """How a skill ended.
 
     Attributes:
-        status: `SUCCESS`, `FAILURE`, `HALTED`, `RUNNING` if it did not end, or `FAULT`.
+        status: `SUCCESS`, `FAILURE`, `HALTED`, `RUNNING` if it did not end, `STUCK` if a tick did not, or
+            `FAULT`.
         reason: Of a failure, declared or not.
-        message: The sentence of a failure, or what a fault was and where.
+        message: The sentence of a failure, or what a fault was and where, or where a tick got stuck.
     """
 
     status: str
@@ -112,7 +114,11 @@ def rehearse(
     actor = _Actor(skill, values, scene)
     clocks: list[str] = []
     with clocks_watched(clocks):
-        ending = actor.act(adversity, halt_at)
+        try:
+            with patience(skill, lambda: actor.ticks):
+                ending = actor.act(adversity, halt_at)
+        except Stuck as stuck:
+            ending = Ending("STUCK", message=str(stuck))
     attributes = vars(actor.instance) if actor.instance else {}
     outputs = [name for name, port in skill.ports.items() if port.direction is Direction.OUT]
     known = {*skill.params, *skill.ports}
@@ -211,9 +217,6 @@ class _Actor:
 
     def _told(self, error: Exception) -> str:
         """Return what an error says, and where in the skill's own files it came from."""
-        files = {str(path) for path in files_of(self._skill)}
-        for frame in reversed(extract_tb(error.__traceback__)):
-            if frame.filename in files:
-                name = frame.filename.rpartition("/")[2]
-                return f"{type(error).__name__} in {name}:{frame.lineno}: {error}"
-        return f"{type(error).__name__}: {error}"
+        frames = ((frame.filename, frame.lineno or 0) for frame in reversed(extract_tb(error.__traceback__)))
+        place = place_in(self._skill, frames)
+        return f"{type(error).__name__}{place and f' in {place}'}: {error}"

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from executive.skill import ANY, EMPTY, HOLDING, Direction, Param, Port, Skill
+from executive.testing.conformance.patience import Stuck
 from executive.testing.conformance.stage import Stage, set_up
 from executive.testing.conformance.values import CannotMakeUp, made_up, others
 
@@ -19,7 +20,11 @@ _GRIPS: Mapping[Any, tuple[bool, ...]] = {EMPTY: (False,), HOLDING: (True,), ANY
 _NAMES = {False: "with an empty tool", True: "with an item in the tool"}
 
 
-class NotArranged(Exception):
+class NotTried(Exception):
+    """What a check looks at cannot be found out; the text says why."""
+
+
+class NotArranged(NotTried):
     """A skill cannot be tried, because nobody knows what to give it; the text says what to do."""
 
 
@@ -108,6 +113,8 @@ def situations(skill: type[Skill]) -> Iterator[Situation]:
 def _asked(skill: type[Skill], arrange: Arrange, stage: Stage) -> dict[str, Any]:
     try:
         given = dict(arrange(stage))
+    except Stuck as stuck:
+        raise NotArranged(f"what arranges it {stuck}") from None
     except Exception as error:
         raise NotArranged(f"what arranges it raised {type(error).__name__}: {error}") from error
     known = {**skill.params, **_inputs(skill)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from types import FunctionType
 
@@ -18,6 +18,12 @@ def functions_of(skill: type[Skill]) -> list[FunctionType]:
 def files_of(skill: type[Skill]) -> list[Path]:
     """Return the files of a skill's class and of the skills that it derives from, its own first."""
     return [*dict.fromkeys(Path(f.__code__.co_filename) for f in functions_of(skill))]
+
+
+def place_in(skill: type[Skill], frames: Iterable[tuple[str, int]]) -> str:
+    """Return the first of some files and lines that is in the skill's own files, as `wave.py:12`, or ""."""
+    files = {str(path) for path in files_of(skill)}
+    return next((f"{Path(file).name}:{line}" for file, line in frames if file in files), "")
 
 
 def trees_of(skill: type[Skill]) -> Iterator[tuple[Path, ast.Module]]:
@@ -44,5 +50,6 @@ def _members(skill: type[Skill]) -> Iterator[tuple[str, FunctionType]]:
     for parent in skill.__mro__:
         if issubclass(parent, Skill) and parent is not Skill:
             for member in vars(parent).values():
-                if isinstance(member, FunctionType):
-                    yield parent.__name__, member
+                plain = member.__func__ if isinstance(member, classmethod | staticmethod) else member
+                if isinstance(plain, FunctionType):
+                    yield parent.__name__, plain
