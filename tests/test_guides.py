@@ -16,6 +16,7 @@ from click.testing import CliRunner
 from guide_blocks import AUTHORS, GUIDES, ROOT, blocks, files, in_code, read, rows, shown, transcripts
 
 from executive.cli.main import main
+from executive.discovery import discover
 from executive.events import Event
 from executive.messages import Target
 from executive.mission.findings import MissionError
@@ -28,7 +29,6 @@ from executive.mission.text.yaml_text import parse_yaml, plain
 from executive.record.result import EXIT_CODES
 from executive.runtime.cells import cell_kind
 from executive.runtime.run import Run
-from executive.skill import discover
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 

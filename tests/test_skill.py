@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from importlib.metadata import EntryPoint
 from typing import Any
 
 import pytest
 
-from executive.errors import InputError
-from executive.skill import Skill, discover, param, port
+from executive.skill import Skill, param, port
 
 
 @pytest.mark.parametrize(
@@ -31,15 +29,3 @@ def test_a_default_that_is_changed_needs_its_annotation_again() -> None:
 
     with pytest.raises(TypeError, match=r"Louder\.times has no annotation"):
         type("Louder", (Knock,), {"times": param(3)})
-
-
-def test_a_skill_that_cannot_be_loaded_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    entry = EntryPoint("Knock", "no_such_package.knock:Knock", "executive.skills")
-    monkeypatch.setattr("executive.skill.entry_points", lambda group: [entry])
-    with pytest.raises(InputError) as raised:
-        discover()
-    assert str(raised.value) == (
-        'the skill "Knock" (no_such_package.knock:Knock) cannot be loaded: ModuleNotFoundError: No module '
-        "named 'no_such_package'. Mend it, or uninstall its package; `executive --debug ...` shows where it "
-        "happens"
-    )

@@ -62,9 +62,9 @@ def sweep(
 
 def run_job(job: Job) -> Result:
     """Do one run and return its result object."""
+    from executive.discovery import discover
     from executive.mission.load import load_mission
     from executive.record.recorded_run import recorded_run
-    from executive.skill import discover
 
     skills = discover()
     loaded = load_mission(job.mission, skills, job.overrides)

@@ -22,11 +22,11 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
     Exit code 2 if any cannot be run.
     """
     with stdout_kept_clean():
+        from executive.discovery import discover
         from executive.errors import InputError
         from executive.mission.findings import Finding, MissionError
         from executive.mission.load import load_mission
         from executive.runtime.cells import cell_kind
-        from executive.skill import discover
         from executive.view.verdict import verdict
 
         skills = discover()

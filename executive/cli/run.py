@@ -55,8 +55,8 @@ def command(
         # The simulator would end the process with a line of its own.
         raise click.UsageError("--gui needs a display, and DISPLAY names none; leave it out")
     with stdout_kept_clean():
+        from executive.discovery import discover
         from executive.record.result import EXIT_CODES
-        from executive.skill import discover
         from executive.view.story import story_lines
         from executive.view.summary import repeat_command, summary
 

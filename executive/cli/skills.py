@@ -35,9 +35,9 @@ def command(ctx: click.Context, name: str | None, conform: bool, as_json: bool) 
     With --conform the exit code is 1 if a check fails, or cannot be run.
     """
     with stdout_kept_clean():
+        from executive.discovery import discover
         from executive.errors import InputError
         from executive.mission.findings import alternatives
-        from executive.skill import discover
 
         skills = discover()
         if name is not None and name not in skills:

@@ -56,10 +56,10 @@ def command(
     with stdout_kept_clean():
         from executive.campaign.sweep import summarize, sweep
         from executive.cli.progress import bar, say_halting
+        from executive.discovery import discover
         from executive.mission.load import load_mission
         from executive.record.run_directory import check_place
         from executive.runtime.cells import cell_kind
-        from executive.skill import discover
 
         # What is wrong with the mission, or with the place, is told once and not for every seed.
         load_mission(mission, discover(), overrides, cell_kind)

@@ -68,11 +68,11 @@ def command(
 def _outline_of(mission: str, overrides: dict[str, str]) -> tuple[str, Sequence[OutlineNode]]:
     """Return a mission's name and its tree's outline."""
     from executive.control.scope import Scope
+    from executive.discovery import discover
     from executive.events import ignore
     from executive.mission.build import build
     from executive.mission.load import load_mission
     from executive.mission.outline import outline
-    from executive.skill import discover
 
     skills = discover()
     loaded = load_mission(mission, skills, overrides)

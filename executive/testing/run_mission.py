@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from executive.control.skill_node import SkillNode
+from executive.discovery import discover
 from executive.errors import InputError
 from executive.events import Event, Observer
 from executive.mission.load import load_mission
 from executive.record.result import ledger_agrees
 from executive.runtime.outcome import Outcome
 from executive.runtime.run import Run
-from executive.skill import Skill, discover
+from executive.skill import Skill
 from executive.testing.bounded_cell import BoundedCell
 from executive.testing.disturbances.disturbed_cell import DisturbedCell, disturbed
 from executive.testing.disturbances.script import Disturbance

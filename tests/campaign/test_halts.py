@@ -12,9 +12,9 @@ import pytest
 
 from executive.campaign.halts import Undisturbed, halt_everywhere, rehearse, spread_ticks
 from executive.campaign.subject import Subject
+from executive.discovery import discover
 from executive.errors import ExecutiveError
 from executive.mission.load import load_mission
-from executive.skill import discover
 from executive.testing.fake_cell import FakeCell
 from executive.testing.oracle import oracle_cell
 from executive.workcell import Workcell

@@ -9,12 +9,12 @@ import pytest
 
 from executive.campaign import journal_cost
 from executive.campaign.journal_cost import JournalCost, TimedJournal, measure
+from executive.discovery import discover
 from executive.errors import InputError
 from executive.events import Event
 from executive.mission.load import LoadedMission, load_mission
 from executive.record.journal import read_journal
 from executive.runtime.cells import cell_kind
-from executive.skill import discover
 
 COST = JournalCost(
     entries=793, size=160_534, syncs=19, encode=0.01, write=0.02, sync=0.0575, append=0.1, record=0.125,

@@ -8,8 +8,8 @@ import pytest
 
 from executive.campaign.kills import kill_often
 from executive.campaign.subject import Subject
+from executive.discovery import discover
 from executive.mission.load import load_mission
-from executive.skill import discover
 from executive.testing.fake_cell import FakeCell
 from executive.testing.oracle import oracle_cell
 from executive.view.kill_figures import Kill, KillFigures, as_plain, kill_text

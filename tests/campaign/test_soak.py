@@ -13,9 +13,9 @@ import pytest
 from executive.campaign import soak as soaking
 from executive.campaign.soak import sample, soak
 from executive.campaign.subject import Subject
+from executive.discovery import discover
 from executive.errors import InputError
 from executive.mission.load import load_mission
-from executive.skill import discover
 from executive.testing.fake_cell import FakeCell
 from executive.workcell import Workcell
 

@@ -76,7 +76,7 @@ def project(monkeypatch):
         module = ModuleType(f"executive.{name}")
         setattr(module, function.__name__, function)
         monkeypatch.setitem(sys.modules, module.__name__, module)
-    monkeypatch.setattr("executive.skill.discover", lambda: {"Reach": Reach})
+    monkeypatch.setattr("executive.discovery.discover", lambda: {"Reach": Reach})
     return asked
 
 
@@ -87,7 +87,7 @@ def invoke(*words: str):
 def test_sigterm_ends_a_command_with_a_word_as_ctrl_c_does(project, monkeypatch):
     before = signal.getsignal(signal.SIGTERM)
     # While it still loads what it needs, long before a run listens.
-    monkeypatch.setattr("executive.skill.discover", lambda: os.kill(os.getpid(), signal.SIGTERM))
+    monkeypatch.setattr("executive.discovery.discover", lambda: os.kill(os.getpid(), signal.SIGTERM))
     shown = invoke("run", "sort")
     assert (shown.exit_code, shown.stdout, shown.stderr) == (130, "", "\nhalted\n")
     assert signal.getsignal(signal.SIGTERM) is before
@@ -96,7 +96,9 @@ def test_sigterm_ends_a_command_with_a_word_as_ctrl_c_does(project, monkeypatch)
 def test_sigterm_that_is_to_be_ignored_is_ignored(project, monkeypatch):
     before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
     try:
-        monkeypatch.setattr("executive.skill.discover", lambda: os.kill(os.getpid(), signal.SIGTERM) or {})
+        monkeypatch.setattr(
+            "executive.discovery.discover", lambda: os.kill(os.getpid(), signal.SIGTERM) or {}
+        )
         assert invoke("run", "sort").exit_code == 0
     finally:
         signal.signal(signal.SIGTERM, before)

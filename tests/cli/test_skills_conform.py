@@ -49,7 +49,7 @@ class Called(Rest):
 
 @pytest.fixture(autouse=True)
 def installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("executive.skill.discover", lambda: {"Rest": Rest, "Nap": Nap, "Dream": Dream})
+    monkeypatch.setattr("executive.discovery.discover", lambda: {"Rest": Rest, "Nap": Nap, "Dream": Dream})
 
 
 def conform(*words: str) -> Result:
@@ -117,7 +117,7 @@ def test_a_skill_that_is_not_installed_is_bad_input() -> None:
 
 
 def test_ctrl_c_tells_what_was_found_and_which_check_was_under_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("executive.skill.discover", lambda: {"Called": Called})
+    monkeypatch.setattr("executive.discovery.discover", lambda: {"Called": Called})
     result = conform("Called")
     *_, last = result.stdout.splitlines()
     assert last == "ok       Called.arranged"

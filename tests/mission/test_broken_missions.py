@@ -17,10 +17,10 @@ from click.testing import CliRunner
 
 import executive.mission
 from executive.cli.main import main
+from executive.discovery import discover
 from executive.mission.findings import Finding, MissionError
 from executive.mission.load import load_mission
 from executive.runtime.cells import cell_kind
-from executive.skill import discover
 
 FOLDER = Path(__file__).parent / "broken"
 BROKEN = sorted(FOLDER.glob("*.yaml"))

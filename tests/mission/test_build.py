@@ -157,8 +157,8 @@ def test_a_labelled_use_names_its_failures(built: Any) -> None:
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in shipped_folder().glob("*.yaml")))
 def test_shipped_missions_load_and_build(name: str) -> None:
+    from executive.discovery import discover
     from executive.mission.load import load_mission
-    from executive.skill import discover
 
     installed = discover()
     if not installed:

@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 from editor import Editor
 
+from executive.discovery import discover
 from executive.mission.model import grammar
 from executive.mission.text.files import shipped_folder
-from executive.skill import discover
 
 SERVER = os.environ.get("YAML_LANGUAGE_SERVER") or shutil.which("yaml-language-server")
 pytestmark = pytest.mark.skipif(

@@ -27,6 +27,7 @@ from unkind_cell import UnkindCell
 from witness import Witness
 
 from executive.control.scope import Scope
+from executive.discovery import discover
 from executive.errors import InputError
 from executive.mission.findings import Finding, MissionError
 from executive.mission.load import LoadedMission, load_mission
@@ -34,7 +35,7 @@ from executive.mission.model.grammar import CONTROL
 from executive.runtime import run as run_module
 from executive.runtime.cells import cell_kind
 from executive.runtime.run import Run
-from executive.skill import Skill, discover
+from executive.skill import Skill
 from executive.testing.fake_cell import FakeCell
 
 HERE = Path(__file__).parent

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from jsonschema import Draft7Validator
 
+from executive.discovery import discover
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission
 from executive.mission.model import grammar
@@ -18,7 +19,7 @@ from executive.mission.schema.types import cell_schema
 from executive.mission.source import Source
 from executive.mission.text.files import shipped_folder
 from executive.mission.text.yaml_text import parse_yaml, plain
-from executive.skill import Skill, discover
+from executive.skill import Skill
 
 MISSIONS = shipped_folder()
 SCHEMAS: dict[str, tuple[Callable[[], dict[str, Any]], str, str]] = {

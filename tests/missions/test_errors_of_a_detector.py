@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from executive.discovery import discover
 from executive.mission.load import LoadedMission, load_mission
 from executive.record.result import ledger_agrees
 from executive.runtime.cells import cell_kind
 from executive.runtime.run import Run
-from executive.skill import discover
 from executive.testing.fake_cell import FakeCell
 from executive.testing.noisy_detector import NoisyDetector
 from executive.vision.detectors.setting import Setting

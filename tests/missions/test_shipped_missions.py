@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
+from executive.discovery import discover
 from executive.events import Event
 from executive.mission.load import LoadedMission, load_mission
 from executive.record.result import ledger_agrees
 from executive.runtime.cells import cell_kind
 from executive.runtime.run import Outcome, Run
-from executive.skill import discover
 from executive.testing.fake_cell import FakeCell
 from executive.testing.oracle import oracle_cell
 from executive.workcell import Workcell

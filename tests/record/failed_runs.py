@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from executive.discovery import discover
 from executive.mission.load import load_mission
 from executive.record.story.story import Story
 from executive.runtime.run import Run
-from executive.skill import discover
 from executive.testing.fake_cell import FakeCell
 
 HEAD = """\

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from executive.discovery import discover
 from executive.errors import InputError
 from executive.mission.load import load_mission
 from executive.record.journal import ending_of, read_journal
@@ -18,7 +19,6 @@ from executive.record.recorded_run import recorded_run
 from executive.record.recorder import Recorder
 from executive.record.run_directory import RunDirectory
 from executive.runtime.cells import cell_kind
-from executive.skill import discover
 
 SMALL = {"cell.kind": "fake", "cell.table.objects": "[1, 1]"}
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from executive.discovery import discover
 from executive.mission.load import load_mission
 from executive.record.journal import read_journal
 from executive.record.recorded_run import recorded_run
 from executive.record.result import ledger_agrees
-from executive.skill import discover
 from executive.testing.fake_cell import FakeCell
 
 

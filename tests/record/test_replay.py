@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from executive.discovery import discover
 from executive.errors import InputError
 from executive.mission.load import load_mission
 from executive.record.entry import entry_of
@@ -14,7 +15,6 @@ from executive.record.find_run import find_run
 from executive.record.journal import read_journal
 from executive.record.recorded_run import recorded_run
 from executive.record.replay import Replay, compare, replay
-from executive.skill import discover
 from executive.tape.past import Past
 from executive.testing.disturbances.script import during
 from executive.testing.disturbances.tool import seal_fails
@@ -106,7 +106,12 @@ def test_a_mission_that_gives_up_sooner_says_where(missions: Path) -> None:
 
 def test_where_the_record_has_no_answer_it_says_so(missions: Path, tmp_path: Path) -> None:
     path = recorded(missions, tmp_path, "sort_fruit")
-    done = again(path, edited(path, missions, "  - use: take_stock\n", "  - {MoveToScan: {pose: aside}}\n  - use: take_stock\n"))
+    done = again(
+        path,
+        edited(
+            path, missions, "  - use: take_stock\n", "  - {MoveToScan: {pose: aside}}\n  - use: take_stock\n"
+        ),
+    )
     assert done.replayed is not None
     assert (done.replayed["node"], done.replayed["status"]) == ("MoveToScan", "INVALID")
     assert done.difference.endswith(

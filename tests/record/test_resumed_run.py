@@ -15,6 +15,7 @@ import pytest
 from hypothesis import HealthCheck, Phase, example, given, settings
 from hypothesis import strategies as st
 
+from executive.discovery import discover
 from executive.errors import InputError
 from executive.events import Event
 from executive.mission.load import LoadedMission, load_mission
@@ -24,7 +25,6 @@ from executive.record.recorded_run import recorded_run
 from executive.record.replay import replay
 from executive.record.result import ledger_agrees
 from executive.record.resumed_run import resumed_run
-from executive.skill import discover
 from executive.testing.disturbances.hand import Hand
 from executive.testing.fake_cell import FakeCell
 from executive.testing.meanwhile import meanwhile

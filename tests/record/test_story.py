@@ -12,10 +12,10 @@ from failed_runs import PICK, FailedRun
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from executive.discovery import discover
 from executive.events import Event, Exact
 from executive.record.recorded_run import recorded_run
 from executive.record.story.course import Course
-from executive.skill import discover
 from executive.testing.fake_cell import FakeCell
 
 CUBE = [("cube", 0.5, 0.1)]
@@ -205,6 +205,20 @@ def test_a_failure_remembers_what_the_cell_had_answered_until_then_and_no_list_o
     ran = course.node("tree/Approach")
     assert ran is not None
     assert [(sense.name, sense.value, sense.tick) for sense in ran.senses] == [("arm.met", "a wrench", 3)]
+
+
+def test_an_undeclared_reason_is_told_at_the_line_of_its_skill() -> None:
+    run = FailedRun(PICK, objects=CUBE)
+
+    def seals() -> bool:
+        raise discover()["MoveToScan"]().failed("tired", "no more")
+
+    run.fake.tool.seals = seals
+    story = run.tell()
+    assert story is not None
+    assert 'raised the undeclared reason "tired"' in story["verdict"]
+    assert story["raised_at"].startswith("record/test_story.py:")
+    assert story["raised_at"].endswith(", in seals")
 
 
 def test_a_fault_says_where_it_was_raised_and_what_is_known_of_the_arm() -> None:

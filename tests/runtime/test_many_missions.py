@@ -17,13 +17,14 @@ from py_trees.common import Status
 
 from executive.control.scope import Scope
 from executive.control.skill_node import SkillNode
+from executive.discovery import discover
 from executive.events import Event
 from executive.mission.build import build
 from executive.mission.load import LoadedMission, load_mission
 from executive.record.plain import plain
 from executive.record.trace import Trace
 from executive.runtime.run import Run
-from executive.skill import Skill, discover
+from executive.skill import Skill
 from executive.testing.fake_cell import FakeCell
 
 MISSIONS = Path(__file__).parents[2] / "missions"

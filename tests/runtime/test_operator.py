@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from executive.discovery import discover
 from executive.errors import InputError, Stopped
 from executive.events import Event
 from executive.mission.load import load_mission
@@ -17,7 +18,6 @@ from executive.record.entry import entry_of
 from executive.record.replay import compare
 from executive.runtime.operator import ScriptedOperator, TerminalOperator, understood
 from executive.runtime.run import Run
-from executive.skill import discover
 from executive.tape.past import Past
 from executive.testing.fake_cell import FakeCell
 

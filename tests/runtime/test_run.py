@@ -8,12 +8,12 @@ from typing import Any
 import pytest
 from py_trees.common import Status
 
+from executive.discovery import discover
 from executive.errors import InputError
 from executive.events import Event
 from executive.messages import Detection
 from executive.mission.load import load_mission
 from executive.runtime.run import Run
-from executive.skill import discover
 from executive.testing.fake_cell import FakeCell
 
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from executive.discovery import discover
 from executive.errors import Fault
 from executive.events import Event
 from executive.mission.load import load_mission
 from executive.runtime.run import Run
-from executive.skill import discover
 from executive.testing.fake_cell import FakeCell
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from executive.discovery import discover
 from executive.mission.load import load_mission
 from executive.record.trace import Trace
 from executive.runtime.run import Run
-from executive.skill import discover
 from executive.testing.oracle import oracle_cell
 
 

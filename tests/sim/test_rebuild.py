@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from executive.discovery import discover
 from executive.events import ignore
 from executive.geometry import Array
 from executive.mission.load import load_mission
@@ -17,7 +18,6 @@ from executive.motion.trajectory import Trajectory
 from executive.runtime.run import Run
 from executive.sim.cell import SimCell
 from executive.sim.world import STEP
-from executive.skill import discover
 from executive.testing.disturbances.hands import hand_of
 from executive.testing.fake_cell import SilentOperator
 from executive.testing.meanwhile import meanwhile

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from executive.skill import discover
+from executive.discovery import discover
 from executive.testing.conformance import conformance
 from executive.testing.conformance.case import Case
 from executive.testing.conformance.check import Check

@@ -9,12 +9,13 @@ from pathlib import Path
 import pytest
 
 from executive.arm import Goal, Task
+from executive.discovery import discover
 from executive.errors import Blocked, Unreachable
 from executive.events import Event
 from executive.mission.load import load_mission
 from executive.motion.plans import Plan
 from executive.runtime.run import Run
-from executive.skill import EMPTY, SkillFailed, discover
+from executive.skill import EMPTY, SkillFailed
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach

@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
+from executive.discovery import discover
 from executive.messages import Target
-from executive.skill import Skill, discover
+from executive.skill import Skill
 from executive.testing.fake_cell import FakeCell, bare_table
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from executive.cell_config import CellConfig
+from executive.discovery import discover
 from executive.errors import InputError
 from executive.messages import Detections
 from executive.mission.load import load_mission
 from executive.mission.parse.cell_file import load_cell
 from executive.runtime.run import Run
-from executive.skill import discover
 from executive.testing.fake_cell import FakeCell, SilentOperator
 from executive.testing.run_skill import run_skill
 from executive.workcell import CellOptions

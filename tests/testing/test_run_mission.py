@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
+from executive.discovery import discover
 from executive.errors import Fault, InputError
 from executive.events import Event
 from executive.mission.load import load_mission
 from executive.runtime.run import Run
-from executive.skill import discover
 from executive.testing.bounded_cell import BoundedCell
 from executive.testing.disturbances import after, detector_dead, during, seal_fails
 from executive.testing.fake_cell import FakeCell

@@ -20,9 +20,9 @@ def journal(mission: str, seed: int, overrides: dict[str, str], runs: Path, as_j
     """Measure what the journal costs a run of MISSION; its record is thrown away."""
     with stdout_kept_clean():
         from executive.campaign.journal_cost import measure
+        from executive.discovery import discover
         from executive.mission.load import load_mission
         from executive.runtime.cells import cell_kind
-        from executive.skill import discover
 
         skills = discover()
         loaded = load_mission(mission, skills, overrides, cell_kind)

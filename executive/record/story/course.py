@@ -13,8 +13,10 @@ from executive.errors import RecordLost
 from executive.events import Event, Exact
 from executive.record.progress import is_skill
 from executive.record.story.items import ItemCourses
+from executive.skill import Skill
 
 _PLACE = re.compile(r'File "(?P<file>[^"]+)", line (?P<line>\d+), in (?P<function>\S+)')
+_SKILL = "executive/skill.py"
 _CAUSED = "\nThe above exception was the direct cause"
 _WORTH_TELLING = (bool, int, float, str)
 
@@ -160,8 +162,10 @@ class Course:
 def _place(traceback: str) -> str:
     """Return where the exception was raised that everything began with: `skills/grasp.py:45, in run`."""
     cause, _, whole = traceback.rpartition(_CAUSED)
-    places = list(_PLACE.finditer(cause or whole))
+    places = [place.group("file", "line", "function") for place in _PLACE.finditer(cause or whole)]
+    if len(places) > 1 and places[-1][0].endswith(_SKILL) and places[-1][2] == Skill.failed.__name__:
+        places.pop()  # The skill's own line says more.
     if not places:
         return ""
-    file, line, function = places[-1].group("file", "line", "function")
+    file, line, function = places[-1]
     return f"{'/'.join(PurePath(file).parts[-2:])}:{line}, in {function}"

@@ -6,8 +6,8 @@ import pytest
 
 from executive.campaign.faults.campaign import Campaign
 from executive.campaign.subject import Subject
+from executive.discovery import discover
 from executive.mission.load import load_mission
-from executive.skill import discover
 from executive.testing.fake_cell import FakeCell
 
 

@@ -15,9 +15,9 @@ import pytest
 from executive.campaign.faults.branches import branches
 from executive.campaign.faults.campaign import Campaign
 from executive.campaign.subject import Subject
-from executive.errors import ExecutiveError, InputError
+from executive.discovery import discover
+from executive.errors import InputError
 from executive.mission.load import load_mission
-from executive.skill import discover
 from executive.testing.fake_cell import FakeCell
 from executive.view.fault_trials import FaultFigures, Trial
 
@@ -146,8 +146,19 @@ def test_a_number_that_there_is_not_is_told_with_those_that_there_are(campaign: 
 def test_a_mission_that_does_not_succeed_by_itself_is_not_tried(small: Subject) -> None:
     loaded = load_mission(small.loaded.path, discover(), {"cell.table.objects": "[0, 0]"})
     broken = replace(small, loaded=loaded, kind=Empty)
-    with pytest.raises(ExecutiveError, match=r"small ended as FAULT .* although nothing was wrong"):
+    with pytest.raises(InputError, match=r"undisturbed, small with seed 0 ends as FAULT .* another seed"):
         Campaign(broken)
+
+
+def test_a_mission_with_books_that_are_not_the_world_is_not_tried(small: Subject, tmp_path: Path) -> None:
+    file = tmp_path / "blind.yaml"
+    shutil.copytree(small.loaded.path.parent / "cells", tmp_path / "cells")
+    file.write_text(
+        "mission: blind\ndescription: d\ncell: cells/fruit.yaml\n"
+        "routes: {apple: premium_crate}\ntree: MoveToScan\n"
+    )
+    with pytest.raises(InputError, match=r"undisturbed, blind .* or a mission that looks at the whole table"):
+        Campaign(replace(small, loaded=load_mission(file, discover())))
 
 
 class Empty(FakeCell):

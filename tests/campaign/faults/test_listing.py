@@ -10,8 +10,8 @@ import pytest
 from executive.campaign.faults.campaign import Campaign
 from executive.campaign.faults.listing import list_faults, skill_nodes
 from executive.campaign.subject import Subject
+from executive.discovery import discover
 from executive.mission.load import load_mission
-from executive.skill import discover
 from executive.testing.fake_cell import FakeCell
 
 MISSIONS = sorted((Path(__file__).parents[3] / "missions").glob("*.yaml"))

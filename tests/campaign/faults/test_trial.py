@@ -13,8 +13,8 @@ from executive.campaign.faults.breakages import broken_skills
 from executive.campaign.faults.campaign import Campaign
 from executive.campaign.faults.fault import Breakage, Fault
 from executive.campaign.faults.trial import record, try_out
+from executive.discovery import discover
 from executive.record.journal import read_journal
-from executive.skill import discover
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_mission import run_mission
 from executive.view.fault_trials import Trial

@@ -11,8 +11,9 @@ from broken_endings import Scheming
 from conforming_skills import Pause, Speed
 
 from executive.cell import Cell, Steps
+from executive.discovery import discover
 from executive.messages import Bin, Detection, Detections, Frame, Item, ObjectClass, Target
-from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, discover, param, port
+from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, param, port
 from executive.testing.conformance import Stage, conformance
 from executive.testing.conformance.checks import nothing_to_add
 from executive.testing.conformance.situations import Arrange, NotArranged, Scene, situations

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
+from executive.discovery import discover
 from executive.errors import InputError
 from executive.events import ignore
 from executive.mission.load import load_mission
 from executive.runtime.run import Run
-from executive.skill import discover
 from executive.testing.disturbances import (
     DisturbedCell,
     after,

@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 from stub_server import BODIES, SPOILT, StubServer, predictions
 
+from executive.discovery import discover
 from executive.events import Event
 from executive.mission.load import load_mission
 from executive.runtime.run import Run
-from executive.skill import discover
 from executive.vision.detectors.embedded import LABELS, MODEL
 from executive.vision.detectors.onnx_model import OnnxModel, read_labels
 
