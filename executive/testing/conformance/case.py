@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -116,6 +117,10 @@ class Case:
                 "and leave long work to a detector."
             )
             raise GotStuck(self._stuck)
+        # What the skill leaves comes up again, or with its first run; what another thread of this process
+        # happens to open meanwhile does not.
+        if rehearsal.left and self.tries > 1 and not rehearse(self.skill, scene, adversity, halt_at).left:
+            return replace(rehearsal, left=())
         return rehearsal
 
 

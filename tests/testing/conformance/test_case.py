@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import count, pairwise
 from typing import ClassVar
 
+import pytest
 from broken_endings import Endless
 from conforming_skills import Push
 
@@ -55,3 +56,16 @@ def test_runs_that_are_kept_by_the_hundred_keep_no_arguments() -> None:
     pushing = case(Push)
     assert any(call.arguments for rehearsal in pushing.plain for call in rehearsal.calls)
     assert not any(call.arguments for rehearsal in pushing.halted for call in rehearsal.calls)
+
+
+@pytest.mark.parametrize(("looks", "found"), [({8}, False), ({8, 10}, True), ({2}, True)])
+def test_what_is_opened_once_by_the_way_is_not_the_skills_but_for_its_first_run(
+    monkeypatch: pytest.MonkeyPatch, looks: set[int], found: bool
+) -> None:
+    number = count(1)
+    monkeypatch.setattr(
+        "executive.testing.conformance.rehearsal.open_things",
+        lambda: {"the open file socket (number 9)"} if next(number) in looks else set(),
+    )
+    pushing = case(Push)
+    assert any(rehearsal.left for rehearsal in (*pushing.plain, *pushing.halted)) == found
