@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -97,6 +97,8 @@ def situations(skill: type[Skill]) -> Iterator[Situation]:
     Raises:
         NotArranged: It does not say what it needs.
     """
+    if not isinstance(skill.tool_state, Sequence) or not skill.tool_state:
+        raise NotArranged(f"its tool_state is {skill.tool_state!r}; it must say what it needs and leaves")
     if (needs := skill.tool_state[0]) not in _GRIPS:
         raise NotArranged(f"its tool_state begins with {needs!r}; it must say ANY, EMPTY or HOLDING")
     first, *more = _GRIPS[needs]

@@ -126,3 +126,9 @@ class Grumpy(Pause):
         if values:
             raise InputError("no")
         super().__init__()
+
+
+class Single(Pause):
+    """Wait."""
+
+    tool_state: ClassVar = EMPTY  # type: ignore[assignment]

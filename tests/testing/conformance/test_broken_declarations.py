@@ -92,6 +92,14 @@ EVERYTHING: list[tuple[type[Skill], str, list[str]]] = [
     (broken.Texts, "arranged", [
         "Texts cannot be tried: its tool_state begins with 'e'; it must say ANY, EMPTY or HOLDING",
     ]),
+    (broken.Single, "tool_declared", [
+        "Single.tool_state is <ToolState.EMPTY: 'empty'>. Write two of ANY, EMPTY and HOLDING: "
+        "before and after.",
+    ]),
+    (broken.Single, "arranged", [
+        "Single cannot be tried: its tool_state is <ToolState.EMPTY: 'empty'>; "
+        "it must say what it needs and leaves",
+    ]),
     (broken.Confused, "tool_declared", [
         'Confused.tool_left tells of "dropped", which is no ending of it. There are: tired, halt.',
         'Confused.tool_left["tired"] is False. Write ANY, EMPTY or HOLDING.',
