@@ -10,7 +10,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.runtime.outcome import Outcome
-from executive.view.halt_figures import FARTHEST, LONGEST_REST, MOST_ACCELERATION, MOST_JERK, Halt
+from executive.view.figures.halt import FARTHEST, LONGEST_REST, MOST_ACCELERATION, MOST_JERK, Halt
 from executive.workcell import Workcell
 
 AFTER = 6

@@ -40,7 +40,7 @@ from executive.runtime.outcome import Outcome
 from executive.runtime.run import Run
 from executive.sim.arm import SimArm
 from executive.testing.wrapped_cell import WrappedCell
-from executive.view.halt_figures import Halt, HaltFigures
+from executive.view.figures.halt import Halt, HaltFigures
 from executive.workcell import Workcell
 
 PATIENCE = 120.0

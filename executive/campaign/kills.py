@@ -35,7 +35,7 @@ from executive.runtime.cells import cell_kind
 from executive.tape.past import Past
 from executive.testing.disturbances.hand import Hand, Thing
 from executive.testing.meanwhile import meanwhile
-from executive.view.kill_figures import Kill, KillFigures
+from executive.view.figures.kill import Kill, KillFigures
 
 PATIENCE = 300.0
 """Time that a child may take to take a run up again [s]."""

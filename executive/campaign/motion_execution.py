@@ -19,7 +19,7 @@ from executive.sim.arm import SimArm
 from executive.sim.clock import SimClock
 from executive.sim.tool import SuctionTool
 from executive.sim.world import STEP, World
-from executive.view.motion_figures import ExecutionFigures
+from executive.view.figures.motion import ExecutionFigures
 
 SETTLE = 24
 """Steps given to a seal, as the skill that grasps does."""

@@ -30,7 +30,7 @@ from executive.motion.stop import brake
 from executive.motion.trajectory import STEP, Trajectory, peaks
 from executive.sim.clearance import PathClearance
 from executive.sim.world import World
-from executive.view.motion_figures import MethodFigures, MotionFigures, PlanningFigures
+from executive.view.figures.motion import MethodFigures, MotionFigures, PlanningFigures
 
 Progress = Callable[[int, int], None]
 """Is told how many pairs of how many are done."""

@@ -14,8 +14,8 @@ from executive.campaign.subject import Subject
 from executive.errors import InputError
 from executive.record.recorded_run import recorded_run
 from executive.record.result import ledger_agrees
-from executive.view.soak_figures import Sample, SoakFigures
-from executive.view.summary import verdict
+from executive.view.figures.soak import Sample, SoakFigures
+from executive.view.terminal.summary import verdict
 
 PROCESS = Path("/proc/self")
 """Where Linux tells what a process has."""

@@ -84,7 +84,7 @@ def command(
         from executive.campaign.detector_trial import Scenes, check_subject, measure, subjects
         from executive.cli.cells import find_cell, load_cells
         from executive.cli.progress import bar
-        from executive.view.detector_figures import print_figures
+        from executive.view.figures.detector import print_figures
         from executive.vision.evaluation.misses import WorstMisses
 
         worst, scenes = WorstMisses(), Scenes(images, seed, as_run, view, workers)

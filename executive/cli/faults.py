@@ -79,8 +79,8 @@ def command(
         from executive.campaign.faults.campaign import Campaign
         from executive.campaign.faults.trial import record
         from executive.cli.progress import bar, say_halting
-        from executive.view.fault_figures import fault_text, trial_text
-        from executive.view.fault_trials import as_plain, trial_as_plain
+        from executive.view.figures.fault import fault_text, trial_text
+        from executive.view.figures.fault_trials import as_plain, trial_as_plain
 
         subject = load_subject(mission, overrides, oracle, seed)
         with bar("tried", quiet=as_json or listed or numbers is not None) as progress:

@@ -15,8 +15,8 @@ from executive.cli.output import print_json, stdout_kept_clean
 
 if TYPE_CHECKING:
     from executive.skill import Skill
-    from executive.view.lines import Lines
-    from executive.view.terminal import Terminal
+    from executive.view.terminal.lines import Lines
+    from executive.view.terminal.screen import Terminal
 
 
 @click.command(name="run")
@@ -57,8 +57,8 @@ def command(
     with stdout_kept_clean():
         from executive.discovery import discover
         from executive.record.result import EXIT_CODES
-        from executive.view.story import story_lines
-        from executive.view.summary import repeat_command, summary
+        from executive.view.terminal.story import story_lines
+        from executive.view.terminal.summary import repeat_command, summary
 
         skills = discover()
         view = None if quiet else _view()
@@ -126,7 +126,7 @@ def _resumed(
     from executive.record.find_run import find_run
     from executive.record.journal import read_journal
     from executive.record.resumed_run import resumed_run
-    from executive.view.summary import repeat_command
+    from executive.view.terminal.summary import repeat_command
 
     path = find_run(name, runs)
     result = resumed_run(path, skills, view=view, **options)
@@ -140,8 +140,8 @@ def _view() -> Lines | Terminal:
     """Return the live view where a person watches a terminal, plain lines elsewhere."""
     from rich.console import Console
 
-    from executive.view.lines import Lines
-    from executive.view.terminal import Terminal
+    from executive.view.terminal.lines import Lines
+    from executive.view.terminal.screen import Terminal
 
     console = Console(stderr=True)
     if not console.is_terminal or console.is_dumb_terminal:

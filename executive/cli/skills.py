@@ -60,7 +60,7 @@ def _conform(skills: Mapping[str, type[Skill]], as_json: bool) -> bool:
     with stdout_kept_clean():
         from executive.testing.conformance import conformance
         from executive.testing.conformance.check import Interrupted
-        from executive.view.conformance import conformance_lines, conformance_total
+        from executive.view.figures.conformance import conformance_lines, conformance_total
 
     verdicts = []
     for name, skill in skills.items():

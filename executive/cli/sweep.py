@@ -77,7 +77,7 @@ def command(
 
 
 def _text(figures: dict[str, Any]) -> str:
-    from executive.view.summary import verdict
+    from executive.view.terminal.summary import verdict
 
     objects, robot, wall = figures["objects"], figures["robot_time_s"], figures["wall_time_s"]
     low, high = objects["interval_95"]

@@ -48,9 +48,9 @@ def command(
     with stdout_kept_clean():
         from pydantic_core import to_json
 
-        from executive.view.outline import drawn, folded
-        from executive.view.tree_dot import dot
-        from executive.view.tree_svg import svg
+        from executive.view.tree.dot import dot
+        from executive.view.tree.outline import drawn, folded
+        from executive.view.tree.svg import svg
 
         name, nodes = _outline_of(mission, overrides)
         nodes = folded(nodes) if fold else nodes

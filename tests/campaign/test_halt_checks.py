@@ -20,7 +20,7 @@ from executive.campaign.halt_checks import (
 )
 from executive.runtime.outcome import Outcome
 from executive.testing.fake_cell import FakeCell
-from executive.view.halt_figures import Halt
+from executive.view.figures.halt import Halt
 
 HALTED = Outcome("HALTED", "halted", "halted by the user", "", "", 40, 0.166667)
 BOOKS = {"seen": 4, "placed": 1, "rejected": 2, "lost": 1, "phantom": 0}

@@ -12,7 +12,7 @@ from executive.discovery import discover
 from executive.mission.load import load_mission
 from executive.testing.fake_cell import FakeCell
 from executive.testing.oracle import oracle_cell
-from executive.view.kill_figures import Kill, KillFigures, as_plain, kill_text
+from executive.view.figures.kill import Kill, KillFigures, as_plain, kill_text
 
 
 def subject(missions: Path, name: str, kind, cell: str) -> Subject:

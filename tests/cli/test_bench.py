@@ -10,9 +10,9 @@ from click.testing import CliRunner, Result
 
 from executive.campaign.tick_cost import ChangeCost, SteadyCost
 from executive.cli.main import main
-from executive.view.halt_figures import Halt, HaltFigures
-from executive.view.motion_figures import ExecutionFigures, MethodFigures, MotionFigures, PlanningFigures
-from executive.view.soak_figures import Sample, SoakFigures
+from executive.view.figures.halt import Halt, HaltFigures
+from executive.view.figures.motion import ExecutionFigures, MethodFigures, MotionFigures, PlanningFigures
+from executive.view.figures.soak import Sample, SoakFigures
 
 
 def invoke(*words: str) -> Result:

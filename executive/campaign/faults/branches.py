@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from executive.mission.model import nodes
 from executive.mission.model.nodes import Node
 from executive.mission.source import Mark
-from executive.view.fault_trials import Branch, Trial
+from executive.view.figures.fault_trials import Branch, Trial
 
 
 def branches(tree: Node, trials: Iterable[Trial]) -> tuple[Branch, ...]:

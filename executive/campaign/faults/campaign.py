@@ -14,7 +14,7 @@ from executive.campaign.faults.trial import try_out
 from executive.campaign.pool import do_all
 from executive.campaign.subject import Subject
 from executive.errors import InputError
-from executive.view.fault_trials import FaultFigures, Trial
+from executive.view.figures.fault_trials import FaultFigures, Trial
 
 DEEPEST = 4
 """Most faults in a run whose last one needs the others to happen at all."""

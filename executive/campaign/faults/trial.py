@@ -38,7 +38,7 @@ from executive.testing.bounded_cell import BoundedCell
 from executive.testing.disturbances import DisturbedCell, disturbed
 from executive.testing.disturbances.objects import ObjectRemoved
 from executive.testing.wrapped_cell import WrappedCell
-from executive.view.fault_trials import Trial
+from executive.view.figures.fault_trials import Trial
 from executive.workcell import Workcell
 
 Numbered = Mapping[int, Fault]

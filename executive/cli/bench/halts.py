@@ -35,7 +35,7 @@ def halts(
     with stdout_kept_clean():
         from executive.campaign.halts import halt_everywhere
         from executive.cli.progress import bar
-        from executive.view.halt_figures import as_plain, halt_text
+        from executive.view.figures.halt import as_plain, halt_text
 
         subject = load_subject(mission, overrides, oracle, seed)
         every = every or (10 if subject.loaded.cell_config.kind == "sim" else 1)

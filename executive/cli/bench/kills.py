@@ -42,7 +42,7 @@ def kills(
     with stdout_kept_clean():
         from executive.campaign.kills import kill_often
         from executive.cli.progress import bar
-        from executive.view.kill_figures import as_plain, kill_text
+        from executive.view.figures.kill import as_plain, kill_text
 
         subject = load_subject(mission, overrides, oracle, seed)
         with bar("killed", quiet=as_json) as progress:

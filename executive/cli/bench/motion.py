@@ -29,7 +29,7 @@ def motion(cell: str, pairs: int, executed: int, seed: int, as_json: bool) -> No
         from executive.campaign.motion_trial import measure
         from executive.cli.cells import load_cells
         from executive.cli.progress import bar
-        from executive.view.motion_figures import as_plain, print_figures
+        from executive.view.figures.motion import as_plain, print_figures
 
         (config,) = load_cells((cell,)).values()
         with bar("planned", quiet=as_json) as progress:

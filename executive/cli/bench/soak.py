@@ -35,7 +35,7 @@ def soak(
     with stdout_kept_clean():
         from executive.campaign.soak import soak
         from executive.cli.progress import bar
-        from executive.view.soak_figures import as_plain, soak_text
+        from executive.view.figures.soak import as_plain, soak_text
 
         subject = load_subject(mission, overrides, oracle, seed)
         with bar("run", quiet=as_json) as progress:

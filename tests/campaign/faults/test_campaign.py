@@ -19,7 +19,7 @@ from executive.discovery import discover
 from executive.errors import InputError
 from executive.mission.load import load_mission
 from executive.testing.fake_cell import FakeCell
-from executive.view.fault_trials import FaultFigures, Trial
+from executive.view.figures.fault_trials import FaultFigures, Trial
 
 MISSION = """\
 mission: small

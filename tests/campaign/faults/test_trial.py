@@ -17,7 +17,7 @@ from executive.discovery import discover
 from executive.record.journal import read_journal
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_mission import run_mission
-from executive.view.fault_trials import Trial
+from executive.view.figures.fault_trials import Trial
 
 
 def number_of(campaign: Campaign, name: str, what: str, when: str = "first", *, behind: bool = False) -> int:

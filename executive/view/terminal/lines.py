@@ -11,7 +11,7 @@ from executive.events import Event
 from executive.mission.outline import outline
 from executive.runtime.run_control import RunControl
 from executive.view.items import ItemTable
-from executive.view.outline import skills
+from executive.view.tree.outline import skills
 
 _ENDS = {"SUCCESS": "done", "FAILURE": "failed", "INVALID": "halted"}
 

@@ -13,10 +13,10 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from executive.mission.outline import OutlineNode, children
-from executive.view.tree_card import Card, card
-from executive.view.tree_layout import FRAME, Layout, Rectangle, Size, layout
-from executive.view.tree_style import LINE, NAME, SLOT, STYLE, TITLE
-from executive.view.tree_text import extent, writable
+from executive.view.tree.card import Card, card
+from executive.view.tree.layout import FRAME, Layout, Rectangle, Size, layout
+from executive.view.tree.style import LINE, NAME, SLOT, STYLE, TITLE
+from executive.view.tree.text import extent, writable
 
 _NOT_ID = re.compile(r"[^A-Za-z0-9_/]")
 _PADDING = 11.0

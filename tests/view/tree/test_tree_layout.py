@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from executive.view.tree_layout import GAP, MARGIN, Layout, Rectangle, Size, layout
+from executive.view.tree.layout import GAP, MARGIN, Layout, Rectangle, Size, layout
 
 LEAF = Size(60, 28)
 

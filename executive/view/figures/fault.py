@@ -6,7 +6,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from executive.view.fault_trials import FaultFigures, Trial
+from executive.view.figures.fault_trials import FaultFigures, Trial
 
 COLUMNS = ("first", "middle", "late", "lasting")
 """When a fault happens."""

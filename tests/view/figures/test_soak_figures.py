@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.view.soak_figures import MOST_GROWTH, Sample, SoakFigures, as_plain, soak_text
+from executive.view.figures.soak import MOST_GROWTH, Sample, SoakFigures, as_plain, soak_text
 
 
 def figures(*memory: float, threads: int = 4, failed: tuple[tuple[int, str], ...] = ()) -> SoakFigures:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from executive.view.items import ItemTable
-from executive.view.story import story_lines
+from executive.view.terminal.story import story_lines
 
 
 def repeat_command(

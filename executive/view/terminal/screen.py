@@ -15,8 +15,8 @@ from executive.events import Event
 from executive.mission.outline import OutlineNode, outline
 from executive.runtime.run_control import RunControl
 from executive.view.items import ItemTable
-from executive.view.keys import HELP, HELP_PAUSED, Keys
-from executive.view.outline import branches, opened
+from executive.view.terminal.keys import HELP, HELP_PAUSED, Keys
+from executive.view.tree.outline import branches, opened
 
 PAUSE = 0.1
 """Shortest time between two redraws [s]."""

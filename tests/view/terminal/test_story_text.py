@@ -11,8 +11,8 @@ import pytest
 from executive.events import Event
 from executive.record.requests import Requests
 from executive.view.items import ItemTable
-from executive.view.story import WIDTH, story_lines
-from executive.view.summary import repeat_command, summary
+from executive.view.terminal.story import WIDTH, story_lines
+from executive.view.terminal.summary import repeat_command, summary
 from tests.record.failed_runs import PICK, FailedRun
 
 CUBE = [("cube", 0.5, 0.1)]
@@ -144,7 +144,7 @@ def test_an_exception_in_a_part(abroad) -> None:
     expected = """\
 FAULT after 0.57 s: Grasp: ZeroDivisionError: vacuum gauge
 where       tree/5:retry/do/Grasp (trial.yaml:15)
-raised at   view/test_story_text.py:N, in broken; the whole traceback is in the journal, event "fault"
+raised at   terminal/test_story_text.py:N, in broken; the whole traceback is in the journal, event "fault"
 the cell    command raised ZeroDivisionError (0.57 s)
 last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera overhead, by embedded, at 0.05 s;
             1 look, 0 failed attempts in all

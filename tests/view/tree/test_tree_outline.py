@@ -15,7 +15,7 @@ from executive.control.sequence import Sequence
 from executive.control.skill_node import SkillNode, Wiring
 from executive.mission.outline import Connection, OutlineNode, children, outline
 from executive.skill import In, Metres, Out, Skill, param, port
-from executive.view.outline import WIDTH, drawn, folded
+from executive.view.tree.outline import WIDTH, drawn, folded
 
 CELL: Any = SimpleNamespace()
 

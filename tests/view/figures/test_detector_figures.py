@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from executive.view.detector_figures import print_figures
+from executive.view.figures.detector import print_figures
 from executive.vision.evaluation.figures import ClassFigures, Evaluation, Spread
 from executive.vision.evaluation.reliability import MeasuredReliability
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from executive.view.halt_figures import Halt, HaltFigures, as_plain, halt_text
+from executive.view.figures.halt import Halt, HaltFigures, as_plain, halt_text
 
 LOST = "the ledger says seen 1; the audit left 0"
 HALTS = (

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from executive.mission.outline import OutlineNode
-from executive.view.outline import reads, why, writes
-from executive.view.tree_text import fitted
+from executive.view.tree.outline import reads, why, writes
+from executive.view.tree.text import fitted
 
 SYMBOLS: Mapping[str, str] = {
     "sequence": "→",

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from executive.view.motion_figures import (
+from executive.view.figures.motion import (
     ExecutionFigures,
     MethodFigures,
     MotionFigures,

@@ -1,0 +1,1 @@
+"""What measurements found, as text and as plain data."""

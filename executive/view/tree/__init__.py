@@ -1,0 +1,1 @@
+"""A tree, seen: as text, as a picture, as Graphviz."""
