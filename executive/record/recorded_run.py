@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from executive.errors import ExecutiveError
 from executive.events import Event, Observer
+from executive.mission.outline import outline
 from executive.record.planning import PlanningTally
+from executive.record.recorded_tree import tree_text
 from executive.record.recorder import Recorder
 from executive.record.requests import Requests
 from executive.record.result import ENDED, result_of, write_result
@@ -81,20 +83,31 @@ def recorded_run(
     began = time.perf_counter()
     run = Run(loaded, skills, seed=seed, gui=gui, realtime=realtime, requests=requests, kind=kind)
     with closing(run):
-        directory = RunDirectory.create(runs, mission=loaded.mission.name, seed=seed, started=datetime.now())
-        directory.save_inputs(
-            mission=loaded.text,
-            params=loaded.params,
-            cell=loaded.cell_config.model_dump(mode="json", exclude_unset=True),
-            libraries=loaded.libraries,
-        )
-        run.log_to(directory.world)
+        directory = new_directory(run, loaded, seed, runs)
         recorder = Recorder(directory, frames=frames)
         result = Recording(run, loaded, skills, directory, recorder, view).execute(seed, began)
     if not frames and result["status"] in ENDED:
         # Of a run that is over nothing can be taken up again, and who wants no pictures wants no film.
         directory.world.unlink(missing_ok=True)
     return result
+
+
+def new_directory(run: Run, loaded: LoadedMission, seed: int, runs: Path) -> RunDirectory:
+    """Make a run's directory below `runs`, with all that it begins from in it, and return it.
+
+    Raises:
+        InputError: It cannot be made or written to.
+    """
+    directory = RunDirectory.create(runs, mission=loaded.mission.name, seed=seed, started=datetime.now())
+    directory.save_inputs(
+        mission=loaded.text,
+        params=loaded.params,
+        cell=loaded.cell_config.model_dump(mode="json", exclude_unset=True),
+        tree=tree_text(outline(run.root)),
+        libraries=loaded.libraries,
+    )
+    run.log_to(directory.world)
+    return directory
 
 
 class Recording:

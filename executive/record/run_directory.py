@@ -42,6 +42,16 @@ class RunDirectory:
         return self.path / "world.log"
 
     @property
+    def tree(self) -> Path:
+        """File with the tree as it was built."""
+        return self.path / "tree.json"
+
+    @property
+    def report(self) -> Path:
+        """File with the page that explains the run."""
+        return self.path / "report.html"
+
+    @property
     def result(self) -> Path:
         """File with the object that `executive run --json` prints."""
         return self.path / "result.json"
@@ -75,13 +85,15 @@ class RunDirectory:
         mission: str,
         params: Mapping[str, Any],
         cell: Mapping[str, Any],
+        tree: str = "",
         libraries: Mapping[str, str] | None = None,
     ) -> None:
         """Write the mission's text as it was read, the params as they were resolved, and the cell.
 
-        The text of every library goes where the mission looks for it, beside the mission. All of it is on
-        the disk before the run begins; then `runs/latest` points at this directory. Params and cell are of
-        values that YAML knows, and are kept to the last digit: the run may be repeated with them.
+        `tree` is the text of `tree.json`, "" for none. The text of every library goes where the mission looks
+        for it, beside the mission. All of it is on the disk before the run begins; then `runs/latest` points
+        at this directory. Params and cell are of values that YAML knows, and are kept to the last digit: the
+        run may be repeated with them.
 
         Raises:
             InputError: The directory cannot be written to; no file in it is half-written.
@@ -97,6 +109,8 @@ class RunDirectory:
             for name, content in (("params.yaml", params), ("cell.yaml", cell)):
                 text = yaml.safe_dump(dict(content), sort_keys=False, allow_unicode=True)
                 write_whole(self.path / name, text)
+            if tree:
+                write_whole(self.tree, tree)
         except OSError as error:
             raise refused(f'write to the run directory "{self.path}"', error) from error
         _point_latest(self.path.parents[1], self.path)

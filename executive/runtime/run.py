@@ -26,6 +26,7 @@ from executive.runtime.plant import Plant
 from executive.runtime.run_control import RunControl
 from executive.runtime.signals import stopped_by_signals
 from executive.runtime.take_up import begin_anew, reconcile
+from executive.runtime.versions import versions
 from executive.skill import Skill
 from executive.tape.past import Past
 from executive.workcell import CellOptions, CellPast, Workcell
@@ -174,6 +175,7 @@ class Run:
             requests=self._requests,
             base=str(loaded.cell_path.parent.resolve()),
             step=Exact(self._plant.tape.step),
+            versions=versions(),
         )
 
     def _loop(self) -> Ending:
@@ -216,7 +218,7 @@ class Run:
             assert self._past is not None
             ticked, intent = plant.tick, self._past.last_intent
             plant.go_live()
-            self._emit("resume", ticked=ticked, intent=intent)
+            self._emit("resume", ticked=ticked, intent=intent, versions=versions())
         elif plant.tape.playing and self._past and plant.tick in self._past.resumes:
             entry = self._past.resumes[plant.tick]
             plant.tick, intent = entry["tick"], entry["intent"]

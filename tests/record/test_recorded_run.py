@@ -6,6 +6,7 @@ import json
 import sys
 from types import ModuleType, SimpleNamespace
 
+import py_trees
 import pytest
 
 from executive.errors import InputError
@@ -20,7 +21,7 @@ class PretendedRun:
 
     error: BaseException | None = None
     closed = 0
-    root = "the tree"
+    root = py_trees.behaviours.Success("tree")
     control = "the control"
 
     def __init__(self, loaded, skills, *, seed, gui, realtime, requests, kind):
@@ -95,7 +96,8 @@ def test_leaves_a_directory_that_explains_the_run(tmp_path, runtime):
     left = tmp_path / "latest"
     names = {path.name for path in left.iterdir()}
     assert names == {
-        "mission.yaml", "library", "params.yaml", "cell.yaml", "journal.jsonl", "world.log", "result.json",
+        "mission.yaml", "library", "params.yaml", "cell.yaml", "tree.json", "journal.jsonl", "world.log",
+        "result.json",
     }  # fmt: skip
     assert json.loads((left / "result.json").read_text()) == result
     assert [entry["kind"] for entry in read_journal(left / "journal.jsonl")] == ["run", "decision"]
@@ -112,7 +114,7 @@ def test_two_runs_have_one_trace(tmp_path, runtime):
 def test_a_view_is_told_the_tree_first_and_the_end_last(tmp_path, runtime):
     view = Watcher()
     recorded_run(LOADED, {}, seed=7, runs=tmp_path, view=view)
-    assert view.seen == ["the tree", "run", "decision", "closed"]
+    assert view.seen == [PretendedRun.root, "run", "decision", "closed"]
 
 
 @pytest.mark.parametrize("error", [InputError("no such weights"), KeyboardInterrupt()])

@@ -6,7 +6,6 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +27,8 @@ from executive.campaign.faults.rehearsal import Rehearsal
 from executive.campaign.halt_checks import check_journal, check_rest, check_tool
 from executive.campaign.subject import Subject
 from executive.events import Event
-from executive.record.recorded_run import Recording
+from executive.record.recorded_run import Recording, new_directory
 from executive.record.recorder import Recorder
-from executive.record.run_directory import RunDirectory
 from executive.runtime.cells import cell_kind
 from executive.runtime.outcome import Outcome
 from executive.runtime.run import Run
@@ -62,16 +60,7 @@ def record(subject: Subject, rehearsal: Rehearsal, faults: Numbered, runs: Path)
     began, loaded = time.perf_counter(), subject.loaded
     trying = _Trying(subject, rehearsal, faults)
     with closing(trying.run):
-        directory = RunDirectory.create(
-            runs, mission=loaded.mission.name, seed=subject.seed, started=datetime.now()
-        )
-        directory.save_inputs(
-            mission=loaded.text,
-            params=loaded.params,
-            cell=loaded.cell_config.model_dump(mode="json", exclude_unset=True),
-            libraries=loaded.libraries,
-        )
-        trying.run.log_to(directory.world)
+        directory = new_directory(trying.run, loaded, subject.seed, runs)
         recording = Recording(trying.run, loaded, subject.skills, directory, Recorder(directory), None)
         result = recording.execute(subject.seed, began)
         outcome = Outcome(
