@@ -61,14 +61,18 @@ def sweep(
 
 
 def run_job(job: Job) -> Result:
-    """Do one run and return its result object."""
+    """Do one run, leave its record and its report, and return its result object."""
     from executive.discovery import discover
     from executive.mission.load import load_mission
     from executive.record.recorded_run import recorded_run
+    from executive.view.report.leave import leave_report
 
     skills = discover()
     loaded = load_mission(job.mission, skills, job.overrides)
-    return recorded_run(loaded, skills, seed=job.seed, runs=job.runs, frames=job.frames)
+    result = recorded_run(loaded, skills, seed=job.seed, runs=job.runs, frames=job.frames)
+    # A run without a report counts as well as any other.
+    leave_report(result)
+    return result
 
 
 def summarize(results: Sequence[Result], asked: int) -> dict[str, Any]:

@@ -57,8 +57,10 @@ def command(
     with stdout_kept_clean():
         from executive.discovery import discover
         from executive.record.result import EXIT_CODES
-        from executive.view.terminal.story import story_lines
-        from executive.view.terminal.summary import repeat_command, summary
+        from executive.view.repeat import repeat_command
+        from executive.view.report.leave import leave_report
+        from executive.view.story import story_lines
+        from executive.view.terminal.summary import summary
 
         skills = discover()
         view = None if quiet else _view()
@@ -74,10 +76,13 @@ def command(
             repeat = repeat_command(
                 mission, seed=seed, overrides=overrides, requests=requests or result["requests"]
             )
+        report, problem = leave_report(result)
+        if problem:
+            click.echo(f"note: {problem}", err=True)
         if view is not None:
-            click.echo(summary(result, view.items, repeat), err=True, nl=False)
+            click.echo(summary(result, view.items, repeat, report), err=True, nl=False)
         elif result["story"] is not None:
-            click.echo("\n".join(story_lines(result["story"], result["run"], repeat)), err=True)
+            click.echo("\n".join(story_lines(result["story"], result["run"], repeat, report)), err=True)
     if as_json:
         print_json(result)
     ctx.exit(EXIT_CODES[result["status"]])
@@ -126,7 +131,7 @@ def _resumed(
     from executive.record.find_run import find_run
     from executive.record.journal import read_journal
     from executive.record.resumed_run import resumed_run
-    from executive.view.terminal.summary import repeat_command
+    from executive.view.repeat import repeat_command
 
     path = find_run(name, runs)
     result = resumed_run(path, skills, view=view, **options)

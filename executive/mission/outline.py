@@ -48,6 +48,8 @@ class OutlineNode:
         params: Its constants from the mission.
         reads, writes: Its connected ports.
         reasons: Why it may fail.
+        senses: Whether it takes in something new.
+        uses: The parts of the cell that it needs for itself.
     """
 
     path: str
@@ -65,6 +67,8 @@ class OutlineNode:
     reads: tuple[Connection, ...] = ()
     writes: tuple[Connection, ...] = ()
     reasons: tuple[str, ...] = ()
+    senses: bool = False
+    uses: tuple[str, ...] = ()
 
     @property
     def subtree(self) -> str:
@@ -162,4 +166,6 @@ def _skill_facts(node: SkillNode) -> dict[str, Any]:
         "reads": connections(wiring.inputs),
         "writes": connections(wiring.outputs),
         "reasons": tuple(skill.reasons),
+        "senses": skill.senses,
+        "uses": tuple(skill.uses),
     }

@@ -37,6 +37,7 @@ from executive.testing.disturbances import DisturbedCell, disturbed
 from executive.testing.disturbances.objects import ObjectRemoved
 from executive.testing.wrapped_cell import WrappedCell
 from executive.view.figures.fault_trials import Trial
+from executive.view.report.leave import leave_report
 from executive.workcell import Workcell
 
 Numbered = Mapping[int, Fault]
@@ -63,6 +64,7 @@ def record(subject: Subject, rehearsal: Rehearsal, faults: Numbered, runs: Path)
         directory = new_directory(trying.run, loaded, subject.seed, runs)
         recording = Recording(trying.run, loaded, subject.skills, directory, Recorder(directory), None)
         result = recording.execute(subject.seed, began)
+        leave_report(result)
         outcome = Outcome(
             result["status"], result["reason"], result["message"], result["node"], result["holds"],
             result["ticks"], result["robot_time_s"],

@@ -2,24 +2,11 @@
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from executive.view.items import ItemTable
-from executive.view.terminal.story import story_lines
-
-
-def repeat_command(
-    mission: str, *, seed: int, overrides: Mapping[str, str], requests: Iterable[str] = ()
-) -> str:
-    """Return the command line that repeats a run exactly."""
-    words = ["executive", "run", mission, "--seed", str(seed)]
-    for key, value in overrides.items():
-        words += ["--set", f"{key}={value}"]
-    for request in requests:
-        words += ["--request", request]
-    return shlex.join(words)
+from executive.view.story import story_lines
 
 
 def verdict(result: Mapping[str, Any]) -> str:
@@ -32,8 +19,10 @@ def verdict(result: Mapping[str, Any]) -> str:
     return f"{result['status']}{reason}{where}{why}"
 
 
-def summary(result: Mapping[str, Any], items: ItemTable, repeat: str) -> str:
+def summary(result: Mapping[str, Any], items: ItemTable, repeat: str, report: str = "") -> str:
     """Return how it ended, how long it took, and a line for each bin and each other fate of an item.
+
+    `report` is the file of its report, or "".
 
     What did not succeed ends with its story instead: what is read first stands last on a terminal.
     """
@@ -43,6 +32,7 @@ def summary(result: Mapping[str, Any], items: ItemTable, repeat: str) -> str:
     story = result.get("story")
     if story is None:
         lines = [verdict(result), times, f"{result['run']}  (repeat: {repeat})", *fates]
+        lines += [f"report: {report}"] if report else []
     else:
-        lines = [times, *fates, "", *story_lines(story, result["run"], repeat)]
+        lines = [times, *fates, "", *story_lines(story, result["run"], repeat, report)]
     return "\n".join(lines) + "\n"

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from executive.mission.outline import OutlineNode
+from executive.view.text import fitted
 from executive.view.tree.outline import reads, why, writes
-from executive.view.tree.text import fitted
 
 SYMBOLS: Mapping[str, str] = {
     "sequence": "→",
@@ -28,7 +28,8 @@ SYMBOLS: Mapping[str, str] = {
 UNKNOWN = "◇"
 """What stands beside a word that has no symbol of its own."""
 
-_COLUMNS = 28
+COLUMNS = 28
+"""Length of a node's lines [characters]."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +52,8 @@ class Card:
 def card(node: OutlineNode) -> Card:
     """Return what a picture says of a node."""
     symbol = "" if node.kind == "skill" else SYMBOLS.get(node.kind, UNKNOWN)
-    title = "".join(fitted(node.title, _COLUMNS))
-    lines = fitted(node.when, _COLUMNS, 2) + fitted(node.detail, _COLUMNS, 3 if symbol else 2)
+    title = "".join(fitted(node.title, COLUMNS))
+    lines = fitted(node.when, COLUMNS, 2) + fitted(node.detail, COLUMNS, 3 if symbol else 2)
     return Card(symbol, title, lines, "\n".join(_facts(node)))
 
 

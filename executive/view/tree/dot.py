@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from executive.mission.outline import OutlineNode, children
+from executive.view.text import writable
 from executive.view.tree.card import card
-from executive.view.tree.text import writable
 
 SHAPES: Mapping[str, str] = {
     "skill": "box",

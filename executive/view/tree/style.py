@@ -11,6 +11,7 @@ STYLE = f"""
   font-size: {LINE:g}px; fill: #4b5768;
 }}
 .behaviour-tree .title {{ font-size: {TITLE:g}px; font-weight: 600; fill: #172033; }}
+.behaviour-tree .note {{ fill: #172033; }}
 .behaviour-tree .slot {{ font-size: {SLOT:g}px; fill: #7d8896; }}
 .behaviour-tree .edge {{ fill: none; stroke: #98a2b0; stroke-width: 2; }}
 .behaviour-tree .box {{ fill: #f6f7f9; stroke: #9aa5b4; stroke-width: 1.2; }}

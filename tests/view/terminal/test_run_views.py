@@ -15,9 +15,10 @@ from executive.events import Event
 from executive.mission.outline import outline
 from executive.runtime.run_control import RunControl
 from executive.view.items import ItemTable
+from executive.view.repeat import repeat_command
 from executive.view.terminal.lines import Lines
 from executive.view.terminal.screen import Terminal
-from executive.view.terminal.summary import repeat_command, summary
+from executive.view.terminal.summary import summary
 from executive.view.tree.outline import branches, drawn, opened, skills
 
 GRASP = "tree/sort/repeat/Grasp"

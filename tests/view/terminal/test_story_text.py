@@ -11,8 +11,9 @@ import pytest
 from executive.events import Event
 from executive.record.requests import Requests
 from executive.view.items import ItemTable
-from executive.view.terminal.story import WIDTH, story_lines
-from executive.view.terminal.summary import repeat_command, summary
+from executive.view.repeat import repeat_command
+from executive.view.story import WIDTH, story_lines
+from executive.view.terminal.summary import summary
 from tests.record.failed_runs import PICK, FailedRun
 
 CUBE = [("cube", 0.5, 0.1)]

@@ -10,10 +10,10 @@ from xml.etree.ElementTree import Element
 import pytest
 
 from executive.mission.outline import Connection, OutlineNode
+from executive.view.text import extent, fitted, writable
 from executive.view.tree.card import SYMBOLS, UNKNOWN, card
 from executive.view.tree.dot import dot
 from executive.view.tree.svg import identifier, svg
-from executive.view.tree.text import extent, fitted, writable
 
 NASTY = """<b onload="x">&amp; 'quoted' "twice" \\ ]]> --> größer ≥ 日本 \x00\x1b \ud800"""
 RETRY = "up to 3 attempts, on Grasp.missed, Grasp.blocked"

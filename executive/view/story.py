@@ -21,22 +21,23 @@ _UNIT = re.compile(r"(?<=[0-9)]) (?=(?:s|m)\b)")
 _JOINED = "\N{NO-BREAK SPACE}"
 
 
-def story_lines(story: Mapping[str, Any], run: str, repeat: str) -> list[str]:
+def story_lines(story: Mapping[str, Any], run: str, repeat: str, report: str = "") -> list[str]:
     """Return the story of a run, the most important first.
 
     Args:
         story: As `executive.record.story.story.Story.tell` returns it.
         run: The run directory.
         repeat: The command that repeats the run. Commands are never wrapped, so that they can be copied.
+        report: File of its report, or "".
     """
     lines = _wrapped(f"{story['status']} after {story['clock']:.2f} s: {story['verdict']}", "", "  ", most=3)
     lines += _way_down(story)
-    for label, text in _rows(story):
+    for label, text in facts(story):
         lines += _wrapped(text, f"{label:{_LABEL}}", " " * _LABEL, most=3)
-    commands = {"record": run, "repeat": repeat}
+    commands = {"record": run, "report": report, "repeat": repeat}
     if story["resumes"]:
         commands["go on"] = shlex.join(["executive", "run", "--resume", run])
-    return lines + [f"{label:{_LABEL}}{command}" for label, command in commands.items()]
+    return lines + [f"{label:{_LABEL}}{command}" for label, command in commands.items() if command]
 
 
 def _way_down(story: Mapping[str, Any]) -> list[str]:
@@ -57,7 +58,7 @@ def _way_down(story: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def _rows(story: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+def facts(story: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """Yield what else there is to say: a word, and what it is about."""
     node = story["node"]
     if node is not None and not any(link["why"] for link in story["chain"]):

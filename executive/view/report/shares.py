@@ -1,0 +1,113 @@
+"""Where the time of a run went, object by object: every instant belongs to one object and one activity."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from executive.mission.outline import OutlineNode
+from executive.view.report.course import Span
+
+LOOK, RETRY, WAITING = "look", "retry", "waiting"
+"""Activities that are no skill's: to find out what to do next; attempts that failed, and what it took to try
+again; and what else passed between."""
+
+NOBODY = ""
+"""Stands for the time that led to no object, such as the last look at an empty table."""
+
+
+@dataclass(frozen=True)
+class Shares:
+    """The time of a run [s].
+
+    Attributes:
+        activities: In the order in which a pick has them; each was something's at some time.
+        rows: Time by object, then by activity; what led to no object last, under `NOBODY`.
+    """
+
+    activities: tuple[str, ...]
+    rows: Mapping[str, Mapping[str, float]]
+
+
+def shares(
+    course: Sequence[Span], nodes: Sequence[OutlineNode], decisions: Sequence[tuple[float, str]]
+) -> Shares:
+    """Return where the time went.
+
+    Where skills ran at the same time, it is that of the one that began first and was about an object.
+
+    Args:
+        course: Every time that a node ran.
+        nodes: The tree.
+        decisions: When it was decided for which object, in order.
+    """
+    skills = {node.path: node for node in nodes if node.kind == "skill"}
+    ran = [span for span in course if span.node in skills]
+    spent: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))
+    seen: dict[str, None] = {}
+    retried = _retried(ran, skills, decisions)
+    for began, ended, running in _slices(ran):
+        about = next((span for span in running if span.item), None)
+        if about is not None:
+            item, activity = about.item, skills[about.node].skill.lower()
+        else:
+            item, activity = _next_item(decisions, ended), _between(running, skills)
+        first, last = retried.get(item, (0.0, 0.0))
+        if first <= began and ended <= last:
+            activity = RETRY
+        elif about is not None:
+            seen[activity] = None
+        spent[item][activity] += ended - began
+    known = [LOOK, *seen, RETRY, WAITING]
+    used = {activity for row in spent.values() for activity in row}
+    order = sorted(spent, key=lambda item: item == NOBODY)
+    return Shares(tuple(name for name in known if name in used), {item: dict(spent[item]) for item in order})
+
+
+def _slices(ran: Sequence[Span]) -> Iterator[tuple[float, float, list[Span]]]:
+    """Yield the time between any two changes, with the skills that run then, in the order they began."""
+    waiting = sorted((span for span in ran if span.ended > span.began), key=lambda span: span.began)
+    times = sorted({time for span in ran for time in (span.began, span.ended)})
+    running: list[Span] = []
+    for began, ended in pairwise(times):
+        running = [span for span in running if span.ended > began]
+        while waiting and waiting[0].began <= began:
+            running.append(waiting.pop(0))
+        yield began, ended, running
+
+
+def _between(running: Sequence[Span], skills: Mapping[str, OutlineNode]) -> str:
+    """Return what is done while no skill is about an object."""
+    nodes = [skills[span.node] for span in running]
+    return LOOK if any(node.senses or "arm" in node.uses for node in nodes) else WAITING
+
+
+def _next_item(decisions: Sequence[tuple[float, str]], now: float) -> str:
+    """Return the object that is decided for next."""
+    place = bisect_left(decisions, (now, ""))
+    return decisions[place][1] if place < len(decisions) else NOBODY
+
+
+def _retried(
+    ran: Sequence[Span], skills: Mapping[str, OutlineNode], decisions: Sequence[tuple[float, str]]
+) -> dict[str, tuple[float, float]]:
+    """Return from when to when each object with a failed attempt was tried in vain."""
+    failed = {
+        span.item: span.ended
+        for span in ran
+        if span.item and span.status == "FAILURE" and _acts(skills[span.node])
+    }
+    retried = {}
+    for item, last in failed.items():
+        decided = [time for time, name in decisions if name == item]
+        first = min(decided, default=min(span.began for span in ran if span.item == item))
+        # Looks that led to the next attempt are the price of the failed one.
+        retried[item] = first, next((time for time in decided if time > last), last)
+    return retried
+
+
+def _acts(skill: OutlineNode) -> bool:
+    return bool(skill.uses) and not skill.senses
