@@ -9,6 +9,7 @@ from typing import Any, Protocol
 
 from executive.cell import Cell, LeastTimes, Operator, Routes
 from executive.events import Emit
+from executive.scenery import Scenery
 
 
 class Accounts(Protocol):
@@ -50,6 +51,9 @@ class Workcell(Protocol):
 
     def advance(self) -> None:
         """Let one control step pass."""
+
+    def scenery(self) -> Scenery | None:
+        """Return what there is to be seen, for people only; None where nothing tells."""
 
     def audit(self) -> Mapping[str, int] | None:
         """Return what really became of the objects, or None where nobody can know (real hardware)."""

@@ -21,21 +21,18 @@ from executive.record.run_directory import RunDirectory
 from executive.record.story.story import Story
 
 if TYPE_CHECKING:
-    from py_trees.behaviour import Behaviour
-
     from executive.mission.load import LoadedMission
     from executive.runtime.outcome import Outcome
     from executive.runtime.run import Run
-    from executive.runtime.run_control import RunControl
     from executive.skill import Skill
     from executive.workcell import Workcell
 
 
 class View(Protocol):
-    """Something a person watches: an observer that is told the tree first and the end last."""
+    """Something a person watches: an observer that is told of the run first and of its end last."""
 
-    def open(self, root: Behaviour, control: RunControl) -> None:
-        """Begin to show a run of this tree; `control` stops, pauses and steps it."""
+    def open(self, run: Run) -> None:
+        """Begin to show a run; its `control` stops, pauses and steps it."""
 
     def __call__(self, event: Event) -> None:
         """Take an event and return at once."""
@@ -57,6 +54,7 @@ def recorded_run(
     gui: bool = False,
     realtime: bool = False,
     requests: Sequence[str] | None = None,
+    keyboard: bool = True,
     frames: bool = True,
     kind: Callable[..., Workcell] | None = None,
 ) -> dict[str, Any]:
@@ -71,6 +69,7 @@ def recorded_run(
         gui: Show the simulated world in a window.
         realtime: Pace the run by the wall clock.
         requests: What the operator asks for, or None to ask at the terminal.
+        keyboard: Whether somebody can type there.
         frames: Keep the pictures behind the decisions, and of a run that is over the log of its world.
         kind: Makes the work cell; by default the installed kind that the cell file names.
 
@@ -81,7 +80,9 @@ def recorded_run(
     from executive.runtime.run import Run
 
     began = time.perf_counter()
-    run = Run(loaded, skills, seed=seed, gui=gui, realtime=realtime, requests=requests, kind=kind)
+    run = Run(
+        loaded, skills, seed=seed, gui=gui, realtime=realtime, requests=requests, keyboard=keyboard, kind=kind
+    )
     with closing(run):
         directory = new_directory(run, loaded, seed, runs)
         recorder = Recorder(directory, frames=frames)
@@ -173,7 +174,7 @@ class Recording:
         try:
             if view is not None:
                 watchers.append(view)
-                view.open(run.root, run.control)
+                view.open(run)
             for watcher in watchers:
                 run.observe(watcher)
             for event in self._past:

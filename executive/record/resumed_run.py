@@ -34,6 +34,7 @@ def resumed_run(
     view: View | None = None,
     gui: bool = False,
     realtime: bool = False,
+    keyboard: bool = True,
     frames: bool = True,
     kind: Callable[..., Workcell] | None = None,
 ) -> dict[str, Any]:
@@ -50,6 +51,7 @@ def resumed_run(
         view: Shows it.
         gui: Show the simulated world in a window.
         realtime: Pace the run by the wall clock.
+        keyboard: Whether somebody can type at the terminal.
         frames: Keep the pictures behind the decisions.
         kind: Makes the work cell; by default the installed kind that the cell file names.
 
@@ -71,7 +73,7 @@ def resumed_run(
         _require_same(compare(loaded, skills, _taken_up(past), seed), path)
         run = Run(
             loaded, skills, seed=seed, gui=gui, realtime=realtime, requests=past.start["requests"],
-            kind=kind, past=past, takes_up=directory.world,
+            keyboard=keyboard, kind=kind, past=past, takes_up=directory.world,
         )  # fmt: skip
     except BaseException:
         recorder.close(wait=False)

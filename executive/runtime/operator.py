@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import select
 import sys
+import time
 from collections.abc import Callable, Sequence
 
 from executive.errors import InputError, Stopped
@@ -42,11 +43,27 @@ class ScriptedOperator:
 
 
 class TerminalOperator:
-    """Asks at the terminal; the run's clock stands still meanwhile, Ctrl-C works."""
+    """Asks at the terminal; the run's clock stands still meanwhile, Ctrl-C works.
 
-    def __init__(self, emit: Emit, interrupted: Callable[[], bool]) -> None:
+    Args:
+        emit: Takes the `asking` and `request` events.
+        interrupted: Tells whether the run is to end.
+        requested: Returns a word that was asked for elsewhere than at the terminal, once, or None.
+        keyboard: Whether somebody can type; otherwise only what is asked for elsewhere is heard.
+    """
+
+    def __init__(
+        self,
+        emit: Emit,
+        interrupted: Callable[[], bool],
+        requested: Callable[[], str | None] = lambda: None,
+        *,
+        keyboard: bool = True,
+    ) -> None:
         self._emit = emit
         self._interrupted = interrupted
+        self._requested = requested
+        self._keyboard = keyboard
 
     def ask(self, choices: Sequence[str]) -> str | None:
         """Return the class typed, `rescan`, or None for `q` or the end of the input.
@@ -57,8 +74,9 @@ class TerminalOperator:
         self._emit("asking", choices=list(choices))
         numbered = "  ".join(f"{number} {label}" for number, label in enumerate(choices))
         while True:
-            sys.stderr.write(f"pick what?  {numbered}  s rescan  q quit > ")
-            sys.stderr.flush()
+            if self._keyboard:
+                sys.stderr.write(f"pick what?  {numbered}  s rescan  q quit > ")
+                sys.stderr.flush()
             line = self._line()
             answer = understood(line.strip(), choices) if line else None
             if answer != "":
@@ -68,7 +86,12 @@ class TerminalOperator:
 
     def _line(self) -> str:
         while not self._interrupted():
-            if select.select([sys.stdin], [], [], SLICE)[0]:
+            if (word := self._requested()) is not None:
+                sys.stderr.write("\n" if self._keyboard else "")
+                return word or "?"
+            if not self._keyboard:
+                time.sleep(SLICE)
+            elif select.select([sys.stdin], [], [], SLICE)[0]:
                 return sys.stdin.readline()
         raise Stopped("the run is to end, and nothing was asked for")
 

@@ -46,7 +46,8 @@ class Run:
         observers: Told of every event, in order.
         gui: Show the simulated world in a window.
         realtime: Pace the run by the wall clock.
-        requests: What the operator asks for, or None to ask at the terminal.
+        requests: What the operator asks for, or None to ask at the terminal and heed what `control` is asked.
+        keyboard: Whether somebody can type at the terminal; otherwise only `control` is heeded.
         kind: Makes the work cell; by default the installed kind that the cell file names.
         substitutes: What runs instead of a node's skill, by a pattern of the node's path (`*/Grasp`).
         past: What an earlier run was told; None: there was none.
@@ -72,6 +73,7 @@ class Run:
         gui: bool = False,
         realtime: bool = False,
         requests: Sequence[str] | None = None,
+        keyboard: bool = True,
         kind: Callable[..., Workcell] | None = None,
         substitutes: Mapping[str, type[Skill]] | None = None,
         past: Past | None = None,
@@ -80,6 +82,7 @@ class Run:
         self._loaded = loaded
         self._seed = seed
         self._requests = requests
+        self._keyboard = keyboard
         self._realtime = realtime
         self._past = past
         self._holds = ""
@@ -116,6 +119,11 @@ class Run:
     def tick(self) -> int:
         """Control steps taken so far."""
         return self._plant.tick
+
+    @property
+    def loaded(self) -> LoadedMission:
+        """Its mission and cell, as loaded."""
+        return self._loaded
 
     @property
     def workcell(self) -> Workcell:
@@ -159,7 +167,9 @@ class Run:
 
     def _operator(self) -> Operator:
         if self._requests is None:
-            return TerminalOperator(self._emit, interrupted=lambda: self.control.stopped)
+            return TerminalOperator(
+                self._emit, lambda: self.control.stopped, self.control.requested, keyboard=self._keyboard
+            )
         served = self._past.number_of("request") if self._past else 0
         return ScriptedOperator(self._requests, tuple(self._loaded.routes), self._emit, served)
 

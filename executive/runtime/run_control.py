@@ -1,8 +1,10 @@
-"""What a person does to a run from outside: stop it, let it pause, go on, or take one step."""
+"""What a person does to a run from outside: stop it, pause it, let it go on or step, ask for things."""
 
 from __future__ import annotations
 
 import threading
+from collections import deque
+from collections.abc import Callable
 
 SLICE = 0.05
 """Longest time a pause holds the tick thread at once [s]: a signal is handled in between."""
@@ -19,6 +21,8 @@ class RunControl:
         self._paused = False
         self._steps = 0
         self._change = threading.Event()
+        self._requests: deque[str] = deque()
+        self._between: list[Callable[[], None]] = []
 
     @property
     def stopped(self) -> bool:
@@ -50,11 +54,30 @@ class RunControl:
         self._paused = True
         self._change.set()
 
+    def request(self, word: str) -> None:
+        """Answer the question what is to be picked, now or when it is asked."""
+        self._requests.append(word)
+
+    def requested(self) -> str | None:
+        """Return the next word that was asked for, once; None where there is none."""
+        return self._requests.popleft() if self._requests else None
+
+    def between_ticks(self, do: Callable[[], None]) -> None:
+        """Have something done between any two ticks, and now and then while the run stands still.
+
+        It is done on the tick thread, where the cell may be looked at, and must return at once.
+        """
+        self._between.append(do)
+
     def wait(self) -> None:
         """Return when the next tick may begin, or the run is to halt."""
+        for do in self._between:
+            do()
         while self._paused and not self._stopped:
             if self._steps > 0:
                 self._steps -= 1
                 return
             self._change.wait(SLICE)
             self._change.clear()
+            for do in self._between:
+                do()

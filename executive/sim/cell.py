@@ -28,6 +28,7 @@ from executive.sim.poses import unfit_poses
 from executive.sim.ray import cast
 from executive.sim.reach import out_of_reach
 from executive.sim.rebuild import UnderWay, rebuild
+from executive.sim.scenery import SimScenery
 from executive.sim.spawn import spawn
 from executive.sim.tool import SuctionTool
 from executive.sim.view import ArmShadow
@@ -176,6 +177,10 @@ class SimCell:
         self._arm.advance()
         self._world.step()
         self._tool.advance()
+
+    def scenery(self) -> SimScenery:
+        """Return what there is to be seen, for people only."""
+        return SimScenery(self._world)
 
     def audit(self) -> dict[str, int]:
         """Return what really became of the objects; for after the run only."""

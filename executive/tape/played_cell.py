@@ -87,6 +87,9 @@ class PlayedCell:
         """Let one control step pass."""
         self._steps += 1
 
+    def scenery(self) -> None:
+        """Return None: there is nothing to be seen."""
+
     def audit(self) -> Mapping[str, int] | None:
         """Return None: nobody can know."""
         return None

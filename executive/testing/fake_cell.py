@@ -22,6 +22,7 @@ from executive.mission.text.files import shipped_folder
 from executive.testing.fake_arm import FakeArm, FakeTool, out_of_reach
 from executive.testing.fake_camera import FakeCamera, FakeDetector
 from executive.testing.fake_log import FakeLog, read_state, restore
+from executive.testing.fake_scenery import FakeScenery
 from executive.testing.fake_times import FakeTimes
 from executive.testing.fake_world import FakeClock, FakeObject, FakeWorld
 from executive.vision.localization.plane import PlaneLocalizer
@@ -79,6 +80,7 @@ class FakeCell:
         if options.gui:
             raise InputError(f'cell {config.cell} is of kind "fake" and has no window; run it without --gui')
         self._emit = emit
+        self._config = config
         self._gate = config.ledger.gate
         self.routes = dict(routes)
         classes = {label: as_class(label, kind) for label, kind in config.objects.items()}
@@ -175,6 +177,10 @@ class FakeCell:
         self.arm.advance()
         self.world.steps += 1
         self.note()
+
+    def scenery(self) -> FakeScenery:
+        """Return what there is to be seen, for people only."""
+        return FakeScenery(self._config, self.world, lambda: self.arm.tool_pose)
 
     def audit(self) -> dict[str, int]:
         """Return what became of the objects.

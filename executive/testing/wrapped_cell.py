@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from executive.cell import Cell
+from executive.scenery import Scenery
 from executive.workcell import Accounts, Workcell
 
 
@@ -41,6 +42,10 @@ class WrappedCell:
     def advance(self) -> None:
         """Let one control step pass."""
         self.inner.advance()
+
+    def scenery(self) -> Scenery | None:
+        """Return what there is to be seen."""
+        return self.inner.scenery()
 
     def audit(self) -> Mapping[str, int] | None:
         """Return what really became of the objects, or None where nobody can know."""

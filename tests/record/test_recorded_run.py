@@ -24,7 +24,7 @@ class PretendedRun:
     root = py_trees.behaviours.Success("tree")
     control = "the control"
 
-    def __init__(self, loaded, skills, *, seed, gui, realtime, requests, kind):
+    def __init__(self, loaded, skills, *, seed, gui, realtime, requests, keyboard, kind):
         self._observers = []
 
     def observe(self, observer):
@@ -58,8 +58,8 @@ class Watcher:
     def __init__(self):
         self.seen = []
 
-    def open(self, root, control):
-        self.seen.append(root)
+    def open(self, run):
+        self.seen.append(run.root)
 
     def __call__(self, event):
         self.seen.append(event.kind)

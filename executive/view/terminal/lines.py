@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, TextIO
 
-from py_trees.behaviour import Behaviour
-
 from executive.events import Event
 from executive.mission.outline import outline
-from executive.runtime.run_control import RunControl
+from executive.runtime.run import Run
 from executive.view.items import ItemTable
 from executive.view.tree.outline import skills
 
@@ -28,10 +26,9 @@ class Lines:
         self._skills: dict[str, str] = {}
         self.items = ItemTable()
 
-    def open(self, root: Behaviour, control: RunControl) -> None:
+    def open(self, run: Run) -> None:
         """Learn the names of the nodes; a log has no keys to want anything of the run."""
-        del control
-        nodes = outline(root)
+        nodes = outline(run.root)
         self._names = {node.path: node.name for node in nodes}
         self._skills = skills(nodes)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 
-from py_trees.behaviour import Behaviour
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.table import Table
@@ -13,6 +12,7 @@ from rich.text import Text
 
 from executive.events import Event
 from executive.mission.outline import OutlineNode, outline
+from executive.runtime.run import Run
 from executive.runtime.run_control import RunControl
 from executive.view.items import ItemTable
 from executive.view.terminal.keys import HELP, HELP_PAUSED, Keys
@@ -59,11 +59,11 @@ class Terminal:
         self._drawer: threading.Thread | None = None
         self.items = ItemTable()
 
-    def open(self, root: Behaviour, control: RunControl) -> None:
+    def open(self, run: Run) -> None:
         """Draw the tree and begin to follow the run, and to hand on what keys want of it."""
         with self._lock:
-            self._outline = outline(root)
-        self._control = control
+            self._outline = outline(run.root)
+        self._control = control = run.control
         if self._keyboard is not None:
             self._keys = Keys(self._keyboard, control, self._changed.set)
         self._show(True)

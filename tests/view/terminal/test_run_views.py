@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import itertools
 import time
+from types import SimpleNamespace
 
 import py_trees
 import pytest
@@ -37,6 +38,7 @@ TREE = node(
     node("repeat", "tree/sort/repeat", node("Detect", "tree/sort/repeat/Detect"), node("Grasp", GRASP)),
     node("Release", "tree/sort/Release", detail="slot: 1"),
 )
+RUN = SimpleNamespace(root=TREE, control=RunControl())
 
 
 def item(state: str, **data) -> Event:
@@ -82,7 +84,7 @@ def test_what_rests_is_folded():
 def lines():
     stream = io.StringIO()
     view = Lines(stream)
-    view.open(TREE, RunControl())
+    view.open(RUN)
     return view, stream
 
 
@@ -124,7 +126,7 @@ def test_an_item_is_told_when_its_state_changes_and_not_at_every_look(lines):
 def test_the_live_view_shows_the_running_path_the_items_and_the_clock():
     stream = io.StringIO()
     view = Terminal(Console(file=stream, force_terminal=True, width=100, color_system=None))
-    view.open(TREE, RunControl())
+    view.open(RUN)
     view(Event("run", 0, 0.0, {"mission": "sort", "seed": 7}))
     view(status("tree/sort", "RUNNING"))
     view(status("tree/sort/repeat", "RUNNING"))
@@ -145,7 +147,7 @@ def test_the_live_view_redraws_on_change_only_and_at_most_ten_times_a_second(mon
     renders = []
     render = view.render
     monkeypatch.setattr(view, "render", lambda: renders.append(time.perf_counter()) or render())
-    view.open(TREE, RunControl())
+    view.open(RUN)
     for tick in range(300):
         view(status("tree/sort/repeat/Detect", "RUNNING", tick / 240))
         time.sleep(0.001)
