@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,9 @@ from executive.cli.options import json_option, overrides_option, runs_option, se
 from executive.cli.output import print_json, stdout_kept_clean
 
 if TYPE_CHECKING:
+    from executive.record.recorded_run import View
     from executive.skill import Skill
+    from executive.view.live.page import LivePage
     from executive.view.terminal.lines import Lines
     from executive.view.terminal.screen import Terminal
 
@@ -30,6 +33,8 @@ if TYPE_CHECKING:
 @runs_option
 @json_option
 @click.option("--quiet", is_flag=True, help="Show nothing, unless the run does not succeed.")
+@click.option("--view", "live", is_flag=True, help="Show it on a page in the browser, at the address told.")
+@click.option("--paused", is_flag=True, help="Stand still before the first step, until somebody goes on.")
 @click.option("--gui", is_flag=True, help="Open the simulator's window.")
 @click.option("--realtime", is_flag=True, help="Run on the wall clock instead of as fast as possible.")
 @click.option(
@@ -45,12 +50,17 @@ def command(
     runs: Path,
     as_json: bool,
     quiet: bool,
+    live: bool,
+    paused: bool,
     gui: bool,
     realtime: bool,
     requests: tuple[str, ...],
 ) -> None:
     """Run MISSION (a file or the name of a shipped mission) and record it."""
     _require_sense(ctx, mission, resume)
+    typing = sys.stdin is not None and sys.stdin.isatty()
+    if paused and not live and (quiet or not typing):
+        raise click.UsageError("nobody could let it go on: --paused needs --view or a terminal to type in")
     if gui and not os.environ.get("DISPLAY"):
         # The simulator would end the process with a line of its own.
         raise click.UsageError("--gui needs a display, and DISPLAY names none; leave it out")
@@ -61,26 +71,34 @@ def command(
         from executive.view.report.leave import leave_report
         from executive.view.story import story_lines
         from executive.view.terminal.summary import summary
+        from executive.view.together import Together
 
         skills = discover()
-        view = None if quiet else _view()
-        if mission is None:
-            assert resume is not None
-            result, repeat = _resumed(resume, runs, skills, view, gui=gui, realtime=realtime)
-        else:
-            result = _fresh(
-                mission, skills, overrides, view,
-                seed=seed, runs=runs, gui=gui, realtime=realtime, requests=requests or None,
-            )  # fmt: skip
-            # What was asked for at the terminal is asked for again.
-            repeat = repeat_command(
-                mission, seed=seed, overrides=overrides, requests=requests or result["requests"]
-            )
-        report, problem = leave_report(result)
+        shown = None if quiet else _view()
+        with _page(live) as page:
+            views = [view for view in (shown, page) if view is not None]
+            view = Together(views, paused=paused) if views else None
+            options = {"gui": gui, "realtime": realtime, "keyboard": page is None or typing}
+            if mission is None:
+                assert resume is not None
+                result, repeat = _resumed(resume, runs, skills, view, **options)
+            else:
+                asked = requests or None
+                result = _fresh(
+                    mission, skills, overrides, view, seed=seed, runs=runs, requests=asked, **options
+                )
+                # What was asked for by a person is asked for again.
+                repeat = repeat_command(
+                    mission, seed=seed, overrides=overrides, requests=requests or result["requests"]
+                )
+            report, problem = leave_report(result)
+            if page is not None:
+                page.finish(result, report)
+                problem = "; ".join(filter(None, (problem, page.problem)))
         if problem:
             click.echo(f"note: {problem}", err=True)
-        if view is not None:
-            click.echo(summary(result, view.items, repeat, report), err=True, nl=False)
+        if shown is not None:
+            click.echo(summary(result, shown.items, repeat, report), err=True, nl=False)
         elif result["story"] is not None:
             click.echo("\n".join(story_lines(result["story"], result["run"], repeat, report)), err=True)
     if as_json:
@@ -109,7 +127,7 @@ def _fresh(
     mission: str,
     skills: Mapping[str, type[Skill]],
     overrides: dict[str, str],
-    view: Lines | Terminal | None,
+    view: View | None,
     **options: Any,
 ) -> dict[str, Any]:
     """Run a mission from its start and return the result."""
@@ -125,7 +143,7 @@ def _fresh(
 
 
 def _resumed(
-    name: str, runs: Path, skills: Mapping[str, type[Skill]], view: Lines | Terminal | None, **options: Any
+    name: str, runs: Path, skills: Mapping[str, type[Skill]], view: View | None, **options: Any
 ) -> tuple[dict[str, Any], str]:
     """Take up a run again and return the result, and the command that would repeat it."""
     from executive.record.find_run import find_run
@@ -139,6 +157,22 @@ def _resumed(
     return result, repeat_command(
         start["file"], seed=start["seed"], overrides=start["overrides"], requests=result["requests"]
     )
+
+
+@contextlib.contextmanager
+def _page(wanted: bool) -> Iterator[LivePage | None]:
+    """Serve a page for a run while it goes on, and say where."""
+    if not wanted:
+        yield None
+        return
+    from executive.view.live.page import LivePage
+
+    page = LivePage()
+    click.echo(f"watch it at {page.address}", err=True)
+    try:
+        yield page
+    finally:
+        page.finish()
 
 
 def _view() -> Lines | Terminal:

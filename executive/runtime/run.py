@@ -194,6 +194,7 @@ class Run:
         try:
             if self._past is None:
                 self._begin()
+            self.control.wait()
             while not self.control.stopped:
                 ticked = False
                 self._plant.begin_tick()

@@ -10,6 +10,9 @@ from executive.geometry import Pose
 from executive.scenery import Shape
 from executive.sim.world import World
 
+TABLE_COLOUR = (0.86, 0.78, 0.66)
+"""About that of its texture, which a colour has to stand for."""
+
 _KINDS = {
     pybullet.GEOM_BOX: "box",
     pybullet.GEOM_CYLINDER: "cylinder",
@@ -68,7 +71,8 @@ def _shapes_of(world: World, bodies: Mapping[int, str]) -> Iterator[Shape]:
             lengths = (2 * size[1], 2 * size[1], size[0]) if kind == pybullet.GEOM_CYLINDER else tuple(size)
             if kind == pybullet.GEOM_SPHERE:
                 lengths = (2 * size[0],) * 3
-            yield Shape(owner, _KINDS[kind], lengths, X_BS, tuple(colour[:3]), file.decode())
+            seen_in = TABLE_COLOUR if body == world.table else tuple(colour[:3])
+            yield Shape(owner, _KINDS[kind], lengths, X_BS, seen_in, file.decode())
 
 
 def _inertia(world: World, body: int) -> Pose:

@@ -1,0 +1,6 @@
+"""The page on which a run is watched in a browser, and commanded, by whoever has its address.
+
+It is served by a process of its own, on loopback only. Whoever wants anything of it must know the token in
+its address and come from no other page than itself, so that no page elsewhere in the browser can see or
+command anything.
+"""

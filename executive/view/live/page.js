@@ -1,0 +1,174 @@
+"use strict";
+// Shows what the server tells, and tells it which button was pressed.
+
+const SVG = "http://www.w3.org/2000/svg";
+const STATUS = ["running", "success", "failure", "invalid"];
+const COLOURS = ["#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#F0E442", "#0072B2", "#D55E00"];
+const FOLLOW_EVERY = 400; // ms
+
+const find = (id) => document.getElementById(id);
+const state = { nodes: {}, items: {}, paused: false, over: false };
+const groups = new Map();
+const classes = [];
+let followed = 0;
+
+const address = new URL("live", location.href);
+address.protocol = "ws:";
+const socket = new WebSocket(address);
+socket.onmessage = (message) => show(JSON.parse(message.data));
+socket.onclose = () => {
+  if (!state.result) headline("failure", "the run is gone", "the connection ended");
+  for (const button of document.querySelectorAll("button")) button.disabled = true;
+};
+for (const what of ["pause", "resume", "step", "stop"]) find(what).onclick = () => wish({ do: what });
+
+function wish(what) {
+  if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(what));
+}
+
+function show(news) {
+  const { nodes, items, ...rest } = news;
+  Object.assign(state, rest);
+  if ("tree" in news) plant(news.tree);
+  for (const [path, node] of Object.entries(nodes ?? {})) {
+    state.nodes[path] = node;
+    light(path, node);
+  }
+  Object.assign(state.items, items);
+  if ("run" in news) {
+    find("mission").textContent = `${news.run.mission}, seed ${news.run.seed}`;
+    document.title = `${news.run.mission} · executive`;
+  }
+  if ("clock" in news) find("clock").textContent = `${news.clock.toFixed(1)} s`;
+  if (items) table();
+  if ("look" in news || "decision" in news || (items && state.look)) picture();
+  if ("asking" in news) ask(news.asking);
+  if (nodes) follow();
+  if ("result" in news) outcome(news.result);
+  else if (!state.result) {
+    headline(state.over ? "invalid" : "running", state.over ? "ending" : state.paused ? "paused" : "running");
+  }
+  find("pause").disabled = state.paused || state.over;
+  find("resume").disabled = !state.paused || state.over;
+  find("step").disabled = find("stop").disabled = state.over;
+}
+
+function headline(kind, text) {
+  find("head").className = kind;
+  find("status").textContent = text;
+}
+
+function plant(text) {
+  const tree = document.importNode(new DOMParser().parseFromString(text, "image/svg+xml").documentElement, true);
+  document.querySelector("#tree .scroll").replaceChildren(tree);
+  groups.clear();
+  for (const group of tree.querySelectorAll("g.node")) groups.set(group.dataset.path, group);
+  for (const [path, node] of Object.entries(state.nodes)) light(path, node);
+}
+
+function light(path, node) {
+  const group = groups.get(path);
+  if (!group) return;
+  group.classList.remove(...STATUS);
+  group.classList.add(node.status);
+  const counts = [[node.done, "✓"], [node.failed, "✗"], [node.halted, "–"]];
+  const told = counts.filter(([number]) => number).map(([number, mark]) => `${number} ${mark}`);
+  const note = group.querySelector(".note");
+  if (note) note.textContent = told.join("  ");
+  if (node.status === "running") group.parentNode.append(group); // its line above its siblings'
+}
+
+function follow() {
+  const now = performance.now();
+  if (!find("follow").checked || now - followed < FOLLOW_EVERY) return;
+  const running = [...groups.values()].filter((g) => g.classList.contains("skill") && g.classList.contains("running"));
+  const target = running[0];
+  if (!target) return;
+  followed = now;
+  const frame = document.querySelector("#tree .scroll");
+  const box = target.querySelector(".box").getBoundingClientRect();
+  const view = frame.getBoundingClientRect();
+  frame.scrollTo({
+    left: frame.scrollLeft + box.left - view.left - 0.62 * view.width,
+    top: frame.scrollTop + box.top - view.top - 0.4 * view.height,
+    behavior: "smooth",
+  });
+}
+
+function table() {
+  const rows = Object.values(state.items).filter((item) => item.state !== "phantom");
+  find("items").querySelector("tbody").replaceChildren(...rows.map((item) => {
+    const row = document.createElement("tr");
+    row.className = item.state;
+    for (const text of [item.item, item.label, item.state, item.bin, item.why]) {
+      row.appendChild(document.createElement("td")).textContent = text ?? "";
+    }
+    return row;
+  }));
+}
+
+function picture() {
+  const look = state.look;
+  if (!look) return;
+  const shown = element("svg", { viewBox: `0 0 ${look.width} ${look.height}`, class: "look" });
+  shown.append(element("image", { href: look.source, width: look.width, height: look.height }));
+  const chosen = nearest(look);
+  look.found.forEach((box, number) => shown.append(...boxed(box, number === chosen)));
+  document.querySelector("#look .picture").replaceChildren(shown);
+  find("frame").textContent = `${look.camera}, frame ${look.frame} at ${look.stamp.toFixed(2)} s, by ${look.detector}`;
+}
+
+function boxed(box, chosen) {
+  const [left, top, right, bottom] = box.box;
+  if (!classes.includes(box.label)) classes.push(box.label);
+  const colour = COLOURS[classes.indexOf(box.label) % COLOURS.length];
+  const drawn = element("rect", { x: left, y: top, width: right - left, height: bottom - top, class: chosen ? "chosen" : "" });
+  drawn.style.stroke = colour;
+  const label = element("text", { x: left, y: top - 4 });
+  label.textContent = `${chosen ? state.decision.item : box.label} ${box.confidence.toFixed(2)}`;
+  label.style.fill = colour;
+  return [drawn, label];
+}
+
+function nearest(look) {
+  const item = state.decision && state.items[state.decision.item];
+  if (!item || !item.position || item.state === "placed") return -1;
+  const away = (box) => (box.position ? Math.hypot(box.position[0] - item.position[0], box.position[1] - item.position[1]) : Infinity);
+  const best = look.found.reduce((a, box, number) => (a < 0 || away(box) < away(look.found[a]) ? number : a), -1);
+  return best >= 0 && away(look.found[best]) < 0.03 ? best : -1;
+}
+
+function element(tag, attributes) {
+  const made = document.createElementNS(SVG, tag);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  return made;
+}
+
+function ask(choices) {
+  const panel = find("asking");
+  panel.hidden = !choices;
+  for (const button of panel.querySelectorAll("button")) button.remove();
+  const words = choices ? [...choices, "rescan", "quit"] : [];
+  for (const word of words) {
+    const button = panel.appendChild(document.createElement("button"));
+    button.textContent = word;
+    button.onclick = () => wish({ do: "request", word });
+  }
+}
+
+function outcome(result) {
+  const kinds = { SUCCESS: "success", FAILURE: "failure", FAULT: "failure" };
+  headline(kinds[result.status] ?? "invalid", result.status);
+  const panel = find("outcome");
+  panel.hidden = false;
+  panel.className = kinds[result.status] ?? "invalid";
+  const lines = [
+    result.story ? result.story.verdict : result.message,
+    result.report ? `report: ${result.report}` : `record: ${result.run}`,
+  ];
+  panel.replaceChildren(...lines.filter(Boolean).map((line) => {
+    const paragraph = document.createElement("p");
+    paragraph.textContent = line;
+    return paragraph;
+  }));
+}

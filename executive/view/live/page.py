@@ -1,0 +1,204 @@
+"""The live page, seen from the run: what it is told, and what it wants."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import pickle
+import queue
+import secrets
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Mapping
+from importlib.util import find_spec
+from typing import Any
+
+from executive.errors import InputError
+from executive.events import Event
+from executive.mission.outline import outline
+from executive.runtime.run import Run
+from executive.runtime.run_control import RunControl
+from executive.scenery import Scenery
+from executive.view.live.telling import Told, picture, poses, told
+from executive.view.tree.svg import Note, svg
+
+LOOPBACK = "127.0.0.1"
+PERIOD = 1 / 15
+"""Time between two looks at where everything is, while somebody watches [s]."""
+GATHER = 0.03
+"""For so long things to tell are gathered, so that they cost the run less [s]."""
+PATIENCE = 3.0
+"""Longest wait for the page's last words [s]."""
+NEEDS = ("aiohttp", "trimesh", "viser")
+
+
+class LivePage:
+    """Shows a run to whoever opens `address`, and hands on what they want of it; implements `View`.
+
+    While nobody watches it is told only of events, which are small. Whatever goes wrong with it, the run goes
+    on without it.
+
+    Attributes:
+        address: Of the page; whoever knows it can see and command the run.
+
+    Raises:
+        InputError: The packages it needs are not installed.
+    """
+
+    def __init__(self) -> None:
+        if missing := [name for name in NEEDS if find_spec(name) is None]:
+            raise InputError(
+                f"--view needs {', '.join(missing)}; install the extra: uv sync --extra view, "
+                'or pip install "executive[view]"'
+            )
+        token = secrets.token_urlsafe(24)
+        self._said = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the page)
+        with socket.create_server((LOOPBACK, 0)) as listener:
+            port = listener.getsockname()[1]
+            self.address = f"http://{LOOPBACK}:{port}/{token}/"
+            self._server = subprocess.Popen(
+                [sys.executable, "-m", "executive.view.live", str(listener.fileno())],
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said,
+                pass_fds=[listener.fileno()],
+                # Out of reach of Ctrl-C: it ends when its input does, and says first how the run ended.
+                start_new_session=True,
+            )  # fmt: skip
+        self._queue: queue.SimpleQueue[Told | None] = queue.SimpleQueue()
+        self._control: RunControl | None = None
+        self._scenery: Scenery | None = None
+        self._clock: Callable[[], float] = lambda: 0.0
+        self._watched = 0
+        self._due = 0.0
+        self._paused = False
+        self._last_look: Event | None = None
+        self.problem = ""
+        """Why the page shows nothing more, or ""."""
+        # Not as an argument: those can be read by everybody on the machine.
+        self._tell("secret", token=token, port=port)
+        self._threads = [
+            threading.Thread(target=work, name="page", daemon=True) for work in (self._send, self._listen)
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    def open(self, run: Run) -> None:
+        """Begin to show a run."""
+        nodes = outline(run.root)
+        mission = run.loaded.mission.name
+        self._control = run.control
+        self._clock = lambda: run.workcell.cell.clock.now
+        self._scenery = run.workcell.scenery()
+        # A line in every node for what became of it so far.
+        blank = {node.path: Note("", ("",)) for node in nodes}
+        self._tell("tree", mission=mission, svg=svg(nodes, mission, blank))
+        if self._scenery is not None:
+            self._tell("shapes", shapes=tuple(self._scenery.shapes))
+        run.control.between_ticks(self._look_around)
+        self._look_around()
+
+    def __call__(self, event: Event) -> None:
+        """Tell of an event what a person wants to see."""
+        with self._harmless():
+            if event.kind == "look" and event.data.get("frame_object") is not None:
+                self._last_look = event
+                if self._watched:
+                    self._queue.put(picture(event))
+            elif (words := told(event)) is not None:
+                self._queue.put(words)
+
+    def close(self) -> None:
+        """Go on without new events; `finish` says how the run ended."""
+
+    def note(self, sentence: str) -> None:
+        """Show a sentence about the record."""
+        self._tell("note", sentence=sentence)
+
+    def finish(self, result: Mapping[str, Any] | None = None, report: str = "") -> None:
+        """Say how the run ended, and end the page; more calls do nothing."""
+        if not self._threads:
+            return
+        if result is not None:
+            keys = ("status", "reason", "message", "story", "run")
+            self._tell("result", **{key: result.get(key) for key in keys}, report=report)
+        self._queue.put(None)
+        for thread in self._threads:
+            thread.join(PATIENCE)
+        self._threads = []
+        try:
+            self._server.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            self._server.kill()
+            self._server.wait()
+        self._said.close()
+
+    def _look_around(self) -> None:
+        """Tell, now and then, where everything is; called between two ticks."""
+        now = time.monotonic()
+        if now < self._due or self._control is None:
+            return
+        self._due = now + PERIOD
+        with self._harmless():
+            if self._control.paused != self._paused:
+                self._paused = self._control.paused
+                self._tell("paused", paused=self._paused)
+            if self._watched and self._scenery is not None:
+                self._queue.put(poses(self._clock(), self._scenery.poses()))
+
+    def _tell(self, kind: str, **data: Any) -> None:
+        self._queue.put((kind, data))
+
+    @contextlib.contextmanager
+    def _harmless(self) -> Any:
+        """Keep what goes wrong from the run: a page is not worth a motion that is cut off."""
+        if self.problem:
+            yield
+            return
+        try:
+            yield
+        except Exception as error:
+            self.problem = f"the page shows nothing more: {type(error).__name__}: {error}"
+
+    def _send(self) -> None:
+        """Hand on what there is to tell, until there is nothing more."""
+        assert self._server.stdin is not None
+        over = False
+        with contextlib.suppress(BrokenPipeError), self._server.stdin as pipe:
+            while not over:
+                batch = [self._queue.get()]
+                while not self._queue.empty():
+                    batch.append(self._queue.get())
+                over = None in batch
+                pickle.dump([words for words in batch if words is not None], pipe, pickle.HIGHEST_PROTOCOL)
+                pipe.flush()
+                if not over:
+                    time.sleep(GATHER)
+
+    def _listen(self) -> None:
+        """Do what the page wants, until it ends."""
+        assert self._server.stdout is not None
+        for line in self._server.stdout:
+            with self._harmless():
+                self._do(json.loads(line))
+
+    def _do(self, wish: Mapping[str, Any]) -> None:
+        control, what = self._control, wish["do"]
+        if what == "watched":
+            self._watched = wish["by"]
+            if self._watched and self._last_look is not None:
+                self._queue.put(picture(self._last_look))
+        elif control is None:
+            return
+        elif what == "request":
+            control.request(wish["word"])
+        else:
+            do = {
+                "pause": control.pause,
+                "resume": control.resume,
+                "step": control.step,
+                "stop": control.stop,
+            }
+            do[what]()

@@ -1,0 +1,111 @@
+"""The server of the live page: the page, what it shows, and what it wants."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+from collections.abc import Callable, Mapping
+from importlib.resources import files
+from typing import Any
+
+from aiohttp import WSMsgType, web
+
+from executive.view.live.board import Board
+from executive.view.live.guard import Guard
+from executive.view.live.tunnel import Tunnel
+
+PERIOD = 1 / 15
+"""Time between two messages to the browsers [s]."""
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
+    "connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+WISHES = ("pause", "resume", "step", "stop")
+LONGEST = 4096
+"""Of what a browser may say at once [bytes]."""
+_FILES = {"": ("page.html", "text/html"), "page.js": ("page.js", "text/javascript"),
+          "page.css": ("page.css", "text/css")}  # fmt: skip
+
+Wish = Callable[[Mapping[str, Any]], None]
+
+
+class Server:
+    """Serves the page to whoever the guard lets in.
+
+    Args:
+        board: What is shown.
+        guard: Decides who may come.
+        tunnel: Leads to the scene.
+        wish: Takes what a person wants of the run, and how many watch.
+    """
+
+    def __init__(self, board: Board, guard: Guard, tunnel: Tunnel, wish: Wish) -> None:
+        self._board = board
+        self._wish = wish
+        self._watchers: set[web.WebSocketResponse] = set()
+        self.app = web.Application(middlewares=[guard.middleware()])
+        self.app.router.add_get("/{token}/live", self._live)
+        self.app.router.add_get("/{token}/scene", tunnel.socket)
+        self.app.router.add_get("/{token}/scene/{file:.*}", tunnel.page)
+        self.app.router.add_get("/{token}/{file:.*}", self._file)
+
+    async def tell(self) -> None:
+        """Tell the watchers what is new."""
+        news = self._board.news()
+        if news and self._watchers:
+            text = json.dumps(news)
+            for watcher in list(self._watchers):
+                with contextlib.suppress(ConnectionError):
+                    await watcher.send_str(text)
+
+    async def keep_telling(self) -> None:
+        """Tell the watchers what is new, for ever."""
+        while True:
+            await asyncio.sleep(PERIOD)
+            await self.tell()
+
+    async def end(self) -> None:
+        """Say the last news and good-bye."""
+        await self.tell()
+        for watcher in list(self._watchers):
+            await watcher.close()
+
+    async def _file(self, request: web.Request) -> web.Response:
+        name = request.match_info["file"]
+        if name not in _FILES:
+            raise web.HTTPNotFound(text="there is no such thing here\n")
+        file, kind = _FILES[name]
+        text = files(__package__).joinpath(file).read_text(encoding="utf-8")
+        return web.Response(text=text, content_type=kind, headers={"Content-Security-Policy": POLICY})
+
+    async def _live(self, request: web.Request) -> web.WebSocketResponse:
+        """Show a watcher everything, then the news; take what they want."""
+        socket = web.WebSocketResponse(max_msg_size=LONGEST, heartbeat=10)
+        await socket.prepare(request)
+        await socket.send_str(json.dumps(self._board.everything()))
+        self._watchers.add(socket)
+        self._wish({"do": "watched", "by": len(self._watchers)})
+        try:
+            async for message in socket:
+                if message.type is WSMsgType.TEXT and (wish := understood(message.data)) is not None:
+                    self._wish(wish)
+        finally:
+            self._watchers.discard(socket)
+            self._wish({"do": "watched", "by": len(self._watchers)})
+        return socket
+
+
+def understood(text: str) -> dict[str, Any] | None:
+    """Return what a browser wants, or None for something that nobody can want."""
+    try:
+        wish = json.loads(text)
+    except ValueError:
+        return None
+    if not isinstance(wish, dict):
+        return None
+    if wish.get("do") in WISHES:
+        return {"do": wish["do"]}
+    if wish.get("do") == "request" and isinstance(wish.get("word"), str):
+        return {"do": "request", "word": wish["word"]}
+    return None
