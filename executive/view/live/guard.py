@@ -54,8 +54,8 @@ class Guard:
         # A name that leads here is not enough: a foreign site may let its own name lead to this machine.
         if request.headers.get("Host") not in self._hosts:
             return "this page goes by the address of this machine only"
-        token = request.path.split("/")[1]
-        if not secrets.compare_digest(token.encode(), self._token.encode()):
+        token, _, _ = request.path.removeprefix("/").partition("/")
+        if not secrets.compare_digest(token.encode(errors="replace"), self._token.encode()):
             return "the address lacks the token of this run; take it from the terminal that the run is in"
         origin = request.headers.get("Origin")
         if origin is not None and origin not in self._origins:

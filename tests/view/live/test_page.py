@@ -1,0 +1,207 @@
+"""The live page of a run on the fake cell: what it shows, what it does, and what it leaves."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import threading
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import aiohttp
+import pytest
+
+from executive.discovery import discover
+from executive.errors import InputError
+from executive.events import Event
+from executive.mission.load import load_mission
+from executive.runtime.outcome import Outcome
+from executive.runtime.run import Run
+from executive.testing.fake_cell import FakeCell
+from executive.view.live.page import LivePage
+
+MISSION = """\
+mission: bring_one
+description: Bring one object.
+cell: cells/overhead.yaml
+routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}
+tree: [MoveToScan, Detect, Localize, SelectTarget, Approach, Grasp, Transit, Release]
+"""
+ASKING = """\
+mission: ask
+description: Ask what to bring.
+cell: cells/overhead.yaml
+routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}
+tree: [AwaitRequest]
+"""
+
+
+class Watched:
+    """A run with its page, and a browser's connection to it."""
+
+    def __init__(self, run: Run, page: LivePage, socket: aiohttp.ClientWebSocketResponse) -> None:
+        self.run, self.page, self.socket = run, page, socket
+        self.shown: dict[str, Any] = {}
+
+    async def until(self, holds: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:
+        """Take in news until something holds of what is shown."""
+        while not (self.shown and holds(self.shown)):
+            news = await self.socket.receive_json(timeout=20)
+            for key in ("nodes", "items"):
+                self.shown.setdefault(key, {}).update(news.pop(key, {}))
+            self.shown |= news
+        return self.shown
+
+    async def wish(self, **what: str) -> None:
+        await self.socket.send_json(what)
+
+
+def watch(text: str, folder: Path, do: Callable[[Watched], Awaitable[None]]) -> Outcome:
+    """Execute a run that is paused first, while something is done at its page."""
+    file = folder / "mission.yaml"
+    file.write_text(text)
+    loaded = load_mission(file, discover())
+    page = LivePage()
+    # In real time, so that there is something to pause.
+    run = Run(loaded, discover(), seed=3, observers=[page], realtime=True, kind=FakeCell, keyboard=False)
+    run.control.pause()
+    page.open(run)
+    outcomes: list[Outcome] = []
+    # Signals are heard in the main thread only, so the run goes on as it would there.
+    runner = threading.Thread(target=lambda: outcomes.append(run.execute()))
+
+    async def visit() -> None:
+        origin = page.address.rsplit("/", 2)[0]
+        async with (
+            aiohttp.ClientSession() as session,
+            session.ws_connect(f"{page.address}live", headers={"Origin": origin}) as socket,
+        ):
+            watched = Watched(run, page, socket)
+            await watched.until(lambda shown: "tree" in shown)
+            runner.start()
+            await do(watched)
+
+    try:
+        asyncio.run(visit())
+    finally:
+        run.control.stop()
+        with contextlib.suppress(RuntimeError):
+            runner.join()
+        page.finish()
+        run.close()
+    return outcomes[0]
+
+
+def test_a_watcher_sees_the_run_to_its_end(tmp_path: Path) -> None:
+    async def do(watched: Watched) -> None:
+        await watched.wish(do="resume")
+        shown = await watched.until(lambda shown: shown.get("over"))
+        assert '<svg xmlns="http://www.w3.org/2000/svg" class="behaviour-tree"' in shown["tree"]
+        assert shown["nodes"]["tree/Release"]["status"] == "success"
+        assert shown["run"] == {"mission": "bring_one", "seed": 3}
+        assert {item["state"] for item in shown["items"].values()} >= {"placed"}
+        assert shown["look"]["source"].startswith("data:image/jpeg;base64,")
+        watched.page.finish({"status": "SUCCESS", "run": "runs/x"}, "runs/x/report.html")
+        shown = await watched.until(lambda shown: "result" in shown)
+        assert shown["result"]["report"] == "runs/x/report.html"
+
+    assert watch(MISSION, tmp_path, do).status == "SUCCESS"
+
+
+def test_pause_step_and_stop_are_heard(tmp_path: Path) -> None:
+    async def do(watched: Watched) -> None:
+        await watched.wish(do="step")
+        await watched.until(lambda shown: shown.get("clock", 0.0) > 0.0)
+        assert watched.run.tick == 1
+        await watched.wish(do="resume")
+        await watched.until(lambda shown: shown["paused"] is False)
+        await watched.wish(do="pause")
+        shown = await watched.until(lambda shown: shown["paused"])
+        assert not shown.get("over")
+        await watched.wish(do="stop")
+        await watched.until(lambda shown: shown.get("over"))
+
+    assert watch(MISSION, tmp_path, do).status == "HALTED"
+
+
+def test_what_is_to_be_picked_can_be_said_on_the_page(tmp_path: Path) -> None:
+    async def do(watched: Watched) -> None:
+        await watched.wish(do="resume")
+        shown = await watched.until(lambda shown: shown.get("asking"))
+        assert shown["asking"] == ["cube", "sphere", "duck"]
+        await watched.wish(do="request", word="a unicorn")
+        await watched.wish(do="request", word="sphere")
+        await watched.until(lambda shown: shown.get("over"))
+
+    assert watch(ASKING, tmp_path, do).status == "SUCCESS"
+
+
+def test_nothing_of_it_is_left_when_it_ends() -> None:
+    page = LivePage()
+    pid = page._server.pid
+    page.finish()
+    page.finish()
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+    assert page.problem == ""
+
+
+def test_it_listens_on_loopback_only_and_at_one_port() -> None:
+    page = LivePage()
+    try:
+        # Once it answers, all that will ever listen does.
+        asyncio.run(_answered(page.address))
+        files = Path(f"/proc/{page._server.pid}/fd")
+        held = {os.readlink(file) for file in files.iterdir()}
+        listening = []
+        for table in ("tcp", "tcp6"):
+            for line in Path(f"/proc/{page._server.pid}/net/{table}").read_text().splitlines()[1:]:
+                fields = line.split()
+                if fields[3] == "0A" and f"socket:[{fields[9]}]" in held:
+                    listening.append(fields[1])
+        port = int(page.address.split(":")[2].partition("/")[0])
+        assert listening == [f"0100007F:{port:04X}"]
+    finally:
+        page.finish()
+
+
+async def _answered(address: str) -> None:
+    async with aiohttp.ClientSession() as session, session.get(address) as answer:
+        assert answer.status == 200
+
+
+def test_a_page_that_died_costs_the_run_nothing(tmp_path: Path) -> None:
+    file = tmp_path / "mission.yaml"
+    file.write_text(MISSION)
+    page = LivePage()
+    run = Run(load_mission(file, discover()), discover(), seed=3, observers=[page], kind=FakeCell)
+    page.open(run)
+    page._server.kill()
+    assert run.execute().status == "SUCCESS"
+    page.finish({"status": "SUCCESS"})
+    run.close()
+
+
+def test_what_goes_wrong_with_it_is_said_and_the_run_goes_on() -> None:
+    page = LivePage()
+    try:
+        page(Event("look", 1, 0.1, {"frame_object": object(), "found": ()}))
+        page._watched = 1
+        page(Event("look", 1, 0.1, {"frame_object": object(), "found": ()}))
+        assert page.problem == (
+            "the page shows nothing more: AttributeError: 'object' object has no attribute 'image'"
+        )
+        page(Event("look", 2, 0.2, {"frame_object": object(), "found": ()}))
+    finally:
+        page.finish()
+
+
+def test_without_its_packages_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("executive.view.live.page.find_spec", lambda name: None if name == "viser" else name)
+    with pytest.raises(InputError) as refused:
+        LivePage()
+    assert str(refused.value) == (
+        '--view needs viser; install the extra: uv sync --extra view, or pip install "executive[view]"'
+    )
