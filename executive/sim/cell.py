@@ -18,6 +18,7 @@ from executive.messages import Target
 from executive.motion.planner import Planner
 from executive.sim.arm import SimArm
 from executive.sim.audit import audit
+from executive.sim.beginning import PartSeeds, first_world
 from executive.sim.camera import SimCamera
 from executive.sim.clearance import PathClearance
 from executive.sim.clock import SimClock
@@ -29,10 +30,9 @@ from executive.sim.ray import cast
 from executive.sim.reach import out_of_reach
 from executive.sim.rebuild import UnderWay, rebuild
 from executive.sim.scenery import SimScenery
-from executive.sim.spawn import spawn
 from executive.sim.tool import SuctionTool
 from executive.sim.view import ArmShadow
-from executive.sim.world import STEP, World
+from executive.sim.world import STEP
 from executive.vision.detectors.registry import build_detectors, known_labels, wrong_detectors
 from executive.vision.detectors.setting import ClosableDetector
 from executive.vision.localization.build import build_localizer
@@ -68,15 +68,10 @@ class SimCell:
     ) -> None:
         for _, sentence in _lacking_depth(config):
             raise InputError(f"cell {config.cell}: {sentence}")
-        spawn_seed, camera_seed, detector_seed = (
-            int(s.generate_state(1)[0]) for s in np.random.SeedSequence(seed).spawn(3)
-        )
+        seeds = PartSeeds.of(seed)
         self._config = config
         self._routes = dict(routes)
-        self._world = World(config, gui=options.gui)
-        self._world.set_arm(np.radians(config.arm.poses_deg["home"]))
-        spawn(self._world, config, spawn_seed)
-        self._world.stood.clear()
+        self._world = first_world(config, seed, gui=options.gui)
         self._initial = {body: self._world.object_pose(body).position for body in self._world.bodies}
         self._bins = {name: as_bin(name, bin) for name, bin in config.bins.items()}
         self._clock = clock = SimClock(self._world, STEP)
@@ -92,7 +87,7 @@ class SimCell:
             name,
             camera_config,
             clock,
-            camera_seed,
+            seeds.camera,
             shadow=ArmShadow(self._arm, planner.kinematics, config, lambda: self._tool.holding),
             epoch=lambda: self._ledger.epoch,
         )
@@ -106,7 +101,7 @@ class SimCell:
         localizer = build_localizer(config.localization, classes, partial(cast, self._world))
         # Last of all: some of them start processes, which nobody would end if something after them failed.
         self._detectors = detectors(
-            config.detectors, camera=camera_config, clock=clock, base=options.base, seed=detector_seed
+            config.detectors, camera=camera_config, clock=clock, base=options.base, seed=seeds.detectors
         )
         self._cell = Cell(
             clock=clock,

@@ -33,26 +33,44 @@ class UnderWay:
     idle: int
 
 
-def rebuild(world: World, tool: SuctionTool, commands: Iterable[Command]) -> UnderWay:
-    """Do to a world, fresh from the same cell file and seed, all that was done to another one.
+class Rebuilding:
+    """Does to a world, fresh from the same cell file and seed, one by one what was done to another one.
 
-    The world is then the same to the last bit. What the arm was following is returned: as a controller that
-    lost its master, it is to brake on its path.
+    After each command the world is to the last bit what the other one was then.
+
+    Args:
+        world: The fresh world.
+        tool: The tool on its arm.
     """
-    command, motion, time, idle = np.zeros(0), None, 0.0, 0
-    for kind, numbers, states in commands:
+
+    def __init__(self, world: World, tool: SuctionTool) -> None:
+        self._world, self._tool = world, tool
+        self._command: Array = np.zeros(0)
+        self._motion: Trajectory | None = None
+        self._time = 0.0
+        self._idle = 0
+
+    @property
+    def under_way(self) -> UnderWay:
+        """What the arm was following: as a controller that lost its master, it is to brake on its path."""
+        return UnderWay(self._command, self._motion, self._time, self._idle)
+
+    def do(self, command: Command) -> None:
+        """Do the next command."""
+        kind, numbers, _ = command
+        world, tool = self._world, self._tool
         if kind in (log.STEP, log.IDLE):
-            idle += kind == log.IDLE
+            self._idle += kind == log.IDLE
             world.step()
             tool.advance()
         elif kind == log.JOINTS_TO:
-            time, command = numbers[0], np.array(numbers[1:])
-            world.command_arm(command, time)
+            self._time, self._command = numbers[0], np.array(numbers[1:])
+            world.command_arm(self._command, self._time)
         elif kind == log.MOTION:
             duration, guarded, _ = numbers
-            motion, time = sampled(states_of(Command(kind, numbers, states)), duration, guarded), 0.0
+            self._motion, self._time = sampled(states_of(command), duration, guarded), 0.0
         elif kind == log.DONE:
-            motion = None
+            self._motion = None
         elif kind == log.CLOSE:
             tool.close()
         elif kind == log.OPEN:
@@ -67,4 +85,11 @@ def rebuild(world: World, tool: SuctionTool, commands: Iterable[Command]) -> Und
             tool.leaks = bool(numbers[0])
         elif kind == log.STICKS:
             tool.sticks = bool(numbers[0])
-    return UnderWay(command, motion, time, idle)
+
+
+def rebuild(world: World, tool: SuctionTool, commands: Iterable[Command]) -> UnderWay:
+    """Do all commands to a fresh world, and return what the arm was following when nobody commanded it."""
+    rebuilding = Rebuilding(world, tool)
+    for command in commands:
+        rebuilding.do(command)
+    return rebuilding.under_way

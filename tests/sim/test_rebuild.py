@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,12 @@ from executive.mission.load import load_mission
 from executive.motion.limits import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.runtime.run import Run
+from executive.sim.beginning import first_world
 from executive.sim.cell import SimCell
+from executive.sim.command_log import STEP as STEP_MADE
+from executive.sim.command_log import read_commands
+from executive.sim.rebuild import Rebuilding
+from executive.sim.tool import SuctionTool
 from executive.sim.world import STEP
 from executive.testing.disturbances.hands import hand_of
 from executive.testing.fake_cell import SilentOperator
@@ -43,7 +49,7 @@ class Left:
     time: float
 
 
-def state_of(cell: SimCell) -> str:
+def state_of(cell: SimCell | SimpleNamespace) -> str:
     """Everything that moves, and the seal."""
     world, tool = cell._world, cell._tool
     joints = [joint[:2] for joint in world.client.getJointStates(world.arm, range(7))]
@@ -108,6 +114,19 @@ def test_it_is_the_same_to_the_last_bit(cells: list[tuple[Left, SimCell]]) -> No
     assert any(one.motion is not None for one, _ in cells)
     for one, cell in cells:
         assert state_of(cell) == one.state, one.tick
+
+
+def test_it_is_the_same_after_each_step_on_the_way(left: list[Left], mission) -> None:
+    world = first_world(mission.cell_config, SEED)
+    tool = SuctionTool(world, mission.cell_config.tool)
+    rebuilding, start, states = Rebuilding(world, tool), world.steps, {}
+    for command in read_commands(left[-1].log):
+        rebuilding.do(command)
+        steps = world.steps - start
+        if command.kind == STEP_MADE:
+            states[steps] = state_of(SimpleNamespace(_world=world, _tool=tool, steps=steps))
+    world.close()
+    assert [states[one.tick] for one in left] == [one.state for one in left]
 
 
 def test_the_arm_brakes_on_the_path_it_was_on(cells: list[tuple[Left, SimCell]], mission) -> None:
