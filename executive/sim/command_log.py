@@ -103,6 +103,15 @@ class CommandLog:
             ) from error
 
 
+def is_log(path: Path) -> bool:
+    """Tell whether a file begins as the log of a world does.
+
+    Raises:
+        InputError: It cannot be read.
+    """
+    return _content(path).startswith(MAGIC)
+
+
 def read_commands(path: Path) -> Iterator[Command]:
     """Yield the commands of a log, in order; one that a kill tore is left out.
 
@@ -115,13 +124,7 @@ def read_commands(path: Path) -> Iterator[Command]:
 
 def _commands(path: Path) -> Iterator[tuple[Command, int]]:
     """Yield the whole commands of a log, each with how long the log is up to its end."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(
-            f'cannot read the log of the world "{path}": {(error.strerror or str(error)).lower()}; '
-            "without it a simulated run cannot be taken up again"
-        ) from error
+    data = _content(path)
     if not data.startswith(MAGIC):
         raise InputError(f'"{path}" is no log of a world: it does not begin with {MAGIC.decode().strip()!r}')
     place = len(MAGIC)
@@ -140,6 +143,16 @@ def _commands(path: Path) -> Iterator[tuple[Command, int]]:
             states = np.frombuffer(data, "<f8", _STATE * int(numbers[-1]), place).reshape(-1, _STATE)
             place += size
         yield Command(kind, numbers, states), place
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(
+            f'cannot read the log of the world "{path}": {(error.strerror or str(error)).lower()}; '
+            "without it a simulated run can neither be taken up again nor filmed"
+        ) from error
 
 
 def states_of(command: Command) -> State:

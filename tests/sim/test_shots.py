@@ -1,0 +1,85 @@
+"""Pictures of a recorded world: of the right moments, whoever takes them."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from executive.cell_config import CellConfig
+from executive.errors import InputError
+from executive.sim import command_log as log
+from executive.sim import shots as module
+from executive.sim.camera import Image
+from executive.sim.command_log import CommandLog
+from executive.sim.shots import GROUND, SKY, Shoot, pictures, shots, steps_in
+from executive.sim.viewpoint import overview
+
+SIZE = (96, 84)
+STEPS = 36
+
+
+def swing(config: CellConfig, path: Path, idle: int) -> Shoot:
+    """A log in which the arm swings for some steps; in the middle some steps of nobody's run."""
+    home = np.radians(config.arm.poses_deg["home"])
+    commands = CommandLog(path)
+    for step in range(STEPS):
+        commands.note(log.JOINTS_TO, step / 240, *(home - 0.02 * step * np.eye(7)[0]))
+        commands.note(log.STEP)
+        if step == 20:
+            for _ in range(idle):
+                commands.note(log.IDLE)
+    commands.close()
+    return Shoot(config, 5, path, overview(config, SIZE, (2, 2, 94, 82)))
+
+
+@pytest.fixture
+def shoot(overhead: CellConfig, tmp_path: Path) -> Shoot:
+    return swing(overhead, tmp_path / "log", idle=8)
+
+
+def changed(one: Image, other: Image) -> int:
+    """How many pixels differ."""
+    return np.count_nonzero((one != other).any(axis=2))
+
+
+def test_the_steps_of_the_run_are_counted_and_no_others(shoot: Shoot, tmp_path: Path) -> None:
+    assert steps_in(shoot.log) == STEPS
+    with pytest.raises(InputError, match="can neither be taken up again nor filmed"):
+        steps_in(tmp_path / "none")
+
+
+def test_each_picture_is_of_its_moment(shoot: Shoot) -> None:
+    first, same, middle, last = pictures(shoot, [0, 0, 18, STEPS])
+    assert first.shape == (SIZE[1], SIZE[0], 3)
+    assert (first == same).all()
+    assert 0 < changed(first, middle) < changed(first, last)
+    (alone,) = pictures(shoot, [18])
+    assert (alone == middle).all()
+
+
+def test_steps_of_nobodys_run_take_none_of_its_time(
+    shoot: Shoot, overhead: CellConfig, tmp_path: Path
+) -> None:
+    (last,) = pictures(shoot, [STEPS])
+    earlier, same = pictures(swing(overhead, tmp_path / "whole", idle=0), [STEPS - 8, STEPS])
+    assert changed(last, same) * 4 < changed(last, earlier)
+
+
+def test_the_floor_is_not_in_the_picture(shoot: Shoot) -> None:
+    (image,) = pictures(shoot, [0])
+    assert np.abs(image[0].astype(int) - SKY).max() <= 1
+    assert np.abs(image[-1, -1].astype(int) - GROUND).max() <= 1
+
+
+def test_several_processes_take_the_same_pictures_in_the_same_order(
+    shoot: Shoot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "BLOCK", 4)
+    steps = [0, 3, 6, 9, 12, 15, 24, 30, STEPS]
+    with closing(shots(shoot, steps, workers=2)) as taken:
+        together = list(taken)
+    for here, there in zip(pictures(shoot, steps), together, strict=True):
+        assert (here == there).all()
