@@ -1,0 +1,32 @@
+"""One short run on a simulated cell, filmed by many tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from executive.discovery import discover
+from executive.mission.load import load_mission
+from executive.record.recorded_run import recorded_run
+from executive.record.run_directory import RunDirectory
+from executive.testing.oracle import oracle_cell
+
+MISSION = """\
+mission: bring_one
+description: Bring one object.
+cell: cells/overhead.yaml
+routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}
+tree: [MoveToScan, Detect, Localize, SelectTarget, Approach, Grasp, Transit, Release]
+"""
+
+
+@pytest.fixture(scope="session")
+def filmed_run(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
+    """The directory of a run that brings one object; nobody is to write into it."""
+    folder = tmp_path_factory.mktemp("run")
+    (folder / "bring_one.yaml").write_text(MISSION)
+    skills = discover()
+    loaded = load_mission(folder / "bring_one.yaml", skills)
+    result = recorded_run(loaded, skills, seed=5, runs=folder / "runs", kind=oracle_cell())
+    return RunDirectory(Path(result["run"]))

@@ -1,0 +1,100 @@
+"""The file a film is in: what it may be called, when it is there, and what is in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from PIL import Image, ImageDraw
+
+from executive.errors import InputError
+from executive.view.film.encoder import GIF_SIZE, write_gif, write_mp4
+from executive.view.film.formats import GIF, MP4, format_of
+from executive.view.film.ink import BACK, SUCCESS
+from executive.view.film.place import file_for
+
+
+@pytest.fixture
+def frames() -> list[Image.Image]:
+    """Twelve frames on which something moves, and that end in another colour."""
+    made = []
+    for number in range(12):
+        frame = Image.new("RGB", (1280, 720), BACK)
+        ImageDraw.Draw(frame).rectangle((40 * number, 300, 40 * number + 60, 360), "#c02020")
+        made.append(frame)
+    ImageDraw.Draw(made[-1]).rectangle((900, 100, 1200, 500), SUCCESS)
+    return made
+
+
+def test_an_mp4_is_h264_that_everything_plays(frames: list[Image.Image], tmp_path: Path) -> None:
+    write_mp4(tmp_path / "x", iter(frames), 25.0)
+    with av.open(str(tmp_path / "x")) as container:
+        (stream,) = container.streams
+        assert stream.codec_context.name == "h264"
+        assert stream.codec_context.pix_fmt == "yuv420p"
+        assert stream.average_rate == 25
+        decoded = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+    assert len(decoded) == len(frames)
+    for frame, original in zip(decoded, frames, strict=True):
+        assert np.abs(frame.astype(int) - np.asarray(original)).mean() < 3
+
+
+def test_a_gif_goes_round_and_keeps_its_colours_to_the_end(frames: list[Image.Image], tmp_path: Path) -> None:
+    write_gif(tmp_path / "x", iter(frames), 10.0)
+    with Image.open(tmp_path / "x") as gif:
+        assert (gif.n_frames, gif.size, gif.info["loop"], gif.info["duration"]) == (12, GIF_SIZE, 0, 100)
+        gif.seek(11)
+        last = np.asarray(gif.convert("RGB")).astype(int)
+    assert np.abs(last[225, 790] - np.asarray(Image.new("RGB", (1, 1), SUCCESS))[0, 0]).max() < 10
+    assert np.abs(last[248, 352] - (0xC0, 0x20, 0x20)).max() < 10
+
+
+@pytest.mark.parametrize(
+    ("out", "gif", "found"),
+    [(None, False, MP4), (None, True, GIF), (Path("a.mp4"), False, MP4), (Path("a.GIF"), False, GIF)],
+)
+def test_the_name_says_what_a_film_is(out: Path | None, gif: bool, found: object) -> None:
+    assert format_of(out, gif) is found
+
+
+@pytest.mark.parametrize(
+    ("out", "gif", "sentence"),
+    [
+        ("a.mp4", True, '"a.mp4" is no name for a GIF; end it in .gif, or leave out --gif'),
+        ("a.avi", False, '"a.avi" is no name for a film; end it in .mp4 or .gif'),
+    ],
+)
+def test_another_name_is_refused(out: str, gif: bool, sentence: str) -> None:
+    with pytest.raises(InputError) as refused:
+        format_of(Path(out), gif)
+    assert str(refused.value) == sentence
+
+
+def test_a_file_is_there_whole_or_as_it_was(tmp_path: Path) -> None:
+    out = tmp_path / "film.mp4"
+    with file_for(out, force=False) as part:
+        part.write_text("one")
+        assert not out.exists()
+    assert out.read_text() == "one"
+    with pytest.raises(InputError) as refused, file_for(out, force=False):
+        pytest.fail("it began")
+    assert (
+        str(refused.value)
+        == f'"{out}" is there already; name another file with -o, or write over it with --force'
+    )
+    with pytest.raises(KeyboardInterrupt), file_for(out, force=True) as part:
+        part.write_text("half")
+        raise KeyboardInterrupt
+    assert [file.name for file in tmp_path.iterdir()] == ["film.mp4"]
+    assert out.read_text() == "one"
+
+
+def test_a_place_that_takes_nothing_is_told_before_anything_is_drawn(tmp_path: Path) -> None:
+    out = tmp_path / "nowhere" / "film.mp4"
+    with pytest.raises(InputError) as refused, file_for(out, force=False):
+        pytest.fail("it began")
+    assert str(refused.value) == (
+        f'cannot write the film "{out}": no such file or directory; name another place with -o'
+    )

@@ -1,0 +1,130 @@
+"""A whole film: what it is made from, and that picture and tree are in step."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from executive.errors import InputError
+from executive.record.journal import read_journal
+from executive.record.run_directory import RunDirectory
+from executive.sim.beginning import first_world
+from executive.sim.command_log import STEP, read_commands
+from executive.sim.rebuild import Rebuilding
+from executive.sim.shots import steps_in
+from executive.sim.tool import SuctionTool
+from executive.view.film.course import Course
+from executive.view.film.film import film
+from executive.view.film.formats import MP4
+from executive.view.film.source import Source
+
+MP4_HELD = 50
+"""Frames for which the end of an MP4 is shown."""
+
+
+@pytest.fixture
+def copy(filmed_run: RunDirectory, tmp_path: Path) -> RunDirectory:
+    """A copy of the run's directory, to take something away from."""
+    return RunDirectory(Path(shutil.copytree(filmed_run.path, tmp_path / "copy")))
+
+
+def test_a_run_becomes_a_film(filmed_run: RunDirectory, tmp_path: Path) -> None:
+    told: list[tuple[int, int]] = []
+    source = Source.of(filmed_run)
+    frames = film(
+        source, tmp_path / "film", MP4, speed=12.0, workers=1, progress=lambda *done: told.append(done)
+    )
+    with av.open(str(tmp_path / "film")) as container:
+        images = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+    assert len(images) == frames
+    assert told == [(done, frames) for done in range(1, frames + 1)]
+    assert images[0].shape == (720, 1280, 3)
+    # The end stands still; before it the robot moved and the tree ran.
+    assert np.abs(images[-1].astype(int) - images[-2]).mean() < 0.5
+    # Over the last picture stands how it ended.
+    card = np.s_[560:700, 560:780]
+    assert np.abs(images[-1][card].astype(int) - images[-MP4_HELD - 1][card]).mean() > 30
+    half = images[(frames - MP4_HELD) // 2]
+    for part in (np.s_[:, :800], np.s_[120:500, 820:]):
+        assert (np.abs(images[0][part].astype(int) - half[part]).max(axis=2) > 60).sum() > 500
+
+
+def test_picture_and_tree_are_in_step(filmed_run: RunDirectory) -> None:
+    source = Source.of(filmed_run)
+    entries = source.past.entries
+    (grasped,) = (e["tick"] for e in entries if e.get("node") == "tree/Grasp" and e["status"] == "SUCCESS")
+    (closed,) = (e["tick"] for e in entries if e["kind"] == "intent" and e["action"] == "close")
+    world = first_world(source.config, source.start["seed"])
+    tool = SuctionTool(world, source.config.tool)
+    rebuilding, holds = Rebuilding(world, tool), [False]
+    for command in read_commands(filmed_run.world):
+        rebuilding.do(command)
+        if command.kind == STEP:
+            holds.append(tool.holding)
+    world.close()
+    course = Course(entries, source.nodes, [])
+    course.go_to(grasped, 0.0)
+    assert course.status["tree/Grasp"] == "SUCCESS"
+    assert {row.item: row.state for row in course.items}[course.beside["tree/Grasp"]] == "held"
+    assert holds[grasped]
+    assert not any(holds[: closed + 1])
+    # The last thing that the journal tells of happened after the last step.
+    assert entries[-1]["tick"] == steps_in(filmed_run.world) == len(holds) - 1
+
+
+def test_the_source_is_the_record(filmed_run: RunDirectory) -> None:
+    source = Source.of(filmed_run)
+    assert (source.start["mission"], source.start["seed"]) == ("bring_one", 5)
+    assert (source.config.cell, source.nodes[0].path) == ("overhead", "tree")
+    assert (source.ending.status, source.items) == ("SUCCESS", 6)
+
+
+def test_a_run_that_was_cut_off_can_be_filmed(copy: RunDirectory) -> None:
+    copy.result.unlink()
+    lines = copy.journal.read_text().splitlines(keepends=True)
+    copy.journal.write_text("".join(lines[:-1]))
+    assert Source.of(copy).ending.status == "CUT OFF"
+    copy.result.write_text("{")
+    assert Source.of(copy).ending.status == "CUT OFF"
+    copy.result.write_text(json.dumps([]))
+    assert Source.of(copy).ending.status == "CUT OFF"
+
+
+def test_without_a_log_of_its_world_a_run_is_refused(copy: RunDirectory) -> None:
+    copy.world.write_text("{}")
+    with pytest.raises(InputError) as refused:
+        Source.of(copy)
+    assert str(refused.value) == (
+        f'the run in "{copy.path}" cannot be filmed: its cell has no simulated world to look at; '
+        "film a run on a cell of `kind: sim`"
+    )
+    copy.world.unlink()
+    with pytest.raises(InputError) as refused:
+        Source.of(copy)
+    assert str(refused.value) == (
+        f'the run in "{copy.path}" cannot be filmed: it has no world.log, from which its world is rebuilt; '
+        "sweeps keep none. Run the mission once more with `executive run` and the same seed, "
+        "and film that run"
+    )
+
+
+@pytest.mark.parametrize(
+    ("broken", "sentence"),
+    [
+        ("tree.json", 'cannot read the tree "'),
+        ("cell.yaml", "holds no cell that can be read"),
+        ("journal.jsonl", "had not begun when it was cut off; there is nothing to film"),
+    ],
+)
+def test_a_record_that_lacks_a_part_is_refused(copy: RunDirectory, broken: str, sentence: str) -> None:
+    (copy.path / broken).unlink()
+    if broken == "journal.jsonl":
+        (copy.path / broken).touch()
+        assert read_journal(copy.journal) == []
+    with pytest.raises(InputError, match=sentence):
+        Source.of(copy)
