@@ -1,0 +1,60 @@
+"""`executive film`: a recorded run as a film, the tree beside the robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from executive.cli.options import json_option, runs_option, workers_option
+from executive.cli.output import print_json, stdout_kept_clean
+from executive.cli.progress import bar
+
+
+@click.command(name="film")
+@click.argument("run", metavar="RUN")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+    help="The file to write, .mp4 or .gif; by default film.mp4 in the run directory.",
+)  # fmt: skip
+@click.option("--gif", is_flag=True, help="Make an animated GIF, as a README shows it.")
+@click.option(
+    "--speed", type=click.FloatRange(0.1, 100),
+    help="Seconds on the robot's clock per second of the film; by default 1, of a GIF 2.",
+)  # fmt: skip
+@click.option("--force", is_flag=True, help="Write over a file that is there.")
+@click.option("--quiet", is_flag=True, help="Show no progress.")
+@workers_option
+@runs_option
+@json_option
+def command(
+    run: str, output: Path | None, gif: bool, speed: float | None, force: bool, quiet: bool, workers: int,
+    runs: Path, as_json: bool,
+) -> None:  # fmt: skip
+    """Film RUN (a run directory, or `latest`): the robot at work, beside it the tree and every item.
+
+    The world is rebuilt from the run's world.log and looked at again, so this works for every run on a
+    simulated cell, also one that was halted, cut off or taken up again. Needs no display.
+    """
+    with stdout_kept_clean():
+        from executive.record.find_run import find_run
+        from executive.record.run_directory import RunDirectory
+        from executive.view.film.film import film
+        from executive.view.film.formats import format_of
+        from executive.view.film.place import file_for
+        from executive.view.film.source import Source
+
+        directory = RunDirectory(find_run(run, runs))
+        format = format_of(output, gif)
+        file = output or directory.path / f"film{format.suffix}"
+        source = Source.of(directory)
+        with file_for(file, force=force) as part, bar("frames", quiet=quiet) as progress:
+            frames = film(
+                source, part, format, speed=speed or format.speed, workers=workers, progress=progress
+            )
+        made = {
+            "file": str(file), "frames": frames, "seconds": frames / format.rate, "size": file.stat().st_size
+        }  # fmt: skip
+        click.echo(f"{file}: {made['seconds']:.1f} s, {file.stat().st_size / 1e6:.1f} MB", err=True)
+    if as_json:
+        print_json(made)

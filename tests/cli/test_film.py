@@ -1,0 +1,96 @@
+"""`executive film`, by the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from click.testing import CliRunner
+
+from executive.cli.main import main
+
+
+def invoke(*words: str):
+    return CliRunner().invoke(main, words)
+
+
+@pytest.fixture
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A run directory that counts as one that can be filmed; its films are made at once."""
+    path = tmp_path / "runs" / "2026-11-22" / "10-00-00_sort_s5"
+    path.mkdir(parents=True)
+    (path / "journal.jsonl").touch()
+    (tmp_path / "runs" / "latest").symlink_to(path)
+
+    def film(source, file, format, *, speed, workers, progress):
+        file.write_text(f"{source.directory.path.name} {format.suffix} {speed:g} {workers}")
+        progress(30, 30)
+        return 30
+
+    monkeypatch.setattr(
+        "executive.view.film.source.Source.of", lambda directory: SimpleNamespace(directory=directory)
+    )
+    monkeypatch.setattr("executive.view.film.film.film", film)
+    return path
+
+
+def test_a_film_is_made_where_it_was_wanted(run: Path, tmp_path: Path) -> None:
+    out = tmp_path / "a.mp4"
+    done = invoke("film", "latest", "--runs", str(run.parents[1]), "-o", str(out), "--json", "--workers", "3")
+    assert done.exit_code == 0, done.output
+    assert out.read_text() == "10-00-00_sort_s5 .mp4 1 3"
+    told = json.loads(done.stdout)
+    assert told == {"file": str(out), "frames": 30, "seconds": 1.2, "size": out.stat().st_size}
+    assert f"{out}: 1.2 s, 0.0 MB" in done.stderr.replace("\n", "")
+
+
+def test_a_gif_goes_twice_as_fast_unless_told_otherwise(run: Path, tmp_path: Path) -> None:
+    assert invoke("film", str(run), "-o", str(tmp_path / "a.gif"), "--quiet").exit_code == 0
+    assert (tmp_path / "a.gif").read_text() == "10-00-00_sort_s5 .gif 2 2"
+    assert invoke("film", str(run), "-o", str(tmp_path / "b.gif"), "--speed", "1.5").exit_code == 0
+    assert (tmp_path / "b.gif").read_text() == "10-00-00_sort_s5 .gif 1.5 2"
+
+
+def test_a_film_without_a_name_is_in_the_run_directory(run: Path) -> None:
+    assert invoke("film", str(run)).exit_code == 0
+    assert invoke("film", str(run), "--gif").exit_code == 0
+    assert {"film.mp4", "film.gif"} <= {file.name for file in run.iterdir()}
+
+
+def test_nothing_is_written_over_unless_that_is_wanted(run: Path) -> None:
+    (run / "film.mp4").write_text("mine")
+    refused = invoke("film", str(run))
+    assert refused.exit_code == 2
+    assert refused.stderr.endswith(
+        "is there already; name another file with -o, or write over it with --force\n"
+    )
+    assert (run / "film.mp4").read_text() == "mine"
+    assert invoke("film", str(run), "--force").exit_code == 0
+    assert (run / "film.mp4").read_text() != "mine"
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("-o", "a.mp4", "--gif"), '"a.mp4" is no name for a GIF'),
+        (("-o", "a.webm"), '"a.webm" is no name for a film'),
+        (("-o", "/nowhere/a.mp4"), 'cannot write the film "/nowhere/a.mp4": no such file or directory'),
+        (("--speed", "0"), "0.1<=x<=100"),
+    ],
+)
+def test_what_makes_no_film_is_refused(run: Path, words: tuple[str, ...], sentence: str) -> None:
+    refused = invoke("film", str(run), *words)
+    assert refused.exit_code == 2
+    assert sentence in refused.stderr
+
+
+def test_a_run_on_a_cell_that_is_not_simulated_is_refused(tmp_path: Path) -> None:
+    runs = ("--runs", str(tmp_path))
+    assert invoke("run", "sort_fruit", "--seed", "4", "--quiet", *runs).exit_code == 0
+    refused = invoke("film", "latest", *runs, "-o", str(tmp_path / "a.mp4"))
+    assert refused.exit_code == 2
+    assert "its cell has no simulated world to look at; film a run on a cell of `kind: sim`" in refused.stderr
+    assert not (tmp_path / "a.mp4").exists()
+    assert invoke("film", "nowhere", *runs).exit_code == 2
