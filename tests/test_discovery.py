@@ -20,13 +20,14 @@ HEAD = "from executive.skill import Out, Skill, param\n\n\n"
 def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Install:
     """Make a module the only one that registers skills, under these names."""
     monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.chdir(tmp_path)
 
     def install(module: str, text: str, **entries: str) -> None:
         (tmp_path / f"{module}.py").write_text(text)
         points = [
             EntryPoint(name, f"{module}:{value}", "executive.skills") for name, value in entries.items()
         ]
-        monkeypatch.setattr("executive.discovery.entry_points", lambda group: points)
+        monkeypatch.setattr("executive.entry_points.entry_points", lambda group: points)
 
     return install
 

@@ -1,9 +1,8 @@
-"""Finding the installed kinds of work cells."""
+"""Finding the kinds of work cells that there are."""
 
 from __future__ import annotations
 
-from importlib.metadata import entry_points
-
+from executive.entry_points import registered
 from executive.errors import InputError
 from executive.workcell import CellKind
 
@@ -14,9 +13,9 @@ def cell_kind(name: str) -> CellKind:
     """Return the class that makes cells of a kind.
 
     Raises:
-        InputError: No installed package offers this kind.
+        InputError: No package offers this kind, or it cannot be loaded.
     """
-    entries = {entry.name: entry for entry in entry_points(group=GROUP)}
+    entries = registered(GROUP, "kind of cell")
     if name not in entries:
         raise InputError(
             f'no installed package offers cells of kind "{name}"; '

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
 from executive.cell import Clock
 from executive.cell_config import CameraConfig, DetectorConfig
+from executive.entry_points import Entry, registered
 from executive.errors import InputError
 from executive.vision.detectors.setting import ClosableDetector, Setting
 from executive.workcell import KeyPath
@@ -16,9 +16,9 @@ from executive.workcell import KeyPath
 GROUP = "executive.detectors"
 
 
-def installed() -> dict[str, EntryPoint]:
-    """Return the installed kinds of detectors by name."""
-    return {entry.name: entry for entry in entry_points(group=GROUP)}
+def installed() -> dict[str, Entry]:
+    """Return the kinds of detectors by name."""
+    return registered(GROUP, "kind of detector")
 
 
 def build_detectors(
@@ -99,7 +99,7 @@ def labels_of(name: str, configs: Mapping[str, DetectorConfig], base: Path) -> t
 
 
 def _offered(
-    kind: EntryPoint, method: str
+    kind: Entry, method: str
 ) -> Callable[[DetectorConfig, Path, Mapping[str, DetectorConfig]], Any] | None:
     """Return a static method that a kind of detector may have, or None where it has not."""
     found: Callable[[DetectorConfig, Path, Mapping[str, DetectorConfig]], Any] | None = getattr(
@@ -108,7 +108,7 @@ def _offered(
     return found
 
 
-def _not_installed(name: str, kind: str, kinds: Mapping[str, EntryPoint]) -> str:
+def _not_installed(name: str, kind: str, kinds: Mapping[str, Entry]) -> str:
     return (
         f'detector "{name}" is of kind "{kind}", which is not installed; '
         f"installed: {', '.join(sorted(kinds)) or 'none'}"

@@ -1,0 +1,116 @@
+"""The project in whose folder one works: which it is, and what is said of one that is wrong."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from executive.errors import InputError
+from executive.project import project_here
+
+Write = Callable[[str], Path]
+
+SKILLS = '[project.entry-points."executive.skills"]\n'
+
+
+@pytest.fixture
+def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
+    """Write the pyproject.toml of the working directory and return its path."""
+    monkeypatch.chdir(tmp_path)
+
+    def write(text: str) -> Path:
+        file = tmp_path / "pyproject.toml"
+        file.write_text(text)
+        return file
+
+    return write
+
+
+def registers(group: str = "executive.skills") -> dict[str, str]:
+    project = project_here()
+    assert project is not None
+    return project.registers(group)
+
+
+def test_it_says_what_it_registers(write: Write) -> None:
+    file = write(f'[project]\nname = "Blue-Table"\n{SKILLS}Wave = "blue.wave:Wave"\n')
+    project = project_here()
+    assert project is not None
+    assert (project.file, project.name) == (file, "Blue-Table")
+    assert project.registers("executive.skills") == {"Wave": "blue.wave:Wave"}
+    assert project.registers("executive.cells") == {}
+
+
+@pytest.mark.parametrize("text", ["", "[tool.ruff]\n", '[project]\nname = "blue"\n'])
+def test_one_that_has_nothing_to_do_with_the_executive_registers_nothing(write: Write, text: str) -> None:
+    write(text)
+    assert registers() == {}
+
+
+def test_it_is_that_of_the_nearest_file_upwards(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = write("")
+    folder = file.parent / "inner" / "missions"
+    folder.mkdir(parents=True)
+    monkeypatch.chdir(folder)
+    assert (found := project_here()) is not None and found.file == file
+    nearer = folder.parent / "pyproject.toml"
+    nearer.write_text("")
+    assert (found := project_here()) is not None and found.file == nearer
+
+
+@pytest.mark.parametrize(("mode", "counts"), [(0o1777, False), (0o777, True), (0o755, True)])
+def test_a_file_in_a_folder_that_is_everybodys_does_not_count(write: Write, mode: int, counts: bool) -> None:
+    file = write("")
+    file.parent.chmod(mode)
+    found = project_here()
+    assert (found is not None and found.file == file) == counts
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[project\n", "is no TOML: Expected ']' at the end of a table declaration (at line 1, column 9); "
+         "mend it: it says what the project registers"),
+        ("project = 3\n", ": project is no table; begin it with a line [project]"),
+        ("[project]\nentry-points = 3\n",
+         ': [project.entry-points."executive.skills"] is no table; write lines as '
+         'Wave = "my_package.wave:Wave" below it'),
+        ('[project.entry-points]\n"executive.skills" = ["a:B"]\n',
+         ': [project.entry-points."executive.skills"] is no table; write lines as '
+         'Wave = "my_package.wave:Wave" below it'),
+        (f'{SKILLS}Wave = "blue.wave"\n',
+         ': [project.entry-points."executive.skills"]: "Wave" names no class: \'blue.wave\'; write it as '
+         'Wave = "my_package.wave:Wave"'),
+        (f"{SKILLS}Wave = 3\n",
+         ': [project.entry-points."executive.skills"]: "Wave" names no class: 3; write it as '
+         'Wave = "my_package.wave:Wave"'),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said_with_the_file(write: Write, text: str, says: str) -> None:
+    file = write(text)
+    with pytest.raises(InputError, match=f"^{re.escape(str(file))}.?{re.escape(says)}$"):
+        registers()
+
+
+def test_a_file_that_is_no_text_is_refused(write: Write) -> None:
+    file = write("")
+    file.write_bytes(b'name = "\xff"')
+    with pytest.raises(InputError, match=f"^{re.escape(str(file))} is not UTF-8 text: byte 8 does not fit$"):
+        project_here()
+
+
+def test_a_file_that_cannot_be_read_is_refused(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = write("")
+
+    def locked(path: Path) -> bytes:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "read_bytes", locked)
+    with pytest.raises(InputError) as caught:
+        project_here()
+    assert str(caught.value) == (
+        f"{file} cannot be read: Permission denied; what the project registers stands there"
+    )
