@@ -22,7 +22,7 @@ BAD_INPUT, BROKEN, INTERRUPTED = 2, 3, 130
 
 COMMANDS = (
     "run", "check", "tree", "skills", "schema", "dataset", "train", "evaluate", "bench", "sweep", "faults",
-    "replay", "report", "film", "doctor",
+    "replay", "report", "film", "doctor", "init",
 )  # fmt: skip
 """Every command, each in the module of its name, in the order in which `--help` lists them."""
 

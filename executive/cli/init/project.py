@@ -1,0 +1,62 @@
+"""The files of a new project, made from the template beside this file."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path, PurePosixPath
+
+from jinja2 import Environment, StrictUndefined
+
+from executive.errors import InputError
+
+TEMPLATE = Path(__file__).parent / "template"
+SUFFIX = ".jinja"
+"""Ends the name of every file of the template, so that nothing takes it for code of this project."""
+PACKAGE = "package"
+"""The template's folder that gets the package's name."""
+MISSION = "sort.yaml"
+
+
+def write_project(folder: Path, package: str) -> list[str]:
+    """Fill an empty or new folder with a project whose package has this name; return the files' paths.
+
+    Raises:
+        InputError: The folder holds something, is a file, or cannot be written to.
+    """
+    _require_empty(folder)
+    # Code and YAML, not HTML: nothing is escaped.
+    environment = Environment(autoescape=False, undefined=StrictUndefined, keep_trailing_newline=True)
+    files = {
+        _place(file, package): environment.from_string(file.read_text(encoding="utf-8")).render(name=package)
+        for file in sorted(TEMPLATE.rglob(f"*{SUFFIX}"))
+    }
+    try:
+        for place, text in files.items():
+            path = folder / place
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(
+            f"{error.filename or folder} cannot be written: {error.strerror}; name a folder that can"
+        ) from None
+    return list(files)
+
+
+def _require_empty(folder: Path) -> None:
+    """Return if nothing can be overwritten in a folder, or beside what somebody keeps there."""
+    if not folder.exists():
+        return
+    if not folder.is_dir():
+        raise InputError(f'"{folder}" is a file; name a folder that is empty, or not there yet')
+    held = sorted(os.listdir(folder))
+    if held:
+        raise InputError(
+            f'the folder "{folder}" is not empty: it holds {held[0]}'
+            f"{f' and {len(held) - 1} more' if held[1:] else ''}; name one that is empty, or not there yet"
+        )
+
+
+def _place(file: Path, package: str) -> str:
+    """Return where in the project a file of the template belongs."""
+    parts = file.relative_to(TEMPLATE).with_suffix("").parts
+    return str(PurePosixPath(*(package if part == PACKAGE else part for part in parts)))

@@ -1,0 +1,151 @@
+"""`executive init`: a new project in which everything works, and what it refuses to overwrite."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from executive.cli.init.project import TEMPLATE, write_project
+from executive.cli.main import main
+
+FILES = [
+    ".gitignore", "README.md", "cells/table.yaml", "hall/__init__.py", "hall/check_seal.py", "pyproject.toml",
+    "sort.yaml", "tests/test_check_seal.py",
+]  # fmt: skip
+BIN = Path(sys.executable).parent
+
+
+def init(*words: str) -> Result:
+    return CliRunner().invoke(main, ["init", *words])
+
+
+def called(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Call a command as a shell in a folder does, without what pytest tells its children."""
+    inner = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
+    return subprocess.run(
+        [str(BIN / words[0]), *words[1:]], cwd=folder, env=inner, capture_output=True, text=True, check=False
+    )
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def test_it_says_what_is_there_now_and_what_to_type() -> None:
+    result = init("hall")
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert result.stdout.splitlines() == [
+        f"hall: {', '.join(FILES)}",
+        f"Type, after `. {BIN}/activate`:",
+        "  cd hall && executive run sort.yaml",
+        "  pytest",
+    ]
+    assert (
+        sorted(str(path.relative_to("hall")) for path in Path("hall").rglob("*") if path.is_file()) == FILES
+    )
+
+
+def test_in_an_empty_working_directory_nothing_needs_to_be_entered(monkeypatch: pytest.MonkeyPatch) -> None:
+    Path("hall").mkdir()
+    monkeypatch.chdir("hall")
+    result = init(".")
+    assert result.exit_code == 0
+    assert "  executive run sort.yaml" in result.stdout.splitlines()
+    assert Path("hall/check_seal.py").is_file()
+
+
+def test_the_package_may_be_called_otherwise() -> None:
+    result = init("The hall!", "--name", "hall")
+    assert "  cd 'The hall!' && executive run sort.yaml" in result.stdout.splitlines()
+    assert Path("The hall!/hall/check_seal.py").is_file()
+    assert 'CheckSeal = "hall.check_seal:CheckSeal"' in Path("The hall!/pyproject.toml").read_text()
+
+
+def test_a_bad_name_leaves_nothing_behind() -> None:
+    result = init("random")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert "standard library; give another name with --name" in result.stderr
+    assert not Path("random").exists()
+
+
+@pytest.mark.parametrize(("held", "told"), [(["notes"], "notes"), ([".git", "a", "b"], ".git and 2 more")])
+def test_a_folder_that_holds_anything_is_refused(held: list[str], told: str) -> None:
+    Path("hall").mkdir()
+    for name in held:
+        Path("hall", name).write_text("mine")
+    result = init("hall")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert result.stderr == (
+        f'the folder "hall" is not empty: it holds {told}; name one that is empty, or not there yet\n'
+    )
+    assert sorted(os.listdir("hall")) == held
+
+
+def test_a_file_is_refused() -> None:
+    Path("hall").write_text("mine")
+    result = init("hall")
+    assert result.exit_code == 2
+    assert result.stderr == '"hall" is a file; name a folder that is empty, or not there yet\n'
+
+
+def test_a_place_that_cannot_be_written_is_refused() -> None:
+    Path("notes").write_text("mine")
+    result = init("notes/hall")
+    assert result.exit_code == 2
+    assert result.stderr == "notes/hall cannot be written: Not a directory; name a folder that can\n"
+
+
+def test_nothing_of_the_template_is_left_unsaid() -> None:
+    write_project(Path("hall"), "hall")
+    assert all(file.suffix == ".jinja" for file in TEMPLATE.rglob("*") if file.is_file())
+    assert all("{{" not in Path("hall", name).read_text() for name in FILES)
+    assert len(Path("hall/README.md").read_text().splitlines()) <= 60
+
+
+def test_its_code_is_as_tidy_as_this_project(missions: Path) -> None:
+    write_project(Path("hall"), "hall")
+    config = missions.parent / "pyproject.toml"
+    linted = called("ruff", "check", "--config", str(config), "hall", folder=Path("hall"))
+    assert linted.returncode == 0, linted.stdout
+    formatted = called("ruff", "format", "--check", "--config", str(config), ".", folder=Path("hall"))
+    assert formatted.returncode == 0, formatted.stdout
+
+
+def test_everything_works_at_once_and_its_tests_find_a_broken_skill() -> None:
+    made = called("executive", "init", "hall", folder=Path())
+    assert made.returncode == 0, made.stderr
+    hall = Path("hall")
+    run = called("executive", "run", "sort.yaml", folder=hall)
+    assert run.returncode == 0, run.stderr
+    assert "SUCCESS" in run.stderr and "CheckSeal [" in run.stderr
+    tests = called("pytest", "-q", folder=hall)
+    assert tests.returncode == 0, tests.stdout
+    skill = hall / "hall" / "check_seal.py"
+    skill.write_text(skill.read_text().replace("bears < self.least", "bears > self.least"))
+    tests = called("pytest", "-q", folder=hall)
+    assert tests.returncode == 1
+    assert re.search(r"^FAILED .*::test_what_is_held_badly_is_let_go", tests.stdout, re.MULTILINE)
+
+
+def test_processes_that_work_for_a_command_find_its_skill_too() -> None:
+    write_project(Path("hall"), "hall")
+    hall, fake = Path("hall"), ("--set", "cell.kind=fake")
+    swept = called("executive", "sweep", "sort.yaml", "--seeds", "0-1", *fake, folder=hall)
+    assert (swept.returncode, "2 of 2 runs succeeded" in swept.stderr) == (0, True), swept.stderr
+    tried = called("executive", "faults", "sort.yaml", "--pairs", "2", *fake, folder=hall)
+    assert (tried.returncode, "2 runs with pairs of faults" in tried.stdout) == (0, True), (
+        tried.stdout + tried.stderr
+    )
+
+
+def test_the_mission_is_checked_from_its_folder_and_below() -> None:
+    write_project(Path("hall"), "hall")
+    below = called("executive", "check", "../sort.yaml", folder=Path("hall/cells"))
+    assert below.returncode == 0, below.stderr
