@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import platform
 import re
+import sys
 from collections.abc import Mapping
 from importlib import metadata
 from types import MappingProxyType
@@ -23,8 +24,8 @@ def versions() -> Mapping[str, str]:
     return MappingProxyType(found)
 
 
-def required() -> tuple[str, ...]:
-    """Return the packages that this project asks for by name on this Python, extras left out.
+def required(extra: str = "") -> tuple[str, ...]:
+    """Return the packages that this project asks for by name on this Python, or those that an extra adds.
 
     None where it is not installed itself.
     """
@@ -32,8 +33,17 @@ def required() -> tuple[str, ...]:
         asked = metadata.requires(ITSELF) or []
     except metadata.PackageNotFoundError:
         return ()
-    plain = (line for line in asked if "extra ==" not in line and "python_version <" not in line)
-    return tuple(re.split(r"[^A-Za-z0-9._-]", line, maxsplit=1)[0] for line in plain)
+    return tuple(re.split(r"[^A-Za-z0-9._-]", line, maxsplit=1)[0] for line in asked if _wanted(line, extra))
+
+
+def _wanted(line: str, extra: str) -> bool:
+    """Tell whether a line of the metadata asks for something on this Python, for an extra or for none."""
+    marker = line.partition(";")[2].replace('"', "'")
+    of = re.search(r"extra == '([^']+)'", marker)
+    older = re.search(r"python_version < '(\d+)\.(\d+)'", marker)
+    if older is not None and sys.version_info[:2] >= tuple(map(int, older.groups())):
+        return False
+    return (of[1] if of is not None else "") == extra
 
 
 def installed(name: str) -> str:

@@ -21,3 +21,15 @@ def test_extras_are_not_asked_for():
 
 def test_what_is_not_installed_has_no_version():
     assert installed("a-package-that-nobody-wrote") == ""
+
+
+def test_what_an_extra_adds_is_told_apart():
+    assert set(required("view")) == {"viser", "aiohttp", "trimesh"}
+    assert "torch" in required("train")
+    assert not {"torch", "pybullet"} & set(required("view"))
+    assert required("nothing") == ()
+
+
+def test_what_only_an_older_python_needs_is_asked_for_there(monkeypatch):
+    monkeypatch.setattr("sys.version_info", (3, 10, 0))
+    assert "tomli" in required()
