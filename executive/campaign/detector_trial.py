@@ -24,7 +24,7 @@ from executive.vision.evaluation.figures import Evaluation
 from executive.vision.evaluation.misses import WorstMisses
 from executive.vision.evaluation.model_file import FLOOR, NAME, model_detector
 from executive.vision.localization.build import build_localizer
-from executive.vision.samples import LabelledImage, read_samples
+from executive.vision.samples import LabelledImage, count_samples, read_samples
 
 Progress = Callable[[str], AbstractContextManager[Callable[[int, int], None]]]
 """Opens a progress bar of a name, which is told (done, all)."""
@@ -132,7 +132,7 @@ def measure(
     """Return how good a detector is on the dataset or, without one, on scenes of its cell."""
     config = subject.cell
     in_run = config is not None and scenes.as_run
-    with _images(subject, dataset, scenes, progress) as samples, only_cores(cores):
+    with _images(subject, dataset, scenes, progress) as (samples, count), only_cores(cores):
         asked = CellDetector(
             subject.configs,
             subject.name,
@@ -143,25 +143,27 @@ def measure(
         )
         with contextlib.closing(asked):
             localizer = _localizer(config) if config and in_run else None
-            return evaluate(asked, samples, threshold=threshold, localizer=localizer, worst=worst)
+            with progress(f"asking {subject.name}") as told:
+                counted = _counted(samples, count, told)
+                return evaluate(asked, counted, threshold=threshold, localizer=localizer, worst=worst)
 
 
 @contextlib.contextmanager
 def _images(
     subject: Subject, dataset: Path | None, scenes: Scenes, progress: Progress
-) -> Iterator[Iterator[LabelledImage]]:
-    """Provide the images that a detector is measured on."""
+) -> Iterator[tuple[Iterator[LabelledImage], int]]:
+    """Provide the images that a detector is measured on, and how many they are."""
     config = subject.cell
     if dataset is not None or config is None:
         assert dataset is not None
-        yield read_samples(dataset)
+        yield read_samples(dataset), count_samples(dataset)
         return
     if scenes.as_run:
         with progress(f"rendering {config.cell}") as told:
             frames = run_frames(
                 config, images=scenes.images, seed=scenes.seed, workers=scenes.workers, progress=told
             )
-        yield iter(frames)
+        yield iter(frames), scenes.images
         return
     with tempfile.TemporaryDirectory() as folder:
         with progress(f"rendering {config.cell}") as told:
@@ -169,7 +171,16 @@ def _images(
                 {config.cell: config}, Path(folder), images=scenes.images, seed=scenes.seed, layout="coco",
                 workers=scenes.workers, valid=1.0, progress=told,
             )  # fmt: skip
-        yield read_samples(Path(folder))
+        yield read_samples(Path(folder)), scenes.images
+
+
+def _counted(
+    samples: Iterator[LabelledImage], count: int, told: Callable[[int, int], None]
+) -> Iterator[LabelledImage]:
+    """Yield the images, and tell after each that so many of so many are done."""
+    for done, sample in enumerate(samples, 1):
+        yield sample
+        told(done, count)
 
 
 def _localizer(config: CellConfig) -> Localizer | None:

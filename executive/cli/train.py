@@ -34,11 +34,11 @@ def command(dataset: Path, out: Path, start: Path | None, epochs: int, seed: int
 
         if start == Path("embedded"):
             start = MODEL
-        with bar("training") as progress:
+        with bar("training") as batches:
+            train(dataset, out, start=start, epochs=epochs, seed=seed, progress=_tell, batches=batches)
 
-            def told(epoch: int, metrics: dict[str, float]) -> None:
-                progress(epoch, epochs)
-                figures = ", ".join(f"{name} {value:.4g}" for name, value in metrics.items())
-                click.echo(f"epoch {epoch}: {figures}", err=True)
 
-            train(dataset, out, start=start, epochs=epochs, seed=seed, progress=told)
+def _tell(epoch: int, metrics: dict[str, float]) -> None:
+    """Print the figures of an epoch."""
+    figures = ", ".join(f"{name} {value:.4g}" for name, value in metrics.items())
+    click.echo(f"epoch {epoch}: {figures}", err=True)

@@ -54,21 +54,49 @@ def read_samples(folder: Path) -> Iterator[LabelledImage]:
     Raises:
         InputError: There are none, or an image cannot be read.
     """
+    split = _split(folder)
+    yield from _read_coco(split) if _is_coco(split) else _read_yolo(split)
+
+
+def count_samples(folder: Path) -> int:
+    """Return how many labelled images `read_samples` yields.
+
+    Raises:
+        InputError: There are none.
+    """
+    split = _split(folder)
+    return len(_coco(split)["images"]) if _is_coco(split) else len(_yolo_images(split))
+
+
+def _split(folder: Path) -> Path:
+    """Return the folder in which the labelled images of a data set are, or of a split of one.
+
+    Raises:
+        InputError: There is none.
+    """
     for split in (folder, *(folder / name for name in SPLITS)):
-        if (split / ANNOTATIONS).is_file():
-            yield from _read_coco(split)
-            return
-        if (split / "images").is_dir() and (split / "labels").is_dir():
-            yield from _read_yolo(split)
-            return
+        if _is_coco(split) or ((split / "images").is_dir() and (split / "labels").is_dir()):
+            return split
     raise InputError(
         f"{folder} holds no labelled images: {ANNOTATIONS} (COCO) or images/ and labels/ (YOLO) were looked "
         f"for there and in {', '.join(SPLITS)}; make some with `executive dataset`"
     )
 
 
+def _is_coco(split: Path) -> bool:
+    return (split / ANNOTATIONS).is_file()
+
+
+def _coco(split: Path) -> dict[str, Any]:
+    return dict(json.loads((split / ANNOTATIONS).read_text(encoding="utf-8")))
+
+
+def _yolo_images(split: Path) -> list[Path]:
+    return [path for path in sorted((split / "images").iterdir()) if path.suffix.lower() in IMAGE_SUFFIXES]
+
+
 def _read_coco(split: Path) -> Iterator[LabelledImage]:
-    content = json.loads((split / ANNOTATIONS).read_text(encoding="utf-8"))
+    content = _coco(split)
     names = {category["id"]: category["name"] for category in content["categories"]}
     objects: dict[int, list[dict[str, Any]]] = {}
     for annotation in content["annotations"]:
@@ -84,9 +112,7 @@ def _read_coco(split: Path) -> Iterator[LabelledImage]:
 def _read_yolo(split: Path) -> Iterator[LabelledImage]:
     names = _yolo_names(split)
     aside = _Aside(split)
-    for path in sorted((split / "images").iterdir()):
-        if path.suffix.lower() not in IMAGE_SUFFIXES:
-            continue
+    for path in _yolo_images(split):
         image = read_image(path)
         height, width = image.shape[:2]
         text = split / "labels" / f"{path.stem}.txt"

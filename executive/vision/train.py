@@ -11,6 +11,7 @@ from executive.vision.evaluation.model_file import evaluate_folder
 from executive.vision.model_card import ModelCard, read_epochs
 
 Progress = Callable[[int, dict[str, float]], None]
+Batches = Callable[[int, int], None]
 
 CARD_THRESHOLD = 0.5
 """Confidence at which the card states precision and recall."""
@@ -24,6 +25,7 @@ def train(
     epochs: int = 20,
     seed: int = 0,
     progress: Progress = lambda _epoch, _metrics: None,
+    batches: Batches = lambda _done, _all: None,
 ) -> None:
     """Leave a trained model in `out`.
 
@@ -40,6 +42,7 @@ def train(
         epochs: Number of passes over the data.
         seed: Seed of weights, order and augmentation.
         progress: Called after every epoch with its number, from 1, and its figures.
+        batches: Called after every batch with how many of how many are done, all epochs together.
 
     Raises:
         InputError: The folder is no data set, `start` is missing or of another architecture, or the training
@@ -58,7 +61,7 @@ def train(
             f'training needs the package "{error.name}"; install the extra: uv sync --extra train'
         ) from error
     out.mkdir(parents=True, exist_ok=True)
-    fit(dataset, out, start=start, epochs=epochs, seed=seed, progress=progress)
+    fit(dataset, out, start=start, epochs=epochs, seed=seed, progress=progress, batches=batches)
     model, labels = out / "model.onnx", out / "labels.txt"
     export_onnx(out / "checkpoint_best_total.pth", len(read_labels(labels)), model, STORAGE)
     card = ModelCard(

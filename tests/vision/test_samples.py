@@ -7,7 +7,7 @@ import pytest
 
 from executive.errors import InputError
 from executive.vision.dataset import Entry, image_path, save_image, write_annotations
-from executive.vision.samples import read_samples
+from executive.vision.samples import count_samples, read_samples
 
 
 def write(root, layout):
@@ -37,6 +37,7 @@ def test_what_was_written_is_read(tmp_path, layout):
     assert sample.truth == {"camera": "overhead"}
     assert sample.image.shape == (64, 128, 3)
     assert sample.image[30, 60, 0] > 150 > 50 > sample.image[30, 60, 2]
+    assert count_samples(tmp_path) == 1
 
 
 def test_a_split_can_be_given_itself(tmp_path):
@@ -47,6 +48,8 @@ def test_a_split_can_be_given_itself(tmp_path):
 def test_a_folder_without_labels_is_refused_with_what_was_looked_for(tmp_path):
     with pytest.raises(InputError, match=r"no labelled images: _annotations\.coco\.json"):
         list(read_samples(tmp_path))
+    with pytest.raises(InputError, match=r"no labelled images: _annotations\.coco\.json"):
+        count_samples(tmp_path)
 
 
 def test_a_damaged_image_is_named(tmp_path):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib.util
+import sys
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -27,6 +29,28 @@ def test_training_without_the_extra_says_how_to_install_it(tmp_path):
     with pytest.raises(InputError, match='package "torch"; install the extra: uv sync --extra train'):
         train(tmp_path, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_a_training_tells_of_every_batch_and_of_every_epoch(monkeypatch):
+    lightning = ModuleType("pytorch_lightning")
+    lightning.Callback = object
+    monkeypatch.setitem(sys.modules, "pytorch_lightning", lightning)
+    # What is loaded with the stand-in is not to be found by anybody else.
+    monkeypatch.setitem(sys.modules, "executive.vision.training.report", None)
+    del sys.modules["executive.vision.training.report"]
+    from executive.vision.training.report import Report
+
+    told = []
+    report = Report(
+        lambda epoch, metrics: told.append((epoch, metrics)), lambda done, all: told.append((done, all))
+    )
+    trainer = SimpleNamespace(max_epochs=2, num_training_batches=3, callback_metrics={"loss": 1})
+    for trainer.current_epoch in range(2):
+        for batch in range(3):
+            report.on_train_batch_end(trainer, None, None, None, batch)
+        report.on_train_epoch_end(trainer, None)
+    one, two = (1, {"loss": 1.0}), (2, {"loss": 1.0})
+    assert told == [(1, 6), (2, 6), (3, 6), one, (4, 6), (5, 6), (6, 6), two]
 
 
 @pytest.mark.parametrize("element", range(8))

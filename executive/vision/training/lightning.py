@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import torch
-from pytorch_lightning import Callback
 from rfdetr.training import RFDETRDataModule, RFDETRModelModule
 from torch.nn.attention import SDPBackend, sdpa_kernel
 
 from executive.vision.training.symmetry import ELEMENTS, transform_boxes, transform_image
-
-Progress = Callable[[int, dict[str, float]], None]
-"""`progress(epoch, metrics)`: called after every epoch, from 1."""
 
 
 class SymmetricData(RFDETRDataModule):
@@ -63,18 +58,6 @@ class Model(RFDETRModelModule):
         loss = torch.stack([losses[name] * weights[name] for name in losses if name in weights]).sum()
         self.log("train/loss", loss, on_epoch=True, on_step=False, batch_size=len(targets))
         return loss
-
-
-class Report(Callback):
-    """Tells a function about every epoch."""
-
-    def __init__(self, progress: Progress) -> None:
-        self._progress = progress
-
-    def on_train_epoch_end(self, trainer: Any, pl_module: Any) -> None:  # noqa: ARG002 (Lightning's)
-        """Report the epoch's figures; validation has run by now."""
-        metrics = {name: float(value) for name, value in trainer.callback_metrics.items()}
-        self._progress(trainer.current_epoch + 1, metrics)
 
 
 def in_float32(value: Any) -> Any:

@@ -9,14 +9,24 @@ import torch
 from rfdetr.training import build_trainer
 
 from executive.vision.training.architecture import create
-from executive.vision.training.lightning import Model, Progress, Report, SymmetricData
+from executive.vision.training.lightning import Model, SymmetricData
+from executive.vision.training.report import Batches, Progress, Report
 from executive.vision.training.start import checkpoint, learning_rate
 
 BATCH = 16
 THREADS = 2
 
 
-def fit(dataset: Path, out: Path, *, start: Path | None, epochs: int, seed: int, progress: Progress) -> None:
+def fit(
+    dataset: Path,
+    out: Path,
+    *,
+    start: Path | None,
+    epochs: int,
+    seed: int,
+    progress: Progress,
+    batches: Batches,
+) -> None:
     """Train and leave checkpoints, `labels.txt` and `metrics.csv` in `out`."""
     cuda = torch.cuda.is_available()
     if not cuda:
@@ -53,7 +63,7 @@ def fit(dataset: Path, out: Path, *, start: Path | None, epochs: int, seed: int,
     model = Model(detector.model_config, config, reduced=not cuda and has_bfloat16())
     data = SymmetricData(detector.model_config, config)
     trainer = build_trainer(config, detector.model_config, accelerator="gpu" if cuda else "cpu")
-    trainer.callbacks.append(Report(progress))
+    trainer.callbacks.append(Report(progress, batches))
     trainer.fit(model, data)
     (out / "labels.txt").write_text("".join(f"{label}\n" for label in labels), encoding="utf-8")
 

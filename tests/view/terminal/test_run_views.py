@@ -160,6 +160,16 @@ def test_the_live_view_redraws_on_change_only_and_at_most_ten_times_a_second(mon
     assert min(gaps) > 0.09
 
 
+def test_the_live_view_writes_nothing_where_nobody_watches():
+    stream = io.StringIO()
+    view = Terminal(Console(file=stream, force_terminal=False))
+    view.open(RUN)
+    view(status("tree/sort", "RUNNING"))
+    time.sleep(0.15)
+    view.close()
+    assert stream.getvalue() == ""
+
+
 def test_closing_a_view_that_never_opened_is_harmless():
     Terminal(Console(file=io.StringIO())).close()
     Lines(io.StringIO()).close()

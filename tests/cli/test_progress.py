@@ -1,0 +1,155 @@
+"""The bar that says how far a command is: at a terminal with the time left, elsewhere not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from at_terminal import COLOUR, call
+from click.testing import CliRunner, Result
+
+from executive.cli.main import main
+from executive.cli.progress import UNKNOWN, bar, time_left
+from executive.vision.dataset import Entry, image_path, save_image, write_annotations
+
+FAKE = ("--set", "cell.kind=fake")
+
+
+@pytest.mark.parametrize(
+    ("done", "total", "spent", "elapsed", "shown"),
+    [
+        (0, None, 0.0, 5.0, UNKNOWN),
+        (0, 10, 0.0, 5.0, UNKNOWN),
+        (1, 10, 2.0, 2.0, "0:00:18"),
+        # Between two parts it counts down.
+        (1, 10, 2.0, 3.5, "0:00:16"),
+        (1, 4, 3000.0, 3000.0, "2:30:00"),
+        (9, 10, 9.0, 30.0, "0:00:00"),
+        (10, 10, 9.0, 9.0, "0:00:00"),
+    ],
+)
+def test_the_time_left_is_that_of_parts_like_those_that_are_done(
+    done: int, total: int | None, spent: float, elapsed: float, shown: str
+) -> None:
+    assert time_left(done, total, spent, elapsed) == shown
+
+
+def test_a_bar_shows_how_many_of_how_many(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("TERM", "xterm")
+    with bar("sorting") as told:
+        told(3, 10)
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "sorting" in captured.err and "3/10" in captured.err and "0:00:00" in captured.err
+
+
+@pytest.mark.parametrize(
+    ("environment", "quiet"), [({}, False), ({"FORCE_COLOR": "1", "TERM": "dumb"}, False), ({}, True)]
+)
+def test_nothing_is_drawn_where_nothing_can_be_drawn_over(
+    environment: dict[str, str],
+    quiet: bool,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.delenv("FORCE_COLOR", raising=False)
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    with bar("sorting", quiet=quiet) as told:
+        told(3, 10)
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.fixture
+def at_terminal(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
+    """Calls a command whose standard error passes for a terminal."""
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("NO_COLOR", "1")
+    monkeypatch.setenv("TERM", "xterm")
+    return lambda *words: CliRunner().invoke(main, words)
+
+
+@pytest.fixture
+def grey(tmp_path: Path) -> Path:
+    """A data set of two images with nothing on them."""
+    root = tmp_path / "grey"
+    entries = [Entry("test", f"{name}.jpg", (160, 120), (), ()) for name in "ab"]
+    for entry in entries:
+        save_image(image_path(root, "coco", "test", entry.file), np.full((120, 160, 3), 128, np.uint8))
+    write_annotations(root, "coco", entries, ("cube", "sphere", "duck"))
+    return root
+
+
+def test_evaluate_shows_how_many_images_were_searched(at_terminal: Callable[..., Result], grey: Path) -> None:
+    shown = at_terminal("evaluate", "--dataset", str(grey))
+    assert shown.exit_code == 0, shown.stderr
+    assert "asking embedded" in shown.stderr and "2/2" in shown.stderr
+
+
+def test_dataset_shows_how_many_images_were_rendered(
+    at_terminal: Callable[..., Result], tmp_path: Path
+) -> None:
+    out = tmp_path / "data"
+    shown = at_terminal("dataset", "overhead", "--out", str(out), "--images", "2", "--workers", "1")
+    assert shown.exit_code == 0, shown.stderr
+    assert "rendering" in shown.stderr and "2/2" in shown.stderr
+    assert len(list(out.rglob("*.jpg"))) == 2
+
+
+def test_train_shows_batches_and_a_line_per_epoch(
+    at_terminal: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def train(dataset, out, *, start, epochs, seed, progress, batches):
+        for done in range(1, 2 * epochs + 1):
+            batches(done, 2 * epochs)
+            if done % 2 == 0:
+                progress(done // 2, {"loss": 0.51234})
+
+    monkeypatch.setattr("executive.vision.train.train", train)
+    shown = at_terminal("train", "--dataset", "data", "--out", "out", "--epochs", "2")
+    assert shown.exit_code == 0, shown.stderr
+    assert "training" in shown.stderr and "4/4" in shown.stderr
+    assert "epoch 1: loss 0.5123" in shown.stderr and "epoch 2: loss 0.5123" in shown.stderr
+    assert shown.stdout == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "what"),
+    [
+        (("sweep", "sort_overhead", *FAKE, "--seeds", "0-1", "--runs", "runs"), "sort_overhead"),
+        (("faults", "sort_overhead", *FAKE, "--pairs", "2"), "tried"),
+    ],
+)
+def test_many_runs_show_how_many_are_done_at_a_terminal_alone(
+    words: tuple[str, ...], what: str, tmp_path: Path
+) -> None:
+    at_terminal = call(*words, folder=tmp_path, terminal=True)
+    assert at_terminal.code == 0, at_terminal.stderr
+    assert what in at_terminal.stderr and "2/2" in at_terminal.stderr and "0:00:00" in at_terminal.stderr
+    assert COLOUR.search(at_terminal.stderr)
+    piped = call(*words, folder=tmp_path, terminal=False)
+    assert piped.code == 0, piped.stderr
+    assert "2/2" not in piped.stderr and "\x1b" not in piped.stderr and "━" not in piped.stderr
+
+
+def test_a_run_is_drawn_at_a_terminal_in_colours_unless_nobody_wants_them(tmp_path: Path) -> None:
+    words = ("run", "sort_overhead", *FAKE, "--runs", "runs")
+    coloured = call(*words, folder=tmp_path, terminal=True)
+    plain = call(*words, folder=tmp_path, terminal=True, NO_COLOR="1")
+    piped = call(*words, folder=tmp_path, terminal=False)
+    assert coloured.code == plain.code == piped.code == 0
+    assert "▶" in coloured.stderr and COLOUR.search(coloured.stderr)
+    assert "▶" in plain.stderr and not COLOUR.search(plain.stderr)
+    assert "▶" not in piped.stderr and "\x1b" not in piped.stderr
+    assert "sort_overhead starts, seed 0" in piped.stderr
+
+
+def test_a_bar_has_no_colours_where_nobody_wants_them(tmp_path: Path) -> None:
+    words = ("sweep", "sort_overhead", *FAKE, "--seeds", "0", "--runs", "runs")
+    plain = call(*words, folder=tmp_path, terminal=True, NO_COLOR="1")
+    assert "1/1" in plain.stderr and not COLOUR.search(plain.stderr)
