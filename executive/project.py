@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import stat
 import sys
@@ -68,10 +69,14 @@ def project_here() -> Project | None:
     Raises:
         InputError: The file cannot be read, or is no TOML.
     """
-    here = Path.cwd()
+    try:
+        here = Path.cwd()
+    except FileNotFoundError:
+        return None  # Somebody deleted it meanwhile.
     for folder in (here, *here.parents):
         file = folder / FILE
-        if file.is_file() and not _is_everybodys(folder):
+        # Unlike Path's method this says no of a folder that may not be looked into.
+        if os.path.isfile(file) and not _is_everybodys(folder):
             return _read(file)
     return None
 
