@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from executive.events import Event
-from executive.record.recorded_run import View
-from executive.runtime.run import Run
+
+if TYPE_CHECKING:
+    from executive.record.recorded_run import View
+    from executive.runtime.run import Run
 
 
 class Together:

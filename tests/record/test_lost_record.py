@@ -37,7 +37,7 @@ class Thief:
             does, self._does = self._does, None
             does()
 
-    def open(self, root, control):
+    def open(self, run):
         pass
 
     def close(self):

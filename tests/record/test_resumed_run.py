@@ -56,7 +56,7 @@ class Cutter:
     def __init__(self, tick: int, nth: int) -> None:
         self._tick, self._nth = tick, nth
 
-    def open(self, root: object, control: object) -> None:
+    def open(self, run: object) -> None:
         """Begin."""
 
     def __call__(self, event: Event) -> None:

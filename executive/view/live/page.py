@@ -76,7 +76,7 @@ class LivePage:
         self._paused = False
         self._last_look: Event | None = None
         self.problem = ""
-        """Why the page shows nothing more, or ""."""
+        """What went wrong with the page first, or ""."""
         # Not as an argument: those can be read by everybody on the machine.
         self._tell("secret", token=token, port=port)
         self._threads = [
@@ -154,13 +154,10 @@ class LivePage:
     @contextlib.contextmanager
     def _harmless(self) -> Any:
         """Keep what goes wrong from the run: a page is not worth a motion that is cut off."""
-        if self.problem:
-            yield
-            return
         try:
             yield
         except Exception as error:
-            self.problem = f"the page shows nothing more: {type(error).__name__}: {error}"
+            self.problem = self.problem or f"not all was shown on the page: {type(error).__name__}: {error}"
 
     def _send(self) -> None:
         """Hand on what there is to tell, until there is nothing more."""

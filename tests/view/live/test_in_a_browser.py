@@ -98,7 +98,7 @@ def test_a_run_is_seen_paused_and_stopped(visit, address: str) -> None:
     page.wait_for_selector("#items tbody tr", timeout=START)
     page.wait_for_selector("#tree g.node.running", state="attached")
     page.click("#pause")
-    page.wait_for_function("document.getElementById('status').textContent === 'paused'")
+    page.wait_for_selector("#status:text-is('paused')")
     clock = page.inner_text("#clock")
     scene = page.frame_locator("#scene iframe").locator("canvas").first
     scene.wait_for(timeout=START)
@@ -108,7 +108,7 @@ def test_a_run_is_seen_paused_and_stopped(visit, address: str) -> None:
         assert visit.colours(what) > 10, what
     assert len(page.query_selector_all("#look rect")) >= 1
     page.click("#stop")
-    page.wait_for_function("document.getElementById('status').textContent === 'HALTED'", timeout=START)
+    page.wait_for_selector("#status:text-is('HALTED')", timeout=START)
     assert "halted by the user" in page.inner_text("#outcome")
     assert "report.html" in page.inner_text("#outcome")
     assert visit.errors == []

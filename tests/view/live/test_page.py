@@ -191,7 +191,7 @@ def test_what_goes_wrong_with_it_is_said_and_the_run_goes_on() -> None:
         page._watched = 1
         page(Event("look", 1, 0.1, {"frame_object": object(), "found": ()}))
         assert page.problem == (
-            "the page shows nothing more: AttributeError: 'object' object has no attribute 'image'"
+            "not all was shown on the page: AttributeError: 'object' object has no attribute 'image'"
         )
         page(Event("look", 2, 0.2, {"frame_object": object(), "found": ()}))
     finally:
