@@ -8,7 +8,6 @@ import click
 
 from executive.cli.options import json_option, runs_option, workers_option
 from executive.cli.output import print_json, stdout_kept_clean
-from executive.cli.progress import bar
 
 
 @click.command(name="film")
@@ -37,6 +36,7 @@ def command(
     simulated cell, also one that was halted, cut off or taken up again. Needs no display.
     """
     with stdout_kept_clean():
+        from executive.cli.progress import bar
         from executive.record.find_run import find_run
         from executive.record.run_directory import RunDirectory
         from executive.view.film.film import film
