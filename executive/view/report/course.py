@@ -37,7 +37,6 @@ class Tally:
     Attributes:
         ran: How often it was started.
         succeeded, failed, halted: How often it ended so.
-        seconds: How long it ran in all [s].
         status: How it ended last.
         said: Why it failed last: reason and sentence; "" where it never did.
     """
@@ -46,16 +45,18 @@ class Tally:
     succeeded: int
     failed: int
     halted: int
-    seconds: float
     status: str
     said: str
 
     @property
     def counts(self) -> str:
         """The numbers in a few words: `3 done, 1 failed`."""
-        told = ((self.succeeded, "done"), (self.failed, "failed"), (self.halted, "halted"))
-        said = ", ".join(f"{number} {word}" for number, word in told if number)
-        return said or "under way"
+        ended = self.succeeded + self.failed + self.halted
+        told = (
+            (self.succeeded, "done"), (self.failed, "failed"), (self.halted, "halted"),
+            (self.ran - ended, "under way"),
+        )  # fmt: skip
+        return ", ".join(f"{number} {word}" for number, word in told if number)
 
 
 def spans(entries: Iterable[Entry]) -> list[Span]:
@@ -101,5 +102,5 @@ def _tally(ran: Sequence[Span]) -> Tally:
     said = [": ".join(filter(None, (span.reason, span.message))) for span in ran if span.status == "FAILURE"]
     return Tally(
         len(ran), ends.count("SUCCESS"), ends.count("FAILURE"), ends.count("INVALID"),
-        sum(span.ended - span.began for span in ran), ends[-1], said[-1] if said else "",
+        ends[-1], said[-1] if said else "",
     )  # fmt: skip

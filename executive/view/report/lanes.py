@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from math import ceil
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from executive.mission.outline import OutlineNode
-from executive.view.report.course import Span
+from executive.view.report.course import Span, tallies
 from executive.view.svg_element import add
 from executive.view.text import extent, fitted
 
@@ -20,16 +20,19 @@ SECOND = 45.0
 """Length of a second where that is neither too short nor too long in all [pixel]."""
 THINNEST = 1.5
 """Width of what took no time [pixel]."""
+APART, BLOT = 1.0, 3.0
+"""What is closer to each other and not longer together is one blot to the eye [pixel]."""
 _STEP, _LETTERS, _COLUMNS = 9.0, 11.0, 34
 _TICKS = (0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600)
-_APART = 55.0
+_CLOCK = 55.0
+_WORST = ("FAILURE", "RUNNING", "INVALID", "SUCCESS")
 
 
 def timeline(course: Sequence[Span], nodes: Sequence[OutlineNode], end: float) -> str:
     """Return the timeline as an SVG document, up to the time `end` [s].
 
-    What happened is said where the pointer rests on a bar. Bars of one lane that end alike and cannot be told
-    apart are one, so its size does not grow with the length of the run.
+    What happened is said where the pointer rests on a bar. What cannot be told apart in a lane is one bar, in
+    the colour of the worst in it, so the size of the timeline has a bound however long the run was.
     """
     lanes: dict[str, list[Span]] = {}
     for span in course:
@@ -58,45 +61,49 @@ def timeline(course: Sequence[Span], nodes: Sequence[OutlineNode], end: float) -
         lane = add(picture, "g", f"lane {kind}", **{"data-path": node.path})
         add(lane, "text", "name", names[node.path], x=f"{_STEP * node.depth:.0f}", y=f"{y + 12:.0f}")
         thickness = ROW - 5 if kind == "skill" else 5.0
-        for span in _told_apart(lanes[node.path], scale):
+        for blot in _told_apart(lanes[node.path], scale):
+            began, ended = blot[0].began, blot[-1].ended
             bar = add(
-                lane, "rect", span.status.lower(), x=f"{left + scale * span.began:.1f}",
+                lane, "rect", _worst(blot).lower(), x=f"{left + scale * began:.1f}",
                 y=f"{y + (ROW - thickness) / 2:.1f}", height=f"{thickness:.0f}",
-                width=f"{max(scale * (span.ended - span.began), THINNEST):.1f}",
+                width=f"{max(scale * (ended - began), THINNEST):.1f}",
             )  # fmt: skip
-            add(bar, "title", text=_words(node, span))
+            add(bar, "title", text=_words(node, blot))
     return ElementTree.tostring(picture, encoding="unicode")
 
 
 def _ticks(end: float, scale: float) -> Iterator[float]:
     """Yield the times that are written above the lanes."""
-    step = next((step for step in _TICKS if step * scale >= _APART), _TICKS[-1])
+    longest = _TICKS[-1] * ceil(_CLOCK / scale / _TICKS[-1])
+    step = next((step for step in _TICKS if step * scale >= _CLOCK), longest)
     for number in range(int(end / step) + 1):
         yield number * step
 
 
-def _told_apart(lane: Sequence[Span], scale: float) -> Iterator[Span]:
-    """Yield the spans of a lane; those that would be one blot to the eye as one."""
-    last: Span | None = None
+def _told_apart(lane: Sequence[Span], scale: float) -> Iterator[list[Span]]:
+    """Yield the spans of a lane, together those that would be one blot to the eye."""
+    blot: list[Span] = []
     for span in lane:
-        alike = last is not None and (last.status, last.item) == (span.status, span.item)
-        if (
-            last is not None
-            and alike
-            and (span.began - last.ended) * scale < 1 < (span.ended - last.began) * scale < 3
+        if blot and (
+            (span.began - blot[-1].ended) * scale >= APART or (span.ended - blot[0].began) * scale >= BLOT
         ):
-            last = replace(last, ended=span.ended)
-            continue
-        if last is not None:
-            yield last
-        last = span
-    if last is not None:
-        yield last
+            yield blot
+            blot = []
+        blot.append(span)
+    if blot:
+        yield blot
 
 
-def _words(node: OutlineNode, span: Span) -> str:
+def _worst(blot: Sequence[Span]) -> str:
+    """Return the status by which the others are told."""
+    return min((span.status for span in blot), key=_WORST.index)
+
+
+def _words(node: OutlineNode, blot: Sequence[Span]) -> str:
     """Return what is said of a bar."""
-    item = f" of {span.item}" if span.item else ""
-    when = f"{span.began:.2f} s to {span.ended:.2f} s ({span.ended - span.began:.2f} s)"
-    why = ": ".join(filter(None, (span.reason, span.message)))
-    return "\n".join(filter(None, (f"{node.name}{item}: {span.status}", when, why)))
+    began, ended, tally = blot[0].began, blot[-1].ended, tallies(blot)[node.path]
+    items = {span.item for span in blot}
+    item = f" of {blot[0].item}" if blot[0].item and len(items) == 1 else ""
+    how = tally.status if len(blot) == 1 else tally.counts
+    when = f"{began:.2f} s to {ended:.2f} s ({ended - began:.2f} s)"
+    return "\n".join(filter(None, (f"{node.name}{item}: {how}", when, tally.said)))
