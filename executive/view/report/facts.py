@@ -16,7 +16,7 @@ from executive.mission.text.files import shipped_folder
 from executive.record.journal import ending_of, read_journal
 from executive.record.recorded_tree import read_tree
 from executive.record.requests import Requests
-from executive.record.result import ENDED
+from executive.record.result import ENDED, EXIT_CODES
 from executive.record.run_directory import RunDirectory
 from executive.view.items import ItemTable, Row
 from executive.view.repeat import repeat_command
@@ -37,7 +37,7 @@ class Facts:
         start: The journal's first entry.
         status: `SUCCESS`, `FAILURE`, `FAULT`, `HALTED` or `CUT OFF`.
         end: When its record ends, on the run's clock [s].
-        result: As `result.json` holds it; of a run without one what the journal tells, which may be nothing.
+        result: As `result.json` holds it; else what the journal tells of the end, which may be nothing.
         nodes: Its tree.
         course: Every time that a node ran.
         objects: What became of each object; what never was is left out.
@@ -73,6 +73,11 @@ class Facts:
         """The command that goes on with it; "" for a run that came to its end."""
         return "" if self.status in ENDED else shlex.join(["executive", "run", "--resume", str(self.path)])
 
+    @property
+    def replay(self) -> str:
+        """The command that decides it anew."""
+        return shlex.join(["executive", "replay", str(self.path)])
+
 
 def gather(path: Path) -> Facts:
     """Return what the record in a run directory has to say.
@@ -94,28 +99,35 @@ def gather(path: Path) -> Facts:
             table(event)
         requests(event)
     decisions = [(entry["clock"], entry["item"]) for entry in entries if entry["kind"] == "decision"]
-    ending = ending_of(entries)
+    result, end = _result(directory, entries), entries[-1]["clock"]
     return Facts(
         path=path,
         start=start,
-        status=ending["status"] if ending else CUT_OFF,
-        end=entries[-1]["clock"],
-        result=_result(directory, ending),
+        status=result.get("status", CUT_OFF),
+        end=end,
+        result=result,
         nodes=nodes,
         course=course,
         objects=[row for row in table.rows if row.state != "phantom"],
-        shares=shares(course, nodes, decisions),
+        shares=shares(course, nodes, decisions, end),
         pictures=pictures(directory.frames, [row.item for row in table.rows]),
         requests=requests.words,
         disturbances=[(entry["clock"], entry["what"]) for entry in entries if entry["kind"] == "disturbance"],
     )
 
 
-def _result(directory: RunDirectory, ending: Entry | None) -> Mapping[str, Any]:
-    if ending is None:
-        return {}
+def _result(directory: RunDirectory, entries: Sequence[dict[str, Any]]) -> Mapping[str, Any]:
+    """Return the result that belongs to this record; of a run that was cut off there is none."""
+    ending = ending_of(entries)
     try:
         result = json.loads(directory.result.read_text(encoding="utf-8"))
     except (OSError, ValueError):
-        return ending
-    return result if isinstance(result, dict) else ending
+        result = None
+    told = {} if not isinstance(result, dict) else result
+    if ending is not None:
+        # Of a run that was taken up again it may be that of an end before the last.
+        same = all(told.get(key) == ending[key] for key in ("status", "ticks"))
+        return told if same else ending
+    # Where the disk did not take the end, the result alone knows of it.
+    once = all(entry["kind"] != "resume" for entry in entries)
+    return told if once and told.get("status") in EXIT_CODES else {}

@@ -22,5 +22,5 @@ def leave_report(result: Mapping[str, Any]) -> tuple[str, str]:
     except Exception as error:
         return "", (
             f"no report was written: {type(error).__name__}: {error}; "
-            f"`executive --debug report {result['run']}` shows where"
+            f"`executive --debug report {result.get('run', 'RUN')}` shows where"
         )

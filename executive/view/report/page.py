@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,9 @@ import yaml
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from executive.errors import InputError
 from executive.record.pictures.palette import PALETTE
-from executive.record.run_directory import RunDirectory, refused
+from executive.record.run_directory import NO_ROOM, RunDirectory
 from executive.record.whole_file import write_whole
 from executive.view import story
 from executive.view.items import Row
@@ -20,7 +22,8 @@ from executive.view.report.course import tallies
 from executive.view.report.facts import Facts, gather
 from executive.view.report.lanes import timeline
 from executive.view.report.pictures import Picture
-from executive.view.report.shares import LOOK, NOBODY, RETRY, WAITING
+from executive.view.report.shares import LOOK, RETRY, WAITING
+from executive.view.text import writable
 from executive.view.tree.svg import Note, svg
 
 COLOURS = {LOOK: "#56B4E9", RETRY: "#D55E00", WAITING: "#9aa5b4"}
@@ -36,14 +39,12 @@ class Object:
         picture: What the last decision for it was made from, or None.
         failures: What went wrong with it: when [s], what, why.
         pictures: Of that.
-        spent: Time by activity [s].
     """
 
     row: Row
     picture: Picture | None
     failures: Sequence[tuple[float, str, str]]
     pictures: Sequence[Picture]
-    spent: Mapping[str, float]
 
 
 def write_report(path: Path) -> Path:
@@ -57,7 +58,12 @@ def write_report(path: Path) -> Path:
     try:
         write_whole(file, text)
     except OSError as error:
-        raise refused(f'write the report "{file}"', error) from error
+        reason = (error.strerror or str(error)).lower()
+        space = "free some space or " if error.errno in NO_ROOM else ""
+        raise InputError(
+            f'cannot write the report "{file}": {reason}; {space}copy the run directory to where you may '
+            "write, and have the report of the copy made"
+        ) from error
     return file
 
 
@@ -72,25 +78,31 @@ def report(facts: Facts) -> str:
     )
     environment.filters["sum_of"] = lambda spent: sum(spent.values())
     told = facts.result.get("story")
-    return environment.get_template("report.html").render(
+    objects = list(_objects(facts))
+    seen = [*facts.pictures.decisions.values(), *facts.pictures.failures]
+    text = environment.get_template("report.html").render(
         facts=facts,
         verdict=_verdict(facts),
         story=told,
         story_facts=list(story.facts(told)) if told else [],
-        moment=next(
-            (seen for seen in facts.pictures.failures if told and seen.file == told["picture"]), None
-        ),
-        objects=list(_objects(facts)),
-        rest=facts.shares.rows.get(NOBODY, {}),
+        moment=next((picture for picture in seen if told and picture.file == told["picture"]), None),
+        objects=objects,
         colours=_colours(facts.shares.activities),
         tree=Markup(svg(facts.nodes, facts.start["mission"], _notes(facts))),
         timeline=Markup(timeline(facts.course, facts.nodes, facts.end)),
-        params=yaml.safe_dump(dict(facts.start["params"]), sort_keys=False) if facts.start["params"] else "",
-        inputs=[
-            name for name in ("mission.yaml", "params.yaml", "cell.yaml") if (facts.path / name).exists()
+        params=_yaml(facts.start["params"]),
+        other=[
+            picture
+            for picture in facts.pictures.failures
+            if picture.item not in {object.row.item for object in objects}
         ],
-        other=[picture for picture in facts.pictures.failures if not picture.item],
     )
+    # A file name that is not UTF-8 may stand in it.
+    return writable(text)
+
+
+def _yaml(params: Mapping[str, Any]) -> str:
+    return yaml.safe_dump(dict(params), sort_keys=False, allow_unicode=True) if params else ""
 
 
 def _verdict(facts: Facts) -> str:
@@ -100,9 +112,13 @@ def _verdict(facts: Facts) -> str:
         return str(told["verdict"])
     if not facts.result:
         return "The record has no end: the run was killed, or goes on."
-    books: Mapping[str, Any] = facts.result.get("items") or {}
-    if not books:
+    if facts.result.get("message"):
         return str(facts.result["message"])
+    books: Mapping[str, Any] | None = facts.result.get("items")
+    if books is None:
+        return "It came to its end; only the journal is left of its result."
+    if not books["seen"]:
+        return "The mission was done; no object was seen."
     left = {fate: books[fate] for fate in ("rejected", "lost") if books[fate]}
     said = "".join(f", {number} {fate}" for fate, number in left.items())
     return f"{books['placed']} of {books['seen']} objects are in their bins{said}."
@@ -112,18 +128,17 @@ def _objects(facts: Facts) -> Iterator[Object]:
     names = {node.path: node.title for node in facts.nodes}
     for row in facts.objects:
         failures = [
-            (span.ended, f"{names[span.node]}.{span.reason}", span.message)
+            (span.ended, f"{names.get(span.node, span.node)}.{span.reason}", span.message)
             for span in facts.course
             if span.item == row.item and span.status == "FAILURE"
         ]
         seen = [picture for picture in facts.pictures.failures if picture.item == row.item]
-        spent = facts.shares.rows.get(row.item, {})
-        yield Object(row, facts.pictures.decisions.get(row.item), failures, seen, spent)
+        yield Object(row, facts.pictures.decisions.get(row.item), failures, seen)
 
 
 def _colours(activities: Sequence[str]) -> dict[str, str]:
     """Return the colour of each activity."""
-    free = iter([colour for colour in PALETTE if colour not in COLOURS.values()] * len(activities))
+    free = cycle(colour for colour in PALETTE if colour not in COLOURS.values())
     return {activity: COLOURS.get(activity) or next(free) for activity in activities}
 
 

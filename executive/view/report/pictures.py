@@ -6,6 +6,7 @@ import base64
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import quote
 
 ROOM = 3_000_000
 """Bytes of all pictures of a page in all, so that it can be sent by mail; others are linked."""
@@ -16,7 +17,7 @@ class Picture:
     """One picture.
 
     Attributes:
-        source: What an `img` takes: the picture itself, or where there is no room the file's place.
+        source: What an `img` takes: the picture itself, or where there is no room a link to its file.
         file: Its place below the run directory.
         tick: Control step that it is of.
         item: What it is about, or "".
@@ -47,7 +48,9 @@ class Pictures:
 
 def pictures(folder: Path, items: Collection[str]) -> Pictures:
     """Return what the folder `frames` of a run holds; decisions are the first to be given room."""
-    named = [_named(file, items) for file in sorted(folder.glob("*.jpg"))]
+    named = sorted(
+        (_named(file, items) for file in folder.glob("*.jpg")), key=lambda each: (each[1], each[0])
+    )
     decided = {item: (file, tick) for file, tick, item, reason in named if item and not reason}
     failed = [each for each in named if each[3]]
     room = ROOM
@@ -75,9 +78,9 @@ def _named(file: Path, items: Collection[str]) -> tuple[Path, int, str, str]:
 
 def _picture(file: Path, tick: int, item: str, reason: str, room: int) -> Picture:
     place = f"{file.parent.name}/{file.name}"
+    if 4 * file.stat().st_size / 3 > room:
+        return Picture(quote(place), place, tick, item, reason, False)
     data = base64.b64encode(file.read_bytes()).decode()
-    if len(data) > room:
-        return Picture(place, place, tick, item, reason, False)
     return Picture(f"data:image/jpeg;base64,{data}", place, tick, item, reason, True)
 
 

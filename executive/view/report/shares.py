@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections import defaultdict
+from collections import defaultdict, deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -25,7 +25,8 @@ class Shares:
 
     Attributes:
         activities: In the order in which a pick has them; each was something's at some time.
-        rows: Time by object, then by activity; what led to no object last, under `NOBODY`.
+        rows: Time by object, then by activity; what led to no object last, under `NOBODY`. All of it
+            together is the time of the run.
     """
 
     activities: tuple[str, ...]
@@ -33,9 +34,9 @@ class Shares:
 
 
 def shares(
-    course: Sequence[Span], nodes: Sequence[OutlineNode], decisions: Sequence[tuple[float, str]]
+    course: Sequence[Span], nodes: Sequence[OutlineNode], decisions: Sequence[tuple[float, str]], end: float
 ) -> Shares:
-    """Return where the time went.
+    """Return where the time went, from the start of the run to its `end` [s].
 
     Where skills ran at the same time, it is that of the one that began first and was about an object.
 
@@ -43,13 +44,14 @@ def shares(
         course: Every time that a node ran.
         nodes: The tree.
         decisions: When it was decided for which object, in order.
+        end: Not before the end of anything that ran.
     """
     skills = {node.path: node for node in nodes if node.kind == "skill"}
     ran = [span for span in course if span.node in skills]
     spent: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))
     seen: dict[str, None] = {}
     retried = _retried(ran, skills, decisions)
-    for began, ended, running in _slices(ran):
+    for began, ended, running in _slices(ran, end):
         about = next((span for span in running if span.item), None)
         if about is not None:
             item, activity = about.item, skills[about.node].skill.lower()
@@ -61,21 +63,22 @@ def shares(
         elif about is not None:
             seen[activity] = None
         spent[item][activity] += ended - began
-    known = [LOOK, *seen, RETRY, WAITING]
+    # A skill may be called like one of the others.
+    known = dict.fromkeys([LOOK, *seen, RETRY, WAITING])
     used = {activity for row in spent.values() for activity in row}
     order = sorted(spent, key=lambda item: item == NOBODY)
     return Shares(tuple(name for name in known if name in used), {item: dict(spent[item]) for item in order})
 
 
-def _slices(ran: Sequence[Span]) -> Iterator[tuple[float, float, list[Span]]]:
+def _slices(ran: Sequence[Span], end: float) -> Iterator[tuple[float, float, list[Span]]]:
     """Yield the time between any two changes, with the skills that run then, in the order they began."""
-    waiting = sorted((span for span in ran if span.ended > span.began), key=lambda span: span.began)
-    times = sorted({time for span in ran for time in (span.began, span.ended)})
+    to_come = deque(sorted((span for span in ran if span.ended > span.began), key=lambda span: span.began))
+    times = sorted({0.0, end, *(time for span in ran for time in (span.began, span.ended))})
     running: list[Span] = []
     for began, ended in pairwise(times):
         running = [span for span in running if span.ended > began]
-        while waiting and waiting[0].began <= began:
-            running.append(waiting.pop(0))
+        while to_come and to_come[0].began <= began:
+            running.append(to_come.popleft())
         yield began, ended, running
 
 
