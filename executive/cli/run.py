@@ -95,7 +95,7 @@ def command(
             if page is not None:
                 page.finish(result, report)
                 problem = "; ".join(filter(None, (problem, page.problem)))
-        if problem:
+        if problem and (view is not None or result["story"] is not None):
             click.echo(f"note: {problem}", err=True)
         if shown is not None:
             click.echo(summary(result, shown.items, repeat, report), err=True, nl=False)
