@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import ceil
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
@@ -22,6 +22,8 @@ THINNEST = 1.5
 """Width of what took no time [pixel]."""
 APART, BLOT = 1.0, 3.0
 """What is closer to each other and not longer together is one blot to the eye [pixel]."""
+MOST = 8000
+"""Bars of a timeline [about 250 bytes each], and one more for every lane; of more, coarser blots are made."""
 _STEP, _LETTERS, _COLUMNS = 9.0, 11.0, 34
 _TICKS = (0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600)
 _CLOCK = 55.0
@@ -43,6 +45,7 @@ def timeline(course: Sequence[Span], nodes: Sequence[OutlineNode], end: float) -
     length = min(max(SECOND * end, SHORTEST), LONGEST)
     scale = length / max(end, 1e-9)
     width, height = left + length + 12, HEAD + ROW * len(shown) + FOOT
+    bars = _bars(lanes, scale)
     picture = Element(
         "svg",
         {
@@ -61,7 +64,7 @@ def timeline(course: Sequence[Span], nodes: Sequence[OutlineNode], end: float) -
         lane = add(picture, "g", f"lane {kind}", **{"data-path": node.path})
         add(lane, "text", "name", names[node.path], x=f"{_STEP * node.depth:.0f}", y=f"{y + 12:.0f}")
         thickness = ROW - 5 if kind == "skill" else 5.0
-        for blot in _told_apart(lanes[node.path], scale):
+        for blot in bars[node.path]:
             began, ended = blot[0].began, blot[-1].ended
             bar = add(
                 lane, "rect", _worst(blot).lower(), x=f"{left + scale * began:.1f}",
@@ -78,6 +81,16 @@ def _ticks(end: float, scale: float) -> Iterator[float]:
     step = next((step for step in _TICKS if step * scale >= _CLOCK), longest)
     for number in range(int(end / step) + 1):
         yield number * step
+
+
+def _bars(lanes: Mapping[str, Sequence[Span]], scale: float) -> dict[str, list[list[Span]]]:
+    """Return what each bar of each lane stands for."""
+    coarse = 1
+    while True:
+        bars = {path: list(_told_apart(lane, scale / coarse)) for path, lane in lanes.items()}
+        if sum(map(len, bars.values())) <= MOST + len(bars):
+            return bars
+        coarse *= 2
 
 
 def _told_apart(lane: Sequence[Span], scale: float) -> Iterator[list[Span]]:

@@ -1,0 +1,90 @@
+"""Recorded runs on the fake cell, each made once; a test that changes one takes a copy."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from executive.discovery import discover
+from executive.mission.load import load_mission
+from executive.record.find_run import find_run
+from executive.record.recorded_run import recorded_run
+from executive.testing.fake_cell import FakeCell
+
+MISSION = """\
+mission: trial
+description: A test's.
+cell: cells/overhead.yaml
+params: {attempts: 2, note: größer}
+routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}
+tree:
+  - MoveToScan
+  - Detect
+  - Localize
+  - SelectTarget
+  - retry:
+      attempts: $attempts
+      on: [Grasp.missed]
+      recover: [Detect, Localize, {SelectTarget: {same: $item}}]
+      do: [Approach, Grasp, Transit, Release]
+"""
+
+
+class Cut(BaseException):
+    """Ends a run as a kill does, but for what Python itself closes."""
+
+
+class Leaky(FakeCell):
+    """A cell whose cup seals nothing."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.tool.seals = lambda: False
+
+
+class Doomed(FakeCell):
+    """A cell whose run is killed while it carries."""
+
+    def advance(self) -> None:
+        super().advance()
+        if self.steps == 250:
+            raise Cut
+
+
+def recorded(folder: Path, kind: Callable[..., FakeCell]) -> Path:
+    """Run the mission with two objects, and return its run directory."""
+    file = folder / "trial.yaml"
+    file.write_text(MISSION)
+    loaded = load_mission(file, discover(), {"cell.kind": "fake", "cell.table.objects": "[2, 2]"})
+    with contextlib.suppress(Cut):
+        recorded_run(loaded, discover(), seed=3, runs=folder / "my runs", kind=kind, requests=())
+    return find_run("latest", folder / "my runs")
+
+
+@pytest.fixture(scope="session")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run that succeeded: one object is in its bin, the other was never asked for."""
+    return recorded(tmp_path_factory.mktemp("done"), FakeCell)
+
+
+@pytest.fixture(scope="session")
+def failed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run that gave up after two attempts."""
+    return recorded(tmp_path_factory.mktemp("failed"), Leaky)
+
+
+@pytest.fixture(scope="session")
+def killed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run that was killed with an object on the tool."""
+    return recorded(tmp_path_factory.mktemp("killed"), Doomed)
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> Callable[[Path], Path]:
+    """Copies a run directory, for a test to change it."""
+    return lambda run: Path(shutil.copytree(run, tmp_path / "copy"))

@@ -1,0 +1,116 @@
+"""The timeline: what is drawn of a course, and how large it may become."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from itertools import pairwise
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import pytest
+from made_up_runs import TREE, picks, ran
+
+from executive.mission.outline import OutlineNode
+from executive.view.report.course import Span
+from executive.view.report.lanes import LONGEST, MOST, SHORTEST, THINNEST, timeline
+
+SVG = "{http://www.w3.org/2000/svg}"
+NASTY = """</title><script>alert("x")</script> & 'y' {{ 7 * 7 }} \x00 \ud800"""
+
+
+def lanes(course: list[Span], end: float, nodes: tuple[OutlineNode, ...] = TREE) -> dict[str, Element]:
+    picture = ElementTree.fromstring(timeline(course, nodes, end))
+    return {lane.attrib["data-path"]: lane for lane in picture.findall(f"{SVG}g")}
+
+
+def bars(lane: Element) -> list[tuple[str, float]]:
+    """Return the bars of a lane: how each ended, and how wide it is."""
+    return [(bar.attrib["class"], float(bar.attrib["width"])) for bar in lane.findall(f"{SVG}rect")]
+
+
+def said(lane: Element) -> list[str]:
+    return [bar.findtext(f"{SVG}title") or "" for bar in lane.findall(f"{SVG}rect")]
+
+
+def test_every_node_that_ran_has_a_lane_in_the_order_of_the_tree():
+    found = lanes([ran("Wait", 0.0, 1.0), ran("Detect", 1.0, 2.0), Span("tree", 0.0, 2.0, "SUCCESS")], 2.0)
+    assert list(found) == ["tree", "tree/Detect", "tree/Wait"]
+    assert [lane.attrib["class"] for lane in found.values()] == ["lane control", "lane skill", "lane skill"]
+    assert [lane.findtext(f"{SVG}text") for lane in found.values()] == ["tree", "Detect", "Wait"]
+
+
+def test_a_bar_is_as_long_as_it_took_and_says_what_happened():
+    course = [
+        ran("Approach", 0.0, 1.0, "cube-1"),
+        ran("Approach", 2.0, 2.5, "cube-2", "FAILURE", "blocked", "link 5 met a wrench"),
+    ]
+    lane = lanes(course, 90.0)["tree/Approach"]
+    assert bars(lane) == [("success", 45.0), ("failure", 22.5)]
+    assert said(lane) == [
+        "Approach of cube-1: SUCCESS\n0.00 s to 1.00 s (1.00 s)",
+        "Approach of cube-2: FAILURE\n2.00 s to 2.50 s (0.50 s)\nblocked: link 5 met a wrench",
+    ]
+
+
+def test_what_took_no_time_can_be_seen():
+    assert bars(lanes([ran("SelectTarget", 3.0, 3.0)], 90.0)["tree/SelectTarget"]) == [("success", THINNEST)]
+
+
+def test_what_cannot_be_told_apart_is_one_bar_in_the_colour_of_the_worst():
+    course = [ran("Detect", 0.02 * n, 0.02 * n + 0.01) for n in range(3)]
+    course[1] = replace(course[1], status="FAILURE", reason="unsure", message="too dark")
+    lane = lanes([*course, ran("Detect", 1.0, 1.01)], 90.0)["tree/Detect"]
+    assert bars(lane) == [("failure", 2.2), ("success", THINNEST)]
+    assert said(lane)[0] == "Detect: 2 done, 1 failed\n0.00 s to 0.05 s (0.05 s)\nunsure: too dark"
+
+
+def test_a_bar_for_several_objects_names_none_of_them():
+    course = [ran("SelectTarget", 1.0, 1.0, "cube-1"), ran("SelectTarget", 1.0, 1.0, "cube-2")]
+    (words,) = said(lanes(course, 90.0)["tree/SelectTarget"])
+    assert words.startswith("SelectTarget: 2 done\n")
+
+
+def test_bars_that_can_be_told_apart_stay_apart():
+    course = [ran("Wait", 0.0, 1.0), ran("Wait", 1.0, 2.0), ran("Wait", 2.0, 2.0), ran("Wait", 2.1, 2.1)]
+    assert len(bars(lanes(course, 90.0)["tree/Wait"])) == 4
+
+
+@pytest.mark.parametrize("count", [3_000, 10_000])
+def test_however_long_the_run_its_timeline_has_a_bound(count):
+    text = timeline(picks(count), TREE, 5.0 * count)
+    assert MOST / 3 < text.count("<rect") <= MOST + len(TREE)
+    assert len(text) < 300 * MOST
+
+
+@pytest.mark.parametrize(
+    ("end", "length"), [(0.0, SHORTEST), (1.0, SHORTEST), (100.0, 4500.0), (1e6, LONGEST)]
+)
+def test_the_time_axis_is_neither_too_short_nor_too_long(end, length):
+    picture = ElementTree.fromstring(timeline([ran("Wait", 0.0, end)], TREE, end))
+    (bar,) = picture.iter(f"{SVG}rect")
+    assert float(bar.attrib["width"]) == pytest.approx(length if end else THINNEST)
+    assert float(picture.attrib["width"]) > length
+
+
+@pytest.mark.parametrize("end", [0.0, 0.1, 26.0, 500.0, 40_000.0, 4e6])
+def test_the_times_above_the_lanes_stand_clear_of_each_other(end):
+    picture = ElementTree.fromstring(timeline([ran("Wait", 0.0, end)], TREE, end))
+    clocks = [text for text in picture.iter(f"{SVG}text") if text.attrib["class"] == "clock"]
+    places = [float(text.attrib["x"]) for text in clocks]
+    assert clocks[0].text == "0 s"
+    assert all(after - before >= 55 - 0.2 for before, after in pairwise(places))
+    assert places[-1] <= float(picture.attrib["width"])
+
+
+def test_text_from_a_mission_cannot_leave_its_place():
+    node = replace(TREE[1], path=f"tree/{NASTY}", name=NASTY)
+    span = Span(node.path, 0.0, 1.0, "FAILURE", NASTY, NASTY, NASTY)
+    text = timeline([span], [node], 1.0)
+    picture = ElementTree.fromstring(text)
+    assert {element.tag.removeprefix(SVG) for element in picture.iter()} == {
+        "svg", "title", "path", "text", "g", "rect",
+    }  # fmt: skip
+    assert "{{ 7 * 7 }}" in said(picture.findall(f"{SVG}g")[0])[0]
+    text.encode()
+    assert not re.search(r"href|url\(|<script|http(?!://www\.w3\.org/2000/svg)", text)

@@ -1,0 +1,212 @@
+"""The page as a reader finds it: what stands on it, in which order, and that all of it is text."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+from page_reader import SECTIONS, Page
+
+from executive.errors import InputError
+from executive.record.journal import read_journal
+from executive.view.report.facts import gather
+from executive.view.report.page import report, write_report
+
+NASTY = """</style></title><script>alert("x")</script><img src=x onerror='y'> & {{ 7 * 7 }} {% raw %} \x00"""
+WORDS = {"kind", "status", "state", "file", "node", "path", "item", "origin", "picture"}
+"""Keys of words that mean something to a report, and of names that have to agree with each other."""
+
+
+def page(run: Path) -> Page:
+    return Page(report(gather(run)))
+
+
+def change(file: Path, change: Any) -> None:
+    """Change every object in a file of JSON, one a line or one in all."""
+    lines = file.read_text().splitlines() if file.suffix == ".jsonl" else [file.read_text()]
+    file.write_text("".join(json.dumps(change(json.loads(line))) + "\n" for line in lines))
+
+
+def nasty(value: Any) -> Any:
+    """Return a value with something nasty behind every text that a mission or a skill may choose."""
+    if isinstance(value, dict):
+        return {key: each if key in WORDS else nasty(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [nasty(each) for each in value]
+    return value + NASTY if isinstance(value, str) and value else value
+
+
+def test_the_verdict_comes_first_and_then_why_objects_timeline_and_tree(failed):
+    found = page(failed)
+    assert list(found.texts) == ["header", *SECTIONS]
+    assert found.texts["header"].startswith(
+        "FAILURE Grasp.missed Grasp of sphere-1 failed (missed) on the last of 2 attempts: no seal on"
+    )
+    assert "trial , seed 3, 1.2 s on the robot's clock" in found.texts["header"]
+
+
+def test_the_story_is_told_with_the_picture_of_the_failure(failed):
+    found = page(failed)
+    told = found.texts["story"]
+    assert "Why nothing in the mission stopped it, from the root down: retry all 2 attempts failed" in told
+    assert "tree/5:retry/do/Grasp" in told
+    assert "left to do 2: sphere-1" in told
+    assert "The last picture before the end" in [attributes.get("alt") for _, attributes in found.elements]
+
+
+def test_a_success_has_no_story_and_says_what_is_in_the_bins(done):
+    found = page(done)
+    assert list(found.texts) == ["header", *SECTIONS[1:]]
+    assert found.texts["header"].startswith("SUCCESS 1 of 2 objects are in their bins, 1 rejected.")
+
+
+def test_every_object_is_there_with_its_fate_its_time_its_picture_and_what_went_wrong(failed):
+    found, facts = page(failed), gather(failed)
+    told = found.texts["objects"]
+    assert all(f"{row.item} rejected" in told for row in facts.objects)
+    assert [row.item for row in facts.objects] == ["sphere-1", "sphere-2"]
+    assert "2 seen, 0 placed, 2 rejected" in told
+    assert "0.76 s Grasp.missed no seal on sphere-1" in told
+    alts = [attributes["alt"] for tag, attributes in found.elements if tag == "img"]
+    assert alts.count("What the decision for sphere-1 was made from") == 1
+    assert alts.count("sphere-1: missed") == 2
+
+
+def test_the_rows_of_time_sum_up_to_the_time_of_the_run(failed, done, killed):
+    for run in (failed, done, killed):
+        facts = gather(run)
+        rows = re.findall(r"</td><td>([0-9.]+)</td>\s*<td class=\"bar\">", report(facts))
+        assert len(rows) == len(facts.shares.rows)
+        assert sum(map(float, rows)) == pytest.approx(facts.end, abs=0.01 * len(rows))
+
+
+def test_the_tree_says_how_each_node_fared_and_the_timeline_when(failed):
+    found = page(failed)
+    assert "2 failed missed: no seal on" in found.texts["tree"]
+    assert "Grasp Grasp of sphere-1: FAILURE" in found.texts["timeline"]
+    assert {"timeline", "behaviour-tree"} <= {attributes.get("class") for _, attributes in found.elements}
+
+
+def test_params_versions_and_the_commands_that_repeat_it_are_there(failed):
+    found = page(failed)
+    made, again = found.texts["made-with"], found.texts["again"]
+    assert "attempts: 2 note: größer" in made
+    assert "cell.table.objects=[2, 2]" in made
+    assert "python 3." in made
+    start = read_journal(failed / "journal.jsonl")[0]
+    repeat = ["executive", "run", start["file"], "--seed", "3"]
+    repeat += ["--set", "cell.kind=fake", "--set", "cell.table.objects=[2, 2]"]
+    assert f"repeat {shlex.join(repeat)} decide anew" in again
+    assert f"executive replay {shlex.quote(str(failed))}" in again
+    assert "go on" not in again
+
+
+def test_a_run_that_was_killed_is_told_as_far_as_it_came_with_the_command_that_goes_on(killed):
+    assert not (killed / "result.json").exists()
+    found = page(killed)
+    assert found.texts["header"].startswith("CUT OFF The record has no end: the run was killed, or goes on.")
+    assert f"go on executive run --resume {shlex.quote(str(killed))}" in found.texts["again"]
+    assert "Transit Transit of sphere-1: RUNNING" in found.texts["timeline"]
+    assert "sphere-1 held" in found.texts["objects"]
+    assert "1 under way" in found.texts["tree"]
+
+
+def test_a_run_whose_result_is_gone_has_the_verdict_of_its_journal(failed, done, copy):
+    run = copy(failed)
+    (run / "result.json").unlink()
+    assert page(run).texts["header"].startswith("FAILURE Grasp.missed no seal on sphere-1")
+    change(run / "journal.jsonl", lambda entry: entry | ({"message": ""} if entry["kind"] == "end" else {}))
+    assert "It came to its end; only the journal is left of its result." in page(run).texts["header"]
+
+
+def test_a_mission_that_saw_nothing_says_so(done, copy):
+    run = copy(done)
+    change(run / "result.json", lambda result: result | {"items": dict.fromkeys(result["items"], 0)})
+    assert page(run).texts["header"].startswith("SUCCESS The mission was done; no object was seen.")
+
+
+def test_the_time_and_the_pictures_of_what_was_no_object_are_shown_all_the_same(failed, copy):
+    run = copy(failed)
+    phantom = {"state": "phantom"}
+    change(run / "journal.jsonl", lambda entry: entry | (phantom if entry.get("item") == "sphere-1" else {}))
+    found = page(run)
+    assert "sphere-1 missed at step 300" in found.texts["objects"]
+    assert "What the decision for sphere-1 was made from" not in found.texts["objects"]
+    table, _ = found.texts["objects"].split(" look: ")
+    assert "sphere-1" in table
+
+
+def test_whatever_a_mission_says_is_text(failed, copy):
+    run = copy(failed)
+    odd = run / "frames" / "000001_unsure.jpg"
+    odd.write_bytes(b"a picture")
+    plain = page(run)
+    odd.rename(run / "frames" / "000001_<script>'{{ 7 * 7 }}\".jpg")
+    for name in ("journal.jsonl", "tree.json", "result.json"):
+        change(run / name, nasty)
+    text = report(gather(run))
+    found = Page(text)
+    assert found.shape == plain.shape
+    assert found.raw == plain.raw
+    assert NASTY.replace("\x00", "�") in found.texts["header"]
+    assert "<script>'{{ 7 * 7 }}\" at step 1" in found.texts["objects"]
+    assert "49" not in re.sub(r"[\d.]*49[\d.]* s", "", found.texts["header"])
+    assert "<script" not in text
+    text.encode()
+
+
+@pytest.mark.parametrize("name", ["done", "failed", "killed"])
+def test_the_page_needs_nothing_from_outside(name, request):
+    text = report(gather(request.getfixturevalue(name)))
+    found = Page(text)
+    tags = {tag for tag, _ in found.elements}
+    assert not tags & {"script", "iframe", "object", "embed", "base", "form", "image", "use", "foreignobject"}
+    assert all(link.startswith("data:") for link in found.linked())
+    assert not any(key.startswith("on") for _, attributes in found.elements for key in attributes)
+    assert set(re.findall(r"https?://[^\"'\s<]*", text)) == {"http://www.w3.org/2000/svg"}
+    styles = "".join(found.raw) + "".join(each.get("style", "") for _, each in found.elements)
+    assert not re.search(r"url\(|@import|expression", styles)
+    (policy,) = [each["content"] for tag, each in found.elements if "http-equiv" in each]
+    assert policy.startswith("default-src 'none';")
+
+
+def test_pictures_without_room_are_links_below_the_run_directory(failed, monkeypatch):
+    monkeypatch.setattr("executive.view.report.pictures.ROOM", 0)
+    links = {link for link in page(failed).linked() if not link.startswith("data:")}
+    assert all((failed / link).is_file() for link in links)
+    assert len(links) == 3
+
+
+def test_a_name_that_is_not_utf_8_costs_no_report(done, copy, tmp_path):
+    run = copy(done).rename(tmp_path / "run\udcff")
+    assert "run�" in write_report(run).read_text(encoding="utf-8")
+
+
+def test_the_report_is_written_beside_its_record_whole_or_not_at_all(done, copy):
+    run = copy(done)
+    file = write_report(run)
+    assert (file, file.read_text()) == (run / "report.html", report(gather(run)))
+    file.unlink()
+    file.mkdir()
+    with pytest.raises(InputError) as caught:
+        write_report(run)
+    assert str(caught.value) == (
+        f'cannot write the report "{file}": is a directory; copy the run directory to where you may write, '
+        "and have the report of the copy made"
+    )
+    assert not list(run.glob(".*"))
+
+
+def test_on_a_full_disk_space_helps(done, copy, monkeypatch):
+    def full(path: Path, text: str) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("executive.view.report.page.write_whole", full)
+    with pytest.raises(
+        InputError, match="no space left on device; free some space or copy the run directory"
+    ):
+        write_report(copy(done))
