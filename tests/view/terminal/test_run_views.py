@@ -201,6 +201,13 @@ def test_the_summary_says_how_it_ended_how_long_it_took_and_how_to_repeat_it():
     ]
 
 
+def test_the_summary_ends_with_the_report_where_there_is_one():
+    assert (
+        summary(RESULT, ItemTable(), "", "runs/x/report.html").splitlines()[-1]
+        == "report: runs/x/report.html"
+    )
+
+
 def test_a_success_has_nothing_to_explain():
     result = {**RESULT, "status": "SUCCESS", "reason": "", "node": "", "message": ""}
     assert summary(result, ItemTable(), "").splitlines()[0] == "SUCCESS"

@@ -70,6 +70,18 @@ repeat      executive run trial
     assert text(run) == expected
 
 
+def test_the_report_is_named_between_the_record_and_the_command_that_repeats_the_run(abroad) -> None:
+    run = FailedRun(PICK, objects=CUBE)
+    run.fake.tool.seals = lambda: False
+    story = run.tell()
+    assert story is not None
+    assert story_lines(story, "runs/latest", "executive run trial", "runs/latest/report.html")[-3:] == [
+        "record      runs/latest",
+        "report      runs/latest/report.html",
+        "repeat      executive run trial",
+    ]
+
+
 def test_an_object_that_slips_out_of_the_cup_every_time(abroad) -> None:
     run = FailedRun(PICK, objects=CUBE)
     seals = iter([False])

@@ -67,6 +67,17 @@ def test_a_skill_tells_what_the_mission_connects_and_what_it_declares():
     assert node.reasons == ("missed", "blocked")
 
 
+def test_a_skill_tells_what_it_uses_and_whether_it_senses():
+    class Look(Pick):
+        senses: ClassVar = True
+        uses: ClassVar = ("camera", "arm")
+
+    (node,) = outline(SkillNode(Site("tree/Look"), "Look", Look, Wiring(), CELL, Scope()))
+    (other,) = outline(pick("tree/Pick"))
+    assert (node.senses, node.uses) == (True, ("camera", "arm"))
+    assert (other.senses, other.uses) == (False, ())
+
+
 def test_a_label_is_the_title_and_leaves_the_kind_as_it_is():
     nodes = outline(Sequence(Site("tree/pair", "pair"), [pick("tree/pair/first", "first")]))
     assert [(node.title, node.kind, node.skill) for node in nodes] == [

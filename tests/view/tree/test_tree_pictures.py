@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element
 import pytest
 
 from executive.mission.outline import Connection, OutlineNode
-from executive.view.text import extent, fitted, writable
+from executive.view.text import writable
 from executive.view.tree.card import SYMBOLS, UNKNOWN, card
 from executive.view.tree.dot import dot
 from executive.view.tree.svg import identifier, svg
@@ -207,31 +207,3 @@ def test_a_skill_has_two_lines_of_params_at_most():
         "param_2: 2, param_3: 3, …",
     )
     assert card(skill("tree/A", 0, "A", detail="x" * 100)).lines == ("x" * 28, "x" * 27 + "…")
-
-
-@pytest.mark.parametrize(
-    ("text", "rows"),
-    [
-        ("", ()),
-        ("one two three", ("one two", "three")),
-        ("a: 1, b: 2", ("a: 1, b: 2",)),
-        ("alpha: 1, beta: 2", ("alpha: 1,", "beta: 2")),
-        ("a\n  b\tc", ("a b c",)),
-        ("alpha: 1, beta: 2, gamma: 3", ("alpha: 1,", "beta: 2, …")),
-    ],
-)
-def test_text_is_cut_behind_a_comma_where_it_can_be(text, rows):
-    assert fitted(text, 11, 2) == rows
-
-
-def test_long_text_gets_a_longer_box():
-    assert (
-        extent("SelectTarget", 13)
-        < extent("SelectTarget", 13, bold=True)
-        < extent("SelectTargets", 13, bold=True)
-    )
-    assert extent("日本", 10) > extent("ab", 10)
-
-
-def test_what_xml_cannot_hold_is_replaced():
-    assert writable("a\x00\x1b\ud800\ufffeb\tc\n€𝄞") == "a����b\tc\n€𝄞"

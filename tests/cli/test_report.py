@@ -1,0 +1,126 @@
+"""`executive report`, and the report that `executive run` leaves."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from executive.cli.main import main
+
+FEW = ("--set", "cell.kind=fake", "--set", "cell.table.objects=[1, 1]")
+
+
+def invoke(*words: str) -> Result:
+    return CliRunner().invoke(main, words)
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run directory, made once."""
+    runs = tmp_path_factory.mktemp("recorded")
+    assert invoke("run", "sort_fruit", *FEW, "--quiet", "--runs", str(runs)).exit_code == 0
+    return (runs / "latest").resolve()
+
+
+@pytest.fixture
+def run(recorded: Path, tmp_path: Path) -> Path:
+    """A run directory whose report is gone, `latest` below the test's `runs`."""
+    path = Path(shutil.copytree(recorded, tmp_path / "runs" / recorded.parent.name / recorded.name))
+    (path / "report.html").unlink()
+    (tmp_path / "runs" / "latest").symlink_to(path.relative_to(tmp_path / "runs"))
+    return path
+
+
+def test_it_writes_the_report_of_a_run_directory_and_says_where(run: Path) -> None:
+    shown = invoke("report", str(run))
+    assert (shown.exit_code, shown.stdout, shown.stderr) == (0, f"{run / 'report.html'}\n", "")
+    assert (run / "report.html").read_text().startswith("<!doctype html>")
+
+
+@pytest.mark.parametrize("name", ["latest", "by its name"])
+def test_a_run_is_found_below_the_folder_of_runs(run: Path, name: str) -> None:
+    runs = run.parents[1]
+    asked = name if name == "latest" else str(run.relative_to(runs))
+    assert invoke("report", asked, "--runs", str(runs)).stdout == f"{run / 'report.html'}\n"
+
+
+def test_with_json_it_says_how_large_it_is(run: Path) -> None:
+    shown = invoke("report", str(run), "--json")
+    file = run / "report.html"
+    assert json.loads(shown.stdout) == {"report": str(file), "bytes": file.stat().st_size}
+
+
+def test_it_is_written_once_more_from_what_the_record_says_now(run: Path) -> None:
+    invoke("report", str(run))
+    lines = (run / "journal.jsonl").read_text().splitlines(keepends=True)
+    (run / "journal.jsonl").write_text("".join(lines[:-1]))
+    (run / "result.json").unlink()
+    assert invoke("report", str(run)).exit_code == 0
+    assert "CUT OFF" in (run / "report.html").read_text()
+
+
+def test_where_there_is_no_such_run_it_says_which_there_are(run: Path) -> None:
+    shown = invoke("report", "nowhere", "--runs", str(run.parents[1]))
+    assert (shown.exit_code, shown.stdout) == (2, "")
+    assert shown.stderr == (
+        f'"nowhere" is no run directory, nor is there one of that name below "{run.parents[1]}"; '
+        f"the last ones there: {run.relative_to(run.parents[1])}\n"
+    )
+
+
+def test_without_a_tree_there_is_no_report(run: Path) -> None:
+    (run / "tree.json").unlink()
+    shown = invoke("report", str(run))
+    assert (shown.exit_code, shown.stdout) == (2, "")
+    assert shown.stderr == (
+        f'cannot read the tree "{run / "tree.json"}": no such file or directory; every run leaves one beside '
+        "its journal since version 0.1\n"
+    )
+
+
+def test_what_cannot_be_written_is_bad_input_and_says_what_helps(run: Path) -> None:
+    (run / "report.html").mkdir()
+    shown = invoke("report", str(run), "--json")
+    assert (shown.exit_code, shown.stdout) == (2, "")
+    assert shown.stderr == (
+        f'cannot write the report "{run / "report.html"}": is a directory; copy the run directory to where '
+        "you may write, and have the report of the copy made\n"
+    )
+
+
+def test_a_run_leaves_a_report_and_names_it(tmp_path: Path) -> None:
+    shown = invoke("run", "sort_fruit", *FEW, "--runs", str(tmp_path))
+    (file,) = tmp_path.glob("[0-9]*/*/report.html")
+    assert shown.stderr.splitlines()[-1] == f"report: {file}"
+    assert "1 of 1 objects are in their bins" in file.read_text()
+
+
+def test_a_run_that_fails_names_its_report_beside_its_record(tmp_path: Path) -> None:
+    few = ("--set", "cell.kind=fake", "--set", "attempts=1", "--set", "cell.table.objects=[0, 0]")
+    mission = tmp_path / "one.yaml"
+    mission.write_text(
+        "mission: one\ndescription: One.\ncell: cells/overhead.yaml\nparams: {attempts: 2}\n"
+        "routes: {cube: red_bin}\ntree: {retry: {attempts: $attempts, do: IsHolding}}\n"
+    )
+    shown = invoke("run", str(mission), *few, "--quiet", "--runs", str(tmp_path))
+    assert shown.exit_code == 1
+    (file,) = tmp_path.glob("[0-9]*/*/report.html")
+    lines = shown.stderr.splitlines()
+    assert f"report      {file}" == lines[lines.index(f"record      {file.parent}") + 1]
+
+
+@pytest.mark.parametrize(("quiet", "said"), [((), 1), (("--quiet",), 0)])
+def test_without_its_report_a_run_ends_as_it_did(tmp_path, monkeypatch, quiet, said) -> None:
+    def broken(path: Path) -> Path:
+        raise ZeroDivisionError("no ink")
+
+    monkeypatch.setattr("executive.view.report.leave.write_report", broken)
+    shown = invoke("run", "sort_fruit", *FEW, *quiet, "--json", "--runs", str(tmp_path))
+    assert shown.exit_code == 0
+    assert json.loads(shown.stdout)["status"] == "SUCCESS"
+    assert shown.stderr.count("note: no report was written: ZeroDivisionError: no ink; ") == said
+    assert "report:" not in shown.stderr

@@ -1,0 +1,35 @@
+"""Text in a picture: its length, what is left of it where room is short, and what XML can hold."""
+
+from __future__ import annotations
+
+import pytest
+
+from executive.view.text import extent, fitted, writable
+
+
+@pytest.mark.parametrize(
+    ("text", "rows"),
+    [
+        ("", ()),
+        ("one two three", ("one two", "three")),
+        ("a: 1, b: 2", ("a: 1, b: 2",)),
+        ("alpha: 1, beta: 2", ("alpha: 1,", "beta: 2")),
+        ("a\n  b\tc", ("a b c",)),
+        ("alpha: 1, beta: 2, gamma: 3", ("alpha: 1,", "beta: 2, …")),
+    ],
+)
+def test_text_is_cut_behind_a_comma_where_it_can_be(text, rows):
+    assert fitted(text, 11, 2) == rows
+
+
+def test_long_text_gets_a_longer_box():
+    assert (
+        extent("SelectTarget", 13)
+        < extent("SelectTarget", 13, bold=True)
+        < extent("SelectTargets", 13, bold=True)
+    )
+    assert extent("日本", 10) > extent("ab", 10)
+
+
+def test_what_xml_cannot_hold_is_replaced():
+    assert writable("a\x00\x1b\ud800\ufffeb\tc\n€𝄞") == "a����b\tc\n€𝄞"
