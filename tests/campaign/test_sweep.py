@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from executive.campaign.statistics import spread, wilson
-from executive.campaign.sweep import Job, summarize, sweep
+from executive.campaign.sweep import Job, run_job, summarize, sweep
 from executive.errors import InputError
 
 
@@ -76,6 +76,13 @@ def sigint():
 
 
 @pytest.mark.usefixtures("sigint")
+def test_every_run_leaves_its_record_and_its_report(tmp_path):
+    few = {"cell.kind": "fake", "cell.table.objects": "[1, 1]"}
+    result = run_job(Job("sort_fruit", 3, few, tmp_path, frames=False))
+    assert result["status"] == "SUCCESS"
+    assert (Path(result["run"]) / "report.html").is_file()
+
+
 def test_after_ctrl_c_no_further_run_begins_and_the_results_so_far_are_kept():
     told = []
     results = sweep(

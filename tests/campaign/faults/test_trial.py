@@ -147,6 +147,7 @@ def test_a_fault_repeated_is_recorded(campaign: Campaign, tmp_path: Path) -> Non
     kinds = [entry["kind"] for entry in read_journal(path / "journal.jsonl")]
     assert kinds.count("disturbance") == 1
     assert kinds[-1] == "end"
+    assert (path / "report.html").is_file()
 
 
 def test_a_skill_goes_wrong_in_the_activations_named() -> None:

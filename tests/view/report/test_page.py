@@ -76,8 +76,11 @@ def test_every_object_is_there_with_its_fate_its_time_its_picture_and_what_went_
     assert alts.count("sphere-1: missed") == 2
 
 
-def test_the_rows_of_time_sum_up_to_the_time_of_the_run(failed, done, killed):
-    for run in (failed, done, killed):
+def test_the_rows_of_time_sum_up_to_the_time_of_the_run(failed, done, killed, copy):
+    braked = copy(done)
+    change(braked / "journal.jsonl", lambda entry: entry | ({"clock": 2.5} if entry["kind"] == "end" else {}))
+    assert "no object" in page(braked).texts["objects"]
+    for run in (failed, done, killed, braked):
         facts = gather(run)
         rows = re.findall(r"</td><td>([0-9.]+)</td>\s*<td class=\"bar\">", report(facts))
         assert len(rows) == len(facts.shares.rows)
