@@ -1,87 +1,12 @@
-"""The program that serves the live page: told by its standard input, it says on its output what is wanted."""
+"""The process of the live page, which stands back behind the run before it loads anything."""
 
 from __future__ import annotations
 
-import asyncio
-import json
 import os
-import pickle
-import socket
-import sys
-import tempfile
-import threading
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
-
-from aiohttp import web
-
-from executive.view.live.board import Board
-from executive.view.live.guard import Guard
-from executive.view.live.scene import Scene
-from executive.view.live.server import Server, Wish
-from executive.view.live.telling import Told
-from executive.view.live.tunnel import Tunnel
-
-FAREWELL = 0.5
-"""Time that browsers have to take in the last news [s]."""
-
-
-def main() -> None:
-    """Serve until standard input ends."""
-    os.nice(5)  # The tick loop goes first.
-    listener = socket.socket(fileno=int(sys.argv[1]))
-    # Whatever a library prints is none of the run's business.
-    wishes = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
-
-    def say(wish: Mapping[str, Any]) -> None:
-        wishes.write(json.dumps(wish) + "\n")
-        wishes.flush()
-
-    with tempfile.TemporaryDirectory(prefix="executive-") as folder:
-        asyncio.run(_serve(listener, Path(folder) / "scene", say))
-
-
-async def _serve(listener: socket.socket, path: Path, say: Wish) -> None:
-    loop, over = asyncio.get_running_loop(), asyncio.Event()
-    first, *rest = pickle.load(sys.stdin.buffer)
-    board, scene = Board(), Scene(path)
-    server = Server(board, Guard(first[1]["token"], first[1]["port"]), Tunnel(path), say)
-
-    def take(batch: list[Told]) -> None:
-        for words in batch:
-            if words[0] == "shapes":
-                scene.show(words[1]["shapes"])
-            elif words[0] == "poses":
-                scene.move(words[1]["bodies"])
-            board.take(words)
-
-    def listen() -> None:
-        for batch in iter(_heard, None):
-            loop.call_soon_threadsafe(take, batch)
-        loop.call_soon_threadsafe(over.set)
-
-    take(rest)
-    runner = web.AppRunner(server.app, access_log=None)
-    await runner.setup()
-    await web.SockSite(runner, listener, shutdown_timeout=FAREWELL).start()
-    telling = asyncio.create_task(server.keep_telling())
-    threading.Thread(target=listen, daemon=True).start()
-    await over.wait()
-    telling.cancel()
-    await server.end()
-    await runner.cleanup()
-    scene.close()
-
-
-def _heard() -> list[Told] | None:
-    try:
-        batch: list[Told] = pickle.load(sys.stdin.buffer)
-    except EOFError:
-        return None
-    return batch
-
 
 if __name__ == "__main__":
+    os.nice(5)  # The tick loop goes first.
+
+    from executive.view.live.program import main
+
     main()

@@ -6,7 +6,6 @@ import base64
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import cv2
 import numpy as np
 
 from executive.view.live.telling import Told
@@ -90,6 +89,8 @@ class Board:
 
 def _jpeg(image: np.ndarray[Any, Any], hidden: np.ndarray[Any, Any] | None) -> str:
     """Return an RGB image as a page takes it, what is hidden darker."""
+    import cv2
+
     shown = cv2.cvtColor(image, cv2.COLOR_RGB2BGR)
     if hidden is not None:
         shown[hidden] = (shown[hidden] * (1 - SHADE)).astype(np.uint8)

@@ -58,10 +58,6 @@ class Scene:
                 if place is not None:
                     frame.position, frame.wxyz = np.array(place[:3]), np.array(place[3:])
 
-    def close(self) -> None:
-        """End the server."""
-        self._server.stop()
-
     def _add(self, name: str, shape: Shape) -> None:
         scene, colour = self._server.scene, shape.colour
         place: dict[str, Any] = {"position": shape.X_BS.position, "wxyz": np.roll(shape.X_BS.quaternion, 1)}

@@ -21,6 +21,8 @@ POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
     "connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
+FAREWELL = 0.5
+"""Longest wait for the browsers to take in the last news [s]."""
 WISHES = ("pause", "resume", "step", "stop")
 LONGEST = 4096
 """Of what a browser may say at once [bytes]."""
@@ -68,8 +70,9 @@ class Server:
     async def end(self) -> None:
         """Say the last news and good-bye."""
         await self.tell()
-        for watcher in list(self._watchers):
-            await watcher.close()
+        closing = [asyncio.create_task(watcher.close()) for watcher in self._watchers]
+        if closing:
+            await asyncio.wait(closing, timeout=FAREWELL)
 
     async def _file(self, request: web.Request) -> web.Response:
         name = request.match_info["file"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import aiohttp
@@ -21,15 +22,15 @@ class Tunnel:
     """Hands requests on to a server behind a Unix socket.
 
     Args:
-        path: The socket.
+        ready: Returns the socket once that server is there.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
+    def __init__(self, ready: Callable[[], Awaitable[Path]]) -> None:
+        self._ready = ready
 
     async def page(self, request: web.Request) -> web.Response:
         """Return a file of that server."""
-        async with self._session() as session:
+        async with await self._session() as session:
             answer = await session.get(f"http://scene/{request.match_info['file']}")
             headers = {"Content-Security-Policy": POLICY}
             return web.Response(
@@ -46,7 +47,7 @@ class Tunnel:
         here = web.WebSocketResponse(protocols=protocols, max_msg_size=LARGEST)
         await here.prepare(request)
         async with (
-            self._session() as session,
+            await self._session() as session,
             session.ws_connect("http://scene/", protocols=protocols, max_msg_size=LARGEST) as there,
         ):
             ways = [asyncio.create_task(_carry(here, there)), asyncio.create_task(_carry(there, here))]
@@ -56,8 +57,8 @@ class Tunnel:
         await here.close()
         return here
 
-    def _session(self) -> aiohttp.ClientSession:
-        return aiohttp.ClientSession(connector=aiohttp.UnixConnector(path=str(self._path)))
+    async def _session(self) -> aiohttp.ClientSession:
+        return aiohttp.ClientSession(connector=aiohttp.UnixConnector(path=str(await self._ready())))
 
 
 Side = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
