@@ -394,3 +394,9 @@ def test_a_window_without_a_display_is_bad_input(project, monkeypatch):
     assert shown.exit_code == 2
     assert "--gui needs a display, and DISPLAY names none; leave it out" in shown.stderr
     assert project.run == []
+
+
+def test_a_run_that_nobody_could_let_go_on_is_refused(project):
+    shown = invoke("run", "sort", "--paused")
+    assert shown.exit_code == 2
+    assert "nobody could let it go on: --paused needs --view or a terminal to type in" in shown.output

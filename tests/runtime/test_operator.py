@@ -148,3 +148,17 @@ def test_ctrl_c_at_the_question_halts_the_run_instead_of_ending_it_well(missions
     again = compare(loaded, discover(), Past.of(entries), 1)
     assert again.difference == ""
     assert again.decisions == sum(entry["kind"] == "status" for entry in entries) > 0
+
+
+def test_what_is_asked_for_elsewhere_is_heard_where_nobody_can_type() -> None:
+    heard, words = Heard(), iter([None, "a unicorn", "1"])
+    operator = TerminalOperator(heard, lambda: False, lambda: next(words), keyboard=False)
+    assert operator.ask(CHOICES) == "sphere"
+    assert heard == [("asking", {"choices": list(CHOICES)}), ("request", {"wanted": "sphere"})]
+
+
+def test_who_waits_elsewhere_is_interrupted_too() -> None:
+    looks = iter([False, False])
+    operator = TerminalOperator(Heard(), lambda: next(looks, True), keyboard=False)
+    with pytest.raises(Stopped):
+        operator.ask(CHOICES)

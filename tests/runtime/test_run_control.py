@@ -12,6 +12,7 @@ from executive.errors import Fault
 from executive.events import Event
 from executive.mission.load import load_mission
 from executive.runtime.run import Run
+from executive.runtime.run_control import RunControl
 from executive.testing.fake_cell import FakeCell
 
 
@@ -83,3 +84,27 @@ def test_a_record_that_breaks_at_the_very_end_is_a_fault_with_an_outcome(mission
     outcome = run.execute()
     assert (outcome.status, outcome.message) == ("FAULT", "the disk is full")
     assert run.workcell.cell.arm.at_rest
+
+
+def test_something_is_done_between_ticks_and_while_the_run_stands_still() -> None:
+    control, done = RunControl(), []
+    control.between_ticks(lambda: done.append(control.paused))
+    control.wait()
+    assert done == [False]
+    control.pause()
+
+    def go_on_after_three() -> None:
+        if len(done) == 4:
+            control.resume()
+
+    control.between_ticks(go_on_after_three)
+    control.wait()
+    assert done == [False, True, True, True]
+
+
+def test_what_is_asked_for_is_told_once_in_order() -> None:
+    control = RunControl()
+    assert control.requested() is None
+    control.request("cube")
+    control.request("duck")
+    assert [control.requested() for _ in range(3)] == ["cube", "duck", None]

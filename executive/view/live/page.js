@@ -15,6 +15,9 @@ let followed = 0;
 const address = new URL("live", location.href);
 address.protocol = "ws:";
 const socket = new WebSocket(address);
+socket.onopen = () => {
+  if (drawsOnProcessor()) wish({ do: "spare" });
+};
 socket.onmessage = (message) => show(JSON.parse(message.data));
 socket.onclose = () => {
   if (!state.result) headline("failure", "the run is gone", "the connection ended");
@@ -24,6 +27,12 @@ for (const what of ["pause", "resume", "step", "stop"]) find(what).onclick = () 
 
 function wish(what) {
   if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(what));
+}
+
+function drawsOnProcessor() {
+  const context = document.createElement("canvas").getContext("webgl");
+  const named = context && context.getExtension("WEBGL_debug_renderer_info");
+  return !named || /swiftshader|llvmpipe|software/i.test(context.getParameter(named.UNMASKED_RENDERER_WEBGL));
 }
 
 function show(news) {
@@ -75,7 +84,8 @@ function light(path, node) {
   const told = counts.filter(([number]) => number).map(([number, mark]) => `${number} ${mark}`);
   const note = group.querySelector(".note");
   if (note) note.textContent = told.join("  ");
-  if (node.status === "running") group.parentNode.append(group); // its line above its siblings'
+  // Its line goes above its siblings'.
+  if (node.status === "running" && group.nextElementSibling) group.parentNode.append(group);
 }
 
 function follow() {
@@ -88,10 +98,12 @@ function follow() {
   const frame = document.querySelector("#tree .scroll");
   const box = target.querySelector(".box").getBoundingClientRect();
   const view = frame.getBoundingClientRect();
+  const inside = box.left >= view.left && box.right <= view.right && box.top >= view.top && box.bottom <= view.bottom;
+  if (inside) return;
+  // At once: a picture this large glides at the cost of the run.
   frame.scrollTo({
     left: frame.scrollLeft + box.left - view.left - 0.62 * view.width,
     top: frame.scrollTop + box.top - view.top - 0.4 * view.height,
-    behavior: "smooth",
   });
 }
 

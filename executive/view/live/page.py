@@ -27,8 +27,10 @@ from executive.view.live.telling import Told, picture, poses, told
 from executive.view.tree.svg import Note, svg
 
 LOOPBACK = "127.0.0.1"
-PERIOD = 1 / 15
+PERIOD = 1 / 10
 """Time between two looks at where everything is, while somebody watches [s]."""
+SPARING = 1.0
+"""The same where a browser draws without a graphics card, on the processor that the run needs [s]."""
 GATHER = 0.03
 """For so long things to tell are gathered, so that they cost the run less [s]."""
 PATIENCE = 3.0
@@ -73,6 +75,7 @@ class LivePage:
         self._clock: Callable[[], float] = lambda: 0.0
         self._watched = 0
         self._due = 0.0
+        self._period = PERIOD
         self._paused = False
         self._last_look: Event | None = None
         self.problem = ""
@@ -140,7 +143,7 @@ class LivePage:
         now = time.monotonic()
         if now < self._due or self._control is None:
             return
-        self._due = now + PERIOD
+        self._due = now + self._period
         with self._harmless():
             if self._control.paused != self._paused:
                 self._paused = self._control.paused
@@ -185,6 +188,7 @@ class LivePage:
         control, what = self._control, wish["do"]
         if what == "watched":
             self._watched = wish["by"]
+            self._period = SPARING if wish["sparing"] else PERIOD
             if self._watched and self._last_look is not None:
                 self._queue.put(picture(self._last_look))
         elif control is None:

@@ -33,6 +33,10 @@ class Scene:
         scene = self._server.scene
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
+        # Shadows and mirrored surroundings are what a browser without a graphics card draws slowest.
+        scene.configure_default_lights(cast_shadow=False)
+        scene.configure_environment_map(None)
+        scene.add_light_ambient("/light", intensity=1.6)
         scene.set_background_image(np.full((1, 1, 3), BACKGROUND, np.uint8))
         self._server.initial_camera.position = CAMERA
         self._server.initial_camera.look_at = LOOK_AT

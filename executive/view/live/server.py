@@ -15,7 +15,7 @@ from executive.view.live.board import Board
 from executive.view.live.guard import Guard
 from executive.view.live.tunnel import Tunnel
 
-PERIOD = 1 / 15
+PERIOD = 1 / 8
 """Time between two messages to the browsers [s]."""
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
@@ -23,7 +23,7 @@ POLICY = (
 )
 FAREWELL = 0.5
 """Longest wait for the browsers to take in the last news [s]."""
-WISHES = ("pause", "resume", "step", "stop")
+WISHES = ("pause", "resume", "step", "stop", "spare")
 LONGEST = 4096
 """Of what a browser may say at once [bytes]."""
 _FILES = {"": ("page.html", "text/html"), "page.js": ("page.js", "text/javascript"),
@@ -45,7 +45,7 @@ class Server:
     def __init__(self, board: Board, guard: Guard, tunnel: Tunnel, wish: Wish) -> None:
         self._board = board
         self._wish = wish
-        self._watchers: set[web.WebSocketResponse] = set()
+        self._watchers: dict[web.WebSocketResponse, bool] = {}
         self.app = web.Application(middlewares=[guard.middleware()])
         self.app.router.add_get("/{token}/live", self._live)
         self.app.router.add_get("/{token}/scene", tunnel.socket)
@@ -87,16 +87,27 @@ class Server:
         socket = web.WebSocketResponse(max_msg_size=LONGEST, heartbeat=10)
         await socket.prepare(request)
         await socket.send_str(json.dumps(self._board.everything()))
-        self._watchers.add(socket)
-        self._wish({"do": "watched", "by": len(self._watchers)})
+        self._count(socket, sparing=False)
         try:
             async for message in socket:
-                if message.type is WSMsgType.TEXT and (wish := understood(message.data)) is not None:
+                wish = understood(message.data) if message.type is WSMsgType.TEXT else None
+                if wish == {"do": "spare"}:
+                    self._count(socket, sparing=True)
+                elif wish is not None:
                     self._wish(wish)
         finally:
-            self._watchers.discard(socket)
-            self._wish({"do": "watched", "by": len(self._watchers)})
+            del self._watchers[socket]
+            self._tell_watched()
         return socket
+
+    def _count(self, watcher: web.WebSocketResponse, *, sparing: bool) -> None:
+        """Count a watcher, and whether the run should be sparing with it."""
+        self._watchers[watcher] = sparing
+        self._tell_watched()
+
+    def _tell_watched(self) -> None:
+        sparing = any(self._watchers.values())
+        self._wish({"do": "watched", "by": len(self._watchers), "sparing": sparing})
 
 
 def understood(text: str) -> dict[str, Any] | None:

@@ -106,12 +106,18 @@ def test_a_watcher_is_told_everything_then_news_and_is_heard() -> None:
         site.board.take(("run", {"clock": 0.0, "mission": "sort", "seed": 3}))
         async with site.session.ws_connect(f"{site.address}/{TOKEN}/live", headers=site.origin) as socket:
             assert (await socket.receive_json())["run"] == {"mission": "sort", "seed": 3}
-            assert site.wishes == [{"do": "watched", "by": 1}]
+            assert site.wishes == [{"do": "watched", "by": 1, "sparing": False}]
             site.board.news()
             site.board.take(("paused", {"paused": True}))
             await site.server.tell()
             assert await socket.receive_json() == {"paused": True}
-            for said in ('{"do": "pause"}', "rubbish", '{"do": "request", "word": "cube"}', '{"do": "fly"}'):
+            for said in (
+                '{"do": "spare"}',
+                '{"do": "pause"}',
+                "rubbish",
+                '{"do": "request", "word": "cube"}',
+                '{"do": "fly"}',
+            ):
                 await socket.send_str(said)
             await socket.send_str('{"do": "stop"}')
             while site.wishes[-1] != {"do": "stop"}:
@@ -120,9 +126,10 @@ def test_a_watcher_is_told_everything_then_news_and_is_heard() -> None:
             await site.server.end()
             assert (await socket.receive_json())["over"] is True
             assert (await socket.receive()).type is aiohttp.WSMsgType.CLOSE
-        while site.wishes[-1] != {"do": "watched", "by": 0}:
+        while site.wishes[-1] != {"do": "watched", "by": 0, "sparing": False}:
             await asyncio.sleep(0)
-        assert site.wishes[1:-1] == [{"do": "pause"}, {"do": "request", "word": "cube"}, {"do": "stop"}]
+        assert site.wishes[1] == {"do": "watched", "by": 1, "sparing": True}
+        assert site.wishes[2:-1] == [{"do": "pause"}, {"do": "request", "word": "cube"}, {"do": "stop"}]
 
     serve(look)
 
