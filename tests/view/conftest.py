@@ -25,12 +25,21 @@ class Visit:
 
     def colours(self, selector: str) -> int:
         """Return how many colours are to be seen of an element: few where nothing is."""
+        import numpy as np
+
+        return len(np.unique(self._pixels(selector) // 16, axis=0))
+
+    def red(self, selector: str) -> int:
+        """Return how many pixels of an element are of the red of a bin."""
+        blue, green, red = self._pixels(selector).astype(int).T
+        return int(((red > 120) & (green < 0.5 * red) & (blue < 0.5 * red)).sum())
+
+    def _pixels(self, selector: str) -> Any:
         import cv2
         import numpy as np
 
         data = self.page.locator(selector).first.screenshot()
-        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-        return len(np.unique(image.reshape(-1, 3) // 16, axis=0))
+        return cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR).reshape(-1, 3)
 
 
 @pytest.fixture(scope="module")

@@ -98,8 +98,7 @@ class LivePage:
         # A line in every node for what became of it so far.
         blank = {node.path: Note("", ("",)) for node in nodes}
         self._tell("tree", mission=mission, svg=svg(nodes, mission, blank))
-        if self._scenery is not None:
-            self._tell("shapes", shapes=tuple(self._scenery.shapes))
+        self._tell("shapes", shapes=tuple(self._scenery.shapes) if self._scenery is not None else ())
         run.control.between_ticks(self._look_around)
         self._look_around()
 

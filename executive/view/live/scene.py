@@ -14,7 +14,7 @@ import websockets.asyncio.server
 
 from executive.scenery import Shape
 
-CAMERA, LOOK_AT = (1.75, -0.85, 1.15), (0.35, 0.0, 0.2)
+CAMERA, LOOK_AT = (1.35, -0.68, 0.95), (0.33, 0.0, 0.2)
 """Where a person's view begins, and what is in its middle [m]."""
 BACKGROUND = (243, 245, 248)
 

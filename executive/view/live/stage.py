@@ -23,13 +23,15 @@ class Stage:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._shapes: Sequence[Shape] = ()
+        self._told = asyncio.Event()
         self._bodies: Mapping[str, Sequence[float]] = {}
         self._scene: Scene | None = None
         self._building = asyncio.Lock()
 
     def show(self, shapes: Sequence[Shape]) -> None:
-        """Show these shapes, once somebody looks; called before anybody does."""
+        """Show these shapes, to whoever looks already, too."""
         self._shapes = shapes
+        self._told.set()
 
     def move(self, bodies: Mapping[str, Sequence[float]]) -> None:
         """Put bodies where they are: position [m] and quaternion (w, x, y, z)."""
@@ -38,7 +40,8 @@ class Stage:
             self._scene.move(bodies)
 
     async def ready(self) -> Path:
-        """Return the socket, at which the scene can be had from now on."""
+        """Return the socket at which the scene is, once it is known what to show."""
+        await self._told.wait()
         async with self._building:
             if self._scene is None:
                 # Half a second of imports and a second of meshes, during which others are served.
