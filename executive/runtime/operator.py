@@ -71,6 +71,9 @@ class TerminalOperator:
         Raises:
             Stopped: The run is to end.
         """
+        # An answer to no question, such as a second click, must not pick something later.
+        while self._requested() is not None:
+            pass
         self._emit("asking", choices=list(choices))
         numbered = "  ".join(f"{number} {label}" for number, label in enumerate(choices))
         while True:

@@ -55,7 +55,7 @@ class RunControl:
         self._change.set()
 
     def request(self, word: str) -> None:
-        """Answer the question what is to be picked, now or when it is asked."""
+        """Answer the question what is to be picked; what is said before it is asked counts for nothing."""
         self._requests.append(word)
 
     def requested(self) -> str | None:

@@ -75,7 +75,7 @@ def test_pictures_that_cannot_be_written_end_nothing(run, tmp_path):
     def put_a_file_there():
         frames = directory / "frames"
         while not frames.is_file():
-            # Moved and not deleted: somebody may be writing a picture into it at this moment, or make it next.
+            # Moved and not deleted: somebody may be writing a picture into it at this moment.
             if frames.is_dir():
                 frames.rename(directory / "moved")
             frames.touch()

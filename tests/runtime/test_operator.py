@@ -157,6 +157,12 @@ def test_what_is_asked_for_elsewhere_is_heard_where_nobody_can_type() -> None:
     assert heard == [("asking", {"choices": list(CHOICES)}), ("request", {"wanted": "sphere"})]
 
 
+def test_an_answer_to_no_question_picks_nothing() -> None:
+    heard, words = Heard(), iter(["cube", "cube", None, "duck"])
+    operator = TerminalOperator(heard, lambda: False, lambda: next(words), keyboard=False)
+    assert operator.ask(CHOICES) == "duck"
+
+
 def test_who_waits_elsewhere_is_interrupted_too() -> None:
     looks = iter([False, False])
     operator = TerminalOperator(Heard(), lambda: next(looks, True), keyboard=False)

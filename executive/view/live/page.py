@@ -13,7 +13,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from importlib.util import find_spec
 from typing import Any
 
@@ -35,6 +35,8 @@ GATHER = 0.03
 """For so long things to tell are gathered, so that they cost the run less [s]."""
 PATIENCE = 3.0
 """Longest wait for the page's last words [s]."""
+WAITING = 32
+"""Things to tell that may wait; beyond that no image [1 MB] is told of, nor where everything is."""
 NEEDS = ("aiohttp", "trimesh", "viser")
 
 
@@ -73,6 +75,7 @@ class LivePage:
         self._control: RunControl | None = None
         self._scenery: Scenery | None = None
         self._clock: Callable[[], float] = lambda: 0.0
+        self._gone = False
         self._watched = 0
         self._due = 0.0
         self._period = PERIOD
@@ -107,10 +110,10 @@ class LivePage:
         with self._harmless():
             if event.kind == "look" and event.data.get("frame_object") is not None:
                 self._last_look = event
-                if self._watched:
-                    self._queue.put(picture(event))
+                if self._watched and self._keeps_up:
+                    self._put(picture(event))
             elif (words := told(event)) is not None:
-                self._queue.put(words)
+                self._put(words)
 
     def close(self) -> None:
         """Go on without new events; `finish` says how the run ended."""
@@ -127,14 +130,14 @@ class LivePage:
             keys = ("status", "reason", "message", "story", "run")
             self._tell("result", **{key: result.get(key) for key in keys}, report=report)
         self._queue.put(None)
-        for thread in self._threads:
-            thread.join(PATIENCE)
-        self._threads = []
         try:
             self._server.wait(PATIENCE)
         except subprocess.TimeoutExpired:
             self._server.kill()
             self._server.wait()
+        for thread in self._threads:
+            thread.join()
+        self._threads = []
         self._said.close()
 
     def _look_around(self) -> None:
@@ -147,14 +150,22 @@ class LivePage:
             if self._control.paused != self._paused:
                 self._paused = self._control.paused
                 self._tell("paused", paused=self._paused)
-            if self._watched and self._scenery is not None:
-                self._queue.put(poses(self._clock(), self._scenery.poses()))
+            if self._watched and self._keeps_up and self._scenery is not None:
+                self._put(poses(self._clock(), self._scenery.poses()))
+
+    @property
+    def _keeps_up(self) -> bool:
+        return self._queue.qsize() < WAITING
 
     def _tell(self, kind: str, **data: Any) -> None:
-        self._queue.put((kind, data))
+        self._put((kind, data))
+
+    def _put(self, words: Told) -> None:
+        if not self._gone:
+            self._queue.put(words)
 
     @contextlib.contextmanager
-    def _harmless(self) -> Any:
+    def _harmless(self) -> Iterator[None]:
         """Keep what goes wrong from the run: a page is not worth a motion that is cut off."""
         try:
             yield
@@ -175,6 +186,7 @@ class LivePage:
                 pipe.flush()
                 if not over:
                     time.sleep(GATHER)
+        self._gone = True
 
     def _listen(self) -> None:
         """Do what the page wants, until it ends."""
@@ -189,7 +201,7 @@ class LivePage:
             self._watched = wish["by"]
             self._period = SPARING if wish["sparing"] else PERIOD
             if self._watched and self._last_look is not None:
-                self._queue.put(picture(self._last_look))
+                self._put(picture(self._last_look))
         elif control is None:
             return
         elif what == "request":

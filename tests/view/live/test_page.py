@@ -5,12 +5,15 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import signal
 import threading
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import aiohttp
+import numpy as np
 import pytest
 
 from executive.discovery import discover
@@ -20,7 +23,7 @@ from executive.mission.load import load_mission
 from executive.runtime.outcome import Outcome
 from executive.runtime.run import Run
 from executive.testing.fake_cell import FakeCell
-from executive.view.live.page import LivePage
+from executive.view.live.page import WAITING, LivePage
 
 MISSION = """\
 mission: bring_one
@@ -182,6 +185,24 @@ def test_a_page_that_died_costs_the_run_nothing(tmp_path: Path) -> None:
     assert run.execute().status == "SUCCESS"
     page.finish({"status": "SUCCESS"})
     run.close()
+
+
+def test_a_page_that_hangs_is_told_no_more_than_so_much_and_costs_a_few_seconds(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("executive.view.live.page.PATIENCE", 0.2)
+    page = LivePage()
+    asyncio.run(_answered(page.address))
+    page._server.send_signal(signal.SIGSTOP)
+    page._watched = 1
+    frame = SimpleNamespace(
+        image=np.zeros((480, 640, 3), np.uint8), visible=None, id=1, camera="overhead", stamp=0.0
+    )
+    for tick in range(200):
+        page(Event("look", tick, 0.1, {"frame_object": frame, "found": ()}))
+    assert page._queue.qsize() <= WAITING
+    page.finish({"status": "SUCCESS"})
+    assert page._server.returncode == -signal.SIGKILL
 
 
 def test_what_goes_wrong_with_it_is_said_and_the_run_goes_on() -> None:
