@@ -131,7 +131,8 @@ class LivePage:
             self._tell("result", **{key: result.get(key) for key in keys}, report=report)
         self._queue.put(None)
         try:
-            self._server.wait(PATIENCE)
+            if self._server.wait(PATIENCE) != 0:
+                self.problem = self.problem or f"the page ended before the run: {self._last_words()}"
         except subprocess.TimeoutExpired:
             self._server.kill()
             self._server.wait()
@@ -187,6 +188,12 @@ class LivePage:
                 if not over:
                     time.sleep(GATHER)
         self._gone = True
+
+    def _last_words(self) -> str:
+        """Return why the server ended, as far as it said so."""
+        self._said.seek(0)
+        lines = self._said.read().decode(errors="replace").strip().splitlines()
+        return lines[-1] if lines else f"exit status {self._server.returncode}"
 
     def _listen(self) -> None:
         """Do what the page wants, until it ends."""

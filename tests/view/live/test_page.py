@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import os
 import signal
+import subprocess
 import threading
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -184,6 +185,7 @@ def test_a_page_that_died_costs_the_run_nothing(tmp_path: Path) -> None:
     page._server.kill()
     assert run.execute().status == "SUCCESS"
     page.finish({"status": "SUCCESS"})
+    assert page.problem == "the page ended before the run: exit status -9"
     run.close()
 
 
@@ -203,6 +205,17 @@ def test_a_page_that_hangs_is_told_no_more_than_so_much_and_costs_a_few_seconds(
     assert page._queue.qsize() <= WAITING
     page.finish({"status": "SUCCESS"})
     assert page._server.returncode == -signal.SIGKILL
+
+
+def test_a_server_that_cannot_begin_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    popen = subprocess.Popen
+    monkeypatch.setattr(
+        "subprocess.Popen", lambda words, **options: popen([*words[:2], "no.such.program"], **options)
+    )
+    page = LivePage()
+    page.finish()
+    assert page.problem.startswith("the page ended before the run: ")
+    assert "No module named" in page.problem
 
 
 def test_what_goes_wrong_with_it_is_said_and_the_run_goes_on() -> None:
