@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 @overrides_option
 @runs_option
 @json_option
-@click.option("--quiet", is_flag=True, help="Show nothing, unless the run does not succeed.")
+@click.option("--quiet", is_flag=True, help="Show nothing on the terminal, unless the run does not succeed.")
 @click.option("--view", "live", is_flag=True, help="Show it on a page in the browser, at the address told.")
 @click.option("--paused", is_flag=True, help="Stand still before the first step, until somebody goes on.")
 @click.option("--gui", is_flag=True, help="Open the simulator's window.")
@@ -93,7 +93,7 @@ def command(
                 )
             report, problem = leave_report(result)
             if page is not None:
-                page.finish(result, report)
+                page.finish(result, report and str(Path(report).resolve()))
                 problem = "; ".join(filter(None, (problem, page.problem)))
         if problem and (view is not None or result["story"] is not None):
             click.echo(f"note: {problem}", err=True)

@@ -23,6 +23,7 @@ socket.onclose = () => {
   if (!state.result) headline("failure", "the run is gone", "the connection ended");
   for (const button of document.querySelectorAll("button")) button.disabled = true;
 };
+find("whole").onchange = () => document.querySelector("#tree .scroll").classList.toggle("whole", find("whole").checked);
 for (const what of ["pause", "resume", "step", "stop"]) find(what).onclick = () => wish({ do: what });
 
 function wish(what) {
@@ -42,6 +43,11 @@ function show(news) {
   for (const [path, node] of Object.entries(nodes ?? {})) {
     state.nodes[path] = node;
     light(path, node);
+    // What went wrong last, in the words of the skill: those of control nodes only pass it on.
+    const group = groups.get(path);
+    if (node.status === "failure" && node.said && group?.classList.contains("skill")) {
+      find("said").textContent = `${path.split("/").pop().split(":").pop()}: ${node.said}`;
+    }
   }
   Object.assign(state.items, items);
   if ("run" in news) {
@@ -55,7 +61,8 @@ function show(news) {
   if (nodes) follow();
   if ("result" in news) outcome(news.result);
   else if (!state.result) {
-    headline(state.over ? "invalid" : "running", state.over ? "ending" : state.paused ? "paused" : "running");
+    const doing = state.paused ? "paused" : state.asking ? "asking" : "running";
+    headline(state.over ? "invalid" : "running", state.over ? "ending" : doing);
   }
   find("pause").disabled = state.paused || state.over;
   find("resume").disabled = !state.paused || state.over;
