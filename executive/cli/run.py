@@ -168,8 +168,8 @@ def _page(wanted: bool) -> Iterator[LivePage | None]:
     from executive.view.live.page import LivePage
 
     page = LivePage()
-    click.echo(f"watch it at {page.address}", err=True)
     try:
+        click.echo(f"watch it at {page.address}", err=True)
         yield page
     finally:
         page.finish()

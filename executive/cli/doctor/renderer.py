@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from executive.cli.doctor.finding import Finding
+from executive.programs import program
 
 LONGEST = 30.0
 """Time after which nobody waits for a picture any longer [s]."""
@@ -51,7 +51,7 @@ def drawn(way: str) -> Drawing:
     module = f"{__package__}.drawing"
     try:
         ended = subprocess.run(
-            [sys.executable, "-m", module, way], capture_output=True, text=True, timeout=LONGEST, check=False
+            program(module, way), capture_output=True, text=True, timeout=LONGEST, check=False
         )
     except subprocess.TimeoutExpired:
         return Drawing(None, f"no frame came in {LONGEST:.0f} s")

@@ -6,11 +6,11 @@ import contextlib
 import pickle
 import queue
 import subprocess
-import sys
 import tempfile
 import threading
 from pathlib import Path
 
+from executive.programs import program
 from executive.record.pictures.scene import Scene
 
 WAITING = 64
@@ -62,7 +62,7 @@ class Drawer:
             # A file takes what the process says: a pipe that nobody reads could fill up and stop it.
             with tempfile.TemporaryFile() as said:
                 process = subprocess.Popen(
-                    [sys.executable, "-m", "executive.record.pictures"],
+                    program("executive.record.pictures"),
                     stdin=subprocess.PIPE, stdout=said, stderr=said,
                     # Out of reach of Ctrl-C: the pictures of a halted run are wanted all the more.
                     start_new_session=True,

@@ -31,8 +31,8 @@ class Guard:
 
     def __init__(self, token: str, port: int) -> None:
         self._token = token
-        self._hosts = (f"127.0.0.1:{port}", f"localhost:{port}")
-        self._origins = tuple(f"http://{host}" for host in self._hosts)
+        # By no other name: what answers to `localhost` may be somebody else's server, at [::1].
+        self._host = f"127.0.0.1:{port}"
 
     def middleware(self) -> Middleware:
         """Return what stands before every handler."""
@@ -52,13 +52,13 @@ class Guard:
     def problem(self, request: web.Request) -> str:
         """Return why a request is refused, or ""."""
         # A name that leads here is not enough: a foreign site may let its own name lead to this machine.
-        if request.headers.get("Host") not in self._hosts:
+        if request.headers.get("Host") != self._host:
             return "this page goes by the address of this machine only"
         token, _, _ = request.path.removeprefix("/").partition("/")
         if not secrets.compare_digest(token.encode(errors="replace"), self._token.encode()):
             return "the address lacks the token of this run; take it from the terminal that the run is in"
         origin = request.headers.get("Origin")
-        if origin is not None and origin not in self._origins:
+        if origin is not None and origin != f"http://{self._host}":
             return "another page may neither see nor command this run"
         # Browsers say so for every socket that a page opens.
         if origin is None and request.headers.get("Upgrade", "").lower() == "websocket":

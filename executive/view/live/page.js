@@ -20,7 +20,7 @@ socket.onopen = () => {
 };
 socket.onmessage = (message) => show(JSON.parse(message.data));
 socket.onclose = () => {
-  if (!state.result) headline("failure", "the run is gone", "the connection ended");
+  if (!state.result) headline("failure", "the run is gone");
   for (const button of document.querySelectorAll("button")) button.disabled = true;
 };
 find("whole").onchange = () => document.querySelector("#tree .scroll").classList.toggle("whole", find("whole").checked);
@@ -58,6 +58,7 @@ function show(news) {
   if (items) table();
   if ("look" in news || "decision" in news || (items && state.look)) picture();
   if ("asking" in news) ask(news.asking);
+  if (news.notes?.length) find("said").textContent = news.notes.at(-1);
   if (nodes) follow();
   if ("result" in news) outcome(news.result);
   else if (!state.result) {

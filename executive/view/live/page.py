@@ -9,7 +9,6 @@ import queue
 import secrets
 import socket
 import subprocess
-import sys
 import tempfile
 import threading
 import time
@@ -20,6 +19,7 @@ from typing import Any
 from executive.errors import InputError
 from executive.events import Event
 from executive.mission.outline import outline
+from executive.programs import program
 from executive.runtime.run import Run
 from executive.runtime.run_control import RunControl
 from executive.scenery import Scenery
@@ -65,7 +65,7 @@ class LivePage:
             port = listener.getsockname()[1]
             self.address = f"http://{LOOPBACK}:{port}/{token}/"
             self._server = subprocess.Popen(
-                [sys.executable, "-m", "executive.view.live", str(listener.fileno())],
+                program("executive.view.live", str(listener.fileno())),
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said,
                 pass_fds=[listener.fileno()],
                 # Out of reach of Ctrl-C: it ends when its input does, and says first how the run ended.
@@ -97,7 +97,8 @@ class LivePage:
         mission = run.loaded.mission.name
         self._control = run.control
         self._clock = lambda: run.workcell.cell.clock.now
-        self._scenery = run.workcell.scenery()
+        with self._harmless():
+            self._scenery = run.workcell.scenery()
         # A line in every node for what became of it so far.
         blank = {node.path: Note("", ("",)) for node in nodes}
         self._tell("tree", mission=mission, svg=svg(nodes, mission, blank))
@@ -201,6 +202,7 @@ class LivePage:
         for line in self._server.stdout:
             with self._harmless():
                 self._do(json.loads(line))
+        self._watched, self._gone = 0, True
 
     def _do(self, wish: Mapping[str, Any]) -> None:
         control, what = self._control, wish["do"]

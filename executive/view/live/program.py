@@ -56,9 +56,12 @@ async def _serve(listener: socket.socket, path: Path, say: Wish) -> None:
             board.take(words)
 
     def listen() -> None:
-        for batch in iter(_heard, None):
-            loop.call_soon_threadsafe(take, batch)
-        loop.call_soon_threadsafe(over.set)
+        try:
+            for batch in iter(_heard, None):
+                loop.call_soon_threadsafe(take, batch)
+        finally:
+            # A run that was killed in the middle of a word is over, too.
+            loop.call_soon_threadsafe(over.set)
 
     take(rest)
     runner = web.AppRunner(server.app, access_log=None)

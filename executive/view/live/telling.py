@@ -63,6 +63,6 @@ def poses(clock: float, places: Mapping[str, Pose]) -> Told:
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
+    if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     return [_plain(each) for each in value] if isinstance(value, (list, tuple)) else value

@@ -17,10 +17,9 @@ def problem(path: str = f"/{TOKEN}/", **headers: str) -> str:
     return GUARD.problem(make_mocked_request("GET", path, headers=named))
 
 
-@pytest.mark.parametrize("host", [f"127.0.0.1:{PORT}", f"localhost:{PORT}"])
-def test_the_page_itself_is_let_in(host: str) -> None:
-    assert problem(Host=host) == ""
-    assert problem(Host=host, Origin=f"http://{host}", Upgrade="websocket") == ""
+def test_the_page_itself_is_let_in() -> None:
+    assert problem() == ""
+    assert problem(Origin=HERE, Upgrade="websocket") == ""
 
 
 @pytest.mark.parametrize(
@@ -50,8 +49,6 @@ def test_a_socket_that_does_not_say_whose_it_is_is_not() -> None:
     assert problem(Upgrade="WebSocket") == "a connection must say which page it is of"
 
 
-@pytest.mark.parametrize(
-    "host", ["evil.example", f"evil.example:{PORT}", "127.0.0.1", f"127.0.0.1:{PORT}.evil"]
-)
+@pytest.mark.parametrize("host", ["evil.example", f"localhost:{PORT}", "127.0.0.1", f"127.0.0.1:{PORT}.evil"])
 def test_a_name_that_leads_here_is_not(host: str) -> None:
     assert problem(Host=host) == "this page goes by the address of this machine only"

@@ -210,7 +210,7 @@ def test_a_page_that_hangs_is_told_no_more_than_so_much_and_costs_a_few_seconds(
 def test_a_server_that_cannot_begin_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
     popen = subprocess.Popen
     monkeypatch.setattr(
-        "subprocess.Popen", lambda words, **options: popen([*words[:2], "no.such.program"], **options)
+        "subprocess.Popen", lambda words, **options: popen([*words[:3], "no.such.program"], **options)
     )
     page = LivePage()
     page.finish()

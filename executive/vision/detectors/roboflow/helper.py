@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 import threading
 import time
 from collections.abc import Mapping, Sequence
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 import executive
 from executive.errors import Fault, Unavailable
+from executive.programs import program
 from executive.vision.detectors.roboflow.key import ApiKey
 from executive.vision.detectors.roboflow.process import Process
 
@@ -47,7 +47,7 @@ class Helper:
     """
 
     def __init__(self, setup: Mapping[str, Any], key: ApiKey) -> None:
-        self._command = [sys.executable, "-m", PROGRAM, json.dumps(setup)]
+        self._command = program(PROGRAM, json.dumps(setup))
         self._key = key
         self._guard = threading.Lock()
         self._stopped = False
