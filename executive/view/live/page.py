@@ -29,7 +29,7 @@ from executive.view.tree.svg import Note, svg
 LOOPBACK = "127.0.0.1"
 PERIOD = 1 / 10
 """Time between two looks at where everything is, while somebody watches [s]."""
-SPARING = 1.0
+SPARING = 2.5
 """The same where a browser draws without a graphics card, on the processor that the run needs [s]."""
 GATHER = 0.03
 """For so long things to tell are gathered, so that they cost the run less [s]."""
