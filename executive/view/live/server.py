@@ -26,8 +26,12 @@ FAREWELL = 0.5
 WISHES = ("pause", "resume", "step", "stop", "spare")
 LONGEST = 4096
 """Of what a browser may say at once [bytes]."""
-_FILES = {"": ("page.html", "text/html"), "page.js": ("page.js", "text/javascript"),
-          "page.css": ("page.css", "text/css")}  # fmt: skip
+_FILES = {
+    "": ("live/page.html", "text/html"),
+    "page.js": ("live/page.js", "text/javascript"),
+    "page.css": ("live/page.css", "text/css"),
+    "colours.css": ("colours.css", "text/css"),
+}
 
 Wish = Callable[[Mapping[str, Any]], None]
 
@@ -79,7 +83,7 @@ class Server:
         if name not in _FILES:
             raise web.HTTPNotFound(text="there is no such thing here\n")
         file, kind = _FILES[name]
-        text = files(__package__).joinpath(file).read_text(encoding="utf-8")
+        text = files("executive.view").joinpath(file).read_text(encoding="utf-8")
         return web.Response(text=text, content_type=kind, headers={"Content-Security-Policy": POLICY})
 
     async def _live(self, request: web.Request) -> web.WebSocketResponse:

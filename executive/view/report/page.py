@@ -70,7 +70,7 @@ def write_report(path: Path) -> Path:
 def report(facts: Facts) -> str:
     """Return the report as HTML. Whatever a mission or a skill says in it is text, and never markup."""
     environment = Environment(
-        loader=PackageLoader("executive.view.report", "."),
+        loader=PackageLoader("executive.view", "."),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -80,7 +80,7 @@ def report(facts: Facts) -> str:
     told = facts.result.get("story")
     objects = list(_objects(facts))
     seen = [*facts.pictures.decisions.values(), *facts.pictures.failures]
-    text = environment.get_template("report.html").render(
+    text = environment.get_template("report/report.html").render(
         facts=facts,
         verdict=_verdict(facts),
         story=told,

@@ -63,7 +63,12 @@ def serve(do: Callable[[Site], Awaitable[None]]) -> None:
 
 def test_serves_the_page_and_nothing_else() -> None:
     async def look(site: Site) -> None:
-        for file, kind in (("", "text/html"), ("page.js", "text/javascript"), ("page.css", "text/css")):
+        for file, kind in (
+            ("", "text/html"),
+            ("page.js", "text/javascript"),
+            ("page.css", "text/css"),
+            ("colours.css", "text/css"),
+        ):
             status, text, headers = await site.get(f"/{TOKEN}/{file}")
             assert (status, headers["Content-Type"]) == (200, f"{kind}; charset=utf-8")
             assert text
