@@ -1,0 +1,235 @@
+"""Strength of the default tests: the share of small random faults in the code that they detect.
+
+`python -m tests.benchmarks.mutations --seed 2` draws 60 mutations and runs, for each one, those tests of the
+default tier that execute the changed line. A mutation that no test detects survives and is listed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import json
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from queue import Queue
+
+from coverage import CoverageData
+
+ROOT = Path(__file__).parents[2]
+
+EXCLUDED_FOLDERS = ("executive/vision/training", "executive/view/live", "executive/cli/init")
+"""Code that only slow tests execute: training needs an extra, the live page a browser, `init` a process."""
+
+MAX_SELECTED_TESTS = 400
+"""Number of tests up to which they are named one by one; beyond it, their files are named."""
+
+MUTANT_TIMEOUT = 420.0
+"""Time after which a run of the tests counts as a detected endless loop [s]."""
+
+PYTEST = (sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider")
+
+COMPARISONS: Mapping[type[ast.cmpop], str] = {
+    ast.Lt: "<=",
+    ast.LtE: "<",
+    ast.Gt: ">=",
+    ast.GtE: ">",
+    ast.Eq: "!=",
+    ast.NotEq: "==",
+    ast.Is: "is not",
+    ast.IsNot: "is",
+    ast.In: "not in",
+    ast.NotIn: "in",
+}
+ARITHMETIC: Mapping[type[ast.operator], str] = {ast.Add: "-", ast.Sub: "+", ast.Mult: "/", ast.Div: "*"}
+
+
+@dataclass(frozen=True)
+class Mutation:
+    """One changed place of the code.
+
+    Attributes:
+        kind: `operator`, `constant`, `deleted line` or `swapped arguments`.
+        path: File, relative to the repository.
+        line: First line of the place, from 1.
+        span: First and last offset of the replaced text in the file [byte].
+        old: The replaced text.
+        new: Its replacement.
+    """
+
+    kind: str
+    path: str
+    line: int
+    span: tuple[int, int]
+    old: str
+    new: str
+
+
+def find_mutations(path: Path, source: str) -> Iterator[Mutation]:
+    """Yield every mutation of one module that the four kinds allow; no docstring, message or import."""
+    data = source.encode()
+    starts = [0]
+    for line in data.splitlines(keepends=True):
+        starts.append(starts[-1] + len(line))
+
+    def mutate(kind: str, node: ast.expr | ast.stmt, new: str) -> Mutation:
+        assert node.end_lineno is not None and node.end_col_offset is not None
+        first = starts[node.lineno - 1] + node.col_offset
+        last = starts[node.end_lineno - 1] + node.end_col_offset
+        return Mutation(kind, str(path), node.lineno, (first, last), data[first:last].decode(), new)
+
+    tree = ast.parse(source)
+    skipped = {id(child) for node in ast.walk(tree) if _is_skipped(node) for child in ast.walk(node)}
+    for node in ast.walk(tree):
+        if id(node) in skipped:
+            continue
+        if isinstance(node, ast.Compare) and len(node.ops) == 1 and type(node.ops[0]) in COMPARISONS:
+            left, right = ast.unparse(node.left), ast.unparse(node.comparators[0])
+            yield mutate("operator", node, f"({left} {COMPARISONS[type(node.ops[0])]} {right})")
+        elif isinstance(node, ast.BinOp) and type(node.op) in ARITHMETIC:
+            left, right = ast.unparse(node.left), ast.unparse(node.right)
+            yield mutate("operator", node, f"(({left}) {ARITHMETIC[type(node.op)]} ({right}))")
+        elif isinstance(node, ast.BoolOp):
+            word = " or " if isinstance(node.op, ast.And) else " and "
+            values = word.join(f"({ast.unparse(value)})" for value in node.values)
+            yield mutate("operator", node, f"({values})")
+        elif isinstance(node, ast.Constant) and type(node.value) in (bool, int, float):
+            yield mutate("constant", node, _change_constant(node.value))
+        elif isinstance(node, ast.FunctionDef):
+            yield from (mutate("deleted line", child, "pass") for child in _deletable(node))
+        if isinstance(node, ast.Call) and len(node.args) >= 2:
+            first, second = (ast.unparse(one) for one in node.args[:2])
+            if first != second and not any(isinstance(one, ast.Starred) for one in node.args[:2]):
+                rest = [*map(ast.unparse, node.args[2:]), *map(ast.unparse, node.keywords)]
+                arguments = ", ".join([second, first, *rest])
+                yield mutate("swapped arguments", node, f"{ast.unparse(node.func)}({arguments})")
+
+
+def _is_skipped(node: ast.AST) -> bool:
+    """Return True for text, annotations, imports and raised errors: they hold messages or nothing to run."""
+    return isinstance(node, ast.JoinedStr | ast.Raise | ast.Import | ast.ImportFrom | ast.arg)
+
+
+def _change_constant(value: bool | int | float) -> str:
+    if isinstance(value, bool):
+        return str(not value)
+    return str(value + 1) if isinstance(value, int) or value == 0.0 else str(2 * value)
+
+
+def _deletable(function: ast.FunctionDef) -> Iterator[ast.stmt]:
+    """Yield the simple statements of a function, without its docstring."""
+    for node in ast.walk(function):
+        if isinstance(node, ast.Assign | ast.AugAssign | ast.Return | ast.Continue | ast.Break) or (
+            isinstance(node, ast.Expr) and not isinstance(node.value, ast.Constant)
+        ):
+            yield node
+
+
+def draw_mutations(root: Path, seed: int, count: int) -> list[Mutation]:
+    """Return `count` random mutations of `executive/` and `skills/`, the four kinds in equal numbers."""
+    by_kind: dict[str, list[Mutation]] = {}
+    for folder in ("executive", "skills"):
+        for path in sorted((root / folder).rglob("*.py")):
+            relative = path.relative_to(root)
+            if not str(relative).startswith(EXCLUDED_FOLDERS):
+                for mutation in find_mutations(relative, path.read_text()):
+                    by_kind.setdefault(mutation.kind, []).append(mutation)
+    chance = random.Random(seed)
+    kinds = sorted(by_kind)
+    return [chance.choice(by_kind[kinds[index % len(kinds)]]) for index in range(count)]
+
+
+def measure_coverage(root: Path) -> CoverageData:
+    """Run the default tests once and return which test executes which line."""
+    options = ["-n", "2", "--cov=executive", "--cov=skills", "--cov-context=test", "--cov-report="]
+    subprocess.run([*PYTEST, *options], cwd=root, check=True)
+    return _read_coverage(root)
+
+
+def _read_coverage(root: Path) -> CoverageData:
+    data = CoverageData(str(root / ".coverage"))
+    data.read()
+    return data
+
+
+def select_tests(data: CoverageData, root: Path, mutation: Mutation) -> list[str]:
+    """Return the tests that execute the mutated line; all that execute its module if it runs at import."""
+    lines = data.contexts_by_lineno(str(root / mutation.path))
+    at_line = {context for context in lines.get(mutation.line, []) if context}
+    contexts = at_line or {context for found in lines.values() for context in found if context}
+    tests = sorted({context.rpartition("|")[0] for context in contexts})
+    package = Path(mutation.path).parts[1]
+    if len(tests) > MAX_SELECTED_TESTS:
+        tests = sorted({test.partition("::")[0] for test in tests})
+    return sorted(tests, key=lambda test: package not in test)
+
+
+def detect(tree: Path, mutation: Mutation, tests: Sequence[str]) -> bool:
+    """Return True if the tests fail, or do not end, with the mutation applied to a copy of the repository."""
+    if not tests:
+        return False
+    path = tree / mutation.path
+    original = path.read_bytes()
+    first, last = mutation.span
+    path.write_bytes(original[:first] + mutation.new.encode() + original[last:])
+    try:
+        done = subprocess.run(
+            [*PYTEST, "-x", *tests],
+            cwd=tree,
+            env={**os.environ, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"},
+            capture_output=True,
+            timeout=MUTANT_TIMEOUT,
+        )
+    except subprocess.TimeoutExpired:
+        return True
+    finally:
+        path.write_bytes(original)
+    return done.returncode != 0
+
+
+def main() -> None:
+    """Draw mutations, test each one, and print those that survive."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--count", type=int, default=60)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--keep-coverage", action="store_true", help="use the coverage of the last run")
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    data = _read_coverage(ROOT) if options.keep_coverage else measure_coverage(ROOT)
+    mutations = draw_mutations(ROOT, options.seed, options.count)
+    with tempfile.TemporaryDirectory() as folder:
+        trees: Queue[Path] = Queue()
+        for number in range(options.workers):
+            tree = Path(folder) / str(number)
+            ignored = shutil.ignore_patterns(".git", ".venv", "runs", "__pycache__", ".*_cache", ".coverage")
+            shutil.copytree(ROOT, tree, ignore=ignored)
+            trees.put(tree)
+
+        def is_detected(mutation: Mutation) -> bool:
+            tree = trees.get()
+            try:
+                return detect(tree, mutation, select_tests(data, ROOT, mutation))
+            finally:
+                trees.put(tree)
+
+        with ThreadPoolExecutor(options.workers) as pool:
+            detected = list(pool.map(is_detected, mutations))
+    survivors = [mutation for mutation, found in zip(mutations, detected, strict=True) if not found]
+    if options.json:
+        print(json.dumps({"drawn": len(mutations), "survivors": [asdict(one) for one in survivors]}))
+        return
+    print(f"{sum(detected)} of {len(mutations)} mutations detected (seed {options.seed})")
+    for one in survivors:
+        print(f"{one.path}:{one.line}: {one.kind}: {one.old!r} -> {one.new!r}")
+
+
+if __name__ == "__main__":
+    main()
