@@ -47,8 +47,8 @@ CHANGES = ("moved", "removed", "dropped")
 
 
 def measure(subject: Subject, runs: Path, kills: int = 20, changed: int | None = None) -> Figures:
-    """Kill MISSION at random moments and resume it each time; the directories of bad runs are kept."""
-    random = np.random.default_rng(subject.seed)
+    """Kill MISSION at random moments and resume it each time; runs with a problem stay in `runs/kills`."""
+    random, runs = np.random.default_rng(subject.seed), runs / "kills"
     changed = kills // 4 if changed is None else changed
     began = time.monotonic()
     os.waitpid(begin_run(subject, subject.seed, runs / "whole"), 0)
