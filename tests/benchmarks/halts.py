@@ -19,7 +19,6 @@ from typing import Any
 import click
 import numpy as np
 from py_trees.common import Status
-from scipy.optimize import minimize_scalar
 
 from executive.campaign.halt_checks import check_journal, check_rest, check_tool
 from executive.campaign.subject import Subject
@@ -27,7 +26,7 @@ from executive.errors import ExecutiveError
 from executive.events import Event, Observer
 from executive.geometry import Array
 from executive.motion.limits import JointLimits
-from executive.motion.trajectory import STEP, Trajectory
+from executive.motion.trajectory import Trajectory
 from executive.record.journal import Journal, read_journal
 from executive.record.result import ledger_agrees
 from executive.record.trace import Trace
@@ -36,6 +35,7 @@ from executive.runtime.outcome import Outcome
 from executive.runtime.run import Run
 from executive.sim.arm import SimArm
 from executive.workcell import Workcell
+from tests.benchmarks.braking import measure_braking
 from tests.benchmarks.forks import Forks
 from tests.benchmarks.report import Figures, describe, run_mission_command
 
@@ -92,51 +92,6 @@ def spread_ticks(ticks: int, every: int, points: int | None = None) -> Sequence[
     if points is None:
         return range(0, ticks, every)
     return sorted({int(tick) for tick in np.linspace(0, ticks - 1, min(points, ticks))})
-
-
-def measure_braking(
-    commands: Sequence[Array], before: int, path: Trajectory | None, limits: JointLimits
-) -> dict[str, float]:
-    """Return how the arm came to rest: distance from its path, acceleration and jerk over the stop limits.
-
-    Args:
-        commands: Joint positions of consecutive control steps [rad].
-        before: Number of commands from before the stop.
-        path: The motion under way at the stop; None if the arm stood.
-        limits: The arm's.
-    """
-    accelerations = np.diff(commands, 2, axis=0) / STEP**2
-    jerks = np.diff(accelerations, axis=0) / STEP
-    if path is None:
-        deviation = float(np.ptp(commands[max(0, before - 1) :], axis=0).max())
-    else:
-        deviation = max(measure_distance(command, path) for command in commands[before:])
-    return {
-        "deviation_rad": deviation,
-        "acceleration_share": float(np.max(np.abs(accelerations) / limits.stop_acceleration, initial=0.0)),
-        "jerk_share": float(np.max(np.abs(jerks) / limits.stop_jerk, initial=0.0)),
-    }
-
-
-def measure_distance(q: Array, path: Trajectory) -> float:
-    """Return the distance of joint positions `(7,)` from the nearest place of a motion [rad].
-
-    The place is searched around the nearest of the straight lines between the motion's samples. The nearest
-    sample may belong to another part of a path that returns to where it was.
-    """
-    corners = path.samples.q
-    lines = np.diff(corners, axis=0)
-    squares = np.maximum(np.sum(lines**2, axis=1), np.finfo(float).tiny)
-    along = np.clip(np.sum((q - corners[:-1]) * lines, axis=1) / squares, 0.0, 1.0)
-    feet = corners[:-1] + along[:, None] * lines
-    time = int(np.argmin(np.linalg.norm(feet - q, axis=1))) * STEP
-    nearest = minimize_scalar(
-        lambda s: float(np.linalg.norm(path.at(s).q - q)),
-        bounds=(time - STEP / 2, time + STEP * 3 / 2),
-        method="bounded",
-        options={"xatol": 1e-9},
-    )
-    return float(np.abs(path.at(nearest.x).q - q).max())
 
 
 def find_worst(halts: Sequence[Figures]) -> list[Figures]:

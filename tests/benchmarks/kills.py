@@ -24,6 +24,7 @@ from executive.campaign.subject import Subject
 from executive.cell_config import TableConfig
 from executive.cli.options import runs_option
 from executive.errors import ExecutiveError
+from executive.geometry import Array
 from executive.record.find_run import LATEST, find_run
 from executive.record.journal import ending_of, read_journal
 from executive.record.recorded_mission import recorded_mission
@@ -179,8 +180,8 @@ def find_free_shift(
     return None
 
 
-def is_on_table(place: Sequence[float], table: TableConfig) -> bool:
-    """Return True if a place `(x, y)` [m] is in the workspace of the table."""
+def is_on_table(place: Array, table: TableConfig) -> bool:
+    """Return True if a place `(2,)` [m] is in the workspace of the table."""
     return all(low <= x <= high for x, (low, high) in zip(place, (table.x, table.y), strict=True))
 
 
@@ -216,7 +217,11 @@ def find_handled_twice(entries: Sequence[Mapping[str, Any]]) -> list[str]:
 if __name__ == "__main__":
     run_mission_command(
         measure,
-        click.option("--kills", type=click.IntRange(min=1), default=20, show_default=True, help="Number."),
-        click.option("--changed", type=click.IntRange(min=0), help="Kills with a changed world; a quarter."),
+        click.option(
+            "--kills", type=click.IntRange(min=1), default=20, show_default=True, help="Number of kills."
+        ),
+        click.option(
+            "--changed", type=click.IntRange(min=0), help="Kills with a changed world.  [default: a quarter]"
+        ),
         runs_option,
     )

@@ -9,6 +9,7 @@ makes the planner's motions, too (`motion_execution.py`).
 from __future__ import annotations
 
 import time
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
@@ -19,7 +20,6 @@ from executive.cell_config import CellConfig
 from executive.errors import Blocked, InputError, Unreachable
 from executive.geometry import Array
 from executive.layout import travel_height
-from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
 from executive.motion.state import State
 from executive.motion.stop import brake
@@ -48,25 +48,6 @@ def measure(cell: CellConfig, seed: int = 0, pairs: int = 200, execute: int = 0)
     return {**figures, **executed, "problems": [*figures["problems"], *executed["problems"]]}
 
 
-class Tally:
-    """Figures of one method, pair by pair: times [s], planning times [ms], peaks over the limits."""
-
-    def __init__(self, limits: JointLimits) -> None:
-        self._limits = limits
-        self._peaks = np.zeros(3)
-        self.times: list[float] = []
-        self.planning: list[float] = []
-
-    def add(self, duration: float, states: Sequence[State]) -> None:
-        """Add the time and the states of a pair."""
-        self.times.append(duration)
-        self._peaks = np.max([self._peaks, *(peaks(one, self._limits).max(axis=1) for one in states)], axis=0)
-
-    def summarize(self) -> Figures:
-        """Return a row of the table."""
-        return make_row(float(np.mean(self.times)), self._peaks, self.planning)
-
-
 def make_row(time: float, peaks: Array, planning: Sequence[float]) -> Figures:
     """Return mean time [s], peaks over the limits and planning times [ms] as a row of the table."""
     velocity, acceleration, jerk = peaks.tolist()
@@ -85,9 +66,9 @@ class _Trial:
         self._scenes = Scenes(cell, planner, world, seed)
         self._home = np.radians(cell.arm.poses_deg["home"])
         self._q = planner.plan(self._home, self._scenes.draw_start()).end
-        self._methods = {
-            name: Tally(planner.limits) for name in ("stops at corners", "TOPP-RA", "ours", "floor")
-        }
+        self._times: dict[str, list[float]] = defaultdict(list)
+        self._planning: dict[str, list[float]] = defaultdict(list)
+        self._peaks: dict[str, Array] = defaultdict(lambda: np.zeros(3))
         self._failures: list[str] = []
         self._first: rivals.Chains | None = None
 
@@ -100,8 +81,14 @@ class _Trial:
         except (Blocked, Unreachable) as error:
             self._failures.append(str(error))
             return
-        self._methods["ours"].add(duration, [motion.samples for motion in motions])
+        self._add("ours", duration, [motion.samples for motion in motions])
         self._compare(start, scene)
+
+    def _add(self, method: str, duration: float, states: Sequence[State]) -> None:
+        """Add the time [s] and the states of a pair."""
+        shares = [peaks(one, self._planner.limits).max(axis=1) for one in states]
+        self._times[method].append(duration)
+        self._peaks[method] = np.max([self._peaks[method], *shares], axis=0)
 
     def collect_figures(self) -> Figures:
         """Return the table of all methods, and the problems.
@@ -114,13 +101,16 @@ class _Trial:
         article = rivals.measure_article_peaks(self._cell, self._first, self._planner.limits)
         rows = {
             "article": make_row(rivals.ARTICLE_S, article, []),
-            **{name: tally.summarize() for name, tally in self._methods.items()},
+            **{
+                name: make_row(float(np.mean(self._times[name])), self._peaks[name], self._planning[name])
+                for name in ("stops at corners", "TOPP-RA", "ours", "floor")
+            },
         }
         floor, ours = rows["floor"]["time_s"], rows["ours"]
         names = ("velocity", "acceleration", "jerk")
         over_limit = [f"{name} over its limit" for name in names if ours[name] > 1 + PEAK_TOLERANCE]
         return {
-            "planned_pairs": len(self._methods["ours"].times),
+            "planned_pairs": len(self._times["ours"]),
             "article_cycle_s": rivals.ARTICLE_CYCLE_S,
             "methods": [
                 {"method": name, **row, "over_article": row["time_s"] / rivals.ARTICLE_S,
@@ -152,7 +142,7 @@ class _Trial:
         try:
             return plan(*args)
         finally:
-            self._methods[method].planning.append((time.perf_counter() - began) * 1e3)
+            self._planning[method].append((time.perf_counter() - began) * 1e3)
 
     def _compare(self, start: Array, scene: Scene) -> None:
         """Move between the same places by the other methods."""
@@ -165,11 +155,9 @@ class _Trial:
         followers = {"stops at corners": rivals.stop_at_corners, "TOPP-RA": rivals.follow_with_toppra}
         for name, follow in followers.items():
             motions = [self._time(name, follow, chain, limits) for chain in (chains.fetch, chains.carry)]
-            self._methods[name].add(
-                sum(duration for duration, _ in motions), [states for _, states in motions]
-            )
+            self._add(name, sum(duration for duration, _ in motions), [states for _, states in motions])
         ride = rivals.find_floor(kinematics, limits, start, scene.touch, scene.drop)
-        self._methods["floor"].add(*ride)
+        self._add("floor", *ride)
 
 
 if __name__ == "__main__":

@@ -71,7 +71,9 @@ class Gauge:
         for point in client.getContactPoints(bodyA=arm) or ():
             if point[9] > PRESSING and point[3] >= FIRST_MOVING and point[2] not in (held, arm, *allowed):
                 self.contacts.add(f"{self._world.part_of(point[3])} - {self._world.name_of(point[2])}")
-        for point in (client.getContactPoints(bodyA=held) or ()) if held is not None else ():
+        if held is None:
+            return
+        for point in client.getContactPoints(bodyA=held) or ():
             if point[9] > PRESSING and point[2] not in (arm, *allowed):
                 self.contacts.add(f"{self._name_load(held)} - {self._world.name_of(point[2])}")
 

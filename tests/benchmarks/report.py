@@ -51,10 +51,11 @@ def run_command(measure: Callable[..., Figures], *options: Option) -> None:
             print_figures(figures)
         sys.exit(int(bool(figures.get("problems"))))
 
+    configured: Any = command
     for option in reversed((*options, json_option)):
-        command = option(command)
+        configured = option(configured)
     try:
-        click.command(help=measure.__doc__)(command)()
+        click.command(help=measure.__doc__)(configured)()
     except ExecutiveError as error:
         click.echo(str(error), err=True)
         sys.exit(error.exit_code)

@@ -104,6 +104,8 @@ def _slope(samples: Sequence[Figures], name: str) -> float:
 if __name__ == "__main__":
     run_mission_command(
         measure,
-        click.option("--runs", type=click.IntRange(min=1), default=100, show_default=True, help="Number."),
+        click.option(
+            "--runs", type=click.IntRange(min=1), default=100, show_default=True, help="Number of runs."
+        ),
         click.option("--frames", is_flag=True, help="Save the pictures behind every decision, too."),
     )

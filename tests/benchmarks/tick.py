@@ -216,5 +216,7 @@ class _Answer(Behaviour):
 if __name__ == "__main__":
     run_command(
         measure,
-        click.option("--blocks", type=click.IntRange(min=1), default=50, show_default=True, help="Number."),
+        click.option(
+            "--blocks", type=click.IntRange(min=1), default=50, show_default=True, help="Blocks of a figure."
+        ),
     )
