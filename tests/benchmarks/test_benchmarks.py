@@ -224,6 +224,7 @@ class TestSoak:
         assert problem.startswith("seed 7 ended with FAILURE Detect.unavailable")
 
 
+@pytest.mark.slow
 def test_every_line_and_every_sync_of_the_journal_is_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
