@@ -44,7 +44,7 @@ class ArmConfig(Section):
 
 
 class ToolConfig(Section):
-    """A suction tool with one bellows cup; the constants are justified by the seal map."""
+    """A suction tool with one bellows cup; the constants are justified by the suction map."""
 
     length: float = Field(0.12, gt=0)
     """From the flange to the cup's lip [m]."""

@@ -21,7 +21,7 @@ BAD_INPUT, BROKEN, INTERRUPTED = 2, 3, 130
 """Exit codes of what ends a command early."""
 
 COMMANDS = (
-    "run", "check", "tree", "skills", "schema", "dataset", "train", "evaluate", "bench", "sweep", "faults",
+    "run", "check", "tree", "skills", "schema", "dataset", "train", "evaluate", "sweep", "faults",
     "replay", "report", "film", "doctor", "init",
 )  # fmt: skip
 """Every command, each in the module of its name, in the order in which `--help` lists them."""

@@ -74,7 +74,7 @@ def deaf(how: signal.Signals) -> str:
 
 
 @pytest.mark.usefixtures("heard")
-@pytest.mark.parametrize("how", SIGNALS)
+@pytest.mark.parametrize("how", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_a_second_wish_ends_the_jobs_under_way_at_once(how: signal.Signals) -> None:
     with pytest.raises(KeyboardInterrupt):
         do_all([how] * 3, deaf, why, workers=1, halting=lambda: os.kill(os.getpid(), how))

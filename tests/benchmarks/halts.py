@@ -1,0 +1,253 @@
+"""A mission halted at many moments of one run, each time as Ctrl-C would halt it.
+
+The mission is run once. At each of the moments this process forks. The child requests a stop, halts as any
+run does, is checked and ends; its parent continues to the next moment. A detector that works in a process
+of its own serves both, so use detections from the truth (`--oracle`) for a simulated cell.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+import traceback
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from py_trees.common import Status
+
+from executive.campaign.halt_checks import check_journal, check_rest, check_tool
+from executive.campaign.subject import Subject
+from executive.errors import ExecutiveError
+from executive.events import Event, Observer
+from executive.geometry import Array
+from executive.motion.limits import JointLimits
+from executive.motion.trajectory import Trajectory
+from executive.record.journal import Journal, read_journal
+from executive.record.result import ledger_agrees
+from executive.record.trace import Trace
+from executive.runtime.cells import cell_kind
+from executive.runtime.outcome import Outcome
+from executive.runtime.run import Run
+from executive.sim.arm import SimArm
+from executive.workcell import Workcell
+from tests.benchmarks.braking import measure_braking
+from tests.benchmarks.forks import Forks
+from tests.benchmarks.report import Figures, describe, run_mission_command
+
+LIMITS = {"rest_s": 0.5, "deviation_rad": 1e-6, "acceleration_share": 1.0, "jerk_share": 1.02}
+"""Limits of a halt: time to rest, distance of a joint's command from the path it was on, and acceleration and
+jerk over the stop limits; differences over steps see a little more than the profile's constant jerk."""
+COMMANDS_BEFORE = 5
+"""Number of commands from before the stop that are checked too, so that no edge is missed."""
+CHILD_TIMEOUT = 120.0
+"""Time that a child may take to halt and be checked [s]."""
+
+
+def measure(subject: Subject, every: int | None = None, points: int | None = None) -> Figures:
+    """Halt MISSION at moments all over one run, each time as Ctrl-C would."""
+    undisturbed = run_undisturbed(subject)
+    every = every or (10 if subject.loaded.cell_config.kind == "sim" else 1)
+    ticks = spread_ticks(undisturbed[0], every, points)
+    with tempfile.TemporaryDirectory() as folder:
+        halts = _HaltedRun(subject, undisturbed, frozenset(ticks), Path(folder)).run()
+    return {
+        **describe(subject),
+        "ticks": undisturbed[0],
+        "halts": len(halts),
+        "moving": sum(halt["moving"] for halt in halts),
+        "holding": sum(bool(halt["holds"]) for halt in halts),
+        "failed": sum(bool(halt["problems"]) for halt in halts),
+        "worst": find_worst(halts),
+        "problems": [f"{text} (tick {halt['at']})" for halt in halts for text in halt["problems"]],
+    }
+
+
+def run_undisturbed(subject: Subject) -> tuple[int, str]:
+    """Run a mission to its end and return its ticks and its trace.
+
+    Raises:
+        ExecutiveError: It does not succeed, or ledger and audit disagree.
+    """
+    trace = Trace()
+    with closing(_make_run(subject, trace)) as run:
+        outcome = run.execute()
+        agrees = ledger_agrees({"items": run.items(), "audit": run.audit()})
+    if outcome.status == "HALTED":
+        raise KeyboardInterrupt
+    if outcome.status != "SUCCESS" or not agrees:
+        raise ExecutiveError(
+            f"{subject.name} ended as {outcome.status} {outcome.reason} with seed {subject.seed}, ledger and "
+            f"audit {'agree' if agrees else 'disagree'}; choose a seed with which the mission succeeds"
+        )
+    return outcome.ticks, trace.hexdigest()
+
+
+def spread_ticks(ticks: int, every: int, points: int | None = None) -> Sequence[int]:
+    """Return the ticks to halt at: every so many of a run of `ticks`, or so many points evenly spread."""
+    if points is None:
+        return range(0, ticks, every)
+    return sorted({int(tick) for tick in np.linspace(0, ticks - 1, min(points, ticks))})
+
+
+def find_worst(halts: Sequence[Figures]) -> list[Figures]:
+    """Return for each limited figure its largest value, the tick of the halt, and the limit."""
+    worst = []
+    for name, allowed in LIMITS.items():
+        measured = [(halt[name], halt["at"]) for halt in halts if halt[name] is not None]
+        if measured:
+            value, tick = max(measured)
+            worst.append({"largest": name, "value": value, "tick": tick, "allowed": allowed})
+    return worst
+
+
+def check_limits(halt: Figures) -> Iterator[str]:
+    """Yield a sentence for every limit that a halt exceeded."""
+    for name, allowed in LIMITS.items():
+        if halt[name] is not None and halt[name] > allowed:
+            yield f"{name} is {halt[name]:.4g}; {allowed:g} is allowed"
+
+
+def check_ledger(items: Mapping[str, Any], audit: Mapping[str, int] | None) -> Iterator[str]:
+    """Yield a sentence if the ledger does not balance, or disagrees with the audit.
+
+    An object that no look had shown before the halt is in no ledger and lies where it lay.
+    """
+    balanced = items["seen"] == items["placed"] + items["rejected"] + items["lost"]
+    agrees = audit is None or (
+        items["placed"] == audit["right"]
+        and items["rejected"] + audit["unseen"] <= audit["left"]
+        and items["lost"] == audit["elsewhere"]
+        and audit["wrong_bin"] == 0
+    )
+    if not (balanced and agrees):
+        yield f"the ledger says {dict(items)}; the audit {audit}"
+
+
+class _HaltedRun:
+    """The run, and the results of its children so far."""
+
+    def __init__(
+        self, subject: Subject, undisturbed: tuple[int, str], ticks: frozenset[int], folder: Path
+    ) -> None:
+        self._subject = subject
+        self._undisturbed = undisturbed
+        self._ticks = ticks
+        self._forks = Forks(CHILD_TIMEOUT)
+        self._path = folder / "journal.jsonl"
+        self._journal = Journal(self._path)
+        self._trace = Trace()
+        self._commands: deque[Array] | list[Array] = deque(maxlen=COMMANDS_BEFORE)
+        self._before = 0
+        self._motion: Trajectory | None = None
+        self._halts: list[Figures] = []
+        self._halt: Figures = {}
+        self._run = _make_run(subject, self._record, self._trace, kind=self._make_cell)
+        self._arm = self._run.workcell.cell.arm
+
+    def run(self) -> list[Figures]:
+        """Run the mission and return what its children sent.
+
+        Raises:
+            ExecutiveError: It went otherwise than the run without halts.
+        """
+        try:
+            outcome = self._run.execute()
+            if self._forks.is_child:
+                self._halt.update(self._check(outcome))
+        except BaseException:
+            if not self._forks.is_child:
+                raise
+            self._halt["problems"] = [traceback.format_exc()]
+        finally:
+            # In every case: a child must not run beyond this line.
+            if self._forks.is_child:
+                self._forks.send(self._halt)
+            self._run.close()
+            self._journal.close()
+        if outcome.status == "HALTED":
+            raise KeyboardInterrupt
+        if (outcome.ticks, self._trace.hexdigest()) != self._undisturbed:
+            raise ExecutiveError(
+                f"the run with halts ended as {outcome.status} after {outcome.ticks} ticks, and differs from "
+                f"the run without them, which took {self._undisturbed[0]} ticks"
+            )
+        return self._halts
+
+    def _make_cell(self, *args: Any, **options: Any) -> Workcell:
+        """Return the cell, with something to do before and after every control step."""
+        kind = self._subject.kind or cell_kind(self._subject.loaded.cell_config.kind)
+        workcell: Any = kind(*args, **options)
+        advance = workcell.advance
+
+        def watched() -> None:
+            if not self._forks.is_child and self._run.tick in self._ticks:
+                self._try_halt()
+            advance()
+            if isinstance(self._arm, SimArm):
+                self._commands.append(self._arm._command)
+
+        workcell.advance = watched
+        return workcell
+
+    def _record(self, event: Event) -> None:
+        self._journal(event)
+
+    def _try_halt(self) -> None:
+        """Let a child halt here, and keep what it sends."""
+        unknown = dict.fromkeys(LIMITS)
+        self._halt = {"at": self._run.tick, "moving": not self._arm.at_rest, "holds": "", **unknown}
+        answer = self._forks.fork()
+        if answer is not None:
+            result, problem = answer
+            self._halts.append(result or {**self._halt, "problems": [problem]})
+            return
+        self._path = Path(shutil.copyfile(self._path, self._path.with_name("child.jsonl")))
+        self._journal = Journal(self._path, again=True)
+        self._commands, self._before = [*self._commands], len(self._commands)
+        self._motion = self._arm._motion if isinstance(self._arm, SimArm) else None
+        self._run.control.stop()
+
+    def _check(self, outcome: Outcome) -> Figures:
+        """Return the figures and problems of the halt that this child has made."""
+        run, workcell = self._run, self._run.workcell
+        self._journal.close()
+        halt = {**self._halt, "holds": outcome.holds}
+        halt["rest_s"] = (outcome.ticks - halt["at"]) * workcell.cell.clock.step
+        problems = [
+            *check_journal(read_journal(self._path), outcome),
+            *check_ledger(run.items(), run.audit()),
+            *check_tool(outcome, workcell),
+            *check_rest(workcell),
+        ]
+        self._path.unlink()
+        if (outcome.status, outcome.reason) != ("HALTED", "halted"):
+            problems.append(f"the run ended as {outcome.status} {outcome.reason}: {outcome.message}")
+        running = [node.name for node in run.root.iterate() if node.status is Status.RUNNING]
+        if running:
+            problems.append(f"still running: {', '.join(running)}")
+        if isinstance(self._arm, SimArm):
+            limits = JointLimits.of(self._subject.loaded.cell_config.arm.limits)
+            halt.update(measure_braking(self._commands, self._before, self._motion, limits))
+        problems += check_limits(halt)
+        return {**halt, "problems": problems}
+
+
+def _make_run(subject: Subject, *observers: Observer, kind: Callable[..., Workcell] | None = None) -> Run:
+    """Return a run of a mission, ready to be executed."""
+    return Run(
+        subject.loaded, subject.skills, seed=subject.seed, observers=observers,
+        kind=kind or subject.kind, requests=subject.requests,
+    )  # fmt: skip
+
+
+if __name__ == "__main__":
+    run_mission_command(
+        measure,
+        click.option("--every", type=click.IntRange(min=1), help="Control steps from one halt to the next."),
+        click.option("--points", type=click.IntRange(min=1), help="So many halts instead, evenly spread."),
+    )

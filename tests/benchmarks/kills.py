@@ -1,0 +1,227 @@
+"""A mission killed at random moments and resumed, with a changed world or an unchanged one.
+
+Each run continues in a forked child that is killed as `kill -9` does, at a random moment of the wall clock:
+within a control step, a line of the journal or a picture. Another child resumes the run from the disk. This
+process never builds a cell, because a fork would copy the locks of the threads of its detector.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+import signal
+import time
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from executive.campaign.subject import Subject
+from executive.cell_config import TableConfig
+from executive.cli.options import runs_option
+from executive.errors import ExecutiveError
+from executive.geometry import Array
+from executive.record.find_run import LATEST, find_run
+from executive.record.journal import ending_of, read_journal
+from executive.record.recorded_mission import recorded_mission
+from executive.record.recorded_run import recorded_run
+from executive.record.replay import compare
+from executive.record.result import ledger_agrees
+from executive.record.resumed_run import resumed_run
+from executive.runtime.cells import cell_kind
+from executive.tape.past import Past
+from executive.testing.disturbances.hand import Hand, Thing
+from executive.testing.meanwhile import meanwhile
+from tests.benchmarks.forks import Forks
+from tests.benchmarks.report import Figures, describe, run_mission_command, show_progress
+
+RESUME_TIMEOUT = 300.0
+"""Time that a child may take to resume a run [s]."""
+SHIFT = 0.06
+"""Distance by which an object is moved before a run is resumed [m]."""
+CHANGES = ("moved", "removed", "dropped")
+"""Changes of the world: an object on the table is moved or taken away, or the tool lets go."""
+
+
+def measure(subject: Subject, runs: Path, kills: int = 20, changed: int | None = None) -> Figures:
+    """Kill MISSION at random moments and resume it each time; runs with a problem stay in `runs/kills`."""
+    random, runs = np.random.default_rng(subject.seed), runs / "kills"
+    changed = kills // 4 if changed is None else changed
+    began = time.monotonic()
+    os.waitpid(begin_run(subject, subject.seed, runs / "whole"), 0)
+    duration = time.monotonic() - began
+    done: list[Figures] = []
+    for number in show_progress(range(kills), "killed"):
+        is_changed = number * changed // kills < (number + 1) * changed // kills
+        change = str(random.choice(CHANGES)) if is_changed else ""
+        folder = runs / str(number)
+        while not kill_run(subject, subject.seed + number, folder, float(random.uniform(0.0, duration))):
+            pass
+        done.append(resume_run(subject, subject.seed + number, folder, change))
+        if not done[-1]["problems"]:
+            shutil.rmtree(folder)
+    return {
+        **describe(subject),
+        "kills": len(done),
+        "changed": sum(bool(kill["change"]) for kill in done),
+        "failed": sum(bool(kill["problems"]) for kill in done),
+        "interrupted": [skill for kill in done for skill in kill["running"] or ("no skill",)],
+        "ended": [kill["status"] for kill in done],
+        "problems": [
+            f"{kill['run']}, killed at {kill['clock_s']:.2f} s, {kill['change'] or 'unchanged'}: {problem}"
+            for kill in done
+            for problem in kill["problems"]
+        ],
+    }
+
+
+def begin_run(subject: Subject, seed: int, runs: Path) -> int:
+    """Begin a recorded run in a child and return its process id."""
+    child = os.fork()
+    if child == 0:
+        try:
+            recorded_run(
+                subject.loaded, subject.skills, seed=seed, runs=runs, requests=subject.requests,
+                kind=subject.kind, frames=False,
+            )  # fmt: skip
+        finally:
+            os._exit(0)
+    return child
+
+
+def kill_run(subject: Subject, seed: int, runs: Path, after: float) -> bool:
+    """Begin a run, kill it after a time [s], and return True if the run had begun and not ended."""
+    child = begin_run(subject, seed, runs)
+    time.sleep(after)
+    os.kill(child, signal.SIGKILL)
+    _, status = os.waitpid(child, 0)
+    if not os.WIFSIGNALED(status):
+        return False
+    try:
+        entries = read_journal(find_run(LATEST, runs) / "journal.jsonl")
+    except ExecutiveError:
+        return False
+    return Past.of(entries).start is not None and ending_of(entries) is None
+
+
+def resume_run(subject: Subject, seed: int, runs: Path, change: str) -> Figures:
+    """Change the world if asked to, resume a killed run, and return its figures and problems."""
+    path = find_run(LATEST, runs)
+    past = Past.of(read_journal(path / "journal.jsonl"))
+    status = {e["node"]: e["status"] for e in past.entries if e["kind"] == "status" and "item" in e}
+    kill: Figures = {
+        "run": str(path),
+        "clock_s": max(entry["clock"] for entry in past.entries),
+        "running": [node.rpartition("/")[2] for node, value in status.items() if value == "RUNNING"],
+        "change": change,
+        "status": "none",
+    }
+
+    def resume() -> Figures:
+        done = change_world(subject, seed, path, past, change) if change else ""
+        result = resumed_run(path, subject.skills, frames=False, kind=subject.kind)
+        after = Past.of(read_journal(path / "journal.jsonl"))
+        problems = [*check_result(result, change=done), *find_handled_twice(after.entries)]
+        difference = compare(subject.loaded, subject.skills, after, seed).difference
+        if difference:
+            problems.append(f"the replay differs: {difference}")
+        ending = f"{result['status']} {result['reason']}".strip()
+        return {**kill, "change": done, "status": ending, "problems": problems}
+
+    figures, problem = Forks(RESUME_TIMEOUT).call(resume)
+    return figures or {**kill, "problems": [problem]}
+
+
+def change_world(subject: Subject, seed: int, path: Path, past: Past, change: str) -> str:
+    """Change the world of a killed run; return what was changed, or "" if nothing could be."""
+    random = np.random.default_rng(seed)
+    config = subject.loaded.cell_config
+    distance = 2 * max(kind.radius for kind in config.objects.values())
+    done: list[str] = []
+
+    def act(hand: Hand) -> None:
+        held = hand.held
+        standing = [thing for thing in hand.things if held is None or thing.body != held.body]
+        on_table = [thing for thing in standing if is_on_table(thing.position[:2], config.table)]
+        if change == "dropped" and held is not None:
+            hand.part()
+            done.append(f"dropped {held.label}")
+        elif on_table:
+            thing = on_table[int(random.integers(len(on_table)))]
+            shift = find_free_shift(thing, standing, distance, config.table, random)
+            if change == "removed" or shift is None:
+                hand.remove(thing)
+                done.append(f"removed {thing.label}")
+            else:
+                hand.move(thing, shift)
+                done.append(f"moved {thing.label}")
+
+    assert past.start is not None
+    loaded = recorded_mission(path, past.start, subject.skills)
+    meanwhile(path / "world.log", loaded, seed, act, subject.kind or cell_kind(loaded.cell_config.kind))
+    return "".join(done)
+
+
+def find_free_shift(
+    thing: Thing, standing: Sequence[Thing], distance: float, table: TableConfig, random: np.random.Generator
+) -> tuple[float, float] | None:
+    """Return a random shift `(x, y)` [m] to a place with no object within `distance` [m], or None."""
+    others = [other.position[:2] for other in standing if other.body != thing.body]
+    for angle in random.uniform(0, math.tau) + np.linspace(0, math.tau, 12, endpoint=False):
+        shift = (round(SHIFT * math.cos(angle), 3), round(SHIFT * math.sin(angle), 3))
+        place = thing.position[:2] + shift
+        is_free = all(np.linalg.norm(other - place) > distance for other in others)
+        if is_free and is_on_table(place, table):
+            return shift
+    return None
+
+
+def is_on_table(place: Array, table: TableConfig) -> bool:
+    """Return True if a place `(2,)` [m] is in the workspace of the table."""
+    return all(low <= x <= high for x, (low, high) in zip(place, (table.x, table.y), strict=True))
+
+
+def check_result(result: Mapping[str, Any], *, change: str) -> list[str]:
+    """Return what is wrong with the end of a resumed run; only a removed or dropped object may be lost."""
+    problems = []
+    if not ledger_agrees(result):
+        problems.append(f"the ledger says {result['items']}; the audit {result['audit']}")
+    may_lose = change.startswith(("removed", "dropped"))
+    if result["status"] != "SUCCESS" and not (may_lose and result["reason"] == "lost"):
+        problems.append(f"it ended with {result['status']} {result['reason']}: {result['message']}")
+    if result["holds"]:
+        problems.append(f"the tool holds {result['holds']} at the end")
+    return problems
+
+
+def find_handled_twice(entries: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return a sentence for every item that was handled again after it had been placed."""
+    problems, placed = [], Counter[str]()
+    last: dict[str, str] = {}
+    for entry in entries:
+        if entry["kind"] != "item":
+            continue
+        item, state = entry["item"], entry["state"]
+        if state == "placed" and last.get(item) != "placed":
+            placed[item] += 1
+        elif last.get(item) == "placed" and state != "placed":
+            problems.append(f"{item} was {state} after it had been placed")
+        last[item] = state
+    return problems + [f"{item} was placed {count} times" for item, count in placed.items() if count > 1]
+
+
+if __name__ == "__main__":
+    run_mission_command(
+        measure,
+        click.option(
+            "--kills", type=click.IntRange(min=1), default=20, show_default=True, help="Number of kills."
+        ),
+        click.option(
+            "--changed", type=click.IntRange(min=0), help="Kills with a changed world.  [default: a quarter]"
+        ),
+        runs_option,
+    )

@@ -1,0 +1,150 @@
+"""Motions of the planner as the simulated arm makes them, with the object in its tool."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from executive.arm import Goal, Task
+from executive.cell_config import CellConfig
+from executive.errors import Blocked, Unreachable
+from executive.geometry import Pose
+from executive.motion.planner import Planner
+from executive.sim.arm import SimArm
+from executive.sim.clock import SimClock
+from executive.sim.tool import SuctionTool
+from executive.sim.world import STEP, World
+from tests.benchmarks.motion_gauge import Gauge
+from tests.benchmarks.motion_scenes import Scene, Scenes, open_world
+from tests.benchmarks.report import Figures, show_progress
+
+GAUGE_STEPS = 4
+"""Control steps between two measurements of the distances."""
+SETTLE_STEPS = 24
+"""Steps in which a seal forms, as in the skill that grasps."""
+
+
+def execute_pairs(cell: CellConfig, pairs: int, seed: int) -> Figures:
+    """Return the figures of `pairs` random pairs in the live world; an object is removed after its drop.
+
+    Raises:
+        InputError: The cell has no pairs to move between.
+        Unreachable, Blocked: The arm has no way to where it begins.
+        Fault: The arm left its path.
+    """
+    with open_world(cell) as (world, planner):
+        execution = _Execution(cell, world, planner, seed)
+        for _ in show_progress(range(pairs), "executed"):
+            execution.execute_pair()
+        return execution.collect_figures()
+
+
+class _Execution:
+    """An arm and its tool in a live world, and the figures so far."""
+
+    def __init__(self, cell: CellConfig, world: World, planner: Planner, seed: int) -> None:
+        self._world = world
+        self._tool = SuctionTool(world, cell.tool)
+        self._arm = SimArm(world, planner, cell, SimClock(world, STEP), lambda: self._tool.held_body)
+        self._scenes = Scenes(cell, planner, world, seed)
+        self._margin = cell.motion.margin
+        self._gauge = Gauge(world, self._margin)
+        self._slip = self._tracking = 0.0
+        self._missed = self._dropped = 0
+        self._steps: list[int] = []
+        self._failures: list[str] = []
+        self._move(self._scenes.draw_start(), Task())
+
+    def execute_pair(self) -> None:
+        """Fetch one more object and carry it into a bin."""
+        scene = self._scenes.draw()
+        try:
+            self._fetch_and_carry(scene)
+        except (Blocked, Unreachable) as error:
+            self._failures.append(f"not planned: {error}")
+        self._tool.open()
+
+    def collect_figures(self) -> Figures:
+        """Return the figures of all pairs."""
+        contacts = [f"contact: {pair}" for pair in sorted(self._gauge.contacts)]
+        return {
+            "executed_pairs": len(self._steps),
+            "executed_time_s": float(np.mean(self._steps)) * STEP if self._steps else None,
+            "margin_mm": 1e3 * self._margin,
+            "clearance_mm": 1e3 * self._gauge.least if math.isfinite(self._gauge.least) else None,
+            "nearest": self._gauge.nearest,
+            "slip_mm": 1e3 * self._slip,
+            "missed": self._missed,
+            "dropped": self._dropped,
+            "tracking_deg": math.degrees(self._tracking),
+            "problems": [*contacts, *self._failures, *["an object was dropped"] * self._dropped],
+        }
+
+    def _fetch_and_carry(self, scene: Scene) -> None:
+        fetching = self._move(scene.approach, scene.fetching, scene, until=lambda: self._tool.touching)
+        self._tool.close()
+        for _ in range(SETTLE_STEPS):
+            self._step()
+        if not self._tool.holding:
+            self._missed += 1
+            return
+        carrying = self._move(
+            scene.drop, scene.carrying(self._tool.bears), scene, until=lambda: not self._tool.holding
+        )
+        if self._tool.holding:
+            self._steps.append(fetching + carrying)
+        else:
+            self._dropped += 1
+
+    def _move(
+        self, goal: Goal, task: Task, scene: Scene | None = None, until: Callable[[], bool] = lambda: False
+    ) -> int:
+        """Make a motion, braking as soon as `until` holds, and return the number of its steps.
+
+        Raises:
+            Unreachable, Blocked: There is no motion.
+            Fault: The arm left its path.
+        """
+        arm = self._arm
+        motion = arm.plan(goal, task).result()
+        grasp, steps, is_braking = self._locate_in_tool(), 0, False
+        if scene is not None:
+            self._gauge.begin(scene, self._tool.held_body)
+        arm.start(motion)
+        while not arm.at_rest:
+            if not is_braking and until():
+                arm.stop()
+                is_braking = True
+            self._step()
+            steps += 1
+            is_braking = is_braking or arm.met is not None
+            if not is_braking:
+                error = np.abs(arm.q - motion.at(steps * STEP).q)
+                self._tracking = max(self._tracking, float(error.max()))
+            if scene is not None:
+                self._measure(scene, steps, grasp)
+        if arm.met is not None:
+            self._gauge.contacts.add(arm.met)
+        return steps
+
+    def _measure(self, scene: Scene, steps: int, grasp: Pose | None) -> None:
+        held = self._tool.held_body
+        self._gauge.collect_contacts(scene, held)
+        if steps % GAUGE_STEPS:
+            return
+        self._gauge.measure(scene, held)
+        now = self._locate_in_tool()
+        if grasp is not None and now is not None:
+            self._slip = max(self._slip, float(np.linalg.norm(now.position - grasp.position)))
+
+    def _locate_in_tool(self) -> Pose | None:
+        """Return the pose of the held object in the tool's frame, or None."""
+        held, world = self._tool.held_body, self._world
+        return None if held is None else world.tool_pose().inverse() @ world.object_pose(held)
+
+    def _step(self) -> None:
+        self._arm.advance()
+        self._world.step()
+        self._tool.advance()

@@ -1,0 +1,113 @@
+"""Command line, statistics and printing of all benchmarks.
+
+A benchmark returns its figures as one plain dictionary. Values are printed one a line, lists of dictionaries
+as tables, and lists of sentences with their counts. The exit code is 1 if the list `problems` is not empty.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar
+
+import click
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+from executive.campaign.subject import Subject
+from executive.cli.cells import load_cells
+from executive.cli.options import MISSION, json_option, overrides_option, seed_option
+from executive.cli.output import print_json, stdout_kept_clean
+from executive.cli.subject import load_subject, oracle_option
+from executive.errors import ExecutiveError
+
+Figures = dict[str, Any]
+"""Figures of a benchmark by name; a name ends with the unit."""
+Option = Callable[[Callable[..., Any]], Callable[..., Any]]
+"""Argument or option of a command, as click makes it."""
+TABLE_WIDTH = 160
+"""Width of the widest table [characters]."""
+T = TypeVar("T")
+
+CELL_OPTIONS = (click.argument("cell", default="overhead"), seed_option)
+"""Options of a benchmark that measures a cell."""
+
+
+def run_command(measure: Callable[..., Figures], *options: Option) -> None:
+    """Parse the command line, print the figures that `measure` returns for it, and exit."""
+
+    def command(as_json: bool, **values: Any) -> None:
+        if "cell" in values:
+            (values["cell"],) = load_cells((values["cell"],)).values()
+        with stdout_kept_clean():
+            figures = measure(**values)
+        if as_json:
+            print_json(figures)
+        else:
+            print_figures(figures)
+        sys.exit(int(bool(figures.get("problems"))))
+
+    configured: Any = command
+    for option in reversed((*options, json_option)):
+        configured = option(configured)
+    try:
+        click.command(help=measure.__doc__)(configured)()
+    except ExecutiveError as error:
+        click.echo(str(error), err=True)
+        sys.exit(error.exit_code)
+
+
+def run_mission_command(measure: Callable[..., Figures], *options: Option) -> None:
+    """Do the same as `run_command`; `measure` gets the mission as a `Subject` and then the other options."""
+
+    def measure_mission(
+        mission: str, overrides: dict[str, str], oracle: bool, seed: int, **values: Any
+    ) -> Figures:
+        return measure(load_subject(mission, overrides, oracle, seed), **values)
+
+    measure_mission.__doc__ = measure.__doc__
+    run_command(measure_mission, MISSION, *options, oracle_option, seed_option, overrides_option)
+
+
+def describe(subject: Subject) -> Figures:
+    """Return the figures that name a mission and its cell."""
+    return {"mission": subject.name, "cell": subject.cell, "seed": subject.seed}
+
+
+def show_progress(items: Iterable[T], description: str) -> Iterable[T]:
+    """Yield `items`, with a bar on stderr if a person can see it."""
+    console = Console(stderr=True)
+    return track(items, description, console=console, disable=not console.is_interactive)
+
+
+def print_figures(figures: Figures) -> None:
+    """Print figures on standard output."""
+    console = Console(highlight=False, markup=False, soft_wrap=True)
+    console.width = max(console.width, TABLE_WIDTH)
+    for name, value in figures.items():
+        if not isinstance(value, list):
+            console.print(f"{name:24} {_format(value)}")
+        elif value and isinstance(value[0], dict):
+            table = Table(title=name, box=SIMPLE_HEAD, title_justify="left")
+            for key in value[0]:
+                table.add_column(key, justify="left" if isinstance(value[0][key], str) else "right")
+            for row in value:
+                table.add_row(*map(_format, row.values()))
+            console.print(table)
+        else:
+            console.print(f"{name:24} {len(value) or 'none'}")
+            for text, count in Counter(map(_format, value)).most_common():
+                console.print(f"  {count} x {text}")
+
+
+def _format(value: Any) -> str:
+    """Return a value as text, a number with four digits."""
+    if value is None:
+        return ""
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)

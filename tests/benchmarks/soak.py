@@ -1,0 +1,111 @@
+"""A mission run many times in one process: growth of memory, threads, open files and objects."""
+
+from __future__ import annotations
+
+import gc
+import os
+import shutil
+import statistics
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import click
+
+from executive.campaign.subject import Subject
+from executive.errors import InputError
+from executive.record.recorded_run import recorded_run
+from executive.record.result import ledger_agrees
+from tests.benchmarks.report import Figures, describe, run_mission_command, show_progress
+
+PROCESS = Path("/proc/self")
+"""Folder in which Linux lists the resources of this process."""
+WARM_RUNS = 5
+"""Number of runs after which everything is loaded that a run loads."""
+MAX_GROWTH = 20.0
+"""Limit of the growth of the memory over all runs [MB]; a thousand simulated runs may add 0.02 MB each."""
+MAX_OBJECTS_PER_RUN = 2.0
+"""Limit of the Python objects that a run leaves behind; its sample is one."""
+
+
+def measure(subject: Subject, runs: int = 100, frames: bool = False) -> Figures:
+    """Run MISSION many times in one process, each run with the next seed and recorded, and compare."""
+    if not PROCESS.is_dir():
+        raise InputError(f"resources of a process are read from {PROCESS}, which only Linux has; use Linux")
+    samples: list[Figures] = []
+    failed: list[str] = []
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in show_progress(range(subject.seed, subject.seed + runs), "run"):
+            result = recorded_run(
+                subject.loaded, subject.skills, seed=seed, runs=Path(folder), requests=subject.requests,
+                frames=frames, kind=subject.kind,
+            )  # fmt: skip
+            if result["status"] == "HALTED":
+                raise KeyboardInterrupt
+            if result["status"] != "SUCCESS" or not ledger_agrees(result):
+                failed.append(
+                    f"seed {seed} ended with {result['status']} {result['reason']}; the ledger says "
+                    f"{result['items']}, the audit {result['audit']}"
+                )
+            shutil.rmtree(result["run"])
+            samples.append(take_sample())
+    return {**describe(subject), "runs": runs, **compare_samples(samples, failed)}
+
+
+def take_sample() -> Figures:
+    """Return the resources of this process after a garbage collection."""
+    gc.collect()
+    pages = int((PROCESS / "statm").read_text().split()[1])
+    return {
+        "memory_mb": round(pages * os.sysconf("SC_PAGE_SIZE") / 1e6, 3),
+        "threads": len(os.listdir(PROCESS / "task")),
+        "open_files": len(os.listdir(PROCESS / "fd")),
+        "objects": len(gc.get_objects()),
+    }
+
+
+def compare_samples(samples: Sequence[Figures], failed: Sequence[str] = ()) -> Figures:
+    """Return how much the resources grew over the samples, and every limit that was exceeded."""
+    warm, last = samples[min(WARM_RUNS, len(samples)) - 1], samples[-1]
+    memory = [sample["memory_mb"] for sample in samples[min(WARM_RUNS, len(samples)) - 1 :]]
+    quarter = max(1, len(memory) // 4)
+    figures = {
+        "growth_mb": statistics.median(memory[-quarter:]) - statistics.median(memory[:quarter]),
+        "memory_mb_per_run": _slope(samples, "memory_mb"),
+        "objects_per_run": _slope(samples, "objects"),
+    }
+    limits = {
+        "growth_mb": MAX_GROWTH,
+        "memory_mb_per_run": MAX_GROWTH / len(samples),
+        "objects_per_run": MAX_OBJECTS_PER_RUN,
+    }
+
+    def find_problems() -> Iterator[str]:
+        for name, limit in limits.items():
+            if figures[name] > limit:
+                yield f"{name} is {figures[name]:.4g}; {limit:.3g} is allowed"
+        for name in ("threads", "open_files"):
+            if last[name] > warm[name]:
+                yield f"{last[name]} {name} after the last run; {warm[name]} when warm"
+
+    return {
+        **figures,
+        "samples": [{"after": "warm-up", **warm}, {"after": "last run", **last}],
+        "problems": [*find_problems(), *failed],
+    }
+
+
+def _slope(samples: Sequence[Figures], name: str) -> float:
+    """Return the growth of a resource per run: least squares over the last three quarters of the runs."""
+    values = [sample[name] for sample in samples[len(samples) // 4 :]]
+    return statistics.linear_regression(range(len(values)), values).slope if len(values) > 1 else 0.0
+
+
+if __name__ == "__main__":
+    run_mission_command(
+        measure,
+        click.option(
+            "--runs", type=click.IntRange(min=1), default=100, show_default=True, help="Number of runs."
+        ),
+        click.option("--frames", is_flag=True, help="Save the pictures behind every decision, too."),
+    )

@@ -1,0 +1,156 @@
+"""Map of the suction of cups of several sizes on each class of objects, at several offsets.
+
+The map justifies the constants in the `tool` section of a cell file. It is measured on the shapes with which
+the simulation collides. `suction_map.csv` is the map of the cell `overhead`.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+import click
+import numpy as np
+
+from executive.cell_config import CellConfig, ToolConfig
+from executive.geometry import Array, Pose, about_z, tool_down
+from executive.sim.models import load_mesh
+from executive.sim.seal import breakaway
+from executive.sim.seal import measure as measure_seal
+from executive.sim.world import World
+from tests.benchmarks.report import CELL_OPTIONS, Figures, run_command
+
+SHIPPED = Path(__file__).with_name("suction_map.csv")
+"""File with the map of the cell `overhead`."""
+CUP_RADII = (0.004, 0.005, 0.006, 0.008, 0.010, 0.012)
+"""Measured lip radii [m]."""
+OFFSETS = (0.0, 0.002, 0.004, 0.006, 0.008, 0.010, 0.012)
+"""Distances of the cup's axis from the middle of the object's outline [m]."""
+DIRECTIONS = 8
+"""Number of directions of every offset."""
+YAWS = 12
+"""Number of yaws of every object; the box of the outline, at which a detection aims, turns with it."""
+SETTLE_STEPS = 120
+"""Physics steps in which an object comes to rest."""
+
+
+def measure(cell: CellConfig, out: Path | None = None) -> Figures:
+    """Measure the suction of cups on the objects of CELL, and write all rows to `--out` as CSV."""
+    rows = measure_map(cell)
+    if out is not None:
+        write_map(rows, out)
+    # JSON has no word for infinity.
+    plain = [{key: None if value == math.inf else value for key, value in row.items()} for row in rows]
+    return {"cell": cell.cell, "map": plain}
+
+
+def measure_map(
+    cell: CellConfig, cup_radii: Sequence[float] = CUP_RADII, offsets: Sequence[float] = OFFSETS
+) -> list[Figures]:
+    """Return a row for every object class, cup radius and offset.
+
+    Cups of other sizes than that of the cell's tool have its vacuum (force over lip area) and its tolerances.
+    """
+    rows = []
+    world = World(cell)
+    try:
+        for label in cell.objects:
+            places = {offset: list(_find_places(cell, label, offset)) for offset in offsets}
+            body = world.add_object(label, _place_on_table(cell, label), (1.0, 1.0, 1.0))
+            for _ in range(SETTLE_STEPS):
+                world.step()
+            for radius in cup_radii:
+                force = cell.tool.force * (radius / cell.tool.cup_radius) ** 2
+                tool = cell.tool.model_copy(update={"cup_radius": radius, "force": force})
+                for offset in offsets:
+                    key = {"label": label, "cup_radius": radius, "offset": offset}
+                    rows.append({**key, **_measure_places(world, body, tool, places[offset])})
+            world.remove_object(body)
+    finally:
+        world.close()
+    return rows
+
+
+def write_map(rows: Sequence[Figures], path: Path) -> None:
+    """Write the rows as CSV with a header, in SI units."""
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def read_map(path: Path = SHIPPED) -> list[Figures]:
+    """Return the rows of a file that `write_map` wrote."""
+    with path.open(newline="") as file:
+        return [
+            {key: text if key == "label" else float(text) for key, text in line.items()}
+            for line in csv.DictReader(file)
+        ]
+
+
+def _place_on_table(cell: CellConfig, label: str) -> Pose:
+    """Return `X_WO` of an object standing in the middle of the table."""
+    x, y = (sum(side) / 2 for side in (cell.table.x, cell.table.y))
+    return Pose(np.eye(3), np.array([x, y, -load_mesh(cell.objects[label]).bottom]))
+
+
+def _find_places(cell: CellConfig, label: str, offset: float) -> Iterator[Array]:
+    """Yield cup positions `(2,)` [m] in the object's frame: turning the object is turning the aim.
+
+    An object with a ring is touched on the ring, in the direction of the offset.
+    """
+    outline = load_mesh(cell.objects[label]).vertices[:, :2]
+    reach = cell.objects[label].ring + offset
+    for yaw in 2 * np.pi * np.arange(YAWS) / YAWS:
+        R_WO = about_z(yaw)[:2, :2]
+        turned = outline @ R_WO.T
+        aim_W = (turned.min(axis=0) + turned.max(axis=0)) / 2
+        for angle in 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS:
+            yield R_WO.T @ (aim_W + reach * np.array([math.cos(angle), math.sin(angle)]))
+
+
+def _measure_places(world: World, body: int, tool: ToolConfig, places: Iterable[Array]) -> Figures:
+    """Return quantiles of rim gap [m], tilt [rad] and breakaway force [N], and the share of good seals.
+
+    The gap is infinite beside the object; a seal is good if it bears the tool's `least_force`.
+    """
+    X_WO = world.object_pose(body)
+    top = world.client.getAABB(body)[1][2] + tool.reach
+    gaps, tilts, forces = [], [], []
+    for place in places:
+        x, y, _ = X_WO.apply([*place, 0.0])
+        # Twice: Bullet's ray against a sphere errs by up to 0.8 mm over 0.2 m, by 0.02 mm over 5 mm.
+        seal = measure_seal(world.client, tool_down([x, y, top]), {body}, tool.cup_radius, top)
+        if seal is not None:
+            landed = tool_down([x, y, top - seal.distance])
+            seal = measure_seal(world.client, landed, {body}, tool.cup_radius, tool.reach)
+        gaps.append(math.inf if seal is None else seal.gap)
+        tilts.append(math.pi / 2 if seal is None else seal.tilt)
+        forces.append(breakaway(seal, tool))
+    return {
+        "placements": len(gaps),
+        **_quantiles("gap", gaps, 6),
+        **_quantiles("tilt", tilts, 4),
+        "sealed": round(float(np.mean(np.array(forces) >= tool.least_force)), 4),
+        **_quantiles("force", forces, 3),
+    }
+
+
+def _quantiles(name: str, values: Sequence[float], digits: int) -> Figures:
+    """Return quantiles that are themselves values: infinity has no mean."""
+    low, median, high = np.quantile(values, [0.1, 0.5, 0.9], method="lower").tolist()
+    return {
+        f"{name}_p10": round(low, digits),
+        f"{name}_median": round(median, digits),
+        f"{name}_p90": round(high, digits),
+    }
+
+
+if __name__ == "__main__":
+    run_command(
+        measure,
+        *CELL_OPTIONS[:1],
+        click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="CSV file to write."),
+    )

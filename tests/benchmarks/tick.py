@@ -1,0 +1,222 @@
+"""Cost of a tick and of a status change, compared with the same trees in bare py_trees.
+
+Both trees are ticked in turns, in short blocks without garbage collection, and the best block of each counts.
+Other load can only make a block slower, so the best block is the cost of the code itself; the turns keep a
+change of the processor's frequency from favouring either. Times are those of the thread, which stand still
+while another process has the processor.
+"""
+
+from __future__ import annotations
+
+import gc
+import itertools
+import math
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import click
+from py_trees import composites, decorators
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from executive.cell import Cell
+from executive.control.fallback import Fallback
+from executive.control.node import Site
+from executive.control.retry import Retry
+from executive.control.scope import Scope
+from executive.control.sequence import Sequence as SequenceNode
+from executive.control.skill_node import SkillNode, Wiring
+from executive.control.timeout import Timeout
+from executive.events import Event, Observer
+from executive.record.recorder import Recorder
+from executive.record.run_directory import RunDirectory
+from executive.skill import Skill
+from executive.testing.fake_cell import FakeCell
+from tests.benchmarks.report import Figures, run_command
+
+SIZES = (10, 100, 1000)
+"""Numbers of nodes of the measured trees, control nodes and leaves together."""
+MAX_RATIO = 1.3
+"""Limit of the cost of a steady tick over that of bare py_trees."""
+MAX_EXTRA = 20.0
+"""Limit of the cost of a recorded status change above that of bare py_trees [µs]."""
+STEADY_TICKS = 300
+"""Ticks in a block of a tree that waits."""
+ENDING_NODES = 1000
+"""Nodes that begin and end in a block, in one tick or several."""
+ATTEMPTS = 3
+"""Attempts of every retry."""
+TIMEOUT = 1e9
+"""Limit of every timeout, longer than any measurement [s]."""
+
+
+def measure(blocks: int = 50, sizes: Sequence[int] = SIZES) -> Figures:
+    """Measure ticks and status changes; each figure is the best of so many blocks."""
+    ticks = [measure_ticks(shape, nodes, blocks) for shape in SHAPES for nodes in sizes]
+    with tempfile.TemporaryDirectory() as folder:
+        changes = [measure_changes(nodes, blocks, Path(folder, str(nodes))) for nodes in sizes]
+    slow = [row for row in ticks if row["ratio"] > MAX_RATIO]
+    costly = [row for row in changes if row["extra_us"] > MAX_EXTRA]
+    return {
+        "steady tick": ticks,
+        "status changes": changes,
+        "problems": [f"ratio above {MAX_RATIO}: {row}" for row in slow]
+        + [f"more than {MAX_EXTRA} µs above py_trees: {row}" for row in costly],
+    }
+
+
+def measure_ticks(shape: str, nodes: int, blocks: int) -> Figures:
+    """Return the cost of a tick of a tree that waits for its last leaf."""
+    ours, bare = SHAPES[shape](Ours(), nodes), SHAPES[shape](Bare(), nodes)
+    # The first tick runs the leaves that end.
+    ours.tick_once()
+    bare.tick_once()
+    ours_us, bare_us = find_best_costs(ours, bare, blocks, STEADY_TICKS)
+    row = {"shape": shape, "nodes": nodes, "ours_us": ours_us, "py_trees_us": bare_us}
+    return {**row, "ratio": ours_us / bare_us}
+
+
+def measure_changes(nodes: int, blocks: int, folder: Path) -> Figures:
+    """Return the cost of a tick in which every node begins and succeeds, recorded as a run is."""
+    events: list[Event] = []
+    build_ending(Ours([events.append]), nodes).tick_once()
+    folder.mkdir()
+    with closing(Recorder(RunDirectory(folder), frames=False)) as recorder:
+        ours, bare = build_ending(Ours([recorder]), nodes), build_ending(Bare(), nodes)
+        ours_us, bare_us = find_best_costs(ours, bare, blocks, max(1, ENDING_NODES // nodes))
+    row = {"changes": len(events), "nodes": nodes, "ours_us": ours_us, "py_trees_us": bare_us}
+    return {**row, "extra_us": (ours_us - bare_us) / len(events)}
+
+
+def find_best_costs(ours: Behaviour, bare: Behaviour, blocks: int, ticks: int) -> tuple[float, float]:
+    """Return the cost of a tick of each tree in its best block of so many ticks [µs]."""
+    best_ours = best_bare = math.inf
+    gc.collect()
+    gc.disable()
+    try:
+        for _ in range(blocks):
+            best_ours = min(best_ours, _measure_cost(ours, ticks))
+            best_bare = min(best_bare, _measure_cost(bare, ticks))
+    finally:
+        gc.enable()
+    return best_ours, best_bare
+
+
+def _measure_cost(root: Behaviour, ticks: int) -> float:
+    began = time.thread_time()
+    for _ in range(ticks):
+        root.tick_once()
+    return (time.thread_time() - began) / ticks * 1e6
+
+
+class Ours:
+    """Nodes as a mission has them, on a fake cell; events are stamped and handed on as a run does it."""
+
+    def __init__(self, observers: Sequence[Observer] = ()) -> None:
+        self._observers = observers
+        self._cell, self._scope = FakeCell().cell, Scope()
+        self._number = itertools.count(1)
+
+    def leaf(self, *, ends: bool) -> Behaviour:
+        """Return a leaf that succeeds at once, or runs forever."""
+        skill = _Ends if ends else _Waits
+        return SkillNode(self._site(skill.__name__), "leaf", skill, Wiring(), self._cell, self._scope)
+
+    def sequence(self, children: Sequence[Behaviour]) -> Behaviour:
+        """Return a sequence with memory."""
+        return SequenceNode(self._site("sequence"), children)
+
+    def fallback(self, children: Sequence[Behaviour]) -> Behaviour:
+        """Return a fallback with memory."""
+        return Fallback(self._site("fallback"), children)
+
+    def guard(self, body: Behaviour) -> Behaviour:
+        """Return a retry of a timeout of `body`."""
+        timeout = Timeout(self._site("timeout"), body, TIMEOUT, self._cell.clock)
+        return Retry(self._site("retry"), timeout, ATTEMPTS)
+
+    def _site(self, name: str) -> Site:
+        return Site(f"tree/repeat/do/{next(self._number)}:{name}", emit=self._emit)
+
+    def _emit(self, kind: str, **data: Any) -> None:
+        event = Event(kind, 0, round(self._cell.clock.now, 6), data)
+        for observer in self._observers:
+            observer(event)
+
+
+class Bare:
+    """The same nodes of py_trees."""
+
+    def leaf(self, *, ends: bool) -> Behaviour:
+        """Return a leaf that succeeds at once, or runs forever."""
+        return _Answer(Status.SUCCESS if ends else Status.RUNNING)
+
+    def sequence(self, children: Sequence[Behaviour]) -> Behaviour:
+        """Return a sequence with memory."""
+        return composites.Sequence("sequence", memory=True, children=children)
+
+    def fallback(self, children: Sequence[Behaviour]) -> Behaviour:
+        """Return a fallback with memory."""
+        return composites.Selector("fallback", memory=True, children=children)
+
+    def guard(self, body: Behaviour) -> Behaviour:
+        """Return a retry of a timeout of `body`."""
+        return decorators.Retry("retry", decorators.Timeout("timeout", body, TIMEOUT), ATTEMPTS)
+
+
+Kit = Ours | Bare
+"""Maker of the nodes of a tree."""
+
+
+def build_flat(kit: Kit, nodes: int) -> Behaviour:
+    """Return one sequence of leaves, of which the last runs forever."""
+    return kit.sequence([*[kit.leaf(ends=True) for _ in range(nodes - 2)], kit.leaf(ends=False)])
+
+
+def build_nested(kit: Kit, nodes: int) -> Behaviour:
+    """Return retry, timeout, fallback, retry and timeout around a flat tree, and a second choice."""
+    return kit.guard(kit.fallback([kit.guard(build_flat(kit, nodes - 6)), kit.leaf(ends=True)]))
+
+
+def build_ending(kit: Kit, nodes: int) -> Behaviour:
+    """Return one sequence of leaves that all succeed at once."""
+    return kit.sequence([kit.leaf(ends=True) for _ in range(nodes - 1)])
+
+
+SHAPES: dict[str, Callable[[Kit, int], Behaviour]] = {"flat": build_flat, "nested": build_nested}
+"""Shapes of trees that come to wait for their last leaf; any number of nodes from 8 on."""
+
+
+class _Ends(Skill):
+    def run(self, cell: Cell) -> Iterator[None]:
+        del cell
+        yield from ()
+
+
+class _Waits(Skill):
+    def run(self, cell: Cell) -> Iterator[None]:
+        del cell
+        while True:
+            yield
+
+
+class _Answer(Behaviour):
+    def __init__(self, answer: Status) -> None:
+        super().__init__(answer.value)
+        self._answer = answer
+
+    def update(self) -> Status:
+        return self._answer
+
+
+if __name__ == "__main__":
+    run_command(
+        measure,
+        click.option(
+            "--blocks", type=click.IntRange(min=1), default=50, show_default=True, help="Blocks of a figure."
+        ),
+    )
