@@ -9,7 +9,6 @@ from executive.errors import InputError
 from executive.messages import Detection
 from executive.vision.detectors.embedded import LABELS, MODEL
 from executive.vision.detectors.onnx_model import OnnxModel, read_labels
-from executive.vision.detectors.views import without_duplicates
 
 
 @pytest.fixture(scope="module")
@@ -63,13 +62,6 @@ def test_the_input_is_normalized_rgb_of_the_models_size(model, monkeypatch):
     assert given.shape == (1, 3, model.size, model.size)
     assert given[0, 0] == pytest.approx((1 - 0.485) / 0.229, abs=1e-5)
     assert given[0, 2] == pytest.approx((0 - 0.406) / 0.225, abs=1e-5)
-
-
-def test_an_object_seen_twice_is_reported_once_and_neighbours_stay():
-    sure = Detection("cube", 0.9, (0.0, 0.0, 10.0, 10.0))
-    again = Detection("sphere", 0.5, (0.0, 0.0, 10.0, 11.0))
-    neighbour = Detection("cube", 0.4, (5.0, 0.0, 15.0, 10.0))
-    assert without_duplicates([sure, again, neighbour]) == [sure, neighbour]
 
 
 def test_the_wrong_number_of_labels_is_refused(tmp_path):

@@ -166,7 +166,7 @@ WRONG = [
 @pytest.mark.parametrize(("kind", "options", "option", "text"), WRONG)
 def test_a_wrong_option_is_said_in_a_sentence_before_and_at_the_start(tmp_path, kind, options, option, text):
     (tmp_path / "empty.txt").touch()
-    ((found, sentence),) = kind.check(configured(kind, **options), tmp_path)
+    ((found, sentence),) = kind.check(configured(kind, **options), tmp_path, {})
     assert found == option
     with pytest.raises(InputError, match=text) as caught:
         build(kind, tmp_path, **options)
@@ -175,9 +175,9 @@ def test_a_wrong_option_is_said_in_a_sentence_before_and_at_the_start(tmp_path, 
 
 def test_every_wrong_option_is_found_at_once(tmp_path):
     config = configured(RfdetrDetector, colour=1, threads=0, model_path="m.onnx", labels=["a"])
-    assert [option for option, _ in RfdetrDetector.check(config, tmp_path)] == ["threads", "colour"]
+    assert [option for option, _ in RfdetrDetector.check(config, tmp_path, {})] == ["threads", "colour"]
     config = configured(RfdetrDetector, model_path="m.onnx", labels="no.txt")
-    assert [option for option, _ in RfdetrDetector.check(config, tmp_path)] == ["model_path", "labels"]
+    assert [option for option, _ in RfdetrDetector.check(config, tmp_path, {})] == ["model_path", "labels"]
 
 
 def test_the_labels_are_the_cells_names_and_no_model_is_read_for_them(tmp_path):
