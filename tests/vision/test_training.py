@@ -11,6 +11,7 @@ import pytest
 
 from executive.errors import InputError
 from executive.vision.train import train
+from executive.vision.training.start import learning_rate
 
 
 def test_a_folder_that_is_no_data_set_is_refused(tmp_path):
@@ -21,6 +22,20 @@ def test_a_folder_that_is_no_data_set_is_refused(tmp_path):
 def test_a_missing_checkpoint_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"no checkpoint .*old\.pth to start from"):
         train(tmp_path, tmp_path / "out", start=tmp_path / "old.pth")
+
+
+def test_an_exported_model_is_no_checkpoint(tmp_path):
+    (tmp_path / "data.yaml").touch()
+    (tmp_path / "model.onnx").touch()
+    with pytest.raises(InputError, match=r"model\.onnx is an exported model, .* checkpoint_best_total\.pth"):
+        train(tmp_path, tmp_path / "out", start=tmp_path / "model.onnx")
+
+
+def test_a_training_goes_on_in_smaller_steps_if_the_checkpoint_knows_its_labels(tmp_path):
+    start = tmp_path / "checkpoint_best_total.pth"
+    assert learning_rate(None, ["bolt"]) == learning_rate(start, ["bolt", "nut"]) == 3e-4
+    (tmp_path / "labels.txt").write_text("bolt\nnut\n")
+    assert (learning_rate(start, ["bolt", "nut"]), learning_rate(start, ["nut", "bolt"])) == (1e-4, 3e-4)
 
 
 @pytest.mark.skipif(importlib.util.find_spec("torch") is not None, reason="the extra is installed")
