@@ -99,6 +99,14 @@ def test_a_label_says_the_class_and_the_confidence_that_of_the_choice_the_item()
     assert captions(scene(CUBE, chosen=0)) == ["cube 0.90"]
 
 
+def test_the_labels_of_boxes_side_by_side_do_not_cover_each_other():
+    beside = replace(CUBE, label="duck", box=(104.0, 200.0, 164.0, 260.0))
+    apart, close = (draw(scene(CUBE, other))[:480] for other in (DUCK, beside))
+    for colour in (rgb(PALETTE[0]), rgb(PALETTE[1])):
+        labels = [(picture == colour).all(axis=-1).sum() for picture in (apart, close)]
+        assert labels[1] > 0.6 * labels[0]
+
+
 def test_colours_of_classes_come_again_when_there_are_no_more():
     classes = [f"class {number}" for number in range(len(PALETTE) + 1)]
     colours = [class_colour(label, classes) for label in classes]
