@@ -73,9 +73,3 @@ def test_a_file_that_is_no_model_is_refused(tmp_path):
     (tmp_path / "model.onnx").write_bytes(b"not a model")
     with pytest.raises(InputError, match="not a model that onnxruntime can run"):
         OnnxModel(tmp_path / "model.onnx", ("cube",))
-
-
-def test_an_empty_label_file_is_refused(tmp_path):
-    (tmp_path / "labels.txt").write_text("\n\n")
-    with pytest.raises(InputError, match="is empty"):
-        read_labels(tmp_path / "labels.txt")

@@ -90,4 +90,6 @@ def test_of_boxes_that_overlap_by_more_than_seven_tenths_the_most_confident_is_k
     ]
     assert [one.label for one in without_duplicates(detections)] == ["first", "beside", "far"]
     assert [one.label for one in without_duplicates(detections[1:])] == ["again", "far"]
+    equals = [Detection(label, 0.9, (0, 0, 10, 10)) for label in "abc"]
+    assert without_duplicates(equals) == equals[:1]
     assert without_duplicates([]) == merge([], SIZE) == []

@@ -85,8 +85,9 @@ def without_duplicates(found: Sequence[Detection]) -> list[Detection]:
         return list(found)
     from supervision import box_non_max_suppression
 
-    scored = np.array([(*detection.box, detection.confidence) for detection in found])
-    keep = box_non_max_suppression(scored, DUPLICATE)
+    # The rank instead of the confidence, so that of equally confident ones the first is kept.
+    ranked = np.array([(*detection.box, -rank) for rank, detection in enumerate(found)])
+    keep = box_non_max_suppression(ranked, DUPLICATE)
     return [detection for detection, is_kept in zip(found, keep, strict=True) if is_kept]
 
 
