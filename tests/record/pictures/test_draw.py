@@ -7,19 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from executive.messages import Detection
 from executive.record.pictures.boxes import captions
 from executive.record.pictures.draw import WIDTH, draw
 from executive.record.pictures.palette import GROUND, PALETTE, bgr, class_colour
-from executive.record.pictures.scene import Scene, Seen
+from executive.record.pictures.scene import Scene
 from executive.record.pictures.strip import HEIGHT
 
 GREY = 150
-CUBE = Seen("cube", 0.9, (100.0, 200.0, 160.0, 260.0))
-DUCK = Seen("duck", 0.7, (300.0, 100.0, 340.0, 140.0))
+CUBE = Detection("cube", 0.9, (100.0, 200.0, 160.0, 260.0))
+DUCK = Detection("duck", 0.7, (300.0, 100.0, 340.0, 140.0))
 CLASSES = ("cube", "duck")
 
 
-def scene(*seen: Seen, height: int = 480, width: int = 640, **more) -> Scene:
+def scene(*seen: Detection, height: int = 480, width: int = 640, **more) -> Scene:
     image = np.full((height, width, 3), GREY, np.uint8)
     return Scene(image, seen=seen, classes=CLASSES, **more)
 

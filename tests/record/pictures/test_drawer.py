@@ -8,13 +8,14 @@ import cv2
 import numpy as np
 import pytest
 
+from executive.messages import Detection
 from executive.record.pictures import drawer as module
 from executive.record.pictures.drawer import MAX_WAITING, Drawer
-from executive.record.pictures.scene import Scene, Seen
+from executive.record.pictures.scene import Scene
 
 SCENE = Scene(
     np.full((480, 640, 3), 150, np.uint8),
-    seen=[Seen("cube", 0.9, (100, 200, 160, 260))],
+    seen=[Detection("cube", 0.9, (100, 200, 160, 260))],
     chosen=0,
     classes=("cube",),
 )
