@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from executive.cell import Steps
 from executive.cell_config import CameraConfig, DetectorConfig
 from executive.errors import Unavailable
-from executive.messages import Answer, Detection, Frame
+from executive.messages import Answer, Frame
 from executive.vision.detectors.registry import build_detectors
 
 STEP = 1 / 240
@@ -24,25 +24,6 @@ WHOLE_IMAGE = CameraConfig(
     table_view=(0, 0, 64, 64), scan_poses=("none",),
 ).model_copy(update={"table_view": (0, 0, 1 << 20, 1 << 20)})  # fmt: skip
 """A camera whose view `full` is searched in one piece, whatever the size of the image."""
-
-
-@dataclass(frozen=True)
-class Look:
-    """Answer of a detector to one frame.
-
-    Attributes:
-        found: Everything at or above its floor, most confident first.
-        threshold: Confidence from which it counts, for the detector that answered.
-        answered_by: Name of that detector, "" where none gave a usable answer.
-        latency: Wall time that it took [ms].
-        why: Reason for which the detector was unavailable, or "".
-    """
-
-    found: tuple[Detection, ...]
-    threshold: float
-    answered_by: str
-    latency: float
-    why: str = ""
 
 
 class ManualClock:
@@ -93,30 +74,27 @@ class CellDetector:
             configs, camera=camera or WHOLE_IMAGE, clock=self._clock, base=base, seed=0
         )
 
-    def ask(self, frame: Frame) -> Look:
-        """Return the detector's answer to a frame, and the time it took."""
-        stamped = replace(frame, stamp=self._clock.now)
-        began = time.perf_counter()
-        request = self._built[self._name].request(stamped, self._view)
-        while not request.ready:
-            if self._clock.now - stamped.stamp > TIMEOUT:
-                return self._finish(began, why=f"no answer within {TIMEOUT:g} s of the clock")
-            self._clock.now += STEP
+    def ask(self, frame: Frame) -> tuple[Answer, float]:
+        """Return the detector's answer to a frame, and the wall time that it took [ms].
+
+        Raises:
+            Unavailable: The detector gave no usable answer.
+        """
+        began, asked = time.perf_counter(), self._clock.now
         try:
+            request = self._built[self._name].request(replace(frame, stamp=asked), self._view)
+            while not request.ready:
+                if self._clock.now - asked > TIMEOUT:
+                    raise Unavailable(f"no answer within {TIMEOUT:g} s of the clock")
+                self._clock.now += STEP
             answer = request.result()
-        except Unavailable as error:
-            return self._finish(began, why=str(error))
-        return self._finish(began, answer)
+        finally:
+            self._clock.now += PAUSE
+        latency = (time.perf_counter() - began) * 1000
+        found = tuple(one for one in answer.found if self._classes is None or one.label in self._classes)
+        return replace(answer, found=found), latency
 
     def close(self) -> None:
         """Give back what the detectors hold."""
         for detector in self._built.values():
             detector.close()
-
-    def _finish(self, began: float, answer: Answer | None = None, why: str = "") -> Look:
-        latency = (time.perf_counter() - began) * 1000
-        self._clock.now += PAUSE
-        if answer is None:
-            return Look((), self.threshold, "", latency, why)
-        found = tuple(one for one in answer.found if self._classes is None or one.label in self._classes)
-        return Look(found, answer.reliability.threshold, answer.detector, latency)

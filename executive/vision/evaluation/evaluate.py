@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from typing import Protocol
 
 from executive.cell import Localizer
-from executive.messages import Frame
-from executive.vision.evaluation.asking import Look
+from executive.errors import Unavailable
+from executive.messages import Answer, Frame
 from executive.vision.evaluation.average_precision import AveragePrecision
 from executive.vision.evaluation.figures import Evaluation, Spread
 from executive.vision.evaluation.matching import is_ignored, match
@@ -25,8 +25,8 @@ class Examinee(Protocol):
     def threshold(self) -> float:
         """Confidence from which its detections count."""
 
-    def ask(self, frame: Frame) -> Look:
-        """Return what it says about a frame."""
+    def ask(self, frame: Frame) -> tuple[Answer, float]:
+        """Return its answer to a frame and the wall time that it took [ms], or raise `Unavailable`."""
 
 
 def evaluate(
@@ -52,15 +52,16 @@ def evaluate(
     unavailable, why = 0, ""
     for number, sample in enumerate(samples, 1):
         frame = as_frame(sample, number)
-        look = examinee.ask(frame)
-        if look.why:
-            unavailable, why = unavailable + 1, look.why
+        try:
+            answer, latency = examinee.ask(frame)
+        except Unavailable as error:
+            unavailable, why = unavailable + 1, str(error)
             continue
-        answered[look.answered_by] += 1
-        latencies.append(look.latency)
-        found = [one for one in look.found if not is_ignored(one, sample)]
+        answered[answer.detector] += 1
+        latencies.append(latency)
+        found = [one for one in answer.found if not is_ignored(one, sample)]
         precision.add(found, sample)
-        least = look.threshold if threshold is None else threshold
+        least = answer.reliability.threshold if threshold is None else threshold
         matches = match([one for one in found if one.confidence >= least], sample)
         tally.add(matches, sample, frame)
         if worst is not None:
