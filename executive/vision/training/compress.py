@@ -1,7 +1,7 @@
 """Smaller ONNX files: weights stored in fewer bits and widened again when the model is loaded.
 
 The arithmetic stays in float32. Widening is written as `Cast` (and `Mul`), which onnxruntime folds into
-plain weights at load time; `DequantizeLinear` it would execute anew for every image.
+plain weights at load time; `DequantizeLinear` it would execute again for every image.
 """
 
 from __future__ import annotations
