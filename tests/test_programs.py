@@ -13,7 +13,11 @@ def test_a_file_in_the_working_directory_is_not_run_in_place_of_a_library(tmp_pa
     (tmp_path / "executive").mkdir()
     (tmp_path / "executive" / "__init__.py").write_text("raise SystemExit('somebody else')\n")
     ended = subprocess.run(
-        program("executive.record.pictures"), cwd=tmp_path, input=b"", capture_output=True, check=False
+        program("executive.vision.detectors.roboflow"),
+        cwd=tmp_path,
+        input=b"",
+        capture_output=True,
+        check=False,
     )
     assert (ended.returncode, ended.stderr) == (0, b"")
 

@@ -20,8 +20,8 @@ from executive.cli.output import stdout_kept_clean
     help="Folder for checkpoints and figures.",
 )  # fmt: skip
 @click.option(
-    "--from", "start", type=click.Path(path_type=Path, dir_okay=False), metavar="WEIGHTS",
-    help="Checkpoint (.pth) or exported model (.onnx) to fine-tune, or `embedded`; else random weights.",
+    "--from", "start", type=click.Path(path_type=Path, dir_okay=False), metavar="CHECKPOINT",
+    help="Checkpoint (.pth) of an earlier training to fine-tune; without it, random weights.",
 )  # fmt: skip
 @click.option("--epochs", type=click.IntRange(min=1), default=20, show_default=True, help="Passes over it.")
 @seed_option
@@ -29,11 +29,8 @@ def command(dataset: Path, out: Path, start: Path | None, epochs: int, seed: int
     """Train the small RF-DETR; needs the extra `train`."""
     with stdout_kept_clean():
         from executive.cli.progress import bar
-        from executive.vision.detectors.embedded import MODEL
         from executive.vision.train import train
 
-        if start == Path("embedded"):
-            start = MODEL
         with bar("training") as batches:
             train(dataset, out, start=start, epochs=epochs, seed=seed, progress=_tell, batches=batches)
 

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.events import Event
+from executive.messages import Detection
 from executive.record.pictures.drawer import Drawer
-from executive.record.pictures.scene import Scene, Seen
+from executive.record.pictures.scene import Scene
 from executive.record.progress import Progress, is_skill, skill_name
 
 KEPT = 24
@@ -116,7 +117,7 @@ class Frames:
         return Scene(
             image=look.image,
             visible=look.visible,
-            seen=[Seen(box["label"], box["confidence"], tuple(box["box"])) for box in look.found],
+            seen=[Detection(box["label"], box["confidence"], tuple(box["box"])) for box in look.found],
             chosen=_chosen(choice, look.found, choice.get("position", known.get("position"))),
             mission=self._progress.mission,
             clock=event.clock,

@@ -18,6 +18,13 @@ EPOCH_COLUMNS = {
 }
 """Columns of the trainer's `metrics.csv` that a card shows, with their headings."""
 
+FIGURES = {
+    "images": ("images", "{}"), "objects": ("objects", "{}"),
+    "precision": ("precision", "{:.4f}"), "recall": ("recall", "{:.4f}"),
+    "mAP50": ("map50", "{:.4f}"), "mAP50-95": ("map50_95", "{:.4f}"),
+}  # fmt: skip
+"""Figures of an evaluation that a card shows: heading, then name and format."""
+
 
 @dataclass(frozen=True)
 class ModelCard:
@@ -59,37 +66,23 @@ class ModelCard:
         return "\n\n".join(blocks) + "\n"
 
     def _measured(self) -> list[str]:
-        thresholds = {evaluation.threshold for evaluation in self.measured.values()}
-        head = (
-            "images",
-            "objects",
-            "precision",
-            "recall",
-            "mAP50",
-            "mAP50-95",
-            "centre [px]",
-            "position [mm]",
-        )
+        thresholds = sorted({evaluation.threshold for evaluation in self.measured.values()})
+        head = ("on", *FIGURES, "centre [px]", "position [mm]")
         rows = [
             (
                 where,
-                str(one.images),
-                str(one.objects),
-                f"{one.precision:.4f}",
-                f"{one.recall:.4f}",
-                f"{one.map50:.4f}",
-                f"{one.map50_95:.4f}",
+                *(form.format(getattr(one, name)) for name, form in FIGURES.values()),
                 _spread(one.centre),
                 _spread(one.position),
             )
             for where, one in self.measured.items()
         ]
-        confidences = ", ".join(f"{threshold:g}" for threshold in sorted(thresholds))
+        confidences = ", ".join(f"{threshold:g}" for threshold in thresholds)
         return [
             f"Precision and recall at confidence {confidences} and an overlap of 0.5. Centre and position: "
             "how far the centre of a found box lies from the true one's, in the image and in the world at "
             "the object's height; median / 95 % / 99 %.",
-            _table(("on", *head), rows),
+            _table(head, rows),
         ]
 
 

@@ -10,7 +10,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from executive.errors import InputError
@@ -19,8 +18,9 @@ from executive.messages import Box
 
 ANNOTATIONS = "_annotations.coco.json"
 SPLITS = ("test", "valid", "val", "train")
-"""Where labelled images are looked for, the ones a detector has not been trained on first."""
-IMAGE_SUFFIXES = {".jpg", ".jpeg", ".png", ".bmp"}
+"""Folders of a data set in which labelled images are sought, those that no training has used first."""
+DATA = ("data.yaml", "data.yml")
+"""Files that name the classes of a YOLO data set."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,18 @@ def read_samples(folder: Path) -> Iterator[LabelledImage]:
         InputError: There are none, or an image cannot be read.
     """
     split = _split(folder)
-    yield from _read_coco(split) if _is_coco(split) else _read_yolo(split)
+    dataset = _dataset(split)
+    ignored, truth = (_read_json(split / name) for name in ("ignored.json", "truth.json"))
+    for path in map(Path, sorted(dataset.image_paths)):
+        objects = dataset.annotations[str(path)]
+        yield LabelledImage(
+            path.name,
+            read_image(path),
+            tuple(dataset.classes[number] for number in objects.class_id),
+            tuple(map(tuple, objects.xyxy.tolist())),
+            tuple(map(tuple, ignored.get(path.name, ()))),
+            truth.get(path.name, {}),
+        )
 
 
 def count_samples(folder: Path) -> int:
@@ -64,68 +75,7 @@ def count_samples(folder: Path) -> int:
     Raises:
         InputError: There are none.
     """
-    split = _split(folder)
-    return len(_coco(split)["images"]) if _is_coco(split) else len(_yolo_images(split))
-
-
-def _split(folder: Path) -> Path:
-    """Return the folder in which the labelled images of a data set are, or of a split of one.
-
-    Raises:
-        InputError: There is none.
-    """
-    for split in (folder, *(folder / name for name in SPLITS)):
-        if _is_coco(split) or ((split / "images").is_dir() and (split / "labels").is_dir()):
-            return split
-    raise InputError(
-        f"{folder} holds no labelled images: {ANNOTATIONS} (COCO) or images/ and labels/ (YOLO) were looked "
-        f"for there and in {', '.join(SPLITS)}; make some with `executive dataset`"
-    )
-
-
-def _is_coco(split: Path) -> bool:
-    return (split / ANNOTATIONS).is_file()
-
-
-def _coco(split: Path) -> dict[str, Any]:
-    return dict(json.loads((split / ANNOTATIONS).read_text(encoding="utf-8")))
-
-
-def _yolo_images(split: Path) -> list[Path]:
-    return [path for path in sorted((split / "images").iterdir()) if path.suffix.lower() in IMAGE_SUFFIXES]
-
-
-def _read_coco(split: Path) -> Iterator[LabelledImage]:
-    content = _coco(split)
-    names = {category["id"]: category["name"] for category in content["categories"]}
-    objects: dict[int, list[dict[str, Any]]] = {}
-    for annotation in content["annotations"]:
-        objects.setdefault(annotation["image_id"], []).append(annotation)
-    aside = _Aside(split)
-    for image in content["images"]:
-        mine = objects.get(image["id"], [])
-        boxes = tuple((x, y, x + width, y + height) for x, y, width, height in (one["bbox"] for one in mine))
-        labels = tuple(names[one["category_id"]] for one in mine)
-        yield aside.sample(split / image["file_name"], labels, boxes)
-
-
-def _read_yolo(split: Path) -> Iterator[LabelledImage]:
-    names = _yolo_names(split)
-    aside = _Aside(split)
-    for path in _yolo_images(split):
-        image = read_image(path)
-        height, width = image.shape[:2]
-        text = split / "labels" / f"{path.stem}.txt"
-        rows = (
-            [line.split() for line in text.read_text().splitlines() if line.strip()] if text.exists() else []
-        )
-        labels = tuple(names[int(row[0])] for row in rows)
-        values = [[float(value) for value in row[1:5]] for row in rows]
-        boxes = tuple(
-            ((x - w / 2) * width, (y - h / 2) * height, (x + w / 2) * width, (y + h / 2) * height)
-            for x, y, w, h in values
-        )
-        yield aside.sample(path, labels, boxes)
+    return len(_dataset(_split(folder)))
 
 
 def read_image(path: Path) -> NDArray[np.uint8]:
@@ -140,25 +90,38 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     return np.ascontiguousarray(image[..., ::-1], dtype=np.uint8)
 
 
-def _yolo_names(split: Path) -> dict[int, str]:
-    for path in (split.parent / "data.yaml", split.parent / "data.yml"):
-        if path.is_file():
-            names = yaml.safe_load(path.read_text(encoding="utf-8"))["names"]
-            return dict(names) if isinstance(names, dict) else dict(enumerate(names))
-    raise InputError(f"{split.parent} has no data.yaml, which names the classes of a YOLO data set")
+def _split(folder: Path) -> Path:
+    """Return the folder in which the labelled images of a data set are, or of a split of one.
+
+    Raises:
+        InputError: There is none.
+    """
+    for split in (folder, *(folder / name for name in SPLITS)):
+        if (split / ANNOTATIONS).is_file() or ((split / "images").is_dir() and (split / "labels").is_dir()):
+            return split
+    raise InputError(
+        f"{folder} holds no labelled images: {ANNOTATIONS} (COCO) or images/ and labels/ (YOLO) were looked "
+        f"for there and in {', '.join(SPLITS)}; make some with `executive dataset`"
+    )
 
 
-class _Aside:
-    """The side files of a split that this project's own renderer writes."""
+def _dataset(split: Path) -> Any:
+    """Return a split as a `supervision.DetectionDataset`; no image is read.
 
-    def __init__(self, split: Path) -> None:
-        self._ignored, self._truth = (_read_json(split / name) for name in ("ignored.json", "truth.json"))
+    Raises:
+        InputError: An annotation or an image cannot be read.
+    """
+    import supervision as sv
 
-    def sample(self, path: Path, labels: tuple[str, ...], boxes: tuple[Box, ...]) -> LabelledImage:
-        ignored: tuple[Box, ...] = tuple(tuple(box) for box in self._ignored.get(path.name, ()))
-        return LabelledImage(
-            path.name, read_image(path), labels, boxes, ignored, self._truth.get(path.name, {})
-        )
+    try:
+        if (split / ANNOTATIONS).is_file():
+            return sv.DetectionDataset.from_coco(str(split), str(split / ANNOTATIONS))
+        data = next((split.parent / name for name in DATA if (split.parent / name).is_file()), None)
+        if data is None:
+            raise InputError(f"{split.parent} has no data.yaml, which names the classes of a YOLO data set")
+        return sv.DetectionDataset.from_yolo(str(split / "images"), str(split / "labels"), str(data))
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        raise InputError(f"the labelled images in {split} cannot be read: {error}") from error
 
 
 def _read_json(path: Path) -> dict[str, Any]:

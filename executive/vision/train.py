@@ -37,16 +37,16 @@ def train(
         dataset: Folder as Roboflow exports it: `train/` and `valid/`, each with `_annotations.coco.json`, or
             a `data.yaml` for YOLO.
         out: Folder to fill; made if missing.
-        start: Checkpoint (`.pth`) or exported model (`.onnx`, its `labels.txt` or `NAME.labels.txt` beside
-            it) to fine-tune, whatever its classes; None trains from random weights.
+        start: Checkpoint (`.pth`) of this architecture to fine-tune, whatever its classes; a `labels.txt`
+            beside it names them. None trains from random weights.
         epochs: Number of passes over the data.
         seed: Seed of weights, order and augmentation.
         progress: Called after every epoch with its number, from 1, and its figures.
         batches: Called after every batch with how many of how many are done, all epochs together.
 
     Raises:
-        InputError: The folder is no data set, `start` is missing or of another architecture, or the training
-            packages are not installed.
+        InputError: The folder is no data set, `start` is missing or no checkpoint, or the training packages
+            are not installed.
     """
     _check(dataset, start)
     try:
@@ -83,6 +83,11 @@ def train(
 def _check(dataset: Path, start: Path | None) -> None:
     if start is not None and not start.is_file():
         raise InputError(f"there is no checkpoint {start} to start from; train one first, or leave it out")
+    if start is not None and start.suffix == ".onnx":
+        raise InputError(
+            f"{start} is an exported model, which is no checkpoint; start from the checkpoint_best_total.pth "
+            "of its training, which the commands on the model's card make again"
+        )
     coco = [dataset / part / "_annotations.coco.json" for part in ("train", "valid")]
     yolo = [dataset / name for name in ("data.yaml", "data.yml")]
     if not (all(path.is_file() for path in coco) or any(path.is_file() for path in yolo)):

@@ -92,22 +92,20 @@ def test_a_model_file_is_measured_with_its_labels(evaluate, dataset):
             "--as-run renders scenes, and --dataset brings images; give one of them",
         ),
         (("--view", "full"), "--view full is a part of a run's frame; give --as-run with it"),
+        (
+            ("--cell", "fruit"),
+            "and fruit is of kind fake; measure its detector on images of your own with --dataset",
+        ),
+        (("--dataset", "."), ". holds no labelled images"),
+        (("--weights", "no.onnx", "--labels", LABELS, "--dataset", "grey"), "there is no model file"),
         (("--sheet", "sheet.gif"), '"sheet.gif" is no picture; its name must end in .png, .jpg, .jpeg'),
     ],
 )
-def test_options_that_make_no_sense_are_explained(evaluate, arguments, sentence):
+def test_options_that_make_no_sense_are_explained(evaluate, dataset, monkeypatch, arguments, sentence):
+    monkeypatch.chdir(dataset.parent)
     result = evaluate(*arguments)
     assert result.exit_code == 2
     assert sentence in result.stderr
-
-
-def test_a_cell_without_physics_cannot_be_rendered(evaluate):
-    result = evaluate("--cell", "fruit")
-    assert result.exit_code == 2
-    assert (
-        "and fruit is of kind fake; measure its detector on images of your own with --dataset"
-        in result.stderr
-    )
 
 
 def test_a_detector_that_cannot_be_built_is_told_before_anything_is_rendered(evaluate, missions, tmp_path):
@@ -119,15 +117,3 @@ def test_a_detector_that_cannot_be_built_is_told_before_anything_is_rendered(eva
     assert result.exit_code == 2
     assert "detector embedded: there is no model file" in result.stderr
     assert "rendering" not in result.stderr
-
-
-def test_a_folder_without_labels_is_explained(evaluate, tmp_path):
-    result = evaluate("--dataset", tmp_path)
-    assert result.exit_code == 2
-    assert f"{tmp_path} holds no labelled images" in result.stderr
-
-
-def test_a_model_file_that_is_not_there_is_explained(evaluate, dataset):
-    result = evaluate("--weights", "nowhere.onnx", "--labels", LABELS, "--dataset", dataset)
-    assert result.exit_code == 2
-    assert "there is no model file" in result.stderr

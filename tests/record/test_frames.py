@@ -206,7 +206,9 @@ def test_pictures_that_cannot_be_written_are_told_and_break_nothing(tmp_path):
     frames(look(1, CUBE))
     frames(decision())
     frames.close()
-    assert frames.problem == "no pictures were drawn: file exists"
+    assert frames.problem == (
+        f'not every picture was drawn: cannot make the folder "{tmp_path}/frames": File exists'
+    )
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ def test_the_weights_fit_into_a_package_and_a_card_goes_with_them():
     assert "## Measured" in (WEIGHTS / "embedded.card.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("name", ["overhead", "wrist"])
+@pytest.mark.parametrize("name", ["overhead", pytest.param("wrist", marks=pytest.mark.slow)])
 def test_fresh_scenes_of_a_shipped_cell_are_read_almost_without_error(missions, name):
     config = load_cell(missions / "cells" / f"{name}.yaml")
     renderer = SceneRenderer(config, next(iter(config.cameras)))

@@ -9,7 +9,6 @@ from executive.errors import InputError
 from executive.messages import Detection
 from executive.vision.detectors.embedded import LABELS, MODEL
 from executive.vision.detectors.onnx_model import OnnxModel, read_labels
-from executive.vision.detectors.views import without_duplicates
 
 
 @pytest.fixture(scope="module")
@@ -65,13 +64,6 @@ def test_the_input_is_normalized_rgb_of_the_models_size(model, monkeypatch):
     assert given[0, 2] == pytest.approx((0 - 0.406) / 0.225, abs=1e-5)
 
 
-def test_an_object_seen_twice_is_reported_once_and_neighbours_stay():
-    sure = Detection("cube", 0.9, (0.0, 0.0, 10.0, 10.0))
-    again = Detection("sphere", 0.5, (0.0, 0.0, 10.0, 11.0))
-    neighbour = Detection("cube", 0.4, (5.0, 0.0, 15.0, 10.0))
-    assert without_duplicates([sure, again, neighbour]) == [sure, neighbour]
-
-
 def test_the_wrong_number_of_labels_is_refused(tmp_path):
     with pytest.raises(InputError, match="has 3 classes and 2 labels were given: cat, dog"):
         OnnxModel(MODEL, ("cat", "dog"))
@@ -81,9 +73,3 @@ def test_a_file_that_is_no_model_is_refused(tmp_path):
     (tmp_path / "model.onnx").write_bytes(b"not a model")
     with pytest.raises(InputError, match="not a model that onnxruntime can run"):
         OnnxModel(tmp_path / "model.onnx", ("cube",))
-
-
-def test_an_empty_label_file_is_refused(tmp_path):
-    (tmp_path / "labels.txt").write_text("\n\n")
-    with pytest.raises(InputError, match="is empty"):
-        read_labels(tmp_path / "labels.txt")

@@ -11,6 +11,7 @@ import pytest
 
 from executive.errors import InputError
 from executive.vision.train import train
+from executive.vision.training.start import learning_rate
 
 
 def test_a_folder_that_is_no_data_set_is_refused(tmp_path):
@@ -21,6 +22,20 @@ def test_a_folder_that_is_no_data_set_is_refused(tmp_path):
 def test_a_missing_checkpoint_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"no checkpoint .*old\.pth to start from"):
         train(tmp_path, tmp_path / "out", start=tmp_path / "old.pth")
+
+
+def test_an_exported_model_is_no_checkpoint(tmp_path):
+    (tmp_path / "data.yaml").touch()
+    (tmp_path / "model.onnx").touch()
+    with pytest.raises(InputError, match=r"model\.onnx is an exported model, .* checkpoint_best_total\.pth"):
+        train(tmp_path, tmp_path / "out", start=tmp_path / "model.onnx")
+
+
+def test_a_training_goes_on_in_smaller_steps_if_the_checkpoint_knows_its_labels(tmp_path):
+    start = tmp_path / "checkpoint_best_total.pth"
+    assert learning_rate(None, ["bolt"]) == learning_rate(start, ["bolt", "nut"]) == 3e-4
+    (tmp_path / "labels.txt").write_text("bolt\nnut\n")
+    assert (learning_rate(start, ["bolt", "nut"]), learning_rate(start, ["nut", "bolt"])) == (1e-4, 3e-4)
 
 
 @pytest.mark.skipif(importlib.util.find_spec("torch") is not None, reason="the extra is installed")
@@ -54,10 +69,13 @@ def test_a_training_tells_of_every_batch_and_of_every_epoch(monkeypatch):
 
 
 @pytest.mark.parametrize("element", range(8))
-def test_a_symmetry_moves_boxes_with_the_pixels(element):
+def test_each_of_eight_symmetries_moves_boxes_with_the_pixels(element):
     torch = pytest.importorskip("torch")
-    from executive.vision.training.symmetry import transform_boxes, transform_image
+    from executive.vision.training.symmetry import ELEMENTS, transform_boxes, transform_image
 
+    square = torch.arange(16.0).reshape(4, 4)
+    others = [transform_image(square, other) for other in range(ELEMENTS) if other != element]
+    assert not any(torch.equal(transform_image(square, element), other) for other in others)
     image = torch.zeros(3, 64, 64)
     image[:, 10:20, 30:50] = 1
     box = torch.tensor([[40, 15, 20, 10]]) / 64
@@ -66,16 +84,6 @@ def test_a_symmetry_moves_boxes_with_the_pixels(element):
     assert (columns.min(), columns.max() + 1) == pytest.approx((x - width / 2, x + width / 2))
     assert (rows.min(), rows.max() + 1) == pytest.approx((y - height / 2, y + height / 2))
     assert transform_boxes(torch.zeros(0, 4), element).shape == (0, 4)
-
-
-def test_the_symmetries_are_eight_different_ones():
-    torch = pytest.importorskip("torch")
-    from executive.vision.training.symmetry import ELEMENTS, transform_image
-
-    image = torch.arange(16.0).reshape(4, 4)
-    assert (
-        len({tuple(transform_image(image, element).flatten().tolist()) for element in range(ELEMENTS)}) == 8
-    )
 
 
 @pytest.mark.parametrize(("storage", "size", "error"), [("float16", 0.52, 1e-3), ("int8", 0.3, 2e-2)])

@@ -1,4 +1,4 @@
-"""Which parts of a frame are searched, and how overlapping answers become one."""
+"""Parts of a frame that are searched, and overlapping answers that become one."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from executive.errors import InputError
 from executive.messages import Detection
-from executive.vision.detectors.views import Finding, iou, merge, parts_of
+from executive.vision.detectors.views import Finding, merge, parts_of, without_duplicates
 
 TABLE = (192, 100, 448, 356)
 SIZE = (640, 480)
@@ -50,30 +50,46 @@ def test_a_frame_smaller_than_the_table_view_is_one_tile():
     assert parts_of("full", TABLE, (200, 150)) == [(0, 0, 200, 150)]
 
 
-def test_of_two_views_of_an_object_the_one_that_is_whole_wins_though_less_confident():
-    cut = found((240, 100, 256, 130), confidence=0.95)
-    whole = found((240, 100, 270, 130), confidence=0.80, part=(192, 0, 448, 256))
-    assert merge([cut, whole], SIZE) == [whole.detection]
+OTHER = (192, 0, 448, 256)
+"""A part that overlaps with the one from 0 to 256."""
 
 
-def test_of_two_whole_views_of_an_object_the_more_confident_wins():
-    one = found((200, 100, 230, 130), confidence=0.80)
-    other = found((201, 101, 231, 131), confidence=0.90, part=(192, 0, 448, 256))
-    assert merge([one, other], SIZE) == [other.detection]
+@pytest.mark.parametrize(
+    ("one", "other", "kept"),
+    [
+        # A whole view wins over one that is cut off, though less confident.
+        (found((240, 100, 256, 130), 0.95), found((240, 100, 270, 130), 0.80, OTHER), (1,)),
+        (found((240, 226, 270, 256), 0.95), found((240, 226, 270, 257), 0.8, (0, 112, 640, 480)), (1,)),
+        # Of two whole views the more confident wins.
+        (found((200, 100, 230, 130), 0.80), found((201, 101, 231, 131), 0.90, OTHER), (1,)),
+        # A view that the frame itself cuts off is not called cut.
+        (found((0, 100, 20, 130), 0.9), found((0, 101, 20, 131), 0.8, (0, 112, 256, 368)), (0,)),
+        (found((620, 100, 640, 130), 0.9, (384, 0, 640, 256)), found((620, 100, 640, 131), 0.8, OTHER), (0,)),
+        # A view that lies in the other to more than 0.7 shows the same object, one to 0.6 another one.
+        (found((200, 100, 230, 130), 0.9), found((208, 100, 248, 140), 0.8, OTHER), (0,)),
+        (found((200, 100, 230, 130), 0.9), found((212, 100, 252, 140), 0.8, OTHER), (0, 1)),
+        # Two objects that overlap in one tile stay two.
+        (found((10, 10, 40, 40), 0.9), found((15, 10, 45, 40), 0.8), (0, 1)),
+    ],
+)
+def test_an_object_in_two_tiles_is_reported_once(one, other, kept):
+    expected = [(one, other)[number].detection for number in kept]
+    assert merge([one, other], SIZE) == expected
+    assert merge([other, one], SIZE) == expected
 
 
-def test_two_objects_that_overlap_in_one_tile_stay_two():
-    one, other = found((10, 10, 40, 40)), found((20, 10, 50, 40), confidence=0.8)
-    assert merge([other, one], SIZE) == [one.detection, other.detection]
-
-
-def test_an_object_cut_off_by_the_frame_itself_is_not_called_cut():
-    at_edge = found((0, 100, 20, 130), confidence=0.9)
-    shifted = found((0, 101, 20, 131), confidence=0.8, part=(0, 112, 256, 368))
-    assert merge([at_edge, shifted], SIZE) == [at_edge.detection]
-
-
-def test_overlap_is_one_for_equal_boxes_and_zero_for_distant_ones():
-    assert iou((0, 0, 10, 10), (0, 0, 10, 10)) == pytest.approx(1)
-    assert iou((0, 0, 10, 10), (5, 0, 15, 10)) == pytest.approx(1 / 3)
-    assert iou((0, 0, 10, 10), (20, 20, 30, 30)) == 0
+def test_of_boxes_that_overlap_by_more_than_seven_tenths_the_most_confident_is_kept():
+    boxes = {
+        "first": (0, 0, 10, 10),
+        "again": (0, 0, 10, 14),
+        "beside": (0, 0, 10, 15),
+        "far": (50, 0, 60, 9),
+    }
+    detections = [
+        Detection(label, 0.9 - number / 10, box) for number, (label, box) in enumerate(boxes.items())
+    ]
+    assert [one.label for one in without_duplicates(detections)] == ["first", "beside", "far"]
+    assert [one.label for one in without_duplicates(detections[1:])] == ["again", "far"]
+    equals = [Detection(label, 0.9, (0, 0, 10, 10)) for label in "abc"]
+    assert without_duplicates(equals) == equals[:1]
+    assert without_duplicates([]) == merge([], SIZE) == []

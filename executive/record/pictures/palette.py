@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 PALETTE = ("#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#F0E442", "#0072B2", "#D55E00")
-"""Colours of classes, told apart by colour-blind people too; black text can be read on each.
+"""Colours of classes, which colour-blind people can distinguish too; black text can be read on each.
 
 Okabe and Ito, "Color Universal Design", 2008, without their black.
 """

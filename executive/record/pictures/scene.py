@@ -1,4 +1,4 @@
-"""What a picture shows, as plain data: nothing here knows of a run directory or of drawing."""
+"""Content of a picture as plain data, which knows of neither a run directory nor drawing."""
 
 from __future__ import annotations
 
@@ -8,21 +8,12 @@ from dataclasses import KW_ONLY, dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.messages import Box
-
-
-@dataclass(frozen=True)
-class Seen:
-    """One detection: its class, how sure the detector was (0 to 1), and its box [pixel]."""
-
-    label: str
-    confidence: float
-    box: Box
+from executive.messages import Detection
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A camera image with what the robot made of it, at one moment of a run.
+    """Camera image with its detections and the state of a run, at one moment.
 
     Attributes:
         image: `(H, W, 3)` uint8, RGB.
@@ -47,7 +38,7 @@ class Scene:
     image: NDArray[np.uint8]
     visible: NDArray[np.bool_] | None = None
     _: KW_ONLY
-    seen: Sequence[Seen] = ()
+    seen: Sequence[Detection] = ()
     chosen: int | None = None
     mission: str = ""
     clock: float = 0.0

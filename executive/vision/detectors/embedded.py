@@ -9,7 +9,7 @@ from executive.cell_config import DetectorConfig, Section
 from executive.vision.detectors.onnx_model import OnnxModel, read_labels
 from executive.vision.detectors.options import read_options, wrong_options
 from executive.vision.detectors.rfdetr import RfdetrDetector
-from executive.vision.detectors.setting import NO_OTHERS, Setting
+from executive.vision.detectors.setting import Setting
 
 WEIGHTS = Path(__file__).parent.parent / "weights"
 MODEL = WEIGHTS / "embedded.onnx"
@@ -35,16 +35,14 @@ class EmbeddedDetector(RfdetrDetector):
 
     @staticmethod
     def check(
-        config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig] = NO_OTHERS
+        config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]
     ) -> Iterator[tuple[str, str]]:
         """Yield every option that was given, with a sentence: there are none."""
         del base, others
         yield from wrong_options(EmbeddedOptions, config)
 
     @staticmethod
-    def labels(
-        config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig] = NO_OTHERS
-    ) -> tuple[str, ...] | None:
+    def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
         """Return the classes that the shipped weights were trained on."""
-        del config, base, others
+        del config, base
         return read_labels(LABELS)

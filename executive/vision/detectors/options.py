@@ -19,12 +19,12 @@ def wrong_options(options: type[Section], config: DetectorConfig) -> Iterator[tu
         options.model_validate(config.options)
     except ValidationError as error:
         known = ", ".join(options.model_fields) or "none"
-        told = set()
+        named = set()
         for problem in error.errors():
             option = str(problem["loc"][0])
-            if option in told:  # A value that is of none of several types has an error for each.
+            if option in named:  # A value that is of none of several types has an error for each.
                 continue
-            told.add(option)
+            named.add(option)
             place = ".".join(str(part) for part in problem["loc"])
             yield (
                 option,

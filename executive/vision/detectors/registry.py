@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 from executive.cell import Clock
 from executive.cell_config import CameraConfig, DetectorConfig
@@ -76,7 +75,7 @@ def wrong_detectors(configs: Mapping[str, DetectorConfig], base: Path) -> Iterat
         if config.kind not in kinds:
             yield ("detectors", name, "kind"), _not_installed(name, config.kind, kinds)
             continue
-        check = _offered(kinds[config.kind], "check")
+        check = getattr(kinds[config.kind].load(), "check", None)
         for option, sentence in check(config, base, configs) if check else ():
             yield ("detectors", name, option), sentence
 
@@ -84,28 +83,14 @@ def wrong_detectors(configs: Mapping[str, DetectorConfig], base: Path) -> Iterat
 def known_labels(configs: Mapping[str, DetectorConfig], base: Path) -> dict[str, tuple[str, ...] | None]:
     """Return the classes that each detector of a cell file finds, by the cell's names; loads no model.
 
-    None where that is not known: a kind says it in a static method `labels(config, base, others)`, if it can.
+    None where that is not known: a kind says it in a static method `labels(config, base)`, if it can.
     """
-    return {name: labels_of(name, configs, base) for name in configs}
-
-
-def labels_of(name: str, configs: Mapping[str, DetectorConfig], base: Path) -> tuple[str, ...] | None:
-    """Return the classes that one detector of a cell file finds, None where that is not known."""
     kinds = installed()
-    config = configs[name]
-    labels = _offered(kinds[config.kind], "labels") if config.kind in kinds else None
-    found: tuple[str, ...] | None = labels(config, base, configs) if labels else None
-    return found
-
-
-def _offered(
-    kind: Entry, method: str
-) -> Callable[[DetectorConfig, Path, Mapping[str, DetectorConfig]], Any] | None:
-    """Return a static method that a kind of detector may have, or None where it has not."""
-    found: Callable[[DetectorConfig, Path, Mapping[str, DetectorConfig]], Any] | None = getattr(
-        kind.load(), method, None
-    )
-    return found
+    labels = {
+        name: getattr(kinds[config.kind].load(), "labels", None) if config.kind in kinds else None
+        for name, config in configs.items()
+    }
+    return {name: find(configs[name], base) if find else None for name, find in labels.items()}
 
 
 def _not_installed(name: str, kind: str, kinds: Mapping[str, Entry]) -> str:

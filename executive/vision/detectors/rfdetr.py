@@ -16,7 +16,7 @@ from executive.messages import Detection, Frame
 from executive.vision.detectors.onnx_model import OnnxModel, no_model, read_labels
 from executive.vision.detectors.options import read_options, wrong_options
 from executive.vision.detectors.requests import Pending, Worker
-from executive.vision.detectors.setting import NO_OTHERS, Setting
+from executive.vision.detectors.setting import Setting
 from executive.vision.detectors.views import Finding, Part, merge, parts_of
 
 
@@ -71,7 +71,7 @@ class RfdetrDetector:
         Raises:
             InputError: An option is missing, unknown or wrong, or the model cannot be read.
         """
-        for _, sentence in cls.check(config, setting.base):
+        for _, sentence in cls.check(config, setting.base, {}):
             raise InputError(sentence)
         options = read_options(RfdetrOptions, config)
         model = OnnxModel(setting.base / options.model_path, options.names(setting.base), options.threads)
@@ -79,7 +79,7 @@ class RfdetrDetector:
 
     @staticmethod
     def check(
-        config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig] = NO_OTHERS
+        config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]
     ) -> Iterator[tuple[str, str]]:
         """Yield every option because of which the detector could not be built, with a sentence.
 
@@ -107,11 +107,8 @@ class RfdetrDetector:
             )
 
     @staticmethod
-    def labels(
-        config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig] = NO_OTHERS
-    ) -> tuple[str, ...] | None:
+    def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
         """Return the classes it finds, by the cell's names; None where its options do not say."""
-        del others
         try:
             options = read_options(RfdetrOptions, config)
             return tuple(options.class_map.get(name, name) for name in options.names(base))

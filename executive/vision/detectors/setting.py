@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Protocol
 
 from executive.cell import Clock, Detector
-from executive.cell_config import CameraConfig, DetectorConfig
+from executive.cell_config import CameraConfig
 
 
 class ClosableDetector(Detector, Protocol):
@@ -17,10 +16,6 @@ class ClosableDetector(Detector, Protocol):
 
     def close(self) -> None:
         """Give everything back; waits for the answer under way."""
-
-
-NO_OTHERS: Mapping[str, DetectorConfig] = MappingProxyType({})
-"""The detectors of a cell beside one that rests on none."""
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from executive.errors import InputError
 from executive.messages import Box, Detection
 
@@ -17,7 +20,9 @@ OVERLAP = 0.25
 CUT = 0.01
 """A box closer than this share of the tile's side to the next tile may be cut off there."""
 DUPLICATE = 0.7
-"""Overlap from which two boxes are one object seen twice; objects that touch stay below it."""
+"""Intersection over union above which two boxes are one object seen twice; objects that touch stay below."""
+SAME, CONTAINED = 0.5, 0.7
+"""Intersection over union, or over the smaller box, above which boxes of two tiles show one object."""
 
 
 @dataclass(frozen=True)
@@ -62,50 +67,39 @@ def merge(findings: Sequence[Finding], size: tuple[int, int]) -> list[Detection]
     then the more confident one.
 
     Args:
-        findings: What was found in all parts.
+        findings: Detections of all parts.
         size: Width and height of the frame [pixel].
     """
     ranked = sorted(findings, key=lambda finding: (_is_cut(finding, size), -finding.detection.confidence))
-    kept: list[Finding] = []
-    for finding in ranked:
-        if not any(_same_object(finding, other) for other in kept):
-            kept.append(finding)
-    return sorted((finding.detection for finding in kept), key=lambda detection: -detection.confidence)
+    is_same = _is_same_object([finding.detection.box for finding in ranked])
+    kept: list[int] = []
+    for number, finding in enumerate(ranked):
+        if not any(is_same[number, other] and finding.part != ranked[other].part for other in kept):
+            kept.append(number)
+    return sorted((ranked[number].detection for number in kept), key=lambda found: -found.confidence)
 
 
 def without_duplicates(found: Sequence[Detection]) -> list[Detection]:
     """Return `found`, most confident first, without boxes that lie on a more confident one."""
-    kept: list[Detection] = []
-    for detection in found:
-        if all(iou(detection.box, other.box) < DUPLICATE for other in kept):
-            kept.append(detection)
-    return kept
+    if len(found) < 2:
+        return list(found)
+    from supervision import box_non_max_suppression
+
+    # The rank instead of the confidence, so that of equally confident ones the first is kept.
+    ranked = np.array([(*detection.box, -rank) for rank, detection in enumerate(found)])
+    keep = box_non_max_suppression(ranked, DUPLICATE)
+    return [detection for detection, is_kept in zip(found, keep, strict=True) if is_kept]
 
 
-def intersection(one: Box, other: Box) -> float:
-    """Return the area [pixel²] that two boxes share."""
-    width = min(one[2], other[2]) - max(one[0], other[0])
-    height = min(one[3], other[3]) - max(one[1], other[1])
-    return max(width, 0.0) * max(height, 0.0)
+def _is_same_object(boxes: Sequence[Box]) -> NDArray[np.bool_]:
+    """Return for every pair of boxes of different parts whether they show one object, cut off or not."""
+    if len(boxes) < 2:
+        return np.zeros((len(boxes), len(boxes)), dtype=np.bool_)
+    from supervision import OverlapMetric, box_iou_batch
 
-
-def area(box: Box) -> float:
-    """Return the area of a box [pixel²]."""
-    return max(box[2] - box[0], 0.0) * max(box[3] - box[1], 0.0)
-
-
-def iou(one: Box, other: Box) -> float:
-    """Return the intersection of two boxes over their union, 0 to 1."""
-    shared = intersection(one, other)
-    return shared / max(area(one) + area(other) - shared, 1e-9)
-
-
-def _same_object(one: Finding, other: Finding) -> bool:
-    """Tell whether two findings of different parts are one object, cut off in one of them or not."""
-    if one.part == other.part:
-        return False
-    a, b = one.detection.box, other.detection.box
-    return iou(a, b) > 0.5 or intersection(a, b) > 0.7 * min(area(a), area(b))
+    corners = np.array(boxes)
+    contained = box_iou_batch(corners, corners, OverlapMetric.IOS) > CONTAINED
+    return np.asarray((box_iou_batch(corners, corners) > SAME) | contained)
 
 
 def _is_cut(finding: Finding, size: tuple[int, int]) -> bool:

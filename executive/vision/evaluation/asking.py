@@ -1,48 +1,33 @@
-"""Asking a detector outside of any run, just as a run asks it."""
+"""Detectors of a cell file outside of any run, asked as a run asks them."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from executive.cell import Steps
 from executive.cell_config import CameraConfig, DetectorConfig
 from executive.errors import Unavailable
-from executive.messages import Detection, Frame
+from executive.messages import Answer, Frame
 from executive.vision.detectors.registry import build_detectors
-from executive.vision.detectors.setting import ClosableDetector
 
 STEP = 1 / 240
 """Length of a control step of simulated cells [s]."""
 PAUSE = 1.0
 """Time on the clock between two looks [s]: about what lies between two in a run."""
-PATIENCE = 60.0
-"""Time on the clock after which no answer is waited for any more [s]."""
+TIMEOUT = 60.0
+"""Longest time on the clock for an answer [s]."""
+WHOLE_IMAGE = CameraConfig(
+    mount="fixed", position=(0, 0, 1), look_at=(0, 0, 0), up=(1, 0, 0), fov_deg=60,
+    table_view=(0, 0, 64, 64), scan_poses=("none",),
+).model_copy(update={"table_view": (0, 0, 1 << 20, 1 << 20)})  # fmt: skip
+"""A camera whose view `full` is searched in one piece, whatever the size of the image."""
 
 
-@dataclass(frozen=True)
-class Look:
-    """What a detector answered to one frame.
-
-    Attributes:
-        found: Everything at or above its floor, most confident first.
-        threshold: Confidence from which it counts, for the detector that answered.
-        answered_by: Name of that detector, "" where none gave a usable answer.
-        latency: Wall time that it took [ms].
-        why: What the detector said if it was unavailable, or "".
-    """
-
-    found: tuple[Detection, ...]
-    threshold: float
-    answered_by: str
-    latency: float
-    why: str = ""
-
-
-class HandClock:
-    """A run's clock that is advanced by hand; implements `executive.cell.Clock`."""
+class ManualClock:
+    """A run's clock that its owner advances; implements `executive.cell.Clock`."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -54,21 +39,20 @@ class HandClock:
         while self.now < end:
             yield
 
-    def advance(self, duration: float = STEP) -> None:
-        """Let time pass [s]."""
-        self.now += duration
-
 
 class CellDetector:
     """A detector of a cell file, built for measuring it.
 
     Args:
-        configs: The detectors section of the cell file; a cascade needs the others.
-        name: Which one is asked.
+        configs: The detectors section of the cell file; a detector may need the others.
+        name: Name of the detector that is asked.
         base: Folder that paths in their options start from.
         camera: The camera that the frames come from; with None every image is searched as a whole.
         view: The part of such frames that is searched.
-        classes: What the cell handles: as in a run, nothing else that is found counts. None: everything does.
+        classes: Classes that the cell handles: as in a run, nothing else counts. None: everything counts.
+
+    Raises:
+        InputError: A detector cannot be built.
     """
 
     def __init__(
@@ -81,78 +65,36 @@ class CellDetector:
         view: str = "table",
         classes: Collection[str] | None = None,
     ) -> None:
-        self._configs = configs
+        self.threshold = configs[name].threshold
         self._name = name
-        self._base = base
-        self._camera = camera
-        self._view = view
+        self._view = view if camera else "full"
         self._classes = classes
-        self._clock = HandClock()
-        self._size: tuple[int, int] | None = None
-        self._built: dict[str, ClosableDetector] = {}
+        self._clock = ManualClock()
+        self._built = build_detectors(
+            configs, camera=camera or WHOLE_IMAGE, clock=self._clock, base=base, seed=0
+        )
 
-    @property
-    def threshold(self) -> float:
-        """Confidence from which its detections count, as its section says."""
-        return self._configs[self._name].threshold
-
-    def ask(self, frame: Frame) -> Look:
-        """Return what the detector says about a frame, and how long it took.
+    def ask(self, frame: Frame) -> tuple[Answer, float]:
+        """Return the detector's answer to a frame, and the wall time that it took [ms].
 
         Raises:
-            InputError: The detector cannot be built.
+            Unavailable: The detector gave no usable answer.
         """
-        height, width = frame.image.shape[:2]
-        detector = self._detector((width, height))
-        stamped = replace(frame, stamp=self._clock.now)
-        began = time.perf_counter()
-        request = detector.request(stamped, self._view)
-        while not request.ready:
-            if self._clock.now - stamped.stamp > PATIENCE:
-                return self._unavailable(began, f"no answer within {PATIENCE:g} s of the clock")
-            self._clock.advance()
+        began, asked = time.perf_counter(), self._clock.now
         try:
+            request = self._built[self._name].request(replace(frame, stamp=asked), self._view)
+            while not request.ready:
+                if self._clock.now - asked > TIMEOUT:
+                    raise Unavailable(f"no answer within {TIMEOUT:g} s of the clock")
+                self._clock.now += STEP
             answer = request.result()
-        except Unavailable as error:
-            return self._unavailable(began, str(error))
+        finally:
+            self._clock.now += PAUSE
         latency = (time.perf_counter() - began) * 1000
-        self._clock.advance(PAUSE)
         found = tuple(one for one in answer.found if self._classes is None or one.label in self._classes)
-        return Look(found, answer.reliability.threshold, answer.detector, latency)
+        return replace(answer, found=found), latency
 
     def close(self) -> None:
         """Give back what the detectors hold."""
         for detector in self._built.values():
             detector.close()
-        self._built = {}
-
-    def _unavailable(self, began: float, why: str) -> Look:
-        self._clock.advance(PAUSE)
-        return Look((), self.threshold, "", (time.perf_counter() - began) * 1000, why)
-
-    def _detector(self, size: tuple[int, int]) -> ClosableDetector:
-        """Return the detector, built anew where images of another size are searched as a whole."""
-        if not self._built or (self._camera is None and size != self._size):
-            self.close()
-            self._size = size
-            self._built = build_detectors(
-                self._configs,
-                camera=self._camera or whole_image(size),
-                clock=self._clock,
-                base=self._base,
-                seed=0,
-            )
-        return self._built[self._name]
-
-
-def whole_image(size: tuple[int, int]) -> CameraConfig:
-    """Return a camera with images of this width and height [pixel], whose view `table` is all of them.
-
-    A cell's own camera shows the table in a square; an image of a dataset need not be one.
-    """
-    camera = CameraConfig(
-        mount="fixed", position=(0, 0, 1), look_at=(0, 0, 0), up=(1, 0, 0), fov_deg=60,
-        table_view=(0, 0, 64, 64), scan_poses=("none",),
-    )  # fmt: skip
-    width, height = size
-    return camera.model_copy(update={"width": width, "height": height, "table_view": (0, 0, width, height)})

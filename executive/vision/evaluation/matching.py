@@ -1,12 +1,14 @@
-"""Which detection is which object."""
+"""Assignment of detections to labelled objects."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from executive.messages import Box, Detection
-from executive.vision.detectors.views import iou
 from executive.vision.samples import LabelledImage
 
 MATCH = 0.5
@@ -15,12 +17,12 @@ MATCH = 0.5
 
 @dataclass(frozen=True)
 class Match:
-    """What a detection is.
+    """Object that a detection shows.
 
     Attributes:
         detection: The detection.
         number: Number of the object it lies on, or None where there is none.
-        right: Whether it has that object's class.
+        right: True if the detection has the class of that object.
     """
 
     detection: Detection
@@ -29,36 +31,36 @@ class Match:
 
 
 def match(found: Sequence[Detection], sample: LabelledImage) -> list[Match]:
-    """Return what each detection is, the most confident first.
+    """Return the object of each detection, the most confident detection first.
 
-    Greedy: each takes the object of its own class that it overlaps most, if none has taken it; those that
-    remain then take the objects that remain, whatever their class.
+    Greedy: each detection takes the object of its own class that it overlaps most, if none has taken it; the
+    detections that remain then take the objects that remain, whatever their class.
     """
     ranked = sorted(found, key=lambda one: -one.confidence)
-    free = set(range(len(sample.labels)))
+    overlaps = overlap([one.box for one in ranked], sample.boxes)
+    same_class = np.array([[one.label == label for label in sample.labels] for one in ranked], dtype=bool)
     taken: dict[int, int] = {}
-    for same_class in (True, False):
-        for rank, detection in enumerate(ranked):
-            if rank in taken:
-                continue
-            rivals = (i for i in free if not same_class or sample.labels[i] == detection.label)
-            best, overlap = _most_overlapped(detection.box, rivals, sample)
-            if overlap >= MATCH:
-                taken[rank] = best
-                free.discard(best)
-    return [_as_match(detection, taken.get(rank), sample) for rank, detection in enumerate(ranked)]
+    for allowed in (same_class.reshape(overlaps.shape), np.ones_like(overlaps)):
+        for rank in range(len(ranked)):
+            scores = overlaps[rank] * allowed[rank]
+            if rank not in taken and scores.size and scores.max() >= MATCH:
+                taken[rank] = int(scores.argmax())
+                overlaps[:, taken[rank]] = 0.0
+    return [
+        Match(one, taken.get(rank), rank in taken and sample.labels[taken[rank]] == one.label)
+        for rank, one in enumerate(ranked)
+    ]
 
 
 def is_ignored(detection: Detection, sample: LabelledImage) -> bool:
-    """Tell whether a detection is one of the objects that may be found or not."""
-    best = max((iou(detection.box, box) for box in sample.ignored), default=0.0)
-    return best >= MATCH and all(iou(detection.box, box) < best for box in sample.boxes)
+    """Return True for a detection of one of the objects that may be found or not."""
+    best = overlap([detection.box], sample.ignored).max(initial=0.0)
+    return bool(best >= MATCH and best > overlap([detection.box], sample.boxes).max(initial=0.0))
 
 
-def _most_overlapped(box: Box, numbers: Iterable[int], sample: LabelledImage) -> tuple[int, float]:
-    overlap, number = max(((iou(box, sample.boxes[i]), i) for i in numbers), default=(0.0, -1))
-    return number, overlap
+def overlap(boxes: Sequence[Box], others: Sequence[Box]) -> NDArray[np.float32]:
+    """Return the intersection over union of every box with every other one, `(N, M)`."""
+    # The import takes half a second: only an evaluation pays for it.
+    from supervision import box_iou_batch
 
-
-def _as_match(detection: Detection, number: int | None, sample: LabelledImage) -> Match:
-    return Match(detection, number, number is not None and sample.labels[number] == detection.label)
+    return np.asarray(box_iou_batch(np.array(boxes).reshape(-1, 4), np.array(others).reshape(-1, 4)))

@@ -1,9 +1,7 @@
-"""The worst mistakes of a detector, kept to be looked at."""
+"""Worst mistakes of a detector, for a picture of them."""
 
 from __future__ import annotations
 
-import heapq
-import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -37,28 +35,25 @@ class Miss:
 
 
 class WorstMisses:
-    """Keeps the worst mistakes of all images it is told of.
+    """Keeps the worst mistakes of all images, the worst first and of equally bad ones the first.
 
     Args:
-        most: How many.
+        count: Number of mistakes to keep.
     """
 
-    def __init__(self, most: int = 24) -> None:
-        self._most = most
-        self._kept: list[tuple[float, int, Miss]] = []
-        self._count = itertools.count()
+    def __init__(self, count: int = 24) -> None:
+        self._count = count
+        self._kept: list[Miss] = []
 
     def add(self, matches: Sequence[Match], sample: LabelledImage) -> None:
         """Look for mistakes in the answer to one image."""
-        for miss in misses(matches, sample):
-            # Of equally bad ones the first stays; the number also keeps misses from being compared.
-            heapq.heappush(self._kept, (miss.severity, -next(self._count), miss))
-            if len(self._kept) > self._most:
-                heapq.heappop(self._kept)
+        self._kept += misses(matches, sample)
+        self._kept.sort(key=lambda miss: -miss.severity)
+        del self._kept[self._count :]
 
     def worst(self) -> list[Miss]:
-        """Return them, the worst first."""
-        return [miss for _, _, miss in sorted(self._kept, key=lambda kept: kept[:2], reverse=True)]
+        """Return the mistakes, the worst first."""
+        return list(self._kept)
 
 
 def misses(matches: Sequence[Match], sample: LabelledImage) -> Iterator[Miss]:

@@ -1,38 +1,50 @@
-"""Running counts over the images."""
+"""Running counts and measurements over the images."""
 
 from __future__ import annotations
 
+import contextlib
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
+from executive.cell import Localizer
+from executive.errors import NoDepth
+from executive.geometry import Array
+from executive.messages import Frame
+from executive.vision.camera_model import on_plane
 from executive.vision.evaluation.figures import NOTHING, ClassFigures
 from executive.vision.evaluation.matching import Match
 from executive.vision.evaluation.reliability import MeasuredReliability
-from executive.vision.evaluation.truth import in_full_view, pixel_size
+from executive.vision.evaluation.truth import in_full_view, is_whole, pixel_size
 from executive.vision.samples import LabelledImage
 
 
-@dataclass
 class Tally:
-    """Counts what was taken for what.
+    """Counts of right and wrong detections, and distances between found and true places.
+
+    Args:
+        localizer: Turns detections into positions, to be compared with the objects' true ones.
 
     Attributes:
-        confusion: How often a true class was taken for another, `nothing` among both.
-        offsets: Between the centres of found and true box, of right detections [pixel of the image].
+        confusion: Number of times that a true class was taken for another, `nothing` among both.
+        centre: Distances between the centres of found and true box, of right detections [pixel of the image].
+        position: These distances in the world, at the object's height, of objects wholly in view [mm].
+        localized: Distances from the localizer's position to the object's true middle, of the same [mm].
     """
 
-    confusion: Counter[tuple[str, str]] = field(default_factory=Counter)
-    offsets: list[float] = field(default_factory=list)
-    _looks: int = 0
-    _whole: int = 0
-    _overlooked: int = 0
-    _confused: int = 0
-    _squares: list[float] = field(default_factory=list)
+    def __init__(self, localizer: Localizer | None = None) -> None:
+        self._localizer = localizer
+        self._looks = 0
+        # Of objects in full view: how many there are, were overlooked and were given a wrong class.
+        self._whole = self._overlooked = self._confused = 0
+        self._squares: list[float] = []
+        self.confusion: Counter[tuple[str, str]] = Counter()
+        self.centre: list[float] = []
+        self.position: list[float] = []
+        self.localized: list[float] = []
 
-    def add(self, matches: Sequence[Match], sample: LabelledImage) -> None:
+    def add(self, matches: Sequence[Match], sample: LabelledImage, frame: Frame) -> None:
         """Count the answer to one image, with the detections that count."""
         self._looks += 1
         taken = {one.number: one for one in matches if one.number is not None}
@@ -43,11 +55,9 @@ class Tally:
                 self._whole += 1
                 self._overlooked += one is None
                 self._confused += one is not None and not one.right
-        for one in matches:
-            if one.number is None:
-                self.confusion[NOTHING, one.detection.label] += 1
-            elif one.right:
-                self._add_offset(one, one.number, sample)
+            if one is not None and one.right:
+                self._measure(one, number, sample, frame)
+        self.confusion.update((NOTHING, one.detection.label) for one in matches if one.number is None)
 
     @property
     def objects(self) -> int:
@@ -57,31 +67,38 @@ class Tally:
     @property
     def precision(self) -> float:
         """Share of the detections that are right; 0 where there were none."""
-        return self._right() / max(sum(n for (_, found), n in self.confusion.items() if found != NOTHING), 1)
+        found = sum(count for (_, found), count in self.confusion.items() if found != NOTHING)
+        return self._right / max(found, 1)
 
     @property
     def recall(self) -> float:
         """Share of the objects that were found; 0 where there were none."""
-        return self._right() / max(self.objects, 1)
+        return self._right / max(self.objects, 1)
+
+    @property
+    def _right(self) -> int:
+        return sum(count for (true, found), count in self.confusion.items() if true == found)
 
     def by_class(self) -> dict[str, ClassFigures]:
         """Return the figures of every class that is on the images."""
+        table = self.table()
         figures = {}
-        for label in sorted({true for true, _ in self.confusion} - {NOTHING}):
-            right = self.confusion[label, label]
-            objects = sum(count for (true, _), count in self.confusion.items() if true == label)
-            found = sum(count for (_, taken), count in self.confusion.items() if taken == label)
+        for label in sorted(set(table) - {NOTHING}):
+            right, objects = self.confusion[label, label], sum(table[label].values())
+            found = sum(row.get(label, 0) for row in table.values())
             figures[label] = ClassFigures(objects, right / max(found, 1), right / objects)
         return figures
 
     def table(self) -> dict[str, dict[str, int]]:
         """Return the table of confusions: true class, then the class found, then how often."""
-        rows = sorted({true for true, _ in self.confusion}, key=_nothing_last)
-        columns = sorted({found for _, found in self.confusion}, key=_nothing_last)
+        rows, columns = (
+            sorted({pair[side] for pair in self.confusion}, key=lambda label: (label == NOTHING, label))
+            for side in (0, 1)
+        )
         return {true: {found: self.confusion[true, found] for found in columns} for true in rows}
 
     def reliability(self) -> MeasuredReliability | None:
-        """Return how the detector errs on objects in full view, None where nothing was answered."""
+        """Return the error rates on objects in full view, None where nothing was answered."""
         if not self._looks:
             return None
         return MeasuredReliability.of(
@@ -93,21 +110,27 @@ class Tally:
             jitter=float(np.sqrt(np.mean(self._squares))) if self._squares else 0.0,
         )
 
-    def _right(self) -> int:
-        return sum(count for (true, found), count in self.confusion.items() if true == found)
-
-    def _add_offset(self, one: Match, number: int, sample: LabelledImage) -> None:
+    def _measure(self, one: Match, number: int, sample: LabelledImage, frame: Frame) -> None:
+        """Measure how far a right detection is from the object `number`."""
         offset = offset_of(one, number, sample)
-        self.offsets.append(float(np.hypot(*offset)))
+        self.centre.append(float(np.hypot(*offset)))
         if in_full_view(sample, number):
             self._squares += ((offset * pixel_size(sample)) ** 2).tolist()
+        if not is_whole(sample.boxes[number], sample):
+            return
+        if "positions" in sample.truth:
+            true = np.array(sample.truth["positions"][number])
+            seen = on_plane(frame.matrix, frame.X_WC, one.detection.centre, true[2])
+            self.position.append(float(np.linalg.norm(seen - true) * 1000))
+        if self._localizer is not None and "centres" in sample.truth:
+            # Without a depth an object has no place in a run either.
+            with contextlib.suppress(NoDepth):
+                located = self._localizer.locate(one.detection, frame)
+                true = np.array(sample.truth["centres"][number])
+                self.localized.append(float(np.linalg.norm(located - true) * 1000))
 
 
-def offset_of(one: Match, number: int, sample: LabelledImage) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Return how far the centre of a found box is from that of object `number`, `(2,)` [pixel]."""
+def offset_of(one: Match, number: int, sample: LabelledImage) -> Array:
+    """Return the vector from the centre of object `number`'s box to that of the found one, `(2,)` [pixel]."""
     left, top, right, bottom = sample.boxes[number]
     return np.array(one.detection.centre) - [(left + right) / 2, (top + bottom) / 2]
-
-
-def _nothing_last(label: str) -> tuple[bool, str]:
-    return label == NOTHING, label

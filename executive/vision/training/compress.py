@@ -1,7 +1,7 @@
 """Smaller ONNX files: weights stored in fewer bits and widened again when the model is loaded.
 
 The arithmetic stays in float32. Widening is written as `Cast` (and `Mul`), which onnxruntime folds into
-plain weights at load time; `DequantizeLinear` it would execute anew for every image.
+plain weights at load time; `DequantizeLinear` it would execute again for every image.
 """
 
 from __future__ import annotations
@@ -41,21 +41,6 @@ def compress(model: onnx.ModelProto, storage: Storage) -> onnx.ModelProto:
     _replace(graph.initializer, kept)
     _replace(graph.node, [*widening, *graph.node])
     return small
-
-
-def widened(model: onnx.ModelProto) -> dict[str, NDArray[np.float32]]:
-    """Return the floating-point weights of a model by name, as they are once it is loaded."""
-    raw = {tensor.name: numpy_helper.to_array(tensor) for tensor in model.graph.initializer}
-    weights = {}
-    for name, values in raw.items():
-        if name.endswith("_int8"):
-            narrow = name.removesuffix("_int8")
-            weights[narrow] = values.astype(np.float32) * raw[f"{narrow}_scale"]
-        elif name.endswith("_half"):
-            weights[name.removesuffix("_half")] = values.astype(np.float32)
-        elif values.dtype == np.float32 and f"{name.removesuffix('_scale')}_int8" not in raw:
-            weights[name] = values
-    return weights
 
 
 def _store_half(name: str, values: NDArray[np.float32], widening: list[Any]) -> list[onnx.TensorProto]:

@@ -11,7 +11,7 @@ from rfdetr.training import build_trainer
 from executive.vision.training.architecture import create
 from executive.vision.training.lightning import Model, SymmetricData
 from executive.vision.training.report import Batches, Progress, Report
-from executive.vision.training.start import checkpoint, learning_rate
+from executive.vision.training.start import learning_rate
 
 BATCH = 16
 THREADS = 2
@@ -34,7 +34,7 @@ def fit(
     pytorch_lightning.seed_everything(seed, workers=True, verbose=False)
     labels = class_names(dataset)
     rate = learning_rate(start, labels)
-    detector = create(len(labels), checkpoint(start, out), "cuda" if cuda else "cpu")
+    detector = create(len(labels), start, "cuda" if cuda else "cpu")
     config = detector.get_train_config(
         dataset_dir=str(dataset),
         output_dir=str(out),

@@ -7,19 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from executive.messages import Detection
 from executive.record.pictures.boxes import captions
 from executive.record.pictures.draw import WIDTH, draw
 from executive.record.pictures.palette import GROUND, PALETTE, bgr, class_colour
-from executive.record.pictures.scene import Scene, Seen
+from executive.record.pictures.scene import Scene
 from executive.record.pictures.strip import HEIGHT
 
 GREY = 150
-CUBE = Seen("cube", 0.9, (100.0, 200.0, 160.0, 260.0))
-DUCK = Seen("duck", 0.7, (300.0, 100.0, 340.0, 140.0))
+CUBE = Detection("cube", 0.9, (100.0, 200.0, 160.0, 260.0))
+DUCK = Detection("duck", 0.7, (300.0, 100.0, 340.0, 140.0))
 CLASSES = ("cube", "duck")
 
 
-def scene(*seen: Seen, height: int = 480, width: int = 640, **more) -> Scene:
+def scene(*seen: Detection, height: int = 480, width: int = 640, **more) -> Scene:
     image = np.full((height, width, 3), GREY, np.uint8)
     return Scene(image, seen=seen, classes=CLASSES, **more)
 
@@ -97,6 +98,14 @@ def test_the_image_itself_is_left_alone():
 def test_a_label_says_the_class_and_the_confidence_that_of_the_choice_the_item():
     assert captions(scene(CUBE, DUCK, chosen=1, item="duck-3")) == ["cube 0.90", "duck-3 0.70"]
     assert captions(scene(CUBE, chosen=0)) == ["cube 0.90"]
+
+
+def test_the_labels_of_boxes_side_by_side_do_not_cover_each_other():
+    beside = replace(CUBE, label="duck", box=(104.0, 200.0, 164.0, 260.0))
+    apart, close = (draw(scene(CUBE, other))[:480] for other in (DUCK, beside))
+    for colour in (rgb(PALETTE[0]), rgb(PALETTE[1])):
+        labels = [(picture == colour).all(axis=-1).sum() for picture in (apart, close)]
+        assert labels[1] > 0.6 * labels[0]
 
 
 def test_colours_of_classes_come_again_when_there_are_no_more():

@@ -7,11 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from executive.messages import Detection
-from executive.vision.evaluation.asking import Look
+from executive.errors import Unavailable
+from executive.messages import Answer, Detection, Reliability
 from executive.vision.samples import LabelledImage
 
 CUBE, DUCK, HALF_HIDDEN = (10.0, 10.0, 40.0, 40.0), (100.0, 100.0, 140.0, 130.0), (200.0, 20.0, 230.0, 50.0)
+
+
+RELIABILITY = Reliability(threshold=0.5, misses=0.1, confused=0.1, invented=0.1, jitter=1.0)
 
 
 class Scripted:
@@ -27,9 +30,9 @@ class Scripted:
         self.frames.append(frame)
         answer = self.answers.pop(0) if len(self.answers) > 1 else self.answers[0]
         if isinstance(answer, str):
-            return Look((), self.threshold, "", 1000.0, answer)
+            raise Unavailable(answer)
         found = tuple(Detection(label, confidence, box) for label, confidence, box in answer)
-        return Look(found, self.threshold, "scripted", 10.0 * len(self.frames))
+        return Answer("scripted", found, RELIABILITY), 10.0 * len(self.frames)
 
 
 @pytest.fixture

@@ -64,8 +64,8 @@ def test_the_sheet_shows_the_true_and_the_found_box(sample):
     assert has(second, FOUND)
 
 
-def has(picture, bgr):
-    return bool((picture == bgr[::-1]).all(axis=-1).any())
+def has(picture, colour):
+    return bool((picture == list(bytes.fromhex(colour[1:]))).all(axis=-1).any())
 
 
 def test_a_sheet_without_mistakes_says_so_and_more_than_a_row_of_them_make_two(sample):

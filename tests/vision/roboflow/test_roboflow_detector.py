@@ -23,9 +23,13 @@ from executive.vision.detectors.roboflow.helper import Helper
 from executive.vision.detectors.setting import Setting
 
 SECRET = "SECRET1234567890"
-TABLE = (192, 100, 448, 356)
 DEADLINE = 2.0
 """Time for an answer [s]: more than inference-sdk takes for the three times that it asks."""
+V1 = {"api": "v1", "class_map": {"ball": "sphere"}}
+CAMERA = CameraConfig(
+    mount="fixed", position=(0.5, 0, 1.2), look_at=(0.5, 0, 0), up=(1, 0, 0), fov_deg=55,
+    table_view=(192, 100, 448, 356), scan_poses=("home",),
+)  # fmt: skip
 
 
 class Clock:
@@ -33,15 +37,8 @@ class Clock:
     step = 1 / 240
 
 
-def camera():
-    return CameraConfig(
-        mount="fixed", position=(0.5, 0, 1.2), look_at=(0.5, 0, 0), up=(1, 0, 0), fov_deg=55,
-        table_view=TABLE, scan_poses=("home",),
-    )  # fmt: skip
-
-
-def red(image):
-    """The bounding box of what is red: a cube; of what is blue: a ball."""
+def coloured(image):
+    """Yield the bounding box of what is red, a cube, and of what is blue, a ball."""
     for channel, label in ((0, "cube"), (2, "ball")):
         rows, columns = np.nonzero(image[..., channel] > 127)
         if len(rows):
@@ -59,33 +56,35 @@ def spot(left=300, top=200, channel=0):
 
 
 @pytest.fixture(scope="module")
-def server():
-    stub = StubServer(lambda image: list(red(image)))
+def stub():
+    stub = StubServer(lambda image: list(coloured(image)))
     yield stub
     stub.stop()
 
 
-@pytest.fixture(autouse=True)
-def no_fault(server):
-    server.faults = lambda look: ""
-    server.asked.clear()
+@pytest.fixture
+def server(stub):
+    stub.faults = lambda look: ""
+    stub.asked.clear()
+    return stub
 
 
 @pytest.fixture(scope="module")
-def make(server):
+def make(stub):
     """Returns a detector with options; one with the same is made once, for it takes seconds to start."""
     made = {}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROBOFLOW_API_KEY", SECRET)
 
-        def make(**options):
-            options = {"model_id": MODEL, "url": server.url, "deadline": DEADLINE, **options}
-            called = repr(sorted(options.items()))
+        def make(key=SECRET, **options):
+            options = {"model_id": MODEL, "url": stub.url, "deadline": DEADLINE, **options}
+            called = repr((key, sorted(options.items())))
             if called not in made:
-                config = DetectorConfig(kind="roboflow", **options)
-                made[called] = RoboflowDetector.from_config(
-                    config, Setting("server", camera(), Clock(), None, 0, None)
+                patch.setenv("ROBOFLOW_API_KEY", key)
+                config, setting = (
+                    DetectorConfig(kind="roboflow", **options),
+                    Setting("server", CAMERA, Clock(), None, 0, None),
                 )
+                made[called] = RoboflowDetector.from_config(config, setting)
             return made[called]
 
         yield make
@@ -93,72 +92,59 @@ def make(server):
             detector.close()
 
 
-@pytest.fixture(params=["v1", "v0"])
-def detector(request, make):
-    return make(api=request.param, class_map={"ball": "sphere"})
-
-
-def children():
-    """The processes of this one that have not been waited for."""
-    return Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+@pytest.fixture
+def detector(make, server):
+    return make(**V1)
 
 
 def search(detector, frame, view="table"):
     request = detector.request(frame, view)
-    clock = detector._setting.clock
-    clock.now += detector._options.deadline
+    detector._setting.clock.now += detector._options.deadline
     assert request.ready
     return request.result()
 
 
-def complaint(detector, view="table"):
+def assert_unavailable(detector, *patterns):
     with pytest.raises(Unavailable) as caught:
-        search(detector, spot(), view)
-    assert SECRET not in str(caught.value)
-    return str(caught.value)
+        search(detector, spot())
+    text = str(caught.value)
+    assert SECRET not in text
+    for pattern in patterns:
+        assert re.search(pattern, text), text
 
 
 @pytest.mark.parametrize("view", ["table", "full"])
-def test_a_box_is_returned_in_the_frames_pixels_and_renamed(detector, view):
+@pytest.mark.parametrize("api", ["v1", pytest.param("v0", marks=pytest.mark.slow)])
+def test_a_box_is_returned_in_the_frames_pixels_and_renamed(make, server, api, view):
+    detector = make(**{**V1, "api": api})
     answer = search(detector, spot(channel=2), view)
     ((label, box),) = [(found.label, found.box) for found in answer.found]
     assert (label, answer.detector) == ("sphere", "server")
     assert box == pytest.approx((300, 200, 330, 220), abs=1.0)
-
-
-def test_red_is_red(detector):
     assert [found.label for found in search(detector, spot(channel=0)).found] == ["cube"]
+    assert len(search(detector, spot(20, 20), view).found) == (view == "full")
+    path, headers, body = server.asked[-1]
+    assert headers["Authorization"] == f"Bearer {SECRET}"
+    assert all(SECRET not in path and SECRET.encode() not in body for path, _, body in server.asked)
+    assert "confidence=0.25" in path if api == "v0" else json.loads(body)["confidence"] == 0.25
 
 
-def test_the_table_view_does_not_show_what_lies_beside_it(detector):
-    assert search(detector, spot(20, 20)).found == ()
-    assert len(search(detector, spot(20, 20), "full").found) == 1
-
-
+@pytest.mark.slow
 def test_a_full_frame_can_be_sent_in_tiles(make, server):
-    detector = make(full="tiles", deadline=5.0)
     looks = server.looks
-    (found,) = search(detector, spot(180, 240), "full").found
+    (found,) = search(make(full="tiles", deadline=5.0), spot(180, 240), "full").found
     assert found.box == pytest.approx((180, 240, 210, 260), abs=1.0)
     assert server.looks - looks == 9
 
 
-def test_the_key_goes_into_the_header_alone_and_the_floor_is_asked_for(detector, server):
-    search(detector, spot())
-    path, headers, body = server.asked[-1]
-    assert headers["Authorization"] == f"Bearer {SECRET}"
-    assert all(SECRET not in path and SECRET.encode() not in body for path, _, body in server.asked)
-    asked = path if path.startswith("/shapes/1") else json.loads(body)["confidence"]
-    assert asked == 0.25 or "confidence=0.25" in asked
-
-
-def test_what_is_below_the_floor_is_left_out(make, server):
+def test_what_is_below_the_floor_is_left_out_and_a_class_nobody_asked_for_is_not(detector, server):
     server.faults = lambda look: "doubtful"
-    detector = make(api="v1", class_map={"ball": "sphere"})
     assert search(detector, spot()).found == ()
+    server.faults = lambda look: "strangers"
+    assert "cube" in [found.label for found in search(detector, spot()).found]
 
 
-STATUSES = {
+REFUSED = {
     "400": "could not use the request",
     "401": r"does not accept the key \(401: key \*\*\* is no good\); set ROBOFLOW_API_KEY to a key",
     "402": "wants to be paid .* look at the plan",
@@ -171,103 +157,68 @@ STATUSES = {
     "502": "has lost the server behind it",
     "503": "is not ready, or cannot load shapes/1",
 }
+GARBLED = "(answered with something that|gave an answer that)"
+ABSURD = "gave an answer that cannot be right: .*shapes/1"
+FAULTS = {
+    **REFUSED,
+    **dict.fromkeys(sorted(BODIES), GARBLED),
+    **dict.fromkeys(sorted(set(SPOILT) - {"swapped", "strangers", "doubtful"}), ABSURD),
+}
+QUICK = ("401", "404", "html", "deep", "nan")
+"""Faults of every kind; the others are slow tests, and units in test_answers.py and test_complaints.py."""
 
 
-@pytest.mark.parametrize("status", STATUSES)
-def test_a_server_that_refuses_is_quoted_with_what_to_do(detector, server, status):
-    server.faults = lambda look: status
-    assert_matches(complaint(detector), f"^{server.url}|no answer within", STATUSES[status])
-
-
-@pytest.mark.parametrize("body", sorted(BODIES))
-def test_an_answer_that_is_none_is_unavailable(detector, server, body):
-    server.faults = lambda look: body
-    assert_matches(complaint(detector), f"^{server.url} (answered with something that|gave an answer that)")
-
-
-@pytest.mark.parametrize("fault", sorted(set(SPOILT) - {"swapped", "strangers", "doubtful"}))
-def test_an_answer_that_cannot_be_right_is_unavailable(detector, server, fault):
+@pytest.mark.parametrize("fault", QUICK)
+def test_a_fault_of_the_server_is_unavailable_with_what_to_do(detector, server, fault):
     server.faults = lambda look: fault
-    assert_matches(complaint(detector), f"^{server.url} gave an answer that cannot be right: ", "shapes/1")
+    assert_unavailable(detector, f"^{server.url}", FAULTS[fault])
 
 
-def test_classes_nobody_asked_for_are_no_fault(detector, server):
-    server.faults = lambda look: "strangers"
-    assert "cube" in [found.label for found in search(detector, spot()).found]
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("api", ["v0", "v1"])
+def test_every_fault_of_the_server_is_unavailable_with_what_to_do(make, server, fault, api):
+    server.faults = lambda look: fault
+    assert_unavailable(make(**{**V1, "api": api}), f"^{server.url}|no answer within", FAULTS[fault])
 
 
-def assert_matches(text, *patterns):
-    for pattern in patterns:
-        assert re.search(pattern, text), text
-
-
-def test_a_server_that_is_gone_and_comes_back(make, server):
-    detector = make(api="v1", class_map={"ball": "sphere"})
+def test_a_server_that_is_gone_and_comes_back(detector, server):
     server.stop()
     try:
-        assert_matches(complaint(detector), f"^{server.url} refused the connection .*; is it running")
+        assert_unavailable(detector, f"^{server.url} refused the connection .*; is it running")
     finally:
         server.start()
-    assert len(search(detector, spot()).found) == 1
-
-
-def test_a_server_that_ends_in_the_middle_broke_off(make, server):
-    detector = make(api="v1", class_map={"ball": "sphere"})
     server.faults = lambda look: "stop"
     try:
-        assert_matches(complaint(detector), "broke off|refused the connection")
+        assert_unavailable(detector, "broke off|refused the connection")
     finally:
         server.over.wait(5)
         server.start()
+    server.faults = lambda look: ""
+    assert len(search(detector, spot()).found) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("url", "text"),
+    ("options", "text"),
     [
-        ("http://nobody.invalid:9001", r"http://nobody.invalid:9001 is not known by this name"),
-        ("https://127.0.0.1:{port}", r"https://127.0.0.1:\d+ cannot be trusted \(TLS\)"),
+        ({"url": "http://nobody.invalid:9001"}, "http://nobody.invalid:9001 is not known by this name"),
+        ({"url": "https://127.0.0.1:{port}"}, r"https://127.0.0.1:\d+ cannot be trusted \(TLS\)"),
+        ({"key": "", "api": "v0"}, "wants a key .*; set ROBOFLOW_API_KEY"),
     ],
 )
-def test_an_address_that_does_not_work_is_said(make, server, url, text):
-    assert_matches(complaint(make(url=url.format(port=server.port), deadline=30.0)), text)
-
-
-def test_a_missing_key_is_asked_for(server, monkeypatch):
-    monkeypatch.delenv("ROBOFLOW_API_KEY", raising=False)
-    config = DetectorConfig(kind="roboflow", model_id=MODEL, url=server.url, api="v0", deadline=DEADLINE)
-    detector = RoboflowDetector.from_config(config, Setting("server", camera(), Clock(), None, 0, None))
-    try:
-        assert_matches(complaint(detector), "wants a key .*; set ROBOFLOW_API_KEY")
-    finally:
-        detector.close()
-
-
-@pytest.fixture
-def hasty(make):
-    """A detector that waits for a fifth of a second, ready."""
-    detector = make(api="v1", deadline=0.2)
-    detector._helper.wait_until_ready()
-    return detector
-
-
-@pytest.mark.parametrize("fault", ["hang", "drip"])
-def test_a_server_that_never_answers_costs_its_deadline_and_shows_it_on_the_runs_clock(hasty, server, fault):
-    server.faults = lambda look: fault
-    hasty._setting.clock.now = 10.0
-    began = time.monotonic()
-    request = hasty.request(spot(), "table")
-    hasty._setting.clock.now = 10.05
-    assert not request.ready
-    assert 0.15 < time.monotonic() - began < 1.5
-    hasty._setting.clock.now = 10.2
-    with pytest.raises(DeadlinePassed, match=r"^no answer within 0\.2 s from http://127"):
-        request.result()
+def test_an_address_or_key_that_does_not_work_is_said(make, server, options, text):
+    told = {name: value.format(port=server.port) for name, value in options.items()}
+    assert_unavailable(make(deadline=30.0, **told), text)
 
 
 def test_closing_does_not_wait_for_a_server_that_hangs(server):
+    def children():
+        return Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+
     config = DetectorConfig(kind="roboflow", model_id=MODEL, url=server.url, deadline=60.0)
     before = children()
-    detector = RoboflowDetector.from_config(config, Setting("closing", camera(), Clock(), None, 0, None))
+    detector = RoboflowDetector.from_config(config, Setting("closing", CAMERA, Clock(), None, 0, None))
     assert len(children()) == len(before) + 1
     detector.request(spot(), "table")
     began = time.monotonic()
@@ -281,7 +232,21 @@ def test_a_bug_of_ours_is_no_lack_of_an_answer(detector, monkeypatch):
     monkeypatch.setattr(Helper, "ask", lambda *_: {"answer": 1 / 0})
     with pytest.raises(ZeroDivisionError):
         search(detector, spot())
-
-
-def test_inference_sdk_is_never_imported_here():
     assert "inference_sdk" not in sys.modules
+
+
+@pytest.mark.parametrize("fault", ["hang", pytest.param("drip", marks=pytest.mark.slow)])
+def test_a_server_that_never_answers_costs_its_deadline_and_shows_it_on_the_runs_clock(
+    detector, server, fault
+):
+    detector._helper.wait_until_ready()
+    server.faults = lambda look: fault
+    clock = detector._setting.clock
+    clock.now, began = 10.0, time.monotonic()
+    request = detector.request(spot(), "table")
+    clock.now = 10.05
+    assert not request.ready
+    assert DEADLINE - 0.05 < time.monotonic() - began < DEADLINE + 1.5
+    clock.now = 10.0 + DEADLINE
+    with pytest.raises(DeadlinePassed, match=r"^no answer within 2\.0 s from http://127"):
+        request.result()

@@ -45,7 +45,7 @@ def configured(**options):
     ],
 )
 def test_a_wrong_option_is_said_in_a_sentence_that_tells_no_secret(tmp_path, options, option, text):
-    ((found, sentence),) = RoboflowDetector.check(configured(**options), tmp_path)
+    ((found, sentence),) = RoboflowDetector.check(configured(**options), tmp_path, {})
     assert found == option
     assert SECRET not in sentence
     with pytest.raises(InputError, match=text) as caught:
@@ -57,7 +57,7 @@ def test_a_wrong_option_is_said_in_a_sentence_that_tells_no_secret(tmp_path, opt
     "url", ["http://127.0.0.1:9001", "https://serverless.roboflow.com/", "http://[::1]:9001"]
 )
 def test_addresses_of_servers_are_right(tmp_path, url):
-    assert list(RoboflowDetector.check(configured(url=url), tmp_path)) == []
+    assert list(RoboflowDetector.check(configured(url=url), tmp_path, {})) == []
 
 
 def test_the_hosted_service_is_asked_where_no_address_is_given():

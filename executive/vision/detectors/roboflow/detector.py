@@ -18,7 +18,7 @@ from executive.vision.detectors.roboflow.complaints import failed, late, unbelie
 from executive.vision.detectors.roboflow.helper import Helper, NoAnswer
 from executive.vision.detectors.roboflow.key import ApiKey
 from executive.vision.detectors.roboflow.options import RoboflowOptions, wrong_roboflow
-from executive.vision.detectors.setting import NO_OTHERS, Setting
+from executive.vision.detectors.setting import Setting
 from executive.vision.detectors.views import Finding, Part, merge, parts_of, without_duplicates
 
 
@@ -55,18 +55,16 @@ class RoboflowDetector:
 
     @staticmethod
     def check(
-        config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig] = NO_OTHERS
+        config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]
     ) -> Iterator[tuple[str, str]]:
         """Yield every option because of which the detector could not be built, with a sentence."""
         del base, others
         yield from wrong_roboflow(config)
 
     @staticmethod
-    def labels(
-        config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig] = NO_OTHERS
-    ) -> tuple[str, ...] | None:
+    def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
         """Return the classes it finds, by the cell's names; None where its options do not say."""
-        del base, others
+        del base
         if any(True for _ in wrong_roboflow(config)):
             return None
         options = RoboflowOptions.model_validate(config.options)
