@@ -16,7 +16,7 @@ _NAME = NAME.pattern
 
 
 def mission_schema(skills: Mapping[str, type[Skill]]) -> Json:
-    """Return the schema of a mission file that may use these skills."""
+    """Return the schema of a mission file that may use these skills; `library` defines library files."""
     return _file("A mission", grammar.MISSION, skills)
 
 
@@ -34,6 +34,7 @@ def _file(title: str, keys: Mapping[str, Key], skills: Mapping[str, type[Skill]]
             "node": _node([*skills, *grammar.CONTROL], skills),
             "tree": {"anyOf": [_ref("node"), {"title": "A subtree", **_mapping(grammar.SUBTREE)}]},
             "param": _param(),
+            "library": _mapping(grammar.LIBRARY),
             "catch": _mapping(grammar.CATCH),
             "reasons": _reasons(skills),
             "label": {"type": "string", "pattern": f"^{grammar.LABEL}$"},
