@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 from executive.mission.check import (
     cell,
     constants,
-    labels,
     parallel,
     port_types,
     reach,
@@ -30,7 +29,7 @@ CHECKS: tuple[Check, ...] = (
     skills.input_values,
     skills.output_wiring,
     constants.constants,
-    labels.labels,
+    reasons.labels,
     cell.routes,
     cell.names,
     cell.known_classes,

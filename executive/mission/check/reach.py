@@ -15,14 +15,13 @@ from executive.mission.model.values import Literal, Match
 
 def unreachable(case: Case) -> Iterator[Finding]:
     """Find the first node of every part of the tree that can never run."""
-    if case.flow is not None and case.tree is not None:
-        yield from _unreachable(case.tree, case.flow)
+    yield from _unreachable(case.tree, case.flow)
 
 
 def shadowed_catches(case: Case) -> Iterator[Finding]:
     """Find every failure named in a `catch` that earlier ones take already, by this name or another."""
     for node in case.nodes():
-        body = case.flow.flows.get(node.do.path) if case.flow and isinstance(node, nodes.TryNode) else None
+        body = case.flow.flows.get(node.do.path) if isinstance(node, nodes.TryNode) else None
         if body is None or not isinstance(node, nodes.TryNode):
             continue
         earlier: list[Match] = []
@@ -40,8 +39,6 @@ def shadowed_catches(case: Case) -> Iterator[Finding]:
 
 def endless_loops(case: Case) -> Iterator[Finding]:
     """Find every loop that cannot end but by a failure, nor is stopped when another branch has ended."""
-    if case.flow is None:
-        return
     stopped = {node.path for node in _beside_a_lead(case)}
     for node in case.flow.nodes.values():
         if not isinstance(node, nodes.WhileNode) or node.path in stopped:

@@ -66,7 +66,7 @@ def _skill(case: Case, node: Any) -> float:
         except (KeyError, WrongType):
             # Another check says so.
             return 0.0
-    entry = case.flow.entry.get(node.path) if case.flow else None
+    entry = case.flow.entry.get(node.path)
     grips = entry.grips if entry else None
     carries = skill.tool_state[0] is HOLDING
     from_elsewhere = carries and (grips is None or any(grip.moved for grip in grips))

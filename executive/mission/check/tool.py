@@ -16,8 +16,6 @@ from executive.skill import EMPTY, HOLDING
 def tool_states(case: Case) -> Iterator[Finding]:
     """Find every skill that needs an empty tool where it may hold something, or the other way round."""
     flow = case.flow
-    if flow is None:
-        return
     for path, entry in flow.entry.items():
         node = flow.nodes[path]
         skill = case.skills.get(node.skill) if isinstance(node, SkillNode) else None
@@ -38,9 +36,7 @@ def tool_states(case: Case) -> Iterator[Finding]:
 def held_at_the_end(case: Case) -> Iterator[Finding]:
     """Find out whether the mission may succeed with something in the tool."""
     flow = case.flow
-    if flow is None or case.tree is None or flow.result.success is None:
-        return
-    if grip := flow.result.success.may_be(HOLDING):
+    if flow.result.success and (grip := flow.result.success.may_be(HOLDING)):
         message = "the mission may end well with something still in the tool"
         yield warning(case.tree.mark, "tool-state", message, _since(flow, grip, case.tree.mark))
 

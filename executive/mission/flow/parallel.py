@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from executive.mission.flow.grips import grips_at_end, together
-from executive.mission.flow.state import Flow, State, joined
+from executive.mission.flow.state import Flow, State, grips_at_end, joined, together
 
 
 def at_once(flows: Sequence[Flow], state: State, wait_for: Any, halt: bool) -> Flow:
