@@ -23,11 +23,7 @@ Check = Callable[[Case], Iterator[Finding]]
 
 CHECKS: tuple[Check, ...] = (
     skills.unknown_skills,
-    skills.unknown_settings,
-    skills.missing_params,
-    skills.param_values,
-    skills.input_values,
-    skills.output_wiring,
+    skills.settings,
     constants.constants,
     reasons.labels,
     cell.routes,

@@ -27,11 +27,11 @@ def short_timeouts(case: Case) -> Iterator[Finding]:
         seconds = _number(node.seconds)
         shortest = least_time(case, node.do)
         if seconds is not None and 0 < seconds < shortest - _SLACK:
-            origin = node.seconds.origin if isinstance(node.seconds, Literal) else ""
+            note = node.seconds.origin_note if isinstance(node.seconds, Literal) else ""
             message = (
                 f"timeout.seconds is {seconds:g} s, but its body takes {shortest:.2f} s at the very least"
             )
-            message += f" (it is {origin})" if origin else ""
+            message += note
             yield error(node.seconds.mark, "short-timeout", message, _made_of(case, node.do, shortest))
 
 

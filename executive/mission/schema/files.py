@@ -8,8 +8,16 @@ from executive.mission.model import grammar
 from executive.mission.model.grammar import Form, Key
 from executive.mission.parse.fields import NAME
 from executive.mission.parse.params import TYPES
-from executive.mission.schema.skills import REFERENCE, failures, or_reference, settings, words
-from executive.mission.schema.types import ALTERNATIVE, DIALECT, Json
+from executive.mission.schema.types import (
+    ALTERNATIVE,
+    DIALECT,
+    REFERENCE,
+    Json,
+    failures,
+    or_reference,
+    settings,
+    words,
+)
 from executive.skill import Skill
 
 _NAME = NAME.pattern
