@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from executive.mission.check import (
-    cell,
     constants,
     parallel,
     port_types,
@@ -26,9 +25,8 @@ CHECKS: tuple[Check, ...] = (
     skills.settings,
     constants.constants,
     reasons.labels,
-    cell.routes,
-    cell.names,
-    cell.known_classes,
+    skills.routes,
+    skills.known_classes,
     reasons.matches,
     variables.unwritten_inputs,
     variables.unwritten_needs,

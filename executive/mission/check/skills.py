@@ -1,4 +1,4 @@
-"""Checks of single skills and their settings."""
+"""Checks of single skills, their settings, and the names that a mission takes from its cell."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from executive.mission.findings import Finding, alternatives, error, suggest
 from executive.mission.model.nodes import SkillNode
 from executive.mission.model.typed import WrongType, convert, input_fault
 from executive.mission.model.values import Literal
+from executive.mission.model.wiring import literals
+from executive.mission.source import Mark
 from executive.mission.words import describe
 from executive.skill import Direction, Param, Port
 
@@ -31,6 +33,7 @@ def settings(case: Case) -> Iterator[Finding]:
                 yield error(setting.key, "unknown-param", f'{node.skill} has no param or port "{name}"', hint)
             elif isinstance(setting.value, Literal):
                 yield from _value_faults(case, node, known[name], setting.value)
+                yield from _unknown_names(case, node, known[name], setting.value)
             elif name in skill.params:
                 variable = f"${setting.value.name}"
                 message = (
@@ -61,6 +64,21 @@ def _value_faults(case: Case, node: SkillNode, declared: Param | Port, value: Li
         yield error(value.mark, code, f"{name} {sentence}{value.origin_note}", hint)
 
 
+def _unknown_names(case: Case, node: SkillNode, declared: Param | Port, value: Literal) -> Iterator[Finding]:
+    """Find every name of something that the cell does not have."""
+    if declared.refers not in case.names or value.value == declared.default:
+        return
+    choices = declared.choices if isinstance(declared, Param) else None
+    words = [*case.names[declared.refers], *(choices or ())]
+    name, listed = f"{node.skill}.{declared.name}", isinstance(value.value, list)
+    for index, word in enumerate(value.value if listed else [value.value]):
+        if isinstance(word, str) and word not in words:
+            message = f'the cell has no {declared.refers} "{word}" for {name}'
+            hint = case.variable_hint(word) or alternatives(word, words, f"{name} takes")
+            mark = value.element_mark(index) if listed else value.mark
+            yield error(mark, f"unknown-{declared.refers}", message, hint)
+
+
 def _param_fault(param: Param, value: object) -> tuple[str, str]:
     """Return code and sentence of a value that does not fit a param; the sentence is "" if it does."""
     try:
@@ -81,3 +99,40 @@ def _param_fault(param: Param, value: object) -> tuple[str, str]:
         question = f' (did you mean "{meant}"?)' if meant else ""
         return "wrong-value", f"must be {allowed}, not {describe(value)}{question}"
     return "", ""
+
+
+def routes(case: Case) -> Iterator[Finding]:
+    """Find every route of an unknown class or to an unknown bin."""
+    if case.cell is None:
+        return
+    for route in case.mission.routes:
+        if route.label not in case.cell.objects:
+            hint = alternatives(route.label, case.cell.objects, "Its classes")
+            yield error(route.key, "unknown-class", f'the cell knows no class "{route.label}"', hint)
+        for bin in route.bins:
+            if bin.name not in case.cell.bins:
+                hint = alternatives(bin.name, case.cell.bins, "Its bins")
+                yield error(bin.mark, "unknown-bin", f'the cell has no bin "{bin.name}"', hint)
+
+
+def known_classes(case: Case) -> Iterator[Finding]:
+    """Find every class that the mission names and no detector's model knows."""
+    models = {name: labels for name, labels in case.labels.items() if labels is not None}
+    if len(models) < len(case.labels) or not models or case.cell is None:
+        # A detector whose classes are not known may know any.
+        return
+    for label, mark in _named_classes(case):
+        if label in case.cell.objects and not any(label in labels for labels in models.values()):
+            said = "; ".join(f"{name}: {', '.join(labels)}" for name, labels in models.items())
+            message = f'no detector of the cell can see the class "{label}"'
+            yield error(mark, "unseen-class", message, f"Their models know {said}.")
+
+
+def _named_classes(case: Case) -> Iterator[tuple[str, Mark]]:
+    """Yield every class in the routes and in the settings of skills, with its place."""
+    yield from ((route.label, route.key) for route in case.mission.routes)
+    for node, skill in case.known_skills():
+        for name, value in literals(node):
+            declared = skill.params.get(name) or skill.ports.get(name)
+            if declared is not None and declared.refers == "class" and isinstance(value.value, str):
+                yield value.value, value.mark
