@@ -8,7 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner
@@ -58,10 +58,8 @@ def project(monkeypatch):
             raise asked.run_error
         return asked.result
 
-    for name, function in (("mission.load", load_mission), ("record.recorded_run", recorded_run)):
-        module = ModuleType(f"executive.{name}")
-        setattr(module, function.__name__, function)
-        monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.setattr("executive.mission.load.load_mission", load_mission)
+    monkeypatch.setattr("executive.record.recorded_run.recorded_run", recorded_run)
     monkeypatch.setattr("executive.discovery.discover", dict)
     monkeypatch.setattr("executive.view.report.leave.leave_report", lambda result: ("runs/x/report.html", ""))
     return asked
