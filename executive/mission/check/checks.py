@@ -12,7 +12,6 @@ from executive.mission.check import (
     reasons,
     skills,
     timeouts,
-    tool,
     variables,
 )
 from executive.mission.check.case import Case
@@ -34,8 +33,8 @@ CHECKS: tuple[Check, ...] = (
     variables.unread_variables,
     variables.broken_promises,
     port_types.port_types,
-    tool.tool_states,
-    tool.held_at_the_end,
+    reach.tool_states,
+    reach.held_at_the_end,
     reach.unreachable,
     reach.shadowed_catches,
     reach.endless_loops,

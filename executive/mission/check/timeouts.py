@@ -46,12 +46,8 @@ def _made_of(case: Case, body: Node, shortest: float) -> str:
 
 def least_time(case: Case, node: Node | None) -> float:
     """Return the least time in which a node can succeed [s]; 0 where nothing is known."""
-    return 0.0 if node is None else _LEAST.get(type(node), _nothing)(case, node)
-
-
-def _nothing(case: Case, node: Any) -> float:
-    del case, node
-    return 0.0
+    of_kind = _LEAST.get(type(node)) if node else None
+    return of_kind(case, node) if of_kind else 0.0
 
 
 def _skill(case: Case, node: Any) -> float:
@@ -131,10 +127,6 @@ def _parallel(case: Case, node: Any) -> float:
     return times[count - 1] if isinstance(count, int) and 0 < count <= len(times) else 0.0
 
 
-def _use(case: Case, node: Any) -> float:
-    return least_time(case, node.body)
-
-
 def _number(value: Value) -> float | None:
     number = value.value if isinstance(value, Literal) else None
     return number if isinstance(number, int | float) and not isinstance(number, bool) else None
@@ -150,5 +142,5 @@ _LEAST: Mapping[type[Node], Callable[[Case, Any], float]] = {
     nodes.ForEachNode: _elements,
     nodes.TryNode: _try,
     nodes.TimeoutNode: _body,
-    nodes.UseNode: _use,
+    nodes.UseNode: _sum,
 }

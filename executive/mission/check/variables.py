@@ -66,8 +66,13 @@ def unread_variables(case: Case) -> Iterator[Finding]:
             if wire.explicit and wire.variable not in read:
                 message = f"{wire} writes ${wire.variable}, which nothing reads"
                 yield warning(wire.mark, "unread", message)
-        if isinstance(node, UseNode):
-            yield from _unread_returns(node, read)
+        if not isinstance(node, UseNode):
+            continue
+        for setting in node.returns.values():
+            name = setting.value.name if isinstance(setting.value, Reference) else ""
+            if name in node.promised and name not in read:
+                message = f"nothing reads ${name}, which the subtree returns here"
+                yield warning(setting.value.mark, "unread", message)
 
 
 def taken_names(case: Case) -> Iterator[Finding]:
@@ -90,14 +95,6 @@ def taken_names(case: Case) -> Iterator[Finding]:
             yield from walk(child, around)
 
     yield from walk(case.tree, {})
-
-
-def _unread_returns(use: UseNode, read: set[str]) -> Iterator[Finding]:
-    for setting in use.returns.values():
-        value = setting.value
-        if isinstance(value, Reference) and value.name in use.promised and value.name not in read:
-            message = f"nothing reads ${value.name}, which the subtree returns here"
-            yield warning(value.mark, "unread", message)
 
 
 def broken_promises(case: Case) -> Iterator[Finding]:
