@@ -152,6 +152,6 @@ def test_what_a_library_has_and_nobody_uses_is_no_mistake(load: Load) -> None:
 
 
 def test_an_output_cannot_take_the_name_of_an_argument(load: Load) -> None:
-    text = "tree: {use: get, with: {seen: 0.1}}\ntrees: {get: {args: [seen], do: [Look, {Pick: {height: $seen}}]}}"
+    text = "tree: {use: get, with: {seen: 0.1}}\ntrees: {get: {args: [seen], do: Look}}"
     with pytest.raises(MissionError, match=r"Look\.seen would write \$seen, but that is an argument here"):
         load(HEAD + text + "\n")
