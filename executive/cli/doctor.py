@@ -162,10 +162,9 @@ def check_renderer() -> Iterator[Finding]:
         message = f"TinyRenderer, on the processor: {time:.0f} ms for 640x480 of the overhead cell"
         yield Finding("ok", "renderer", message)
     _, problem = draw_in_process("egl")
-    if problem:
-        yield Finding("note", "egl", f"PyBullet's EGL plugin draws nothing: {problem}", "no cell needs it")
-    else:
-        yield Finding("ok", "egl", "PyBullet's EGL plugin can be loaded and draws; no cell needs it")
+    state = f"draws nothing: {problem}" if problem else "can be loaded and draws"
+    mark = "note" if problem else "ok"
+    yield Finding(mark, "egl", f"PyBullet's EGL plugin {state}; no cell needs it")
 
 
 def check_roboflow() -> Iterator[Finding]:
@@ -208,13 +207,25 @@ def has_answer(address: str, timeout: float = SERVER_TIMEOUT) -> bool:
     return True
 
 
-def prepare_tiny() -> Callable[[], object]:
-    """Return a function that draws a frame of the overhead cell as a run does."""
+def prepare_drawing(renderer: str) -> Callable[[], object]:
+    """Return a function that draws a frame: `tiny` one of the overhead cell, `egl` one of an empty scene.
+
+    Raises:
+        SystemExit: There is no EGL plugin, or it cannot be loaded.
+    """
+    import pybullet
+
     from executive.cli.cells import load_cells
     from executive.sim.camera import CELL_LIGHT, camera_pose, render
     from executive.sim.world import World
     from executive.vision.camera_model import calibrated
 
+    if renderer == "egl":
+        pybullet.connect(pybullet.DIRECT)
+        spec = find_spec("eglRenderer")
+        if spec is None or pybullet.loadPlugin(spec.origin, "_eglRendererPlugin") < 0:
+            sys.exit("it cannot be loaded")
+        return lambda: pybullet.getCameraImage(*FRAME_SIZE, renderer=pybullet.ER_BULLET_HARDWARE_OPENGL)
     config = load_cells(("overhead",))["overhead"]
     camera = next(iter(config.cameras.values()))
     world = World(config)
@@ -222,23 +233,7 @@ def prepare_tiny() -> Callable[[], object]:
     return lambda: render(world, matrix, camera_pose(world, camera), (0, 0, *FRAME_SIZE), CELL_LIGHT)
 
 
-def prepare_egl() -> Callable[[], object]:
-    """Return a function that draws an empty scene with PyBullet's EGL plugin.
-
-    Raises:
-        SystemExit: There is no such plugin, or it cannot be loaded.
-    """
-    import pybullet
-
-    pybullet.connect(pybullet.DIRECT)
-    spec = find_spec("eglRenderer")
-    if spec is None or pybullet.loadPlugin(spec.origin, "_eglRendererPlugin") < 0:
-        sys.exit("it cannot be loaded")
-    return lambda: pybullet.getCameraImage(*FRAME_SIZE, renderer=pybullet.ER_BULLET_HARDWARE_OPENGL)
-
-
 if __name__ == "__main__":
     with stdout_kept_clean():
-        draw = prepare_egl() if sys.argv[1] == "egl" else prepare_tiny()
-        times = timeit.repeat(draw, number=1, repeat=1 + FRAMES)
+        times = timeit.repeat(prepare_drawing(sys.argv[1]), number=1, repeat=1 + FRAMES)
     click.echo(f"milliseconds: {1000 * statistics.median(times[1:]):.2f}")
