@@ -58,7 +58,8 @@ def registered(group: str, kind: str) -> dict[str, Entry]:
     """
     project = project_here()
     found: dict[str, Entry] = {}
-    for entry in sorted((*_installed(group, kind, project), *_own(group, kind, project)), key=_order):
+    entries = (*_installed(group, kind, project), *_own(group, kind, project))
+    for entry in sorted(entries, key=lambda entry: (entry.name, entry.value)):
         if entry.name in found and found[entry.name].value != entry.value:
             raise InputError(
                 f'the {kind} "{entry.name}" is registered twice, by {found[entry.name].value} and '
@@ -66,10 +67,6 @@ def registered(group: str, kind: str) -> dict[str, Entry]:
             )
         found[entry.name] = entry
     return found
-
-
-def _order(entry: Entry) -> tuple[str, str]:
-    return entry.name, entry.value
 
 
 def _installed(group: str, kind: str, project: Project | None) -> Iterator[Entry]:

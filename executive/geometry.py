@@ -59,9 +59,10 @@ class Pose:
     @property
     def rotation_vector(self) -> Array:
         """The rotation as its axis `(3,)` times its angle [rad], the angle at most pi: OpenCV's rvec."""
-        q = self.quaternion
-        sine = float(np.linalg.norm(q[:3]))
-        return np.asarray(q[:3] * (2 * math.atan2(sine, q[3]) / sine if sine else 2.0))
+        # Loading scipy.spatial takes a third of a second, and few runs need it.
+        from scipy.spatial.transform import Rotation
+
+        return np.asarray(Rotation.from_matrix(self.rotation).as_rotvec())
 
     def rounded(self, digits: int = 6) -> list[float]:
         """Return position and quaternion, rounded, as a plain list of seven numbers for records."""
@@ -78,13 +79,6 @@ def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
             [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
         ]
     )
-
-
-def rotation_from_vector(vector: ArrayLike) -> Array:
-    """Return the rotation `(3, 3)` about the axis `vector` `(3,)` by its length [rad]: OpenCV's rvec."""
-    axis = np.asarray(vector, dtype=float)
-    angle = float(np.linalg.norm(axis))
-    return rotation_from_quaternion([*(axis * np.sinc(angle / math.tau) / 2), math.cos(angle / 2)])
 
 
 def quaternion_from_rotation(rotation: Array) -> Array:

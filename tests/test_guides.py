@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import importlib.util
 import re
 import sys
@@ -19,7 +18,7 @@ from executive.cli.main import main
 from executive.discovery import discover
 from executive.events import Event
 from executive.messages import Target
-from executive.mission.findings import MissionError
+from executive.mission.findings import CODES, MissionError
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.model import grammar
 from executive.mission.schema.files import mission_schema
@@ -34,9 +33,6 @@ from executive.testing.run_skill import run_skill
 
 LONGEST = 300.0
 """Time on the run's clock within which every mission shown is done on the fake cell [s]."""
-
-CELL_NAMES = ("bin", "class", "detector", "pose")
-"""What a mission takes from its cell by name; there is a code `unknown-...` for each."""
 
 FILES = files()
 MISSIONS = [name for name, file in FILES.items() if "/" not in name and not file.block.is_mistake]
@@ -121,24 +117,7 @@ def test_every_library_and_cell_of_the_authors_guide_is_used_by_a_mission_of_it(
 def test_the_authors_guide_tells_every_code_of_a_finding_and_no_other() -> None:
     told = [code for cell in rows("## 10. What `executive check` finds") for code in in_code(cell)]
     assert len(told) == len(set(told))
-    assert set(told) == {
-        code
-        for path in (ROOT / "executive" / "mission").rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        for code in codes_of(node)
-    }
-
-
-def codes_of(node: ast.AST) -> set[str]:
-    """Return the codes of findings in a piece of a program: words with a hyphen, or second in a call."""
-    if isinstance(node, ast.Constant) and isinstance(node.value, str):
-        return set(re.findall(r"^[a-z]+(?:-[a-z]+)+$", node.value))
-    if isinstance(node, ast.JoinedStr) and ast.unparse(node).startswith("f'unknown-{"):
-        return {f"unknown-{name}" for name in CELL_NAMES}
-    if isinstance(node, ast.Call) and len(node.args) >= 3 and isinstance(node.args[1], ast.Constant):
-        called = ast.unparse(node.func).rpartition(".")[2].lstrip("_")
-        return {str(node.args[1].value)} if called in ("error", "warning", "refuse", "finding") else set()
-    return set()
+    assert set(told) == CODES
 
 
 @pytest.mark.parametrize("word", grammar.CONTROL)

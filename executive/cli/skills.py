@@ -89,8 +89,8 @@ def declared(name: str, skill: type[Skill]) -> Facts:
     return {
         "name": name,
         "doc": inspect.getdoc(skill) or "",
-        "params": [_param(param) for param in skill.params.values()],
-        "ports": [_port(port) for port in skill.ports.values()],
+        "params": [_declared(param) for param in skill.params.values()],
+        "ports": [_declared(port) for port in skill.ports.values()],
         "reasons": list(skill.reasons),
         "uses": list(skill.uses),
         "senses": skill.senses,
@@ -103,31 +103,20 @@ def declared(name: str, skill: type[Skill]) -> Facts:
     }
 
 
-def _param(param: Param) -> Facts:
-    return {
-        "name": param.name,
-        "type": _type(param.type),
-        "unit": param.unit,
-        "required": param.required,
-        "default": _default(param),
-        "min": param.ge,
-        "max": param.le,
-        "choices": None if param.choices is None else list(param.choices),
-        "refers": param.refers,
-        "doc": param.doc,
-    }
+def _declared(declared: Param | Port) -> dict[str, Any]:
+    """Return everything that a skill declares of a param or port."""
+    from executive.skill import Param
 
-
-def _port(port: Port) -> Facts:
-    return {
-        "name": port.name,
-        "type": _type(port.type),
-        "direction": port.direction.value,
-        "required": port.required,
-        "default": _default(port),
-        "refers": port.refers,
-        "doc": port.doc,
-    }
+    facts: dict[str, Any] = {"name": declared.name, "type": _type(declared.type)}
+    if isinstance(declared, Param):
+        facts["unit"] = declared.unit
+    else:
+        facts["direction"] = declared.direction.value
+    facts |= {"required": declared.required, "default": _default(declared)}
+    if isinstance(declared, Param):
+        choices = None if declared.choices is None else list(declared.choices)
+        facts |= {"min": declared.ge, "max": declared.le, "choices": choices}
+    return facts | {"refers": declared.refers, "doc": declared.doc}
 
 
 def _default(of: Param | Port) -> Any:

@@ -16,6 +16,19 @@ _SECRET = re.compile(
     r"(?i)(\b\w*(?:api_?key|token|secret|password|authorization)\w*[\"']?\s*[:=]\s*|://(?=\S+@)).*"
 )
 """A key, or a user's name, and the rest of its line."""
+CODES = frozenset({
+    "alias", "ambiguous", "bad-key", "bad-label", "bad-match", "bad-name", "bad-reference", "duplicate-key",
+    "duplicate-label", "duplicate-tree", "empty", "empty-list", "endless", "impossible-reason", "merge-key",
+    "missing-argument", "missing-key", "missing-node", "missing-param", "no-base", "no-cell", "no-library",
+    "not-finite", "out-of-range", "outside", "port-type", "recursive-use", "robot", "shadowed-param",
+    "shadowed-variable", "shared-resource", "shared-variable", "short-timeout", "tag", "too-deep",
+    "too-large", "tool-state", "two-documents", "two-nodes", "unchanging-retry", "unknown-argument",
+    "unknown-bin", "unknown-class", "unknown-detector", "unknown-key", "unknown-kind", "unknown-node",
+    "unknown-param", "unknown-pose", "unknown-reason", "unknown-return", "unknown-skill", "unknown-tree",
+    "unreachable", "unread", "unseen-class", "unused-argument", "unused-param", "unused-tree", "unwritten",
+    "wrong-length", "wrong-type", "wrong-value", "yaml",
+})  # fmt: skip
+"""Every code of a finding."""
 _OF_A_VALUE = frozenset({
     "wrong-type", "wrong-value", "out-of-range", "port-type", "unwritten",
     "unknown-bin", "unknown-class", "unknown-detector", "unknown-pose", "unseen-class",
@@ -90,6 +103,7 @@ def warning(mark: Mark, code: str, message: str, hint: str = "") -> Finding:
 
 
 def _finding(severity: str, mark: Mark, code: str, message: str, hint: str) -> Finding:
+    assert code in CODES, code
     source = mark.source
     # Whoever wrote a key into a file is told so, without the key.
     excerpt = _SECRET.sub(r"\1***", source.line(mark.line))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from executive.mission.expand.expand import expand
 from executive.mission.findings import Finding, MissionError, in_file_order
 from executive.mission.flow.endings import Ending, endings
 from executive.mission.model.mission import Mission
-from executive.mission.model.nodes import Node
+from executive.mission.model.nodes import Node, UnknownNode
 from executive.mission.model.paths import with_paths
 from executive.mission.parse.read_mission import GivenCell, MissionFiles, read_mission
 from executive.mission.text.files import find_mission
@@ -98,11 +98,12 @@ def load_mission(
         labels = dict(kind.labels(config, base))
         least = None if wrong else kind.least_times(config)
     expanded = expand(mission, skills)
-    tree = expanded.tree and with_paths(expanded.tree)
+    tree = with_paths(expanded.tree or UnknownNode(files.source.mark(), ""))
     case = Case(mission, tree, expanded.unused, skills, config, labels, least)
     findings += (*expanded.findings, *check(case))
     ordered = in_file_order(findings, files.source.path)
-    if config is None or files.cell_path is None or tree is None or case.flow is None or _errors(findings):
+    is_sound = expanded.tree is not None and all(finding.severity != "error" for finding in findings)
+    if config is None or files.cell_path is None or not is_sound:
         raise MissionError(ordered)
     return LoadedMission(
         mission, tree, config, files.source.text, file, files.cell_path, files.libraries,
@@ -119,7 +120,3 @@ def _kind(files: MissionFiles, kinds: Kinds | None, findings: list[Finding]) -> 
     except InputError as problem:
         findings.append(files.cell.finding(("kind",), "unknown-kind", str(problem)))
         return None
-
-
-def _errors(findings: Iterable[Finding]) -> bool:
-    return any(finding.severity == "error" for finding in findings)

@@ -1,14 +1,14 @@
-"""With what a run was made: this project, Python, the machine, every package asked for by name."""
+"""Versions of everything a run was made with: this project, Python, the machine, every required package."""
 
 from __future__ import annotations
 
 import functools
 import platform
-import re
-import sys
 from collections.abc import Mapping
 from importlib import metadata
 from types import MappingProxyType
+
+from packaging.requirements import Requirement
 
 ITSELF = "executive"
 """The distribution that asks for the others."""
@@ -27,23 +27,14 @@ def versions() -> Mapping[str, str]:
 def required(extra: str = "") -> tuple[str, ...]:
     """Return the packages that this project asks for by name on this Python, or those that an extra adds.
 
-    None where it is not installed itself.
+    Empty if the project is not installed itself.
     """
     try:
-        asked = metadata.requires(ITSELF) or []
+        requirements = [Requirement(line) for line in metadata.requires(ITSELF) or ()]
     except metadata.PackageNotFoundError:
         return ()
-    return tuple(re.split(r"[^A-Za-z0-9._-]", line, maxsplit=1)[0] for line in asked if _wanted(line, extra))
-
-
-def _wanted(line: str, extra: str) -> bool:
-    """Tell whether a line of the metadata asks for something on this Python, for an extra or for none."""
-    marker = line.partition(";")[2].replace('"', "'")
-    of = re.search(r"extra == '([^']+)'", marker)
-    older = re.search(r"python_version < '(\d+)\.(\d+)'", marker)
-    if older is not None and sys.version_info[:2] >= tuple(map(int, older.groups())):
-        return False
-    return (of[1] if of is not None else "") == extra
+    wanted = [one for one in requirements if one.marker is None or one.marker.evaluate({"extra": extra})]
+    return tuple(one.name for one in wanted if not extra or "extra" in str(one.marker))
 
 
 def installed(name: str) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from executive.cell_config import CameraConfig
-from executive.geometry import Array, Pose, rotation_from_vector
+from executive.geometry import Array, Pose
 from executive.messages import Box
 
 NEAR, FAR = 0.02, 5.0
@@ -59,9 +59,13 @@ def from_opencv(matrix: ArrayLike, rvec: ArrayLike, tvec: ArrayLike) -> tuple[Ar
     The way back from `Frame.opencv`. OpenCV's pixels have their centres at whole numbers, ours half a
     pixel further; its rvec [rad] and tvec [m], as `cv2.solvePnP` returns them, lead from W to C.
     """
+    # Loading scipy.spatial takes a third of a second, and few cells are calibrated by OpenCV.
+    from scipy.spatial.transform import Rotation
+
     ours = np.array(matrix, dtype=float)
     ours[:2, 2] += 0.5
-    return ours, Pose(rotation_from_vector(rvec), np.asarray(tvec, dtype=float)).inverse()
+    X_CW = Pose(Rotation.from_rotvec(rvec).as_matrix(), np.asarray(tvec, dtype=float))
+    return ours, X_CW.inverse()
 
 
 def calibrated(config: CameraConfig) -> tuple[Array, Pose]:

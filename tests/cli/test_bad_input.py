@@ -64,24 +64,6 @@ CASES = {
         """,
         mission=("{attempts: 4}", "{attempts: 4"),
     ),
-    "a colon in a text": Case(
-        """
-        m.yaml:2:18: error[yaml]: not valid YAML: mapping values are not allowed here
-           2 | description: Sort: everything into its bin.
-             |                  ^
-          Is a colon missing at the end of the line above, or are braces, as in Detect: {view: full}? A text that holds ": " needs quotes.
-        """,
-        mission=("Put everything", "Sort: everything"),
-    ),
-    "a tab": Case(
-        """
-        m.yaml:8:1: error[yaml]: not valid YAML: while scanning for the next token: found character '\\t' that cannot start any token
-           8 | \t- MoveToScan
-             | ^
-          Indent with blanks instead of tabs.
-        """,
-        mission=("  - MoveToScan", "\t- MoveToScan"),
-    ),
     "an unknown skill": Case(
         """
         m.yaml:10:5: error[unknown-skill]: there is no skill "Localise"
@@ -90,55 +72,6 @@ CASES = {
           Did you mean "Localize"? Installed skills: Approach, AwaitRequest, Detect, Grasp, IsHolding, Localize, MoveToScan, PlanAhead, PutDown, RejectTarget, Release, SelectTarget, Transit, Wait.
         """,
         mission=("- Localize", "- Localise"),
-    ),
-    "a route to an unknown bin": Case(
-        """
-        m.yaml:5:16: error[unknown-bin]: the cell has no bin "rde_bin"
-           5 | routes: {cube: rde_bin, sphere: blue_bin, duck: yellow_bin}
-             |                ^^^^^^^
-          Did you mean "red_bin"? Its bins: red_bin, blue_bin, yellow_bin.
-        """,
-        mission=("red_bin", "rde_bin"),
-    ),
-    "a param of the wrong type": Case(
-        """
-        m.yaml:4:20: error[wrong-type]: retry.attempts must be a whole number, not the text "many" (it is $attempts in line 13)
-           4 | params: {attempts: many}
-             |                    ^^^^
-        """,
-        mission=("attempts: 4", "attempts: many"),
-    ),
-    "a value out of range": Case(
-        """
-        m.yaml:16:21: error[out-of-range]: Transit.drop must be at most 0.1 m, not 0.4
-          16 |   - Transit: {drop: 0.4}
-             |                     ^^^
-        """,
-        mission=("- Transit", "- Transit: {drop: 0.4}"),
-    ),
-    "a word that is none of the choices": Case(
-        """
-        m.yaml:9:20: error[wrong-value]: Detect.view must be "table" or "full", not the text "ful" (did you mean "full"?)
-           9 |   - Detect: {view: ful}
-             |                    ^^^
-        """,
-        mission=("- Detect", "- Detect: {view: ful}"),
-    ),
-    "a key twice": Case(
-        """
-        m.yaml:5:1: error[duplicate-key]: the key "params" stands here twice; the first is in line 4
-           5 | params: {attempts: 5}
-             | ^^^^^^
-        """,
-        mission=("params: {attempts: 4}", "params: {attempts: 4}\nparams: {attempts: 5}"),
-    ),
-    "a cell file that is not there": Case(
-        """
-        m.yaml:3:7: error[no-cell]: there is no file "cells/overhed.yaml" beside this one, and none is shipped. Did you mean "cells/overhead.yaml"? There are: cells/cascade.yaml, cells/depth.yaml, cells/fasteners.yaml, cells/fruit.yaml, cells/instruments.yaml, cells/kitting.yaml, cells/noisy.yaml, cells/overhead.yaml, cells/recycling.yaml, cells/roboflow.yaml, cells/wrist.yaml.
-           3 | cell: cells/overhed.yaml
-             |       ^^^^^^^^^^^^^^^^^^
-        """,
-        mission=("overhead", "overhed"),
     ),
     "an unknown key in the cell file": Case(
         """
@@ -233,22 +166,6 @@ def test_a_mission_that_is_not_there_is_told_with_those_that_are(
             """,
         ),
         (
-            "attempts=many",
-            """
-            --set:1:10: error[wrong-type]: attempts must be a whole number, not the text "many"
-               1 | attempts=many
-                 |          ^^^^
-            """,
-        ),
-        (
-            "attempts=0",
-            """
-            --set:1:10: error[out-of-range]: retry.attempts must be at least 1, not 0 (it is $attempts in m.yaml:13)
-               1 | attempts=0
-                 |          ^
-            """,
-        ),
-        (
             "cell.tols.cup_radius=0.01",
             """
             --set:1:22: error[unknown-key]: the cell has no key "tols"
@@ -273,15 +190,6 @@ def test_a_request_for_nothing_known_is_told_with_what_there_is(write: Callable[
     ran = invoke("run", "m.yaml", "--runs", "runs", "--request", "cube", "--request", "banana")
     assert (ran.exit_code, ran.stdout) == (2, "")
     assert ran.stderr == 'cannot pick "banana"; ask for one of: cube, sphere, duck\n'
-
-
-def test_several_mistakes_are_told_at_once_in_the_order_of_the_file(write: Callable[..., int]) -> None:
-    write(("- Detect\n  - Localize", "- Detct\n  - Localise"))
-    shown = invoke("check", "m.yaml").stdout
-    assert [line.split(" ")[0] for line in shown.splitlines() if "error[" in line] == [
-        "m.yaml:9:5:",
-        "m.yaml:10:5:",
-    ]
 
 
 def test_a_whole_process_says_the_same_and_ends_with_the_same_code(write: Callable[..., int]) -> None:

@@ -8,7 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner
@@ -17,20 +17,6 @@ from executive.cli.main import COMMANDS, main
 from executive.errors import Fault, InputError
 from executive.mission.findings import Finding, MissionError
 from executive.mission.flow.endings import Ending
-from executive.skill import In, Metres, Skill, param
-
-
-class Reach(Skill):
-    """Bring the tool to a place.
-
-    Succeeds when it is there.
-    """
-
-    place: In[str]
-    clearance: Metres = param(0.1, ge=0, le=0.5, doc="height over the place")
-    reasons = ("unreachable",)
-    uses = ("arm",)
-
 
 RESULT = {
     "mission": "sort",
@@ -72,11 +58,9 @@ def project(monkeypatch):
             raise asked.run_error
         return asked.result
 
-    for name, function in (("mission.load", load_mission), ("record.recorded_run", recorded_run)):
-        module = ModuleType(f"executive.{name}")
-        setattr(module, function.__name__, function)
-        monkeypatch.setitem(sys.modules, module.__name__, module)
-    monkeypatch.setattr("executive.discovery.discover", lambda: {"Reach": Reach})
+    monkeypatch.setattr("executive.mission.load.load_mission", load_mission)
+    monkeypatch.setattr("executive.record.recorded_run.recorded_run", recorded_run)
+    monkeypatch.setattr("executive.discovery.discover", dict)
     monkeypatch.setattr("executive.view.report.leave.leave_report", lambda result: ("runs/x/report.html", ""))
     return asked
 
@@ -307,25 +291,6 @@ def test_a_warning_is_told_and_stops_nothing(project):
     shown = invoke("run", "sort.yaml")
     assert shown.exit_code == 0
     assert "warning[unused]" in shown.stderr
-
-
-def test_skills_lists_every_skill_with_its_first_line(project):
-    shown = invoke("skills").stdout
-    assert "Reach           Bring the tool to a place." in shown
-    assert "place -> - | params: clearance | reasons: unreachable" in shown
-
-
-def test_skills_tells_everything_about_one(project):
-    shown = invoke("skills", "Reach").stdout
-    assert "Succeeds when it is there." in shown
-    assert "clearance: float [m], default 0.1, at least 0, at most 0.5. height over the place" in shown
-    assert "may fail with: unreachable" in shown
-
-
-def test_an_unknown_skill_is_recognized(project):
-    shown = invoke("skills", "Reech")
-    assert shown.exit_code == 2
-    assert 'Did you mean "Reach"?' in shown.stderr
 
 
 @pytest.mark.parametrize(("seeds", "words"), [("3-1", "holds no seed"), ("a-b", "is no range of seeds")])

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 def test_it_says_at_once_that_it_halts_and_then_how_far_it_came(tmp_path: Path, how: signal.Signals) -> None:
     words = ["sweep", "sort_fruit", "--seeds", "1-400", "--workers", "1", "--json", "--runs", str(tmp_path)]

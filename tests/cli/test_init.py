@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from executive.cli.init.project import TEMPLATE, write_project
+from executive.cli.init.project import FOLDERS, PACKAGE, TEMPLATE, package_name, require_free, write_project
 from executive.cli.main import main
+from executive.errors import InputError
 
 FILES = [
     ".gitignore", "README.md", "cells/table.yaml", "hall/__init__.py", "hall/check_seal.py", "pyproject.toml",
@@ -71,7 +72,7 @@ def test_the_package_may_be_called_otherwise() -> None:
 def test_a_bad_name_leaves_nothing_behind() -> None:
     result = init("random")
     assert (result.exit_code, result.stdout) == (2, "")
-    assert "standard library; give another name with --name" in result.stderr
+    assert "random.py; give another name with --name" in result.stderr
     assert not Path("random").exists()
 
 
@@ -118,6 +119,7 @@ def test_its_code_is_as_tidy_as_this_project(missions: Path) -> None:
     assert formatted.returncode == 0, formatted.stdout
 
 
+@pytest.mark.slow
 def test_everything_works_at_once_and_its_tests_find_a_broken_skill() -> None:
     made = called("executive", "init", "hall", folder=Path())
     assert made.returncode == 0, made.stderr
@@ -134,6 +136,7 @@ def test_everything_works_at_once_and_its_tests_find_a_broken_skill() -> None:
     assert re.search(r"^FAILED .*::test_what_is_held_badly_is_let_go", tests.stdout, re.MULTILINE)
 
 
+@pytest.mark.slow
 def test_processes_that_work_for_a_command_find_its_skill_too() -> None:
     write_project(Path("hall"), "hall")
     hall, fake = Path("hall"), ("--set", "cell.kind=fake")
@@ -149,3 +152,48 @@ def test_the_mission_is_checked_from_its_folder_and_below() -> None:
     write_project(Path("hall"), "hall")
     below = called("executive", "check", "../sort.yaml", folder=Path("hall/cells"))
     assert below.returncode == 0, below.stderr
+
+
+@pytest.mark.parametrize(
+    ("folder", "name"),
+    [("demo", "demo"), ("Blue-Table", "blue_table"), ("a b.c", "a_b_c"), ("x/line_2", "line_2"), ("q", "q")],
+)
+def test_the_package_is_named_after_the_folder(folder: str, name: str) -> None:
+    assert package_name(Path(folder)) == name
+
+
+def test_a_folder_without_python_takes_no_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "hall").mkdir()
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.chdir(tmp_path / "hall")
+    assert package_name(Path()) == "hall"
+
+
+@pytest.mark.parametrize("folder", ["3d", "_x", "x_", "tisch-grün", "a+b", "-"])
+def test_a_folder_that_names_no_package_is_refused(folder: str) -> None:
+    with pytest.raises(InputError) as caught:
+        package_name(Path(folder))
+    assert str(caught.value) == (
+        f'the folder "{folder}" names no package: such a name begins with a letter, goes on with letters, '
+        'digits and "_", and does not end with "_"; give another name with --name'
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("class", "that is a word of Python's own"),
+        ("tests", "that is another folder of the project"),
+        ("skills", "a module of that name is installed already: .*skills/__init__.py"),
+        ("random", "a module of that name is installed already: .*random.py"),
+    ],
+)
+def test_a_name_that_is_taken_is_refused(name: str, why: str) -> None:
+    end = "; give another name with --name$"
+    with pytest.raises(InputError, match=f'^a package cannot be called "{name}": {why}{end}'):
+        require_free(name, "")
+
+
+def test_no_folder_of_the_template_can_be_taken_for_the_package() -> None:
+    folders = {path.name for path in TEMPLATE.iterdir() if path.is_dir()} - {PACKAGE}
+    assert folders < set(FOLDERS)

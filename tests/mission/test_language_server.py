@@ -19,9 +19,12 @@ from executive.mission.model import grammar
 from executive.mission.text.files import shipped_folder
 
 SERVER = os.environ.get("YAML_LANGUAGE_SERVER") or shutil.which("yaml-language-server")
-pytestmark = pytest.mark.skipif(
-    SERVER is None or shutil.which("node") is None, reason="there is no yaml-language-server"
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        SERVER is None or shutil.which("node") is None, reason="there is no yaml-language-server"
+    ),
+]
 
 MISSIONS = shipped_folder()
 HEAD = "# yaml-language-server: $schema=mission.schema.json\nmission: m\ncell: cells/overhead.yaml\n"
@@ -118,6 +121,15 @@ def test_nothing_is_marked_in_a_shipped_file(path: Path, editor: Editor) -> None
     (schema,) = path.parent.glob("*.schema.json")
     text = path.read_text(encoding="utf-8")
     assert editor.problems(f"# yaml-language-server: $schema={schema.name}\n{text}", path.parent) == []
+
+
+def test_a_library_is_completed_and_checked(editor: Editor) -> None:
+    head = "# yaml-language-server: $schema=library/library.schema.json\nlibrary: l\n"
+    assert {"trees", "description"} <= set(editor.completions(head + "|"))
+    assert editor.completions(head + "trees:\n  a:\n    - |\n").keys() >= SKILLS
+    assert editor.problems(head + "trees: {a: {Detect: {vieww: full}}}\n") == [
+        ("vieww", "Property vieww is not allowed.")
+    ]
 
 
 def test_a_cell_is_completed_and_checked(editor: Editor) -> None:

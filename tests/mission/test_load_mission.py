@@ -71,10 +71,6 @@ def test_an_override_out_of_range_is_shown_where_it_was_given(load: Load) -> Non
     )
 
 
-def test_cell_overrides_reach_the_cell(load: Load) -> None:
-    assert load(HEAD + "tree: Look\n", {"cell.table.objects": "[5, 5]"}).cell_config.table.objects == (5, 5)
-
-
 def test_all_findings_come_at_once_and_in_order(load: Load, small_cell: str) -> None:
     text = HEAD + "routes: {cube: rad_bin}\ntree: [Lok, {Pick: {height: 9}}]\nextra: 1\n"
     with pytest.raises(MissionError) as caught:
@@ -99,25 +95,12 @@ def test_findings_of_the_robot_stand_in_the_cell_file(load: Load) -> None:
     assert str(caught.value).startswith("cells/small.yaml:16:14: error[robot]: 0.3 m out of reach\n")
 
 
-def test_a_missing_cell_file_is_a_finding_at_its_key(load: Load) -> None:
-    with pytest.raises(MissionError) as caught:
-        load("mission: m\ncell: cells/smal.yaml\ntree: Look\n")
-    text = str(caught.value)
-    assert text.startswith('m.yaml:2:7: error[no-cell]: there is no file "cells/smal.yaml" beside this one')
-    assert 'Did you mean "cells/small.yaml"?' in text
-
-
 def test_a_link_out_of_the_folder_is_refused(load: Load, tmp_path: Path, small_cell: str) -> None:
     outside = tmp_path.parent / f"{tmp_path.name}_outside.yaml"
     outside.write_text(small_cell)
     Path("link.yaml").symlink_to(outside)
     with pytest.raises(MissionError, match=r'"link\.yaml" is a link out of'):
         load("mission: m\ncell: link.yaml\ntree: Look\n")
-
-
-def test_warnings_do_not_stop_a_mission(load: Load) -> None:
-    (warning,) = load(HEAD + "tree: Look\ntrees: {other: Look}\n").warnings
-    assert str(warning).startswith('m.yaml:4:9: warning[unused-tree]: nothing uses the subtree "other"')
 
 
 def test_arguments_are_put_in_and_defaults_stand_in_for_them(load: Load) -> None:
@@ -149,14 +132,6 @@ def test_subtrees_cannot_blow_up_the_tree(load: Load) -> None:
 def test_a_deep_tree_is_refused_without_a_traceback(load: Load) -> None:
     with pytest.raises(MissionError, match="the tree is more than 40 levels deep"):
         load(HEAD + "tree: " + "{invert: " * 45 + "Look" + "}" * 45 + "\n")
-
-
-def test_an_unknown_mission_names_the_shipped_ones(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(
-        InputError, match=r'there is no mission file "sort_overhed".*Did you mean "sort_overhead"'
-    ):
-        find_mission("sort_overhed")
 
 
 @pytest.mark.parametrize("name", ["sort_overhead", "sort_overhead.yaml", "missions/sort_overhead.yaml"])
@@ -201,8 +176,3 @@ def test_numbers_beyond_64_bits_are_no_whole_numbers(load: Load) -> None:
 def test_an_empty_override_is_nothing_and_no_file(load: Load) -> None:
     with pytest.raises(MissionError, match=r"--set:1:\d+: error\[wrong-type\]"):
         load(HEAD + "tree: Look\n", {"cell.kind": ""})
-
-
-def test_a_folder_that_is_not_there_is_no_mission(load: Load) -> None:
-    with pytest.raises(InputError, match="there is no mission file"):
-        find_mission("missions/")

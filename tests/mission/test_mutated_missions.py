@@ -1,4 +1,4 @@
-"""Thousands of mutated mission files: each is refused with findings, or runs without a fault.
+"""Mutated mission files: each is refused with findings, or runs without a fault.
 
 Nothing that passes the check may fail at run time for its wiring or its types. The runs are on a fake
 cell that is a little unkind, so that the ways of failure are taken, too.
@@ -6,15 +6,10 @@ cell that is a little unkind, so that the ways of failure are taken, too.
 
 from __future__ import annotations
 
-import multiprocessing
 import random
 import shutil
-import sys
-import time
 import traceback
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from unittest import mock
@@ -47,88 +42,46 @@ REAL_KINDS = 20
 
 
 @dataclass
-class Figures:
-    """What became of mutants; `problems` are those that must not be."""
-
-    total: int = 0
-    loaded: int = 0
-    codes: Counter[str] = field(default_factory=Counter)
-    outcomes: Counter[str] = field(default_factory=Counter)
-    problems: list[tuple[int, str]] = field(default_factory=list)
-    slowest: tuple[float, int] = (0.0, -1)
-    seconds: float = 0.0
-
-    def add(self, other: Figures) -> None:
-        """Add what became of other mutants."""
-        self.total, self.loaded = self.total + other.total, self.loaded + other.loaded
-        self.codes.update(other.codes)
-        self.outcomes.update(other.outcomes)
-        self.problems += other.problems
-        self.slowest = max(self.slowest, other.slowest)
-        self.seconds += other.seconds
-
-    def __str__(self) -> str:
-        def listed(counts: Counter[str]) -> str:
-            return ", ".join(f"{name} {count}" for name, count in counts.most_common())
-
-        lines = [
-            f"{self.total} mutants in {self.seconds:.0f} s of processor time: "
-            f"{self.loaded} passed the check ({self.loaded / max(1, self.total):.0%}), "
-            f"{self.total - self.loaded} were refused",
-            f"runs: {listed(self.outcomes)}",
-            f"errors by code, once a mutant: {listed(self.codes)}",
-            f"slowest: {self.slowest[0]:.1f} s, seed {self.slowest[1]}",
-            f"problems: {len(self.problems)}",
-        ]
-        lines += [f"-- seed {seed}: {problem}" for seed, problem in self.problems]
-        # A problem may be that something cannot be printed.
-        return "\n".join(lines).encode(errors="backslashreplace").decode()
-
-
 class Trial:
-    """Loads mutants and runs those that load, in a folder of its own."""
+    """Loads mutants in a folder of its own and runs those that load.
 
-    def __init__(self, folder: Path) -> None:
+    Attributes:
+        loaded: Number of mutants that passed the check.
+        problems: What must not be, each with the seed of its mutant.
+    """
+
+    folder: Path
+    loaded: int = 0
+    problems: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
         self.skills = discover()
         self.mutator = Mutator(bases(), self.skills)
-        self._folder = folder
 
-    def of(self, seeds: Iterable[int]) -> Figures:
-        """Return what becomes of the mutants of these seeds."""
-        figures = Figures()
-        for seed in seeds:
-            began = time.process_time()
-            try:
-                self._one(seed, figures)
-            except Exception:
-                figures.problems.append((seed, traceback.format_exc(limit=-2)))
-            took = time.process_time() - began
-            figures.slowest, figures.seconds = max(figures.slowest, (took, seed)), figures.seconds + took
-        return figures
-
-    def _one(self, seed: int, figures: Figures) -> None:
-        figures.total += 1
-        mutant = self.mutator.mutant(seed)
+    def try_mutant(self, seed: int) -> None:
+        """Load the mutant of a seed, and run it if it loads."""
         try:
-            loaded = self._load(mutant, real_kind=seed % REAL_KINDS == 0)
+            problems = self._problems(seed)
+        except Exception:
+            problems = [traceback.format_exc(limit=-2)]
+        # A problem may be that something cannot be printed.
+        lines = [f"seed {seed}: {problem}" for problem in problems]
+        self.problems += [line.encode(errors="backslashreplace").decode() for line in lines]
+
+    def _problems(self, seed: int) -> list[str]:
+        try:
+            loaded = self._load(self.mutator.mutant(seed), real_kind=seed % REAL_KINDS == 0)
         except MissionError as error:
-            problems = _misplaced(error.findings)
-            problems += [] if any(f.severity == "error" for f in error.findings) else ["refused for nothing"]
-            figures.codes.update({f.code for f in error.findings if f.severity == "error"})
+            refused = any(finding.severity == "error" for finding in error.findings)
+            return _misplaced(error.findings) + ([] if refused else ["refused for nothing"])
         except InputError:
-            figures.codes["unreadable"] += 1
-            return
-        else:
-            figures.loaded += 1
-            problems = _misplaced(loaded.warnings)
-            outcome, broken = _run(loaded, self.skills, seed)
-            figures.outcomes[outcome] += 1
-            problems += broken
-        figures.problems += [(seed, problem) for problem in problems]
+            return []
+        self.loaded += 1
+        return _misplaced(loaded.warnings) + _run(loaded, self.skills, seed)
 
     def _load(self, mutant: Mutant, real_kind: bool) -> LoadedMission:
-        shutil.rmtree(self._folder, ignore_errors=True)
-        mission, file = self._folder / "mission.yaml", self._folder / mutant.base.file
+        shutil.rmtree(self.folder, ignore_errors=True)
+        mission, file = self.folder / "mission.yaml", self.folder / mutant.base.file
         file.parent.mkdir(parents=True)
         mission.write_text(mutant.base.mission)
         # As bytes: no ending of a line is translated.
@@ -163,8 +116,8 @@ def _misplaced(findings: Iterable[Finding]) -> list[str]:
     return problems
 
 
-def _run(loaded: LoadedMission, skills: Mapping[str, type[Skill]], seed: int) -> tuple[str, list[str]]:
-    """Return how a run of a mission ends, and what must not be."""
+def _run(loaded: LoadedMission, skills: Mapping[str, type[Skill]], seed: int) -> list[str]:
+    """Return what must not be in a run of a mission."""
     wishes = random.Random(seed).choices([*loaded.routes, "rescan"], k=5)
     witness = Witness(loaded, skills, scope := Scope())
     with mock.patch.object(run_module, "Scope", lambda: scope):
@@ -173,11 +126,7 @@ def _run(loaded: LoadedMission, skills: Mapping[str, type[Skill]], seed: int) ->
     witness.cell = run.workcell
     outcome = run.execute()
     run.close()
-    return outcome.status, witness.problems(run, outcome)
-
-
-def _figures_of(seeds: Sequence[int], folder: Path) -> Figures:
-    return Trial(folder).of(seeds)
+    return witness.problems(run, outcome)
 
 
 @pytest.mark.parametrize("file", OWN_BASES, ids=lambda file: file.stem)
@@ -191,24 +140,19 @@ def test_the_bases_of_the_mutants_use_every_control_node() -> None:
     assert set(CONTROL) - words == set()
 
 
-def test_five_hundred_mutants_are_refused_or_run_without_a_fault(tmp_path: Path) -> None:
-    figures = Trial(tmp_path / "trial").of(range(500))
-    sys.stdout.write(f"\n{figures}\n")
-    assert figures.problems == [], str(figures)
+@pytest.mark.parametrize(
+    "seeds",
+    [
+        range(100),
+        pytest.param(range(100, 600), marks=pytest.mark.slow),
+        pytest.param(range(1000, 21_000), marks=pytest.mark.campaign),
+    ],
+    ids=len,
+)
+def test_mutants_are_refused_or_run_without_a_fault(tmp_path: Path, seeds: range) -> None:
+    trial = Trial(tmp_path / "trial")
+    for seed in seeds:
+        trial.try_mutant(seed)
+    assert trial.problems == [], "\n".join(trial.problems)
     # Were there hardly any that pass the check, little would be tested.
-    assert 0.2 <= figures.loaded / figures.total <= 0.4
-
-
-@pytest.mark.campaign
-def test_twenty_thousand_mutants_are_refused_or_run_without_a_fault(
-    tmp_path: Path, request: pytest.FixtureRequest
-) -> None:
-    if "campaign" not in request.config.getoption("-m"):
-        pytest.skip("it takes a quarter of an hour: ask for it with -m campaign")
-    figures = Figures()
-    parts = [range(start, start + 250) for start in range(1000, 21_000, 250)]
-    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
-        for part in pool.map(_figures_of, parts, [tmp_path / str(part.start) for part in parts]):
-            figures.add(part)
-    sys.stdout.write(f"\n{figures}\n")
-    assert figures.problems == [], f"{len(figures.problems)} mutants did what none may do"
+    assert 0.2 <= trial.loaded / len(seeds) <= 0.4

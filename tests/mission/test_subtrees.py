@@ -30,108 +30,60 @@ def wiring(loaded: LoadedMission, skills: dict[str, type[Skill]]) -> list[str]:
     return lines
 
 
-def test_a_subtree_without_returns_shares_its_variables(load: Load, skills: dict[str, type[Skill]]) -> None:
-    loaded = load(HEAD + "tree: [use: look, Pick]\ntrees: {look: {do: Look}}\n")
-    assert wiring(loaded, skills) == ["Look seen->$seen", "Pick seen<-$seen only<-$only held->$held"]
-
-
-def test_a_subtree_with_returns_keeps_the_rest_to_itself(load: Load, skills: dict[str, type[Skill]]) -> None:
-    loaded = load(
-        HEAD
-        + "tree: [use: get, {Drop: {bin: red_bin}}]\n"
-        "trees: {get: {returns: [held], do: [Look, {Pick: {only: $who}}]}}\n".replace("{only: $who}", "{}")
-    )
-    assert wiring(loaded, skills) == [
-        "Look seen->$get.seen",
-        "Pick seen<-$get.seen only<-$only held->$held",
-        "Drop held<-$held",
-    ]
-
-
-def test_every_use_has_variables_of_its_own(load: Load, skills: dict[str, type[Skill]]) -> None:
-    loaded = load(
-        HEAD + "tree: [use: get, {Drop: {bin: red_bin}}, use: get, {Drop: {bin: red_bin}}]\n"
-        "trees: {get: {returns: [held], do: [Look, Pick]}}\n"
-    )
-    assert [line for line in wiring(loaded, skills) if line.startswith("Look")] == [
-        "Look seen->$get.seen",
-        "Look seen->$get-2.seen",
-    ]
-
-
-def test_what_is_returned_may_be_called_otherwise(load: Load, skills: dict[str, type[Skill]]) -> None:
-    loaded = load(
-        HEAD + "tree: [{use: get, returns: {held: $mine}}, {Drop: {held: $mine, bin: red_bin}}]\n"
-        "trees: {get: {returns: [held], do: [Look, Pick]}}\n"
-    )
-    assert wiring(loaded, skills)[1:] == ["Pick seen<-$get.seen only<-$only held->$mine", "Drop held<-$mine"]
-
-
-def test_an_argument_means_the_variable_of_the_place_of_use(
-    load: Load, skills: dict[str, type[Skill]]
-) -> None:
-    # Inside, `held` is a variable of the subtree's own; the argument is the one around it.
-    loaded = load(
-        HEAD + "tree: [Look, Pick, {use: again, with: {which: $held}}]\n"
-        "trees:\n"
-        "  again:\n"
-        "    args: [which]\n"
-        "    returns: [seen]\n"
-        "    do: [Look, Pick, {Drop: {held: $which, bin: red_bin}}]\n"
-    )
-    assert wiring(loaded, skills)[2:] == [
-        "Look seen->$seen",
-        "Pick seen<-$seen only<-$only held->$again.held",
-        "Drop held<-$held",
-    ]
-
-
-def test_closed_subtrees_nest(load: Load, skills: dict[str, type[Skill]]) -> None:
-    loaded = load(
-        HEAD + "tree: [Look, Pick, {use: outer, with: {which: $held}}]\n"
+WIRED = {
+    "without returns a subtree shares its variables": (
+        "tree: [use: look, Pick]\ntrees: {look: {do: Look}}\n",
+        ["Look seen->$seen", "Pick seen<-$seen only<-$only held->$held"],
+    ),
+    "with returns it keeps the rest to itself, anew for every use": (
+        "tree: [use: get, {Drop: {bin: red_bin}}, use: get, {Drop: {bin: red_bin}}]\n"
+        "trees: {get: {returns: [held], do: [Look, Pick]}}\n",
+        [
+            "Look seen->$get.seen", "Pick seen<-$get.seen only<-$only held->$held", "Drop held<-$held",
+            "Look seen->$get-2.seen", "Pick seen<-$get-2.seen only<-$only held->$held", "Drop held<-$held",
+        ],
+    ),
+    "what is returned may be called otherwise": (
+        "tree: [{use: get, returns: {held: $mine}}, {Drop: {held: $mine, bin: red_bin}}]\n"
+        "trees: {get: {returns: [held], do: [Look, Pick]}}\n",
+        ["Look seen->$get.seen", "Pick seen<-$get.seen only<-$only held->$mine", "Drop held<-$mine"],
+    ),
+    "an argument is the variable around, not the subtree's own of that name": (
+        "tree: [Look, Pick, {use: outer, with: {which: $held}}]\n"
         "trees:\n"
         "  outer: {args: [which], returns: [seen], do: {use: inner, with: {what: $which}}}\n"
         "  inner:\n"
         "    args: [what]\n"
         "    returns: [seen]\n"
-        "    do: [Look, Pick, {Drop: {held: $what, bin: red_bin}}, {Drop: {bin: red_bin}}]\n"
-    )
-    assert wiring(loaded, skills)[2:] == [
-        "Look seen->$seen",
-        "Pick seen<-$seen only<-$only held->$outer.inner.held",
-        "Drop held<-$held",
-        "Drop held<-$outer.inner.held",
-    ]
+        "    do: [Look, Pick, {Drop: {held: $what, bin: red_bin}}, {Drop: {bin: red_bin}}]\n",
+        [
+            "Look seen->$seen", "Pick seen<-$seen only<-$only held->$held",
+            "Look seen->$seen", "Pick seen<-$seen only<-$only held->$outer.inner.held",
+            "Drop held<-$held", "Drop held<-$outer.inner.held",
+        ],
+    ),
+    "a closed subtree keeps what another returns to it": (
+        "tree: {use: outer}\n"
+        "trees:\n"
+        "  outer: {returns: [], do: [use: inner, Pick, {Drop: {bin: red_bin}}]}\n"
+        "  inner: {returns: [seen], do: Look}\n",
+        [
+            "Look seen->$outer.seen", "Pick seen<-$outer.seen only<-$only held->$outer.held",
+            "Drop held<-$outer.held",
+        ],
+    ),
+    "an argument may stand for a variable by default": (
+        "tree: [Look, Pick, use: drop]\n"
+        "trees: {drop: {args: {which: $held}, do: {Drop: {held: $which, bin: red_bin}}}}\n",
+        ["Look seen->$seen", "Pick seen<-$seen only<-$only held->$held", "Drop held<-$held"],
+    ),
+}  # fmt: skip
 
 
-KEEPS = (
-    "trees:\n"
-    "  outer: {returns: [], do: [use: inner, Pick, {Drop: {bin: red_bin}}]}\n"
-    "  inner: {returns: [seen], do: Look}\n"
-)
-
-
-def test_a_closed_subtree_keeps_what_another_returns_to_it(
-    load: Load, skills: dict[str, type[Skill]]
-) -> None:
-    assert wiring(load(HEAD + "tree: {use: outer}\n" + KEEPS), skills) == [
-        "Look seen->$outer.seen",
-        "Pick seen<-$outer.seen only<-$only held->$outer.held",
-        "Drop held<-$outer.held",
-    ]
-
-
-def test_what_it_keeps_is_not_written_outside(load: Load) -> None:
-    with pytest.raises(MissionError, match=r"Pick.seen reads \$seen, which nothing writes\n"):
-        load(HEAD + "tree: [use: outer, Pick, {Drop: {bin: red_bin}}]\n" + KEEPS)
-
-
-def test_an_argument_may_stand_for_a_variable_by_default(load: Load, skills: dict[str, type[Skill]]) -> None:
-    loaded = load(
-        HEAD + "tree: [Look, Pick, use: drop]\n"
-        "trees: {drop: {args: {which: $held}, do: {Drop: {held: $which, bin: red_bin}}}}\n"
-    )
-    assert wiring(loaded, skills)[2:] == ["Drop held<-$held"]
+@pytest.mark.parametrize("case", WIRED)
+def test_variables_of_subtrees(case: str, load: Load, skills: dict[str, type[Skill]]) -> None:
+    text, expected = WIRED[case]
+    assert wiring(load(HEAD + text), skills) == expected
 
 
 def test_what_a_subtree_does_not_return_cannot_be_read(load: Load) -> None:
@@ -194,48 +146,12 @@ def test_mistakes_in_a_library_are_found_in_its_own_file(load: Load) -> None:
     ]
 
 
-def test_two_subtrees_of_one_name_are_an_error(load: Load) -> None:
-    library("eyes", "library: eyes\ntrees: {look: Look}\n")
-    with pytest.raises(MissionError) as caught:
-        load(HEAD + "library: library/eyes.yaml\ntree: {use: look}\ntrees: {look: Look}\n")
-    assert 'there are two subtrees "look"; the other is in library/eyes.yaml:2' in str(caught.value)
-
-
 def test_what_a_library_has_and_nobody_uses_is_no_mistake(load: Load) -> None:
     library("eyes", "library: eyes\ntrees: {look: Look, unused: {args: [x], do: Look}}\n")
     assert load(HEAD + "library: library/eyes.yaml\ntree: {use: look}\n").warnings == ()
 
 
-def test_a_missing_library_is_a_finding_at_its_name(load: Load) -> None:
-    with pytest.raises(MissionError) as caught:
-        load(HEAD + "library: library/nothing.yaml\ntree: Look\n")
-    assert str(caught.value).startswith(
-        'm.yaml:3:10: error[no-library]: there is no file "library/nothing.yaml"'
-    )
-
-
-def test_a_loop_cannot_take_the_name_of_a_param_or_an_argument(load: Load) -> None:
-    with pytest.raises(MissionError) as caught:
-        load(
-            HEAD + "params: {kind: cube}\n"
-            "tree: [Look, {for_each: {each: kind, in: [cube], do: {Pick: {only: $kind}}}}, "
-            "{use: get, with: {it: 1}}]\n"
-            "trees: {get: {args: [it], do: {for_each: {each: it, in: [1], do: {Look: {view: $it}}}}}}\n"
-        )
-    text = str(caught.value)
-    assert (
-        "m.yaml:4:32: error[shadowed-param]: for_each would write $kind, but that is a param of the mission"
-        in text
-    )
-    assert (
-        "m.yaml:5:49: error[shadowed-param]: for_each would write $it, but that is an argument here" in text
-    )
-
-
 def test_an_output_cannot_take_the_name_of_an_argument(load: Load) -> None:
-    with pytest.raises(MissionError) as caught:
-        load(
-            HEAD + "tree: {use: get, with: {seen: 0.1}}\n"
-            "trees: {get: {args: [seen], do: [Look, {Pick: {height: $seen}}]}}\n"
-        )
-    assert "Look.seen would write $seen, but that is an argument here" in str(caught.value)
+    text = "tree: {use: get, with: {seen: 0.1}}\ntrees: {get: {args: [seen], do: Look}}"
+    with pytest.raises(MissionError, match=r"Look\.seen would write \$seen, but that is an argument here"):
+        load(HEAD + text + "\n")

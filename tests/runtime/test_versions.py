@@ -30,6 +30,8 @@ def test_what_an_extra_adds_is_told_apart():
     assert required("nothing") == ()
 
 
-def test_what_only_an_older_python_needs_is_asked_for_there(monkeypatch):
-    monkeypatch.setattr("sys.version_info", (3, 10, 0))
-    assert "tomli" in required()
+def test_markers_decide_what_is_asked_for(monkeypatch):
+    lines = ["a>=1", "b; python_version < '3.0'", "c<2; python_version >= '3.10'", "d[x]; extra == 'view'"]
+    monkeypatch.setattr("executive.runtime.versions.metadata.requires", lambda name: lines)
+    assert required() == ("a", "c")
+    assert required("view") == ("d",)

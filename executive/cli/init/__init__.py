@@ -17,8 +17,7 @@ def command(folder: Path, name: str | None) -> None:
 
     DIR must be empty, or not be there yet. Nothing needs to be installed: below DIR the skill is found.
     """
-    from executive.cli.init.names import package_name, require_free
-    from executive.cli.init.project import MISSION, write_project
+    from executive.cli.init.project import MISSION, package_name, require_free, write_project
 
     package = package_name(folder) if name is None else require_free(name, f'--name "{name}"')
     written = write_project(folder, package)

@@ -23,7 +23,7 @@ class Case:
 
     Attributes:
         mission: As written.
-        tree: The tree that runs, expanded, with paths; None where it could not be read.
+        tree: The tree that runs, expanded, with paths; an unknown node where it could not be read.
         unused: Expanded subtrees that nothing uses.
         skills: Installed skills by name.
         cell: The cell, or None where its file has findings of its own.
@@ -32,7 +32,7 @@ class Case:
     """
 
     mission: Mission
-    tree: Node | None
+    tree: Node
     unused: tuple[Node, ...]
     skills: Mapping[str, type[Skill]]
     cell: CellConfig | None
@@ -40,15 +40,19 @@ class Case:
     least: LeastTimes | None
 
     @cached_property
-    def flow(self) -> Analysis | None:
-        """What can happen in the tree that runs, or None where there is none."""
-        return None if self.tree is None else Analysis(self.tree, self.skills)
+    def flow(self) -> Analysis:
+        """What can happen in the tree that runs."""
+        return Analysis(self.tree, self.skills)
+
+    @cached_property
+    def written(self) -> set[str]:
+        """Variables that something in the tree may write."""
+        return written_below(self.tree, self.skills)
 
     def nodes(self) -> Iterator[Node]:
         """Yield every node, also of the subtrees that nothing uses."""
         for root in (self.tree, *self.unused):
-            if root is not None:
-                yield from root.walk()
+            yield from root.walk()
 
     def known_skills(self) -> Iterator[tuple[SkillNode, type[Skill]]]:
         """Yield every node that names an installed skill, with the skill."""
@@ -81,9 +85,8 @@ class Case:
             for child in node.children:
                 walk(child, door)
 
-        if self.tree is not None:
-            own = self.tree.mark.source
-            walk(self.tree, None)
+        own = self.tree.mark.source
+        walk(self.tree, None)
         return doors
 
     def constant_hint(self, reference: Reference) -> str:
@@ -95,10 +98,8 @@ class Case:
 
     def variable_hint(self, word: object) -> str:
         """Return what to write where the name of a variable lacks its `$`, or ""."""
-        if self.tree is None or not isinstance(word, str):
-            return ""
-        written = written_below(self.tree, self.skills)
-        return f"For the variable write ${word}." if word in written else ""
+        is_written = isinstance(word, str) and word in self.written
+        return f"For the variable write ${word}." if is_written else ""
 
     def wires(self, node: Node, direction: Direction) -> Iterator[Wire]:
         """Yield the variables that a node reads or writes through the ports of its skill, if it is one."""

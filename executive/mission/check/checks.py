@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from executive.mission.check import (
-    cell,
     constants,
-    labels,
     parallel,
     port_types,
     reach,
     reasons,
     skills,
     timeouts,
-    tool,
     variables,
 )
 from executive.mission.check.case import Case
@@ -24,16 +21,11 @@ Check = Callable[[Case], Iterator[Finding]]
 
 CHECKS: tuple[Check, ...] = (
     skills.unknown_skills,
-    skills.unknown_settings,
-    skills.missing_params,
-    skills.param_values,
-    skills.input_values,
-    skills.output_wiring,
+    skills.settings,
     constants.constants,
-    labels.labels,
-    cell.routes,
-    cell.names,
-    cell.known_classes,
+    reasons.labels,
+    skills.routes,
+    skills.known_classes,
     reasons.matches,
     variables.unwritten_inputs,
     variables.unwritten_needs,
@@ -41,8 +33,8 @@ CHECKS: tuple[Check, ...] = (
     variables.unread_variables,
     variables.broken_promises,
     port_types.port_types,
-    tool.tool_states,
-    tool.held_at_the_end,
+    reach.tool_states,
+    reach.held_at_the_end,
     reach.unreachable,
     reach.shadowed_catches,
     reach.endless_loops,

@@ -44,32 +44,31 @@ def _problem(case: Case, name: str, key: Key, value: Value, node: Node) -> Findi
     if isinstance(value, Reference):
         message = f"{name} is a constant, and ${value.name} is neither param nor argument here"
         return error(value.mark, "unknown-param", message, case.constant_hint(value))
-    origin = f" (it is {value.origin})" if value.origin else ""
     if key.kind == "count":
-        return _count_problem(name, value, node, origin)
+        return _count_problem(name, value, node)
     try:
         number = convert(value.value, _KINDS[key.kind])
     except WrongType as problem:
         meant = f"For the param write ${value.value}." if value.value in [*case.mission.params] else ""
-        return error(value.mark, "wrong-type", f"{name} {problem}{origin}", meant)
+        return error(value.mark, "wrong-type", f"{name} {problem}{value.origin_note}", meant)
     if key.kind == "boolean" or key.allows(number):
         return None
     unit = " s" if "[s]" in key.doc else ""
-    message = f"{name} must be {key.bounds}{unit}, not {describe(value.value)}{origin}"
+    message = f"{name} must be {key.bounds}{unit}, not {describe(value.value)}{value.origin_note}"
     return error(value.mark, "out-of-range", message)
 
 
-def _count_problem(name: str, value: Literal, node: Node, origin: str) -> Finding | None:
+def _count_problem(name: str, value: Literal, node: Node) -> Finding | None:
     total, count = len(node.children), value.value
     if count in ("all", "any", "lead") or (type(count) is int and 1 <= count <= total):
         return None
-    message = f"{name} must be all, any, lead or a number from 1 to {total}, not {describe(count)}{origin}"
+    wanted = f"{name} must be all, any, lead or a number from 1 to {total}"
+    message = f"{wanted}, not {describe(count)}{value.origin_note}"
     return error(value.mark, "out-of-range" if type(count) is int else "wrong-type", message)
 
 
 def _list(value: Literal) -> Iterator[Finding]:
     if not isinstance(value.value, list):
-        origin = f" (it is {value.origin})" if value.origin else ""
-        message = f"for_each.in takes a list or a variable, not {describe(value.value)}{origin}"
-        listed = isinstance(value.value, str) and not origin
+        message = f"for_each.in takes a list or a variable, not {describe(value.value)}{value.origin_note}"
+        listed = isinstance(value.value, str) and not value.origin
         yield error(value.mark, "wrong-type", message, f"Write a list: [{value.value}]." if listed else "")

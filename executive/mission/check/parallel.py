@@ -87,7 +87,7 @@ def _first(node: Node) -> Node:
 def _reads(case: Case, branch: Node) -> Iterator[tuple[Node, str, str, Mark]]:
     """Yield everything below `branch` that reads a variable which is or may be written before it."""
     for node in branch.walk():
-        entry = case.flow.entry.get(node.path) if case.flow else None
+        entry = case.flow.entry.get(node.path)
         if entry is None:
             continue
         if isinstance(node, ForEachNode) and isinstance(node.source, Reference):

@@ -48,7 +48,7 @@ Loops = Mapping[str, Sequence[Writer]]
 def port_types(case: Case) -> Iterator[Finding]:
     """Find every input wired to a variable that may hold something else than it takes."""
     written: dict[str, list[Writer]] = {}
-    for node in case.tree.walk() if case.tree else ():
+    for node in case.tree.walk():
         for wire in case.wires(node, Direction.OUT):
             writer = Writer(str(wire), node.mark, wire.port.type, wire.port.refers)
             written.setdefault(wire.variable, []).append(writer)
@@ -64,8 +64,7 @@ def port_types(case: Case) -> Iterator[Finding]:
         for child in node.children:
             yield from walk(child, loops)
 
-    if case.tree is not None:
-        yield from walk(case.tree, {})
+    yield from walk(case.tree, {})
 
 
 def _sources(loop: ForEachNode, writers: Loops) -> Sequence[Writer]:

@@ -1,4 +1,4 @@
-"""Checks of what can never happen, never end, or never change."""
+"""Checks of the flow: what can never happen, end or change, and what the tool may hold where."""
 
 from __future__ import annotations
 
@@ -7,22 +7,24 @@ from collections.abc import Iterator
 from executive.mission.check.case import Case
 from executive.mission.findings import Finding, error, warning
 from executive.mission.flow.analysis import Analysis
+from executive.mission.flow.state import Grip
 from executive.mission.model import nodes
-from executive.mission.model.nodes import Node
+from executive.mission.model.nodes import Node, SkillNode
 from executive.mission.model.paths import name_of
 from executive.mission.model.values import Literal, Match
+from executive.mission.source import Mark
+from executive.skill import EMPTY, HOLDING
 
 
 def unreachable(case: Case) -> Iterator[Finding]:
     """Find the first node of every part of the tree that can never run."""
-    if case.flow is not None and case.tree is not None:
-        yield from _unreachable(case.tree, case.flow)
+    yield from _unreachable(case.tree, case.flow)
 
 
 def shadowed_catches(case: Case) -> Iterator[Finding]:
     """Find every failure named in a `catch` that earlier ones take already, by this name or another."""
     for node in case.nodes():
-        body = case.flow.flows.get(node.do.path) if case.flow and isinstance(node, nodes.TryNode) else None
+        body = case.flow.flows.get(node.do.path) if isinstance(node, nodes.TryNode) else None
         if body is None or not isinstance(node, nodes.TryNode):
             continue
         earlier: list[Match] = []
@@ -40,8 +42,6 @@ def shadowed_catches(case: Case) -> Iterator[Finding]:
 
 def endless_loops(case: Case) -> Iterator[Finding]:
     """Find every loop that cannot end but by a failure, nor is stopped when another branch has ended."""
-    if case.flow is None:
-        return
     stopped = {node.path for node in _beside_a_lead(case)}
     for node in case.flow.nodes.values():
         if not isinstance(node, nodes.WhileNode) or node.path in stopped:
@@ -65,7 +65,7 @@ def unchanging_retries(case: Case) -> Iterator[Finding]:
     for node in case.nodes():
         if not isinstance(node, nodes.RetryNode) or node.backoff is not None:
             continue
-        skills = [case.skills.get(inner.skill) for inner in node.walk() if isinstance(inner, nodes.SkillNode)]
+        skills = [case.skills.get(inner.skill) for inner in node.walk() if isinstance(inner, SkillNode)]
         if skills and not any(skill is None or skill.senses or skill.moves for skill in skills):
             message = "this retry changes nothing between its attempts: nothing in it looks, moves or waits"
             hint = "Put a look or a motion into do or recover, or wait with backoff."
@@ -114,3 +114,41 @@ def _why(parent: Node, child: Node) -> str:
     if isinstance(parent, nodes.RepeatNode | nodes.ForEachNode):
         return "it is done 0 times"
     return ""
+
+
+def tool_states(case: Case) -> Iterator[Finding]:
+    """Find every skill that needs an empty tool where it may hold something, or the other way round."""
+    flow = case.flow
+    for path, entry in flow.entry.items():
+        node = flow.nodes[path]
+        if not isinstance(node, SkillNode) or node.skill not in case.skills:
+            continue
+        before, door = case.skills[node.skill].tool_state[0], case.doors.get(path)
+        mark = door.mark if door else node.mark
+        who = f'{node.skill} in the subtree "{door.name}"' if door else node.skill
+        if before is EMPTY and (grip := entry.may_be(HOLDING)):
+            message = f"{who} needs an empty tool, but something may still be held here"
+            hint = f"{_since(flow, grip, mark)} Put it down on every way from there to here."
+            yield error(mark, "tool-state", message, hint)
+        if before is HOLDING and (grip := entry.may_be(EMPTY)):
+            message = f"{who} needs something in the tool, but it may be empty here"
+            yield error(mark, "tool-state", message, _since(flow, grip, mark))
+
+
+def held_at_the_end(case: Case) -> Iterator[Finding]:
+    """Find out whether the mission may succeed with something in the tool."""
+    flow = case.flow
+    if flow.result.success and (grip := flow.result.success.may_be(HOLDING)):
+        message = "the mission may end well with something still in the tool"
+        yield warning(case.tree.mark, "tool-state", message, _since(flow, grip, case.tree.mark))
+
+
+def _since(flow: Analysis, grip: Grip, mark: Mark) -> str:
+    """Return since when the tool may be so, and which failure led on from there."""
+    node = flow.nodes.get(grip.since)
+    after = f", when {grip.after} is dealt with" if grip.after else ""
+    if node is None:
+        return f"Nothing has been grasped before{after}."
+    name = node.skill if isinstance(node, SkillNode) else "the node"
+    verb = "may hold something" if grip.tool is HOLDING else "may be empty"
+    return f"It {verb} since {name} in {node.mark.place(mark.source)}{after}."

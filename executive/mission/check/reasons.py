@@ -1,4 +1,4 @@
-"""Checks of `on`, `catch` and `until`: what they name can happen there, and means one node."""
+"""Checks of labels, and of `on`, `catch` and `until`: they name what can happen there, and one node."""
 
 from __future__ import annotations
 
@@ -8,18 +8,39 @@ from executive.mission.check.case import Case
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.flow.analysis import Analysis
 from executive.mission.flow.state import ANYTHING, Raise
-from executive.mission.model import nodes
+from executive.mission.model import grammar, nodes
 from executive.mission.model.nodes import Node
 from executive.mission.model.values import Match
+from executive.mission.source import Mark
 
 _OWN = {nodes.TimeoutNode: ("timeout", "timeout"), nodes.InvertNode: ("invert", "inverted")}
 """Control nodes that fail for a reason of their own: their word, and the reason."""
 
+_SLOTS = ("do", "recover", "condition", "catch", "finally")
+"""What nodes are to their parents; paths are made of these words too."""
+
+
+def labels(case: Case) -> Iterator[Finding]:
+    """Find every label that stands for two nodes, or is a word of the language."""
+    first: dict[str, Mark] = {}
+    for node in case.nodes():
+        if not node.label:
+            continue
+        mark = node.label_mark or node.mark
+        if node.label in grammar.CONTROL or node.label in _SLOTS:
+            message = f'"{node.label}" is a word of the language and cannot be a label'
+            yield error(mark, "bad-label", message)
+        # The same place twice is one node of a subtree that is used twice.
+        other = first.setdefault(node.label, mark)
+        if other != mark:
+            message = (
+                f'the label "{node.label}" stands for two nodes; the first is in {other.place(mark.source)}'
+            )
+            yield error(mark, "duplicate-label", message)
+
 
 def matches(case: Case) -> Iterator[Finding]:
     """Find every failure that is waited for and cannot come, or that more than one node could mean."""
-    if case.flow is None:
-        return
     for node in case.flow.nodes.values():
         for match, where, body in _expectations(node):
             flow = case.flow.flows.get(body.path)

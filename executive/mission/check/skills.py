@@ -1,4 +1,4 @@
-"""Checks of what a mission says about single skills."""
+"""Checks of single skills, their settings, and the names that a mission takes from its cell."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from executive.mission.check.case import Case
 from executive.mission.findings import Finding, alternatives, error, suggest
 from executive.mission.model.nodes import SkillNode
 from executive.mission.model.typed import WrongType, convert, input_fault
-from executive.mission.model.values import Literal, Reference
+from executive.mission.model.values import Literal
 from executive.mission.model.wiring import literals
+from executive.mission.source import Mark
 from executive.mission.words import describe
-from executive.skill import Direction, Param
+from executive.skill import Direction, Param, Port
 
 
 def unknown_skills(case: Case) -> Iterator[Finding]:
@@ -22,67 +23,64 @@ def unknown_skills(case: Case) -> Iterator[Finding]:
             yield error(node.mark, "unknown-skill", f'there is no skill "{node.skill}"', hint)
 
 
-def unknown_settings(case: Case) -> Iterator[Finding]:
-    """Find every key that is neither param nor port of its skill."""
+def settings(case: Case) -> Iterator[Finding]:
+    """Find every setting of a skill that is unknown, missing, or has a value that does not fit."""
     for node, skill in case.known_skills():
-        known = [*skill.params, *skill.ports]
+        known: dict[str, Param | Port] = {**skill.params, **skill.ports}
         for name, setting in node.settings.items():
             if name not in known:
-                message = f'{node.skill} has no param or port "{name}"'
-                yield error(
-                    setting.key, "unknown-param", message, alternatives(name, known, f"{node.skill} takes")
+                hint = alternatives(name, known, f"{node.skill} takes")
+                yield error(setting.key, "unknown-param", f'{node.skill} has no param or port "{name}"', hint)
+            elif isinstance(setting.value, Literal):
+                yield from _value_faults(case, node, known[name], setting.value)
+                yield from _unknown_names(case, node, known[name], setting.value)
+            elif name in skill.params:
+                variable = f"${setting.value.name}"
+                message = (
+                    f"{node.skill}.{name} is a constant, and {variable} is neither param nor argument here"
                 )
-
-
-def missing_params(case: Case) -> Iterator[Finding]:
-    """Find every param without default that the mission does not give."""
-    for node, skill in case.known_skills():
+                hint = case.constant_hint(setting.value)
+                yield error(setting.value.mark, "unknown-param", message, hint)
         for param in skill.params.values():
             if param.required and param.name not in node.settings:
-                message = f'{node.skill} needs the param "{param.name}"'
                 hint = param.doc and f"{param.name}: {param.doc}."
-                yield error(node.mark, "missing-param", message, hint)
+                yield error(node.mark, "missing-param", f'{node.skill} needs the param "{param.name}"', hint)
 
 
-def param_values(case: Case) -> Iterator[Finding]:
-    """Find every param with a value of the wrong type, out of range, or not known before the run."""
-    for node, skill in case.known_skills():
-        for name, setting in node.settings.items():
-            if name not in skill.params:
-                continue
-            if isinstance(setting.value, Reference):
-                yield _variable_for_param(case, node, name, setting.value)
-            elif fault := _param_fault(skill.params[name], setting.value.value):
-                code, sentence = fault
-                yield _wrong(node, name, setting.value, code, sentence)
+def _value_faults(case: Case, node: SkillNode, declared: Param | Port, value: Literal) -> Iterator[Finding]:
+    """Yield a finding if a value does not fit the param or port that it is given to."""
+    name, code, hint, sentence = f"{node.skill}.{declared.name}", "wrong-type", "", ""
+    if isinstance(declared, Param):
+        code, sentence = _param_fault(declared, value.value)
+    elif declared.direction is Direction.IN:
+        sentence, hint = input_fault(value.value, declared), case.variable_hint(value.value)
+    else:
+        sentence = f"{name} is an output: it takes the variable to write, as ${declared.name}"
+        if value.origin:
+            sentence = f"{name} is an output and cannot write the constant {value.origin.split()[0]}"
+        yield error(value.used or value.mark, code, sentence)
+        return
+    if sentence:
+        yield error(value.mark, code, f"{name} {sentence}{value.origin_note}", hint)
 
 
-def input_values(case: Case) -> Iterator[Finding]:
-    """Find every value given to an input that it cannot take."""
-    for node, skill in case.known_skills():
-        for name, value in literals(node):
-            port = skill.ports.get(name)
-            if port is None or port.direction is not Direction.IN:
-                continue
-            if sentence := input_fault(value.value, port):
-                yield _wrong(node, name, value, "wrong-type", sentence, case.variable_hint(value.value))
+def _unknown_names(case: Case, node: SkillNode, declared: Param | Port, value: Literal) -> Iterator[Finding]:
+    """Find every name of something that the cell does not have."""
+    if declared.refers not in case.names or value.value == declared.default:
+        return
+    choices = declared.choices if isinstance(declared, Param) else None
+    words = [*case.names[declared.refers], *(choices or ())]
+    name, listed = f"{node.skill}.{declared.name}", isinstance(value.value, list)
+    for index, word in enumerate(value.value if listed else [value.value]):
+        if isinstance(word, str) and word not in words:
+            message = f'the cell has no {declared.refers} "{word}" for {name}'
+            hint = case.variable_hint(word) or alternatives(word, words, f"{name} takes")
+            mark = value.element_mark(index) if listed else value.mark
+            yield error(mark, f"unknown-{declared.refers}", message, hint)
 
 
-def output_wiring(case: Case) -> Iterator[Finding]:
-    """Find every output that is given a value instead of the name of a variable."""
-    for node, skill in case.known_skills():
-        for name, value in literals(node):
-            port = skill.ports.get(name)
-            if port is None or port.direction is not Direction.OUT:
-                continue
-            sentence = f"is an output: it takes the variable to write, as ${name}"
-            if value.origin:
-                sentence = f"is an output and cannot write the constant {value.origin.split()[0]}"
-            yield error(value.used or value.mark, "wrong-type", f"{node.skill}.{name} {sentence}")
-
-
-def _param_fault(param: Param, value: object) -> tuple[str, str] | None:
-    """Return code and sentence of what is wrong with a value, or None."""
+def _param_fault(param: Param, value: object) -> tuple[str, str]:
+    """Return code and sentence of a value that does not fit a param; the sentence is "" if it does."""
     try:
         converted = convert(value, param.type)
     except WrongType as problem:
@@ -100,14 +98,41 @@ def _param_fault(param: Param, value: object) -> tuple[str, str] | None:
         meant = suggest(value, map(str, param.choices)) if isinstance(value, str) else None
         question = f' (did you mean "{meant}"?)' if meant else ""
         return "wrong-value", f"must be {allowed}, not {describe(value)}{question}"
-    return None
+    return "", ""
 
 
-def _wrong(node: SkillNode, name: str, value: Literal, code: str, sentence: str, hint: str = "") -> Finding:
-    origin = f" (it is {value.origin})" if value.origin else ""
-    return error(value.mark, code, f"{node.skill}.{name} {sentence}{origin}", hint)
+def routes(case: Case) -> Iterator[Finding]:
+    """Find every route of an unknown class or to an unknown bin."""
+    if case.cell is None:
+        return
+    for route in case.mission.routes:
+        if route.label not in case.cell.objects:
+            hint = alternatives(route.label, case.cell.objects, "Its classes")
+            yield error(route.key, "unknown-class", f'the cell knows no class "{route.label}"', hint)
+        for bin in route.bins:
+            if bin.name not in case.cell.bins:
+                hint = alternatives(bin.name, case.cell.bins, "Its bins")
+                yield error(bin.mark, "unknown-bin", f'the cell has no bin "{bin.name}"', hint)
 
 
-def _variable_for_param(case: Case, node: SkillNode, name: str, reference: Reference) -> Finding:
-    message = f"{node.skill}.{name} is a constant, and ${reference.name} is neither param nor argument here"
-    return error(reference.mark, "unknown-param", message, case.constant_hint(reference))
+def known_classes(case: Case) -> Iterator[Finding]:
+    """Find every class that the mission names and no detector's model knows."""
+    models = {name: labels for name, labels in case.labels.items() if labels is not None}
+    if len(models) < len(case.labels) or not models or case.cell is None:
+        # A detector whose classes are not known may know any.
+        return
+    for label, mark in _named_classes(case):
+        if label in case.cell.objects and not any(label in labels for labels in models.values()):
+            said = "; ".join(f"{name}: {', '.join(labels)}" for name, labels in models.items())
+            message = f'no detector of the cell can see the class "{label}"'
+            yield error(mark, "unseen-class", message, f"Their models know {said}.")
+
+
+def _named_classes(case: Case) -> Iterator[tuple[str, Mark]]:
+    """Yield every class in the routes and in the settings of skills, with its place."""
+    yield from ((route.label, route.key) for route in case.mission.routes)
+    for node, skill in case.known_skills():
+        for name, value in literals(node):
+            declared = skill.params.get(name) or skill.ports.get(name)
+            if declared is not None and declared.refers == "class" and isinstance(value.value, str):
+                yield value.value, value.mark

@@ -27,11 +27,11 @@ def short_timeouts(case: Case) -> Iterator[Finding]:
         seconds = _number(node.seconds)
         shortest = least_time(case, node.do)
         if seconds is not None and 0 < seconds < shortest - _SLACK:
-            origin = node.seconds.origin if isinstance(node.seconds, Literal) else ""
+            note = node.seconds.origin_note if isinstance(node.seconds, Literal) else ""
             message = (
                 f"timeout.seconds is {seconds:g} s, but its body takes {shortest:.2f} s at the very least"
             )
-            message += f" (it is {origin})" if origin else ""
+            message += note
             yield error(node.seconds.mark, "short-timeout", message, _made_of(case, node.do, shortest))
 
 
@@ -46,12 +46,8 @@ def _made_of(case: Case, body: Node, shortest: float) -> str:
 
 def least_time(case: Case, node: Node | None) -> float:
     """Return the least time in which a node can succeed [s]; 0 where nothing is known."""
-    return 0.0 if node is None else _LEAST.get(type(node), _nothing)(case, node)
-
-
-def _nothing(case: Case, node: Any) -> float:
-    del case, node
-    return 0.0
+    of_kind = _LEAST.get(type(node)) if node else None
+    return of_kind(case, node) if of_kind else 0.0
 
 
 def _skill(case: Case, node: Any) -> float:
@@ -66,7 +62,7 @@ def _skill(case: Case, node: Any) -> float:
         except (KeyError, WrongType):
             # Another check says so.
             return 0.0
-    entry = case.flow.entry.get(node.path) if case.flow else None
+    entry = case.flow.entry.get(node.path)
     grips = entry.grips if entry else None
     carries = skill.tool_state[0] is HOLDING
     from_elsewhere = carries and (grips is None or any(grip.moved for grip in grips))
@@ -131,10 +127,6 @@ def _parallel(case: Case, node: Any) -> float:
     return times[count - 1] if isinstance(count, int) and 0 < count <= len(times) else 0.0
 
 
-def _use(case: Case, node: Any) -> float:
-    return least_time(case, node.body)
-
-
 def _number(value: Value) -> float | None:
     number = value.value if isinstance(value, Literal) else None
     return number if isinstance(number, int | float) and not isinstance(number, bool) else None
@@ -150,5 +142,5 @@ _LEAST: Mapping[type[Node], Callable[[Case, Any], float]] = {
     nodes.ForEachNode: _elements,
     nodes.TryNode: _try,
     nodes.TimeoutNode: _body,
-    nodes.UseNode: _use,
+    nodes.UseNode: _sum,
 }

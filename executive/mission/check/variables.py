@@ -19,15 +19,14 @@ Read = tuple[Node, str, str, Mark]
 def unwritten_inputs(case: Case) -> Iterator[Finding]:
     """Find everything in the mission's own file that reads a variable not written on every way to it."""
     for _, what, variable, mark in _unwritten(case, libraries=False):
-        written = written_below(case.tree, case.skills) if case.tree else set()
         # Inside a subtree its own variables go by their bare names.
         bare = variable.rpartition(".")[2]
-        if variable in written:
+        if variable in case.written:
             message = f"{what} reads ${bare}, which is not written on every way to here"
             yield error(mark, "unwritten", message, f"It is written by {_writers(case, variable, mark)}.")
         else:
             message = f"{what} reads ${bare}, which nothing writes"
-            yield error(mark, "unwritten", message, _who_could(case, variable, written))
+            yield error(mark, "unwritten", message, _who_could(case, variable))
 
 
 def unwritten_needs(case: Case) -> Iterator[Finding]:
@@ -47,8 +46,6 @@ def unwritten_needs(case: Case) -> Iterator[Finding]:
 
 def _unwritten(case: Case, libraries: bool) -> Iterator[Read]:
     """Yield what reads an unwritten variable: where a library says so, or where the mission does."""
-    if case.flow is None or case.tree is None:
-        return
     for node, what, variable, mark in _reads(case, case.tree):
         entry = case.flow.entry.get(node.path)
         if entry is None or entry.written is None or variable in entry.written:
@@ -60,8 +57,6 @@ def _unwritten(case: Case, libraries: bool) -> Iterator[Read]:
 
 def unread_variables(case: Case) -> Iterator[Finding]:
     """Find every variable that the mission names for an output and that nothing reads."""
-    if case.tree is None:
-        return
     read = {variable for _, _, variable, _ in _reads(case, case.tree, all_inputs=True)}
     for node in case.tree.walk():
         if isinstance(node, ForEachNode) and node.each.name not in read | set(case.mission.params):
@@ -71,14 +66,17 @@ def unread_variables(case: Case) -> Iterator[Finding]:
             if wire.explicit and wire.variable not in read:
                 message = f"{wire} writes ${wire.variable}, which nothing reads"
                 yield warning(wire.mark, "unread", message)
-        if isinstance(node, UseNode):
-            yield from _unread_returns(node, read)
+        if not isinstance(node, UseNode):
+            continue
+        for setting in node.returns.values():
+            name = setting.value.name if isinstance(setting.value, Reference) else ""
+            if name in node.promised and name not in read:
+                message = f"nothing reads ${name}, which the subtree returns here"
+                yield warning(setting.value.mark, "unread", message)
 
 
 def taken_names(case: Case) -> Iterator[Finding]:
     """Find every loop whose variable something else writes too: it is gone when the loop ends."""
-    if case.tree is None:
-        return
     writers = {wire.variable: wire for node in case.tree.walk() for wire in case.wires(node, Direction.OUT)}
 
     def walk(node: Node, around: Mapping[str, Named]) -> Iterator[Finding]:
@@ -99,18 +97,8 @@ def taken_names(case: Case) -> Iterator[Finding]:
     yield from walk(case.tree, {})
 
 
-def _unread_returns(use: UseNode, read: set[str]) -> Iterator[Finding]:
-    for setting in use.returns.values():
-        value = setting.value
-        if isinstance(value, Reference) and value.name in use.promised and value.name not in read:
-            message = f"nothing reads ${value.name}, which the subtree returns here"
-            yield warning(value.mark, "unread", message)
-
-
 def broken_promises(case: Case) -> Iterator[Finding]:
     """Find every variable that a subtree says it `returns` and that it does not write before it succeeds."""
-    if case.flow is None or case.tree is None:
-        return
     for use in case.tree.walk():
         if not isinstance(use, UseNode) or use.body is None:
             continue
@@ -156,15 +144,15 @@ def _who(case: Case, variable: str, mark: Mark) -> str:
     return " and ".join(own) or ", ".join(could) or "nothing"
 
 
-def _who_could(case: Case, variable: str, written: set[str]) -> str:
-    keepers = sorted({name.rpartition(".")[0] for name in written if name.endswith(f".{variable}")})
+def _who_could(case: Case, variable: str) -> str:
+    keepers = sorted({name.rpartition(".")[0] for name in case.written if name.endswith(f".{variable}")})
     if keepers:
         return f'The subtree "{keepers[0]}" writes one of its own: add {variable} to what it returns.'
     writers = [name for name, skill in case.skills.items() if _writes(skill, variable)]
     if writers:
         return f"It is written by: {', '.join(writers)}."
     # What a subtree keeps to itself has a dot in its name.
-    known = sorted(name for name in written if "." not in name)
+    known = sorted(name for name in case.written if "." not in name)
     meant = suggest(variable, known)
     listed = ", ".join(f"${name}" for name in known) or "none"
     return (f'Did you mean "${meant}"? ' if meant else "") + f"Variables that are written: {listed}."

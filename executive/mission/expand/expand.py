@@ -7,16 +7,14 @@ expanded tree, so an argument is checked with the value it has at each place of 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from executive.mission.expand.closure import renamed
 from executive.mission.findings import Finding, alternatives, error, suggest, warning
 from executive.mission.model.mission import Mission, Subtree
-from executive.mission.model.nodes import ForEachNode, Node, SkillNode, UnknownNode, UseNode
-from executive.mission.model.parts import changed
-from executive.mission.model.values import Reference, Value
+from executive.mission.model.nodes import Backoff, Catch, ForEachNode, Node, SkillNode, UnknownNode, UseNode
+from executive.mission.model.values import Reference, Setting, Value
 from executive.mission.model.wiring import written_below
 from executive.mission.source import Mark
 from executive.skill import Direction, Skill
@@ -113,10 +111,10 @@ class _Expander:
                 return self._node(part, names, inside, depth + 1)
             if isinstance(part, Reference):
                 return self._resolved(part, names, inside)
-            return changed(part, filled)
+            return _with_parts(part, filled)
 
         self.findings += self._shadowed(node, names)
-        rebuilt: Node = changed(node, filled)
+        rebuilt: Node = _with_parts(node, filled)
         return self._use(rebuilt, inside, depth) if isinstance(rebuilt, UseNode) else rebuilt
 
     def _shadowed(self, node: Node, names: Names) -> Iterator[Finding]:
@@ -177,9 +175,11 @@ class _Expander:
             return replace(use, body=body)
         arguments = {name: _from_outside(value) for name, value in arguments.items()}
         body = self._node(subtree.do, {**around, **arguments}, (*inside, use.name), depth + 1)
-        return replace(use, body=self._closed(use, body, returns), promised=tuple(returns.values()))
+        return replace(
+            use, body=self._with_own_variables(use, body, returns), promised=tuple(returns.values())
+        )
 
-    def _closed(self, use: UseNode, body: Node, returns: Mapping[str, str]) -> Node:
+    def _with_own_variables(self, use: UseNode, body: Node, returns: Mapping[str, str]) -> Node:
         """Return the body with the variables that it keeps to itself under names of their own."""
         number = self._uses[use.name]
         own = f"{use.name}." if number == 1 else f"{use.name}-{number}."
@@ -192,7 +192,21 @@ class _Expander:
                 return returns[name]
             return own + name if name in kept else name
 
-        return renamed(body, rename, self.skills)
+        def renamed(part: Any) -> Any:
+            if isinstance(part, Reference):
+                return replace(part, name=rename(part.name))
+            part = _with_parts(part, renamed)
+            if isinstance(part, ForEachNode):
+                return replace(part, each=replace(part.each, name=rename(part.each.name)))
+            if isinstance(part, UseNode):
+                return replace(part, promised=tuple(map(rename, part.promised)))
+            if isinstance(part, SkillNode) and part.skill in self.skills:
+                ports = self.skills[part.skill].ports
+                return replace(part, names={port: rename(part.names.get(port, port)) for port in ports})
+            return part
+
+        result: Node = renamed(body)
+        return result
 
     def _returns(self, use: UseNode, subtree: Subtree) -> dict[str, str]:
         """Return what each variable that the subtree returns is called at the place of use."""
@@ -232,3 +246,14 @@ class _Expander:
 
 def _from_outside(value: Value) -> Value:
     return replace(value, name=_OUTSIDE + value.name) if isinstance(value, Reference) else value
+
+
+def _with_parts(part: Any, change: Callable[[Any], Any]) -> Any:
+    """Return a node, or a part of one, with `change` made to everything that stands directly in it."""
+    if isinstance(part, tuple):
+        return tuple([change(item) for item in part])
+    if isinstance(part, dict):
+        return {key: change(item) for key, item in part.items()}
+    if isinstance(part, Node | Setting | Catch | Backoff):
+        return replace(part, **{field.name: change(getattr(part, field.name)) for field in fields(part)})
+    return part

@@ -11,9 +11,19 @@ from dataclasses import replace
 from typing import Any
 
 from executive.mission.findings import suggest
-from executive.mission.flow.grips import left_after, left_after_failure, required
 from executive.mission.flow.parallel import at_once
-from executive.mission.flow.state import ANYTHING, BEGINNING, UNKNOWN, Flow, Raise, State, joined
+from executive.mission.flow.state import (
+    ANYTHING,
+    BEGINNING,
+    UNKNOWN,
+    Flow,
+    Raise,
+    State,
+    joined,
+    left_after,
+    left_after_failure,
+    required,
+)
 from executive.mission.model import nodes
 from executive.mission.model.nodes import Node
 from executive.mission.model.values import Literal, Match, Value

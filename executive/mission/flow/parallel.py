@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from executive.mission.flow.grips import grips_at_end, together
-from executive.mission.flow.state import Flow, State, joined
+from executive.mission.flow.state import Flow, State, grips_at_end, joined, together
 
 
 def at_once(flows: Sequence[Flow], state: State, wait_for: Any, halt: bool) -> Flow:
@@ -19,36 +18,24 @@ def at_once(flows: Sequence[Flow], state: State, wait_for: Any, halt: bool) -> F
             else it is counts as all.
         halt: Whether a failure halts the others.
     """
+    taken = [grips_at_end(flow, state, halts=True) for flow in flows]
+    halted = joined(flow.halted for flow in flows)
+    halted = halted and halted.gripping(together(state.grips, taken))
+    failures = {}
     if wait_for == "lead":
-        return _led(flows, state)
+        lead, beside = flows[0], taken[1:]
+        for failure, after in lead.failures.items():
+            failures[failure] = after.gripping(together(state.grips, [after.grips, *beside]))
+        end = lead.success
+        return Flow(end and end.gripping(together(state.grips, [end.grips, *beside])), failures, halted)
     needed = _needed(wait_for, len(flows))
     ends = [grips_at_end(flow, state, halt or needed < len(flows)) for flow in flows]
-    failures = {}
     if sum(bool(flow.failures) for flow in flows) > len(flows) - needed:
         for index, flow in enumerate(flows):
             others = [*ends[:index], *ends[index + 1 :]]
             for failure, after in flow.failures.items():
                 failures[failure] = after.gripping(together(state.grips, [after.grips, *others]))
-    halted = joined(flow.halted for flow in flows)
-    everything = together(state.grips, [grips_at_end(flow, state, halts=True) for flow in flows])
-    return Flow(_success(flows, state, needed), failures, halted and halted.gripping(everything))
-
-
-def _led(flows: Sequence[Flow], state: State) -> Flow:
-    """Return how branches may end that are halted when the first one ends."""
-    lead, *others = flows
-    beside = [grips_at_end(flow, state, halts=True) for flow in others]
-
-    def after(end: State) -> State:
-        return end.gripping(together(state.grips, [end.grips, *beside]))
-
-    halted = joined(flow.halted for flow in flows)
-    everything = together(state.grips, [grips_at_end(flow, state, halts=True) for flow in flows])
-    return Flow(
-        lead.success and after(lead.success),
-        {failure: after(end) for failure, end in lead.failures.items()},
-        halted and halted.gripping(everything),
-    )
+    return Flow(_success(flows, state, needed), failures, halted)
 
 
 def _success(flows: Sequence[Flow], state: State, needed: int) -> State | None:

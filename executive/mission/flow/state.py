@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import reduce
 
 from executive.mission.model.values import Match
-from executive.skill import ToolState
+from executive.skill import ANY, EMPTY, HOLDING, ToolState
 
 ANYTHING = "*"
 """Source or reason of a failure that nothing is known about."""
@@ -30,6 +30,10 @@ class Grip:
     moved: bool = False
 
 
+Grips = frozenset[Grip] | None
+"""Everything the tool may be; None where that cannot be known."""
+
+
 @dataclass(frozen=True)
 class State:
     """What is true on every way to a place.
@@ -40,7 +44,7 @@ class State:
     """
 
     written: frozenset[str] | None
-    grips: frozenset[Grip] | None
+    grips: Grips
 
     def join(self, other: State) -> State:
         """Return what is true where two ways meet."""
@@ -60,7 +64,7 @@ class State:
         """Return the state once a variable is gone."""
         return self if self.written is None else replace(self, written=self.written - {name})
 
-    def gripping(self, grips: frozenset[Grip] | None) -> State:
+    def gripping(self, grips: Grips) -> State:
         """Return the state with the tool as given."""
         return replace(self, grips=grips)
 
@@ -150,3 +154,45 @@ def joined(states: Iterable[State | None]) -> State | None:
     """Return what is true where all these ways meet; None stands for a way that nobody comes."""
     reached = [state for state in states if state is not None]
     return reduce(State.join, reached) if reached else None
+
+
+def required(grips: Grips, before: ToolState, path: str) -> Grips:
+    """Return what the tool may be once a skill has what it needs: one mistake is told once."""
+    if before is ANY or grips is None:
+        return grips
+    return frozenset(grip for grip in grips if grip.tool is before) or frozenset({Grip(before, path)})
+
+
+def left_after(grips: Grips, after: ToolState, path: str) -> Grips:
+    """Return what the tool is after a skill's success; ANY: as before."""
+    if after is ANY or (grips is not None and all(grip.tool is after for grip in grips)):
+        return grips
+    return frozenset({Grip(after, path)})
+
+
+def left_after_failure(grips: Grips, left: ToolState | None, path: str) -> Grips:
+    """Return what the tool is after a skill's failure; None: as before, ANY: one or the other."""
+    if left is None or grips is None:
+        return grips
+    if left is ANY:
+        return grips | {Grip(EMPTY, path), Grip(HOLDING, path)}
+    return frozenset({Grip(left, path)})
+
+
+def grips_at_end(flow: Flow, state: State, halts: bool) -> Grips:
+    """Return what the tool may be once a branch of a parallel is over, halted or not."""
+    ends = joined((flow.success, *flow.failures.values(), *((flow.halted, state) if halts else ())))
+    return state.grips if ends is None else ends.grips
+
+
+def together(before: Grips, ends: Iterable[Grips]) -> Grips:
+    """Return what the tool may be after branches of which one at most has used it."""
+    changed = [end for end in ends if _holds(end) != _holds(before)]
+    if any(end is None for end in changed):
+        return None
+    return frozenset(grip for end in changed for grip in end or ()) if changed else before
+
+
+def _holds(grips: Grips) -> frozenset[tuple[ToolState, str]] | None:
+    """Return what the tool may hold since when; what was dealt with since then leaves it as it is."""
+    return None if grips is None else frozenset((grip.tool, grip.since) for grip in grips)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from functools import cached_property
 
 from executive.mission.model.values import Match, Named, Setting, Value
 from executive.mission.source import Mark
@@ -25,10 +26,13 @@ class Node:
     label_mark: Mark | None = field(default=None, kw_only=True)
     path: str = field(default="", kw_only=True)
 
-    @property
+    @cached_property
     def children(self) -> tuple[Node, ...]:
         """The nodes directly inside this one, in the order of the file."""
-        return ()
+        parts = [getattr(self, field.name) for field in fields(self)]
+        flat = [item for part in parts for item in (part if isinstance(part, tuple) else (part,))]
+        inner = [item.do if isinstance(item, Catch) else item for item in flat]
+        return tuple(item for item in inner if isinstance(item, Node))
 
     def walk(self) -> Iterator[Node]:
         """Yield this node and every node below it, top to bottom."""
@@ -60,11 +64,6 @@ class UnknownNode(Node):
 
     parts: tuple[Node, ...] = ()
 
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """What could be read of it."""
-        return self.parts
-
 
 @dataclass(frozen=True)
 class SequenceNode(Node):
@@ -73,22 +72,12 @@ class SequenceNode(Node):
     steps: tuple[Node, ...]
     listed: bool = True
 
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """The steps."""
-        return self.steps
-
 
 @dataclass(frozen=True)
 class FallbackNode(Node):
     """One after the other, until one succeeds."""
 
     choices: tuple[Node, ...]
-
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """The choices, best first."""
-        return self.choices
 
 
 @dataclass(frozen=True)
@@ -103,11 +92,6 @@ class ParallelNode(Node):
     branches: tuple[Node, ...]
     wait_for: Value
     halt: Value
-
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """The branches."""
-        return self.branches
 
 
 @dataclass(frozen=True)
@@ -133,11 +117,6 @@ class RetryNode(Node):
     backoff: Backoff | None
     do: Node
 
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """The recovery, if any, and the body."""
-        return (self.do,) if self.recover is None else (self.recover, self.do)
-
 
 @dataclass(frozen=True)
 class RepeatNode(Node):
@@ -147,11 +126,6 @@ class RepeatNode(Node):
     until: tuple[Match, ...]
     do: Node
 
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """The body."""
-        return (self.do,)
-
 
 @dataclass(frozen=True)
 class WhileNode(Node):
@@ -159,11 +133,6 @@ class WhileNode(Node):
 
     condition: Node
     do: Node
-
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """The condition and the body."""
-        return (self.condition, self.do)
 
 
 @dataclass(frozen=True)
@@ -173,11 +142,6 @@ class ForEachNode(Node):
     each: Named
     source: Value
     do: Node
-
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """The body."""
-        return (self.do,)
 
 
 @dataclass(frozen=True)
@@ -196,12 +160,6 @@ class TryNode(Node):
     catches: tuple[Catch, ...]
     finish: Node | None
 
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """The body, every catch and the end."""
-        caught = tuple(catch.do for catch in self.catches)
-        return (self.do, *caught, self.finish) if self.finish else (self.do, *caught)
-
 
 @dataclass(frozen=True)
 class TimeoutNode(Node):
@@ -210,11 +168,6 @@ class TimeoutNode(Node):
     seconds: Value
     do: Node
 
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """The body."""
-        return (self.do,)
-
 
 @dataclass(frozen=True)
 class InvertNode(Node):
@@ -222,22 +175,12 @@ class InvertNode(Node):
 
     do: Node
 
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """The body."""
-        return (self.do,)
-
 
 @dataclass(frozen=True)
 class SucceedNode(Node):
     """Success however the body ends; without a body, success at once."""
 
     do: Node | None
-
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """The body, if any."""
-        return (self.do,) if self.do else ()
 
 
 @dataclass(frozen=True)
@@ -256,8 +199,3 @@ class UseNode(Node):
     returns: Mapping[str, Setting] = field(default_factory=dict)
     promised: tuple[str, ...] = ()
     body: Node | None = None
-
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """The body, once expanded."""
-        return (self.body,) if self.body else ()

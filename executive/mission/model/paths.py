@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 from executive.mission.model import nodes
@@ -29,13 +29,6 @@ WORDS: Mapping[type[Node], str] = {
     nodes.UnknownNode: "unknown",
 }
 """What each control node is called in a mission."""
-
-_LISTS = {
-    nodes.SequenceNode: "steps",
-    nodes.FallbackNode: "choices",
-    nodes.ParallelNode: "branches",
-    nodes.UnknownNode: "parts",
-}
 
 
 def with_paths(root: Node) -> Node:
@@ -61,28 +54,30 @@ def _placed(node: Node, parent: str, slot: str, name: str | None = None) -> Node
     if name is not None or not _is_bare(node):
         path = _join(path, name or name_of(node))
     changes: dict[str, Any] = {"path": path}
-    if isinstance(node, nodes.UseNode):
-        return replace(node, path=path, body=node.body and _body(node, node.body, path))
-    for field in ("do", "recover", "condition"):
-        part = getattr(node, field, None)
-        if part is not None:
-            changes[field] = _placed(part, path, field)
-    if type(node) in _LISTS:
-        field = _LISTS[type(node)]
-        changes[field] = _listed(getattr(node, field), path)
+    for field in fields(node):
+        part = getattr(node, field.name)
+        if isinstance(part, Node):
+            changes[field.name] = _placed(part, path, _slot(node, field.name))
+        elif isinstance(part, tuple) and any(isinstance(item, Node) for item in part):
+            changes[field.name] = _listed(part, path)
     if isinstance(node, nodes.TryNode):
-        changes["do"] = _placed(node.do, path, "do" if _is_bare(node.do) else "")
         changes["catches"] = tuple(
             replace(catch, do=_placed(catch.do, path, f"catch/{index}"))
             for index, catch in enumerate(node.catches, 1)
         )
-        changes["finish"] = node.finish and _placed(node.finish, path, "finally")
     return replace(node, **changes)
 
 
-def _body(use: nodes.UseNode, body: Node, path: str) -> Node:
-    """Return the body of a subtree: a list stands in the place of its use, unless that has a label."""
-    return _placed(body, path, "do" if use.label else "")
+def _slot(parent: Node, field: str) -> str:
+    """Return what a child is called in the path of its parent.
+
+    The body of a `try`, unless it is a bare list, and of a `use`, unless that has a label, is not named.
+    """
+    if isinstance(parent, nodes.TryNode) and field == "do":
+        return "do" if _is_bare(parent.do) else ""
+    if isinstance(parent, nodes.UseNode):
+        return "do" if parent.label else ""
+    return "finally" if field == "finish" else field
 
 
 def _listed(items: Sequence[Node], parent: str) -> tuple[Node, ...]:

@@ -26,6 +26,11 @@ class Literal:
     used: Mark | None = None
     elements: tuple[Mark, ...] = ()
 
+    @property
+    def origin_note(self) -> str:
+        """The origin in brackets, to follow a sentence about the value, or ""."""
+        return f" (it is {self.origin})" if self.origin else ""
+
     def element_mark(self, index: int) -> Mark:
         """Return where an element of the list stands, or the list where that is not known."""
         return self.elements[index] if index < len(self.elements) else self.mark

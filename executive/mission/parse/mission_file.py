@@ -1,29 +1,27 @@
-"""From the positioned nodes of a mission file to the typed mission."""
+"""Mission and library files: from positioned nodes to typed values."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from collections.abc import Mapping as Mapped
 from dataclasses import replace
 
 from executive.mission.findings import Finding, error
 from executive.mission.model import grammar
-from executive.mission.model import mission as model
+from executive.mission.model.mission import Argument, Library, Mission, Route, Subtree
 from executive.mission.model.values import Named
-from executive.mission.parse.fields import Fields
+from executive.mission.parse.fields import NAME, Fields, value_of
 from executive.mission.parse.nodes import NodeParser, Skills
 from executive.mission.parse.params import parse_params
-from executive.mission.parse.trees import parse_trees
 from executive.mission.source import Mark
-from executive.mission.text.yaml_text import Node, Scalar, Sequence, plain
+from executive.mission.text.yaml_text import Mapping, Node, Scalar, Sequence, plain
 from executive.mission.words import describe
 
 _MISSION_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 
 
-def parse_mission(
-    root: Node, overrides: Mapped[str, str], skills: Skills
-) -> tuple[model.Mission, list[Finding]]:
+def parse_mission(root: Node, overrides: Mapped[str, str], skills: Skills) -> tuple[Mission, list[Finding]]:
     """Return what the file says, as far as it can be read, and what is wrong with its form."""
     findings: list[Finding] = []
     start = replace(root.mark, length=1)
@@ -32,15 +30,17 @@ def parse_mission(
         fields.required(key)
     parser = NodeParser(findings, skills)
     tree = fields.get("tree")
-    mission = model.Mission(
+    mission = Mission(
         name=_name(fields),
         description=fields.text("description"),
         cell=_cell(fields),
-        libraries=_libraries(fields),
+        libraries=_names(
+            fields.items("library"), "library takes the path of a file or a list of them", findings
+        ),
         params=parse_params(fields, overrides),
         routes=_routes(fields),
         tree=None if tree is None else parser.node(tree, fields.key_mark("tree")),
-        trees=parse_trees(fields, parser),
+        trees=_trees(fields, parser),
     )
     return mission, findings
 
@@ -60,31 +60,100 @@ def _cell(fields: Fields) -> Named:
     return cell
 
 
-def _routes(fields: Fields) -> tuple[model.Route, ...]:
-    routes: list[model.Route] = []
+def _routes(fields: Fields) -> tuple[Route, ...]:
+    routes: list[Route] = []
 
     def read(label: str, mark: Mark, node: Node) -> None:
-        bins = []
-        for item in node.items if isinstance(node, Sequence) else (node,):
-            if isinstance(item, Scalar) and isinstance(item.value, str):
-                bins.append(Named(item.text, item.mark))
-            else:
-                message = f"a route names a bin or a list of bins, not {describe(plain(item))}"
-                fields.findings.append(error(item.mark, "wrong-type", message))
-        if isinstance(node, Sequence) and not node.items:
+        items = node.items if isinstance(node, Sequence) else (node,)
+        if not items:
             fields.findings.append(error(node.mark, "empty-list", "a route needs at least one bin"))
-        routes.append(model.Route(label, mark, tuple(bins)))
+        bins = _names(items, "a route names a bin or a list of bins", fields.findings)
+        routes.append(Route(label, mark, bins))
 
     fields.mapping("routes", read)
     return tuple(routes)
 
 
-def _libraries(fields: Fields) -> tuple[Named, ...]:
+def _names(items: Iterable[Node], takes: str, findings: list[Finding]) -> tuple[Named, ...]:
+    """Return the texts of a list; anything else is a finding that begins with `takes`."""
     named = []
-    for item in fields.items("library"):
+    for item in items:
         if isinstance(item, Scalar) and isinstance(item.value, str):
             named.append(Named(item.text, item.mark))
         else:
-            message = f"library takes the path of a file or a list of them, not {describe(plain(item))}"
-            fields.findings.append(error(item.mark, "wrong-type", message))
+            findings.append(error(item.mark, "wrong-type", f"{takes}, not {describe(plain(item))}"))
     return tuple(named)
+
+
+def parse_library(root: Node, skills: Skills) -> tuple[Library, list[Finding]]:
+    """Return what a library file says, as far as it can be read, and what is wrong with its form."""
+    findings: list[Finding] = []
+    start = replace(root.mark, length=1)
+    fields = Fields("the library", start, root, grammar.LIBRARY, findings)
+    for key in ("library", "trees"):
+        fields.required(key)
+    name = fields.text("library")
+    return Library(name, _trees(fields, NodeParser(findings, skills), name or "library")), findings
+
+
+def _trees(fields: Fields, parser: NodeParser, library: str = "") -> dict[str, Subtree]:
+    """Return the subtrees under the key `trees`; `library` names the library they belong to."""
+    trees: dict[str, Subtree] = {}
+
+    def read(name: str, mark: Mark, node: Node) -> None:
+        if not NAME.fullmatch(name):
+            parser.refuse(mark, "bad-name", f'a subtree is named by letters, digits and "_", not "{name}"')
+        if isinstance(node, Mapping) and set(grammar.SUBTREE) & set(node.keys):
+            whole = node.get("do") is not None
+            if not whole:
+                parser.refuse(mark, "missing-key", f'the subtree "{name}" needs the key "do"')
+            trees[name] = _subtree(name, mark, node, parser if whole else parser.silent(), library)
+        else:
+            trees[name] = Subtree(name, mark, "", {}, None, parser.node(node, mark), library)
+
+    fields.mapping("trees", read)
+    return trees
+
+
+def _subtree(name: str, mark: Mark, node: Mapping, parser: NodeParser, library: str) -> Subtree:
+    fields = Fields(f'the subtree "{name}"', mark, node, grammar.SUBTREE, parser.findings)
+    args: dict[str, Argument] = {}
+
+    def read(argument: str, where: Mark, value: Node) -> None:
+        if not NAME.fullmatch(argument):
+            hint = "Write the bare name; inside, its value is $name."
+            parser.refuse(where, "bad-name", f'"{argument}" cannot name an argument', hint)
+            argument = argument.removeprefix("$")
+        if argument in args:
+            first = args[argument].mark.line
+            message = f'the argument "{argument}" stands here twice; the first is in line {first}'
+            parser.refuse(where, "duplicate-key", message)
+        required = isinstance(value, Scalar) and value.value is None
+        args[argument] = Argument(where, None if required else value_of(value, parser.findings))
+
+    if isinstance(fields.get("args"), Sequence):
+        for item in fields.items("args"):
+            if isinstance(item, Scalar):
+                read(item.text, item.mark, Scalar(item.mark, None, ""))
+            else:
+                parser.refuse(
+                    item.mark, "wrong-type", "an argument in a list is a name; for a default write a mapping"
+                )
+    else:
+        fields.mapping("args", read)
+    body = parser.node(fields.get("do"), fields.key_mark("do"))
+    return Subtree(name, mark, fields.text("doc"), args, _returns(fields, parser), body, library)
+
+
+def _returns(fields: Fields, parser: NodeParser) -> dict[str, Mark] | None:
+    """Return the names under `returns` with their places, or None where the key is missing."""
+    if fields.get("returns") is None:
+        return None
+    names: dict[str, Mark] = {}
+    for item in fields.items("returns"):
+        written = item.text.removeprefix("$") if isinstance(item, Scalar) else ""
+        if NAME.fullmatch(written):
+            names[written] = item.mark
+        else:
+            parser.refuse(item.mark, "bad-name", "returns takes the names of variables, as [targets]")
+    return names

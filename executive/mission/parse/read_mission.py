@@ -12,9 +12,8 @@ from executive.mission.findings import Finding, MissionError, error, in_file_ord
 from executive.mission.model.mission import Mission, Subtree
 from executive.mission.model.values import Named
 from executive.mission.parse.cell_file import CellFile, read_cell
-from executive.mission.parse.mission_file import parse_mission
+from executive.mission.parse.mission_file import parse_library, parse_mission
 from executive.mission.parse.nodes import Skills
-from executive.mission.parse.trees import parse_library
 from executive.mission.source import Source
 from executive.mission.text.files import below, read_source
 from executive.mission.text.yaml_text import parse_yaml

@@ -50,13 +50,13 @@ def validate(root: Node, model: type[M]) -> Validated[M]:
         return Validated(None, tuple(found))
 
 
-def mark_of(root: Node, path: KeyPath) -> Mark:
-    """Return where the value at `path` stands, or where the last part of the path that exists does."""
+def mark_of(root: Node, path: KeyPath, of_key: bool = False) -> Mark:
+    """Return where the value at `path`, or its key, stands, or where the last part that exists does."""
     node, mark = root, root.mark
     for step in path:
         if isinstance(node, Mapping) and (entry := node.entry(str(step))):
             node = entry.value
-            mark = node.mark if isinstance(node, Scalar) else entry.key.mark
+            mark = node.mark if isinstance(node, Scalar) and not of_key else entry.key.mark
         elif isinstance(node, Sequence) and isinstance(step, int) and step < len(node.items):
             node = node.items[step]
             mark = node.mark
@@ -80,7 +80,7 @@ def _finding(root: Node, model: type[BaseModel], problem: Any) -> Finding:
         owner = dotted(inside) or "the file"
         known = list(parent.model_fields) if parent else []
         hint = alternatives(str(last), known, f"{owner} takes")
-        key = _key_mark(root, inside, str(last))
+        key = mark_of(root, path, of_key=True)
         return error(key, "unknown-key", f'{owner} has no key "{last}"', hint)
     if kind == "missing" and isinstance(last, int):
         given = len(problem["input"])
@@ -92,14 +92,6 @@ def _finding(root: Node, model: type[BaseModel], problem: Any) -> Finding:
     code = "out-of-range" if "than" in kind else _CODES.get(kind, "wrong-type")
     name = dotted(path) or "the file"
     return error(mark_of(root, path), code, f"{name} {violation(problem)}")
-
-
-def _key_mark(root: Node, parent: KeyPath, key: str) -> Mark:
-    node: Node | None = root
-    for step in parent:
-        node = node.get(str(step)) if isinstance(node, Mapping) else None
-    entry = node.entry(key) if isinstance(node, Mapping) else None
-    return entry.key.mark if entry else mark_of(root, parent)
 
 
 def _annotation(model: Any, path: KeyPath) -> Any:

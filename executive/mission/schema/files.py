@@ -8,15 +8,23 @@ from executive.mission.model import grammar
 from executive.mission.model.grammar import Form, Key
 from executive.mission.parse.fields import NAME
 from executive.mission.parse.params import TYPES
-from executive.mission.schema.skills import REFERENCE, failures, or_reference, settings, words
-from executive.mission.schema.types import ALTERNATIVE, DIALECT, Json
+from executive.mission.schema.types import (
+    ALTERNATIVE,
+    DIALECT,
+    REFERENCE,
+    Json,
+    failures,
+    or_reference,
+    settings,
+    words,
+)
 from executive.skill import Skill
 
 _NAME = NAME.pattern
 
 
 def mission_schema(skills: Mapping[str, type[Skill]]) -> Json:
-    """Return the schema of a mission file that may use these skills."""
+    """Return the schema of a mission file that may use these skills; `library` defines library files."""
     return _file("A mission", grammar.MISSION, skills)
 
 
@@ -34,6 +42,7 @@ def _file(title: str, keys: Mapping[str, Key], skills: Mapping[str, type[Skill]]
             "node": _node([*skills, *grammar.CONTROL], skills),
             "tree": {"anyOf": [_ref("node"), {"title": "A subtree", **_mapping(grammar.SUBTREE)}]},
             "param": _param(),
+            "library": _mapping(grammar.LIBRARY),
             "catch": _mapping(grammar.CATCH),
             "reasons": _reasons(skills),
             "label": {"type": "string", "pattern": f"^{grammar.LABEL}$"},

@@ -1,19 +1,26 @@
-"""Python types and pydantic models as JSON Schema draft-07, which editors know best."""
+"""Python types, the cell file and the skills as JSON Schema draft-07, which editors know best."""
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Mapping
 from typing import Any
 
 from pydantic import TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema
+from pydantic_core import to_jsonable_python
 
 from executive.cell_config import CellConfig
+from executive.mission.model.typed import is_plain
+from executive.skill import Direction, Param, Port, Skill
 
 Json = dict[str, Any]
 """A JSON Schema, or a part of one."""
 
 ALTERNATIVE: Json = {"allOf": [True]}
 """Allows everything; without it yaml-language-server offers "- (array item)" beside every alternative."""
+
+REFERENCE: Json = {"$ref": "#/definitions/reference"}
 
 DIALECT = "http://json-schema.org/draft-07/schema#"
 
@@ -59,3 +66,78 @@ def cell_schema() -> Json:
         "else": {"required": required},
         "definitions": sections,
     }
+
+
+def or_reference(*written: Json) -> Json:
+    """Return the schema of a value that is written out in one of these ways, or taken from `$name`."""
+    return {"anyOf": [*written, REFERENCE]}
+
+
+def settings(name: str, skill: type[Skill]) -> Json:
+    """Return what stands under the name of a skill: its params and ports."""
+    required = [param.name for param in skill.params.values() if param.required]
+    params = {key: _param(param) for key, param in skill.params.items()}
+    ports = {key: _port(port) for key, port in skill.ports.items()}
+    shape = {
+        "type": "object" if required else ["object", "null"],
+        "properties": {**params, **ports},
+        "required": required,
+        "additionalProperties": False,
+    }
+    # Under allOf, so that an editor completes the name alone, which is right in a list and in a mapping.
+    return {"title": name, **_documentation(skill), "allOf": [shape]}
+
+
+def words(skills: Mapping[str, type[Skill]]) -> list[Json]:
+    """Return the skills that may stand for themselves, without any params."""
+    return [
+        {"const": name, "title": name, **_documentation(skill), **ALTERNATIVE}
+        for name, skill in skills.items()
+        if not any(param.required for param in skill.params.values())
+    ]
+
+
+def failures(skills: Mapping[str, type[Skill]]) -> list[str]:
+    """Return every `Skill.reason` there is."""
+    return [f"{name}.{reason}" for name, skill in skills.items() for reason in skill.reasons]
+
+
+def _documentation(skill: type[Skill]) -> Json:
+    text = inspect.getdoc(skill) or ""
+    flows = {
+        "reads": [port.name for port in skill.ports.values() if port.direction is Direction.IN],
+        "writes": [port.name for port in skill.ports.values() if port.direction is Direction.OUT],
+        "may fail with": skill.reasons,
+    }
+    facts = [f"* {verb} {', '.join(f'`{name}`' for name in names)}" for verb, names in flows.items() if names]
+    whole = "\n\n".join(part for part in (text, "\n".join(facts)) if part)
+    return {"description": text.partition("\n")[0], "markdownDescription": whole}
+
+
+def _param(param: Param) -> Json:
+    written = type_schema(param.type)
+    bounds = {"minimum": param.ge, "maximum": param.le}
+    written |= {word: bound for word, bound in bounds.items() if bound is not None}
+    if param.choices is not None:
+        # Where a param names something of the cell, its choices are further words.
+        written["examples" if param.refers else "enum"] = list(param.choices)
+    if not param.required:
+        written["default"] = to_jsonable_python(param.default)
+    return {"description": _sentence(param), **or_reference(written)}
+
+
+def _sentence(param: Param) -> str:
+    """Return the param's sentence with its unit, bounds and default, which editors do not show otherwise."""
+    facts = [f"at least {param.ge:g}"] if param.ge is not None else []
+    facts += [f"at most {param.le:g}"] if param.le is not None else []
+    facts += [f"{param.default} if not given"] if param.default not in (..., "", None) else []
+    parts = (param.doc, f"[{param.unit}]" if param.unit else "", f"({', '.join(facts)})" if facts else "")
+    return " ".join(part for part in parts if part)
+
+
+def _port(port: Port) -> Json:
+    written = port.direction is Direction.OUT
+    said = f"{'output' if written else 'input'}: {port.doc}"
+    if written or not is_plain(port.type):
+        return {"description": said, **REFERENCE}
+    return {"description": said, **or_reference(type_schema(port.type))}

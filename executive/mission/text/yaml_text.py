@@ -133,14 +133,14 @@ class _Composer:
     def document(self) -> Node:
         next(self._events)  # the stream's start
         if isinstance(next(self._events), yaml.StreamEndEvent):
-            self._refuse(self.source.mark(), "empty", "the file is empty")
-            raise _Unsound
+            raise self._unsound(self.source.mark(), "empty", "the file is empty")
         root = self._node(next(self._events), 0)
         next(self._events)  # the document's end
         after = next(self._events)
         if not isinstance(after, yaml.StreamEndEvent):
-            self._refuse(self._mark(after, 3), "two-documents", 'a second document starts here, after "---"')
-            raise _Unsound
+            raise self._unsound(
+                self._mark(after, 3), "two-documents", 'a second document starts here, after "---"'
+            )
         return root
 
     def _node(self, event: Any, depth: int) -> Node:
@@ -157,25 +157,21 @@ class _Composer:
 
     def _alias(self, event: Any, depth: int) -> Node:
         if event.anchor not in self._anchors:
-            self._refuse(self._mark(event), "alias", f'nothing above is marked "&{event.anchor}"')
-            raise _Unsound
+            raise self._unsound(self._mark(event), "alias", f'nothing above is marked "&{event.anchor}"')
         node, size = self._anchors[event.anchor]
         if depth + _height(node) > _DEEPEST:
-            self._refuse(self._mark(event), "too-deep", f"nested more than {_DEEPEST} levels deep")
-            raise _Unsound
+            raise self._unsound(self._mark(event), "too-deep", f"nested more than {_DEEPEST} levels deep")
         self._count += size
         if self._count > _MOST_NODES:
             message = f"with its aliases written out, the file has more than {_MOST_NODES} values"
-            self._refuse(self._mark(event), "too-large", message)
-            raise _Unsound
+            raise self._unsound(self._mark(event), "too-large", message)
         return node
 
     def _value(self, event: Any, depth: int) -> Node:
         if isinstance(event, yaml.ScalarEvent):
             return self._scalar(event)
         if depth >= _DEEPEST:
-            self._refuse(self._mark(event, 1), "too-deep", f"nested more than {_DEEPEST} levels deep")
-            raise _Unsound
+            raise self._unsound(self._mark(event, 1), "too-deep", f"nested more than {_DEEPEST} levels deep")
         if isinstance(event, yaml.SequenceStartEvent):
             items = []
             while not isinstance(item := next(self._events), yaml.SequenceEndEvent):
@@ -214,6 +210,11 @@ class _Composer:
             same_line = start.line == end.line
             length = max(1, end.column - start.column) if same_line else 1000
         return Mark(self.source, start.line + 1, start.column + 1, length)
+
+    def _unsound(self, mark: Mark, code: str, message: str) -> _Unsound:
+        """Add a finding after which the tree cannot be completed, and return the exception to raise."""
+        self._refuse(mark, code, message)
+        return _Unsound()
 
     def _refuse(self, mark: Mark, code: str, message: str) -> None:
         self.findings.append(error(mark, code, message))

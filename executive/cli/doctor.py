@@ -1,0 +1,239 @@
+"""`executive doctor`: checks of this installation, each with its cure.
+
+`python -m executive.cli.doctor tiny|egl` draws a few frames and prints the time of one: a process of its own,
+because an EGL driver that fails may end the whole process. A check imports its packages only when it runs, so
+that a missing package spoils no other check.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import statistics
+import subprocess
+import sys
+import timeit
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from importlib.metadata import packages_distributions
+from importlib.util import find_spec
+from typing import NamedTuple
+
+import click
+
+from executive.cli.options import json_option
+from executive.cli.output import print_json, stdout_kept_clean
+from executive.errors import InputError
+from executive.programs import program
+
+MIN_PYTHON, MAX_PYTHON = (3, 10), (3, 11)
+"""Oldest and newest Python for which every required package has wheels."""
+EXTRAS = {"view": "watch a run in the browser", "train": "train a detector of your own"}
+"""Purpose of each extra."""
+FRAMES = 5
+"""Number of frames that are timed, after a first one that is not."""
+FRAME_SIZE = (640, 480)
+"""Width and height of a frame [pixel]."""
+DRAW_TIMEOUT = 30.0
+"""Time after which a drawing process is ended [s]."""
+SERVER_TIMEOUT = 3.0
+"""Time after which a server counts as out of reach [s]."""
+
+
+class Finding(NamedTuple):
+    """Result of one check.
+
+    Attributes:
+        mark: `ok`; `note`: something cannot be used, and nothing that comes with the project needs it;
+            `problem`: the project cannot work.
+        subject: Name of the checked thing.
+        message: State of the checked thing.
+        cure: Next step for the user, or "".
+    """
+
+    mark: str
+    subject: str
+    message: str
+    cure: str = ""
+
+
+@click.command(name="doctor")
+@json_option
+@click.pass_context
+def command(ctx: click.Context, as_json: bool) -> None:
+    """Check Python, packages, what is registered, renderer, display and Roboflow's server.
+
+    Exit code 1 if there is a problem; what is only noted keeps nothing that comes with the project from
+    working.
+    """
+    with stdout_kept_clean():
+        findings = list(examine())
+    problems = sum(finding.mark == "problem" for finding in findings)
+    if as_json:
+        print_json([finding._asdict() for finding in findings])
+    else:
+        width = max(len(finding.subject) for finding in findings)
+        for mark, subject, message, cure in findings:
+            click.echo(f"{mark:7}  {subject:{width}}  {message}{cure and f'; {cure}'}")
+        click.echo(f"{problems} problem{'s' if problems > 1 else ''}" if problems else "all is well")
+    ctx.exit(int(problems > 0))
+
+
+def examine() -> Iterator[Finding]:
+    """Run every check and yield its findings, also if packages are missing that a check needs."""
+    for check in (check_system, check_packages, check_registered, check_renderer, check_roboflow):
+        subject = check.__name__.removeprefix("check_")
+        try:
+            yield from check()
+        except InputError as error:
+            yield Finding("problem", subject, str(error))
+        except ImportError as error:
+            yield Finding("problem", subject, f"cannot be looked at: {error}", "run `uv sync`")
+
+
+def check_system(version: tuple[int, ...] = sys.version_info[:3]) -> Iterator[Finding]:
+    """Yield the version of Python, and the screen on which --gui opens a window."""
+    python = f"{'.'.join(map(str, version))} on {platform.system()} {platform.machine()}"
+    if MIN_PYTHON <= version[:2] <= MAX_PYTHON:
+        yield Finding("ok", "python", python)
+    else:
+        cure = "use 3.10 or 3.11 (uv takes 3.11 by itself)"
+        yield Finding("problem", "python", f"{python} has no pybullet wheel", cure)
+    if name := os.environ.get("DISPLAY"):
+        yield Finding("ok", "display", f"DISPLAY is {name}, where --gui opens the simulator's window")
+    else:
+        cure = "run without --gui, which needs it: terminal, `--view` and report show a run, too"
+        yield Finding("note", "display", "DISPLAY is not set", cure)
+
+
+def check_packages() -> Iterator[Finding]:
+    """Yield required packages that are missing, those that contain a `cv2`, those of extras and films."""
+    from executive.runtime.versions import ITSELF, installed, required
+
+    names = required()
+    missing = [name for name in (ITSELF, *names) if not installed(name)]
+    for name in missing:
+        yield Finding("problem", "packages", f"{name} is missing", "run `uv sync`")
+    if not missing:
+        yield Finding("ok", "packages", f"{ITSELF} {installed(ITSELF)} and the {len(names)} that it needs")
+    opencv = [f"{name} {installed(name)}" for name in sorted(set(packages_distributions().get("cv2", ())))]
+    if len(opencv) == 1:
+        yield Finding("ok", "opencv", f"{opencv[0]} alone brings a `cv2`")
+    elif opencv:
+        message = f"{len(opencv)} packages bring a `cv2` and overwrite each other ({', '.join(opencv)})"
+        cure = "run `uv sync --reinstall`, which leaves opencv-python-headless alone"
+        yield Finding("problem", "opencv", message, cure)
+    for extra, purpose in EXTRAS.items():
+        names = required(extra)
+        if missing := [name for name in names if not installed(name)]:
+            cure = f"to {purpose}, run `uv sync --extra {extra}`"
+            yield Finding("note", extra, f"not installed: {', '.join(missing)}", cure)
+        else:
+            yield Finding("ok", extra, ", ".join(f"{name} {installed(name)}" for name in names))
+    if film := installed("av"):
+        yield Finding("ok", "film", f"av {film} writes films; the program ffmpeg is not needed")
+
+
+def check_registered() -> Iterator[Finding]:
+    """Yield the number of skills, kinds of cells and kinds of detectors; each of them is loaded."""
+    from executive.discovery import discover
+    from executive.entry_points import registered
+    from executive.project import project_here
+    from executive.runtime import cells
+    from executive.vision.detectors import registry
+
+    skills, project = discover(), project_here()
+    kinds, detectors = registered(cells.GROUP, "kind of cell"), registry.installed()
+    for entry in (*kinds.values(), *detectors.values()):
+        entry.load()
+    message = f"{len(skills)} skills, {len(kinds)} kinds of cells, {len(detectors)} kinds of detectors"
+    yield Finding("ok", "registered", f"{message}; {project.file} counts" if project else message)
+
+
+def check_renderer() -> Iterator[Finding]:
+    """Yield the time TinyRenderer needs for a frame, and whether PyBullet's EGL plugin draws."""
+    time, problem = draw_in_process("tiny")
+    if problem:
+        cure = "run `uv sync --reinstall-package pybullet`"
+        yield Finding("problem", "renderer", f"TinyRenderer draws nothing: {problem}", cure)
+    else:
+        message = f"TinyRenderer, on the processor: {time:.0f} ms for 640x480 of the overhead cell"
+        yield Finding("ok", "renderer", message)
+    _, problem = draw_in_process("egl")
+    state = f"draws nothing: {problem}" if problem else "can be loaded and draws"
+    mark = "note" if problem else "ok"
+    yield Finding(mark, "egl", f"PyBullet's EGL plugin {state}; no cell needs it")
+
+
+def check_roboflow() -> Iterator[Finding]:
+    """Yield whether there is a key, without showing it, and whether Roboflow's own server answers."""
+    from executive.vision.detectors.roboflow.key import VARIABLE, ApiKey
+    from executive.vision.detectors.roboflow.options import HOSTED
+
+    if ApiKey(os.environ).is_set:
+        yield Finding("ok", "key", f"{VARIABLE} is set")
+    else:
+        yield Finding("note", "key", f"{VARIABLE} is not set", "set it for models that Roboflow hosts")
+    if has_answer(HOSTED):
+        yield Finding("ok", "roboflow", f"{HOSTED} answers")
+    else:
+        message = f"{HOSTED} does not answer within {SERVER_TIMEOUT:.0f} s"
+        cure = "see to the network for models that Roboflow hosts; nothing else needs it"
+        yield Finding("note", "roboflow", message, cure)
+
+
+def draw_in_process(renderer: str) -> tuple[float, str]:
+    """Return the time of a frame [ms] drawn by `tiny` or `egl`, and "" or the reason why none came."""
+    words = program("executive.cli.doctor", renderer)
+    try:
+        ended = subprocess.run(words, capture_output=True, text=True, timeout=DRAW_TIMEOUT, check=False)
+    except subprocess.TimeoutExpired:
+        return 0.0, f"no frame came in {DRAW_TIMEOUT:.0f} s"
+    # Drivers print what they like around the result, and may crash after it.
+    if result := re.search(r"^milliseconds: ([0-9.]+)$", ended.stdout, re.MULTILINE):
+        return float(result[1]), ""
+    *_, last = ["it says nothing", *filter(str.strip, ended.stderr.splitlines())]
+    return 0.0, f"its process ended with {ended.returncode}: {last.strip()}"
+
+
+def has_answer(address: str, timeout: float = SERVER_TIMEOUT) -> bool:
+    """Return True if a server gives any answer at all within `timeout` [s]."""
+    try:
+        urllib.request.urlopen(address, timeout=timeout).close()
+    except OSError as error:
+        return isinstance(error, urllib.error.HTTPError)
+    return True
+
+
+def prepare_drawing(renderer: str) -> Callable[[], object]:
+    """Return a function that draws a frame: `tiny` one of the overhead cell, `egl` one of an empty scene.
+
+    Raises:
+        SystemExit: There is no EGL plugin, or it cannot be loaded.
+    """
+    import pybullet
+
+    from executive.cli.cells import load_cells
+    from executive.sim.camera import CELL_LIGHT, camera_pose, render
+    from executive.sim.world import World
+    from executive.vision.camera_model import calibrated
+
+    if renderer == "egl":
+        pybullet.connect(pybullet.DIRECT)
+        spec = find_spec("eglRenderer")
+        if spec is None or pybullet.loadPlugin(spec.origin, "_eglRendererPlugin") < 0:
+            sys.exit("it cannot be loaded")
+        return lambda: pybullet.getCameraImage(*FRAME_SIZE, renderer=pybullet.ER_BULLET_HARDWARE_OPENGL)
+    config = load_cells(("overhead",))["overhead"]
+    camera = next(iter(config.cameras.values()))
+    world = World(config)
+    matrix, _ = calibrated(camera)
+    return lambda: render(world, matrix, camera_pose(world, camera), (0, 0, *FRAME_SIZE), CELL_LIGHT)
+
+
+if __name__ == "__main__":
+    with stdout_kept_clean():
+        times = timeit.repeat(prepare_drawing(sys.argv[1]), number=1, repeat=1 + FRAMES)
+    click.echo(f"milliseconds: {1000 * statistics.median(times[1:]):.2f}")
