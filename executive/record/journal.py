@@ -6,13 +6,15 @@ import contextlib
 import errno
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from executive.errors import Fault, InputError, RecordLost
 from executive.events import Event
 from executive.record.entry import Entry, entry_of
 from executive.record.lock import lock
+from executive.record.whole_file import reason_of
 
 _ENCODER = json.JSONEncoder(ensure_ascii=False, allow_nan=False, check_circular=False)
 _ESCAPING = json.JSONEncoder(ensure_ascii=True, allow_nan=False, check_circular=False)
@@ -47,7 +49,7 @@ class Journal:
                 os.close(file)
                 raise
         except OSError as error:
-            raise InputError(f'cannot open the journal "{path}": {_reason(error)}') from error
+            raise InputError(f'cannot open the journal "{path}": {reason_of(error)}') from error
         self._file: int | None = file
 
     def __call__(self, event: Event) -> None:
@@ -75,7 +77,7 @@ class Journal:
             with contextlib.suppress(OSError):
                 os.ftruncate(self._file, self._length)
             raise RecordLost(
-                f'the journal "{self._path}" cannot be written: {_reason(error)}; '
+                f'the journal "{self._path}" cannot be written: {reason_of(error)}; '
                 "the run stops because it could not be explained afterwards"
             ) from error
 
@@ -93,7 +95,7 @@ class Journal:
                 self._sync(file)
         except OSError as error:
             raise Fault(
-                f'the journal "{self._path}" may lack its last lines: {_reason(error)}; '
+                f'the journal "{self._path}" may lack its last lines: {reason_of(error)}; '
                 "believe what you see in the cell rather than the record"
             ) from error
         finally:
@@ -138,7 +140,7 @@ def read_journal(path: Path) -> list[Entry]:
     try:
         content = path.read_bytes()
     except OSError as error:
-        raise InputError(f'cannot read the journal "{path}": {_reason(error)}') from error
+        raise InputError(f'cannot read the journal "{path}": {reason_of(error)}') from error
     entries = []
     for number, line in enumerate(content[: _whole(content)].splitlines(), start=1):
         try:
@@ -151,7 +153,7 @@ def read_journal(path: Path) -> list[Entry]:
     return entries
 
 
-def ending_of(entries: Sequence[Entry]) -> Entry | None:
+def ending_of(entries: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
     """Return the `end` of a run by its journal, or None: it was cut off, or goes on.
 
     A run that was taken up again has ended only when it ended again.
@@ -218,7 +220,3 @@ def _empty(file: int, path: Path) -> int:
             "for instance below another --runs DIR"
         )
     return 0
-
-
-def _reason(error: OSError) -> str:
-    return (error.strerror or str(error)).lower()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,7 +31,8 @@ def resumed_run(
     path: Path,
     skills: Mapping[str, type[Skill]],
     *,
-    view: View | None = None,
+    views: Sequence[View] = (),
+    paused: bool = False,
     gui: bool = False,
     realtime: bool = False,
     keyboard: bool = True,
@@ -48,7 +49,8 @@ def resumed_run(
     Args:
         path: The run directory.
         skills: Installed skills by name.
-        view: Shows it.
+        views: Show it.
+        paused: Let it stand still before its first new step.
         gui: Show the simulated world in a window.
         realtime: Pace the run by the wall clock.
         keyboard: Whether somebody can type at the terminal.
@@ -79,10 +81,12 @@ def resumed_run(
         recorder.close(wait=False)
         raise
     with closing(run):
+        if paused:
+            run.control.pause()
         assert run.played is not None, "a run that is taken up again plays its past"
         recorder.remember(run.played.entries)
         told = _events(run.played)
-        return Recording(run, loaded, skills, directory, recorder, view, told).execute(seed, began)
+        return Recording(run, loaded, skills, directory, recorder, views, told).execute(seed, began)
 
 
 def _past(directory: RunDirectory) -> tuple[Past, int]:

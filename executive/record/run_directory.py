@@ -15,7 +15,7 @@ from typing import Any
 import yaml
 
 from executive.errors import InputError
-from executive.record.whole_file import write_whole
+from executive.record.whole_file import reason_of, write_whole
 
 NO_ROOM = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
 """What the system says where more space would help."""
@@ -131,11 +131,10 @@ def check_place(runs: Path) -> None:
         raise refused(f'make a run directory below "{runs}"', error) from error
 
 
-def refused(what: str, error: OSError) -> InputError:
-    """Return the sentence for what the file system did not let be done, with what may help."""
-    reason = (error.strerror or str(error)).lower()
+def refused(what: str, error: OSError, instead: str = "name another place with --runs DIR") -> InputError:
+    """Return the sentence for an act that the file system refused, with what to do instead."""
     space = "free some space or " if error.errno in NO_ROOM else ""
-    return InputError(f"cannot {what}: {reason}; {space}name another place with --runs DIR")
+    return InputError(f"cannot {what}: {reason_of(error)}; {space}{instead}")
 
 
 def _make_unique(day: Path, name: str) -> Path:

@@ -77,7 +77,7 @@ def project(monkeypatch):
         setattr(module, function.__name__, function)
         monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.setattr("executive.discovery.discover", lambda: {"Reach": Reach})
-    monkeypatch.setattr("executive.view.report.leave.leave_report", lambda result: ("runs/x/report.html", ""))
+    monkeypatch.setattr("executive.view.report.page.leave_report", lambda result: ("runs/x/report.html", ""))
     return asked
 
 

@@ -104,14 +104,6 @@ def test_the_chosen_box_is_the_nearest_else_the_only_one_of_its_class(
     assert drawn["000012_cube-1.jpg"].chosen == expected
 
 
-def test_an_item_is_where_the_ledger_last_said(tmp_path, drawn):
-    frames = Frames(tmp_path)
-    frames(item("cube-1", "seen", position=(0.5, -0.1, 0.02)))
-    frames(look(1, CUBE, NEAR))
-    frames(decision())
-    assert drawn["000012_cube-1.jpg"].chosen == 1
-
-
 def test_a_failed_attempt_is_drawn_on_what_was_decided_from(tmp_path, drawn):
     frames = Frames(tmp_path)
     for event in (
@@ -230,7 +222,3 @@ def test_the_last_picture_of_an_item_and_a_reason_is_found_again(tmp_path, item,
         (tmp_path / file).touch()
     found = picture_of(tmp_path, item, reason)
     assert (found and found.name) == name
-
-
-def test_a_run_without_pictures_has_none_of_anything(tmp_path):
-    assert picture_of(tmp_path / "frames", "cube-1", "missed") is None

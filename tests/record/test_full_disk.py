@@ -61,6 +61,7 @@ def run(bring_one, tmp_path, monkeypatch, cells):
     return once
 
 
+@pytest.mark.slow
 def test_wherever_the_disk_fills_up_the_run_ends_at_rest_and_says_so(run, monkeypatch, cells):
     disk = Disk(monkeypatch, RECORD)
     shown, whole = run()
@@ -101,7 +102,7 @@ def test_wherever_the_disk_fills_up_the_run_ends_at_rest_and_says_so(run, monkey
     assert codes.count(3) > len(kinds)
 
 
-@pytest.mark.parametrize("room", [0, 1, 20, 100, 150, 200, 300])
+@pytest.mark.parametrize("room", [0, 1, 300])
 def test_wherever_the_world_cannot_be_kept_the_run_ends_at_rest_and_says_so(run, monkeypatch, cells, room):
     disk = Disk(monkeypatch, WORLD)
     disk.room = room
@@ -115,7 +116,8 @@ def test_wherever_the_world_cannot_be_kept_the_run_ends_at_rest_and_says_so(run,
         assert json.loads(shown.stdout)["message"].endswith("because it could not be taken up again")
 
 
-@pytest.mark.parametrize("room", range(9))
+@pytest.mark.slow
+@pytest.mark.parametrize("room", [0, 4, 8])
 def test_wherever_the_disk_fills_up_while_a_run_is_halted_it_ends_at_rest_and_says_so(
     run, monkeypatch, cells, room
 ):

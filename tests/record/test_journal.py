@@ -19,9 +19,8 @@ from pydantic_core import from_json
 
 from executive.errors import Fault, InputError
 from executive.events import Event, Exact
-from executive.record.entry import TRANSIENT, entry_of
+from executive.record.entry import entry_of
 from executive.record.journal import Journal, ending_of, read_journal
-from executive.record.plain import plain
 
 
 @pytest.fixture
@@ -32,42 +31,13 @@ def syncs(monkeypatch):
     return sizes
 
 
-def test_writes_an_object_per_line_with_its_stamp_first(tmp_path):
+def test_writes_an_object_per_line_with_its_stamp_first_and_no_pixels(tmp_path):
     journal = Journal(tmp_path / "journal.jsonl")
-    journal(Event("status", 3, 0.0125, {"node": "a/Grasp", "at": np.array([1 / 3])}))
-    text = (tmp_path / "journal.jsonl").read_text()
+    data = {"node": "größe", "at": np.array([1 / 3]), "tick": 9, "kind": "other", "frame_object": object()}
+    journal(Event("status", 3, 0.0125, data))
     journal.close()
-    assert text == '{"tick": 3, "clock": 0.0125, "kind": "status", "node": "a/Grasp", "at": [0.333333]}\n'
-
-
-VALUES = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text() | st.just(np.array([1 / 3, np.nan])),
-    lambda inner: (
-        st.lists(inner, max_size=3)
-        | st.tuples(inner)
-        | st.dictionaries(st.text(max_size=3), inner, max_size=3)
-    ),
-    max_leaves=6,
-)
-KEYS = st.sampled_from(["node", "status", "outputs", "größe", 'a "key"', "tick", "clock", "kind", *TRANSIENT])
-
-
-@settings(deadline=None)
-@given(
-    st.builds(
-        Event, st.sampled_from(["status", "item", "end"]), st.integers(0), st.floats(0),
-        st.dictionaries(KEYS, VALUES),
-    )
-)  # fmt: skip
-def test_every_line_is_the_json_of_the_stamp_and_of_the_data_made_plain(event):
-    stamp = {"tick": event.tick, "clock": plain(event.clock), "kind": event.kind}
-    data = {key: value for key, value in event.data.items() if key not in (*TRANSIENT, *stamp)}
-    line = json.dumps({**stamp, **plain(data)}, ensure_ascii=False, allow_nan=False) + "\n"
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "journal.jsonl"
-        with closing(Journal(path)) as journal:
-            journal(event)
-        assert path.read_bytes() == line.encode()
+    text = (tmp_path / "journal.jsonl").read_text()
+    assert text == '{"tick": 3, "clock": 0.0125, "kind": "status", "node": "größe", "at": [0.333333]}\n'
 
 
 class Shy(Mapping):
@@ -123,7 +93,7 @@ ANYTHING = st.recursive(
 )
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=40)
 @given(st.dictionaries(st.text(max_size=3), ANYTHING, max_size=3))
 def test_whatever_is_told_becomes_one_line_of_json_that_reads_back(data):
     event = Event("status", 0, 0.0, data)
@@ -148,20 +118,6 @@ def test_what_cannot_be_told_is_told_by_the_name_of_its_type(value):
     entry = entry_of(Event("status", 0, 0.0, {"a": 1, "outputs": value, "b": 2}))
     assert entry["outputs"] == type(value).__name__
     assert (entry["a"], entry["b"]) == (1, 2)
-
-
-def test_leaves_the_pixels_out(tmp_path):
-    journal = Journal(tmp_path / "journal.jsonl")
-    journal(Event("look", 0, 0.0, {"frame": 1, "frame_object": object()}))
-    journal.close()
-    assert list(read_journal(tmp_path / "journal.jsonl")[0]) == ["tick", "clock", "kind", "frame"]
-
-
-def test_data_cannot_overwrite_the_stamp(tmp_path):
-    journal = Journal(tmp_path / "journal.jsonl")
-    journal(Event("item", 5, 1.0, {"tick": 9, "kind": "other"}))
-    journal.close()
-    assert read_journal(tmp_path / "journal.jsonl") == [{"tick": 5, "clock": 1.0, "kind": "item"}]
 
 
 @pytest.mark.parametrize(
@@ -250,15 +206,6 @@ def test_a_journal_deleted_meanwhile_is_a_fault_at_the_next_intent_or_the_end(tm
     journal.close()
 
 
-def test_a_journal_whose_folder_is_moved_meanwhile_is_written_on(tmp_path):
-    (tmp_path / "run").mkdir()
-    journal = Journal(tmp_path / "run" / "journal.jsonl")
-    (tmp_path / "run").rename(tmp_path / "moved")
-    journal(Event("end", 0, 0.0, {}))
-    journal.close()
-    assert len(read_journal(tmp_path / "moved" / "journal.jsonl")) == 1
-
-
 def test_a_line_the_disk_takes_in_parts_is_whole(tmp_path, monkeypatch):
     write = os.write
     monkeypatch.setattr(os, "write", lambda file, line: write(file, line[:5]))
@@ -295,21 +242,16 @@ ENDS = {
 
 
 @pytest.mark.parametrize("content", ENDS)
-def test_a_torn_end_is_left_out(tmp_path, content):
+def test_a_torn_end_is_left_out_and_cut_off_where_the_journal_goes_on(tmp_path, content):
     path = tmp_path / "journal.jsonl"
     path.write_bytes(content)
-    assert [entry["tick"] for entry in read_journal(path)] == [1, 2][: ENDS[content]]
-
-
-@pytest.mark.parametrize("content", ENDS)
-def test_a_journal_opened_again_goes_on_with_a_line_of_its_own(tmp_path, content):
-    path = tmp_path / "journal.jsonl"
-    path.write_bytes(content)
+    ticks = [1, 2][: ENDS[content]]
+    assert [entry["tick"] for entry in read_journal(path)] == ticks
     journal = Journal(path, again=True)
     journal(Event("resume", 3, 0.0, {}))
     journal.close()
     entries = [json.loads(line) for line in path.read_bytes().splitlines()]
-    assert [entry["tick"] for entry in entries] == [*[1, 2][: ENDS[content]], 3]
+    assert [entry["tick"] for entry in entries] == [*ticks, 3]
     assert read_journal(path) == entries
 
 
@@ -329,14 +271,13 @@ def test_a_line_the_disk_takes_a_part_of_is_taken_back_from_an_old_journal(tmp_p
     assert (tmp_path / "journal.jsonl").read_bytes() == FIRST + LAST + b"\n"
 
 
-def test_a_journal_that_is_not_there_cannot_be_gone_on_with(tmp_path):
-    with pytest.raises(InputError, match=r'cannot open the journal ".*": no such file or directory'):
-        Journal(tmp_path / "journal.jsonl", again=True)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_new_run_does_not_go_on_with_the_journal_of_another(tmp_path):
+def test_a_new_run_needs_a_new_journal_and_one_that_goes_on_an_old_one(tmp_path):
     path = tmp_path / "journal.jsonl"
+    with pytest.raises(InputError, match=r"cannot read the journal .* no such file"):
+        read_journal(path)
+    with pytest.raises(InputError, match=r'cannot open the journal ".*": no such file or directory'):
+        Journal(path, again=True)
+    assert list(tmp_path.iterdir()) == []
     path.write_bytes(FIRST)
     with pytest.raises(InputError, match="the record of another run; a new run needs a directory of its own"):
         Journal(path)
@@ -389,22 +330,6 @@ def test_a_broken_line_in_the_middle_is_an_error_with_its_number(tmp_path, line,
 def test_a_run_has_ended_where_nothing_comes_after_its_end(kinds, ended):
     entries = [{"tick": number, "kind": kind} for number, kind in enumerate(kinds)]
     assert ending_of(entries) == (None if ended is None else entries[ended])
-
-
-def test_a_missing_journal_is_a_sentence(tmp_path):
-    with pytest.raises(InputError, match=r"cannot read the journal .* no such file"):
-        read_journal(tmp_path / "journal.jsonl")
-
-
-def test_what_is_read_is_what_was_written(tmp_path):
-    journal = Journal(tmp_path / "journal.jsonl")
-    events = [Event("status", tick, tick / 240, {"message": f'"{tick}"\nß'}) for tick in range(50)]
-    for event in events:
-        journal(event)
-    journal.close()
-    entries = read_journal(tmp_path / "journal.jsonl")
-    assert [entry["message"] for entry in entries] == [event.data["message"] for event in events]
-    assert json.dumps(entries)
 
 
 def test_an_exact_value_comes_back_as_it_was(tmp_path):

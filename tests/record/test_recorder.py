@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from executive.errors import Fault, InputError
+from executive.errors import InputError
 from executive.events import Event
 from executive.record.frames import Frames
 from executive.record.journal import Journal, read_journal
@@ -36,26 +36,6 @@ def test_a_picture_that_cannot_be_drawn_is_told_and_ends_nothing(directory, monk
     recorder.close()
     assert recorder.problem == "not every picture was drawn: RuntimeError: can't start new thread"
     assert len(read_journal(directory.journal)) == 2
-
-
-def test_a_journal_that_cannot_be_written_is_a_fault_and_its_close_is_silent(directory, monkeypatch):
-    recorder = Recorder(directory)
-    monkeypatch.setattr(os, "write", full)
-    with pytest.raises(Fault, match="no space left on device; the run stops"):
-        recorder(STATUS)
-    recorder(END)
-    recorder.close()
-    assert recorder.problem == ""
-
-
-def test_what_does_not_reach_the_disk_at_the_close_is_told(directory, monkeypatch):
-    (directory.path / "frames").write_text("a file, no folder")
-    recorder = Recorder(directory)
-    recorder(STATUS)
-    monkeypatch.setattr(os, "fsync", full)
-    recorder.close()
-    recorder.close()
-    assert recorder.problem.startswith(f'the journal "{directory.journal}" may lack its last lines: no space')
 
 
 def test_the_pictures_are_waited_for_whatever_became_of_the_journal(directory, monkeypatch):

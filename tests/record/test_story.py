@@ -139,52 +139,6 @@ def test_a_recovery_that_failed_in_an_earlier_round_explains_nothing() -> None:
     assert story["chain"][2]["why"] == "tries again only after IsHolding.empty"
 
 
-def test_earlier_failures_are_counted_by_reason() -> None:
-    run = FailedRun(PICK, objects=CUBE)
-    seals = iter([False])
-    run.fake.tool.seals = lambda: next(seals, True)
-    run.slip()
-    story = run.tell()
-    assert story is not None
-    assert story["chain"][0]["why"] == "all 3 attempts failed: 1 x Grasp.missed, 2 x Transit.dropped"
-    assert story["verdict"].startswith(
-        "Transit of cube-1 failed (dropped) on the last of 3 attempts: the seal"
-    )
-
-
-def test_the_story_has_the_numbers_of_the_deciding_read_and_of_the_last_look() -> None:
-    run = FailedRun(PICK, objects=CUBE, overrides={"attempts": "2"})
-    run.fake.tool.seals = lambda: False
-    story = run.tell()
-    assert story is not None
-    reads = {read["name"]: (read["value"], read["raised"]) for read in story["reads"]}
-    assert reads == {"tool.touching": (True, ""), "tool.holding": (False, "")}
-    look = story["look"]
-    assert (look["item"], look["frame"], look["label"], look["confidence"]) == ("cube-1", 2, "cube", 0.9)
-    assert look["position"] == pytest.approx([0.5, 0.1, 0.025], abs=0.001)
-    assert (look["looks"], look["attempts"], look["camera"], look["detector"]) == (
-        2,
-        2,
-        "overhead",
-        "embedded",
-    )
-    assert look["clock"] < story["clock"]
-    assert (story["item"], story["left"], story["holds"]) == ("cube-1", ["cube-1"], "")
-    assert story["node"] == {
-        "path": "tree/5:retry/do/Grasp", "name": "Grasp of cube-1", "place": "trial.yaml:15"
-    }  # fmt: skip
-
-
-def test_what_the_cell_refused_is_the_deciding_read() -> None:
-    run = FailedRun("  - MoveToScan\n  - Detect\n", objects=CUBE)
-    run.fake.detector.answers = lambda look, true: "the server is gone"
-    story = run.tell()
-    assert story is not None
-    (read,) = story["reads"]
-    assert (read["name"], read["value"]) == ("detector.embedded", "the server is gone")
-    assert read["raised"] == "Unavailable"
-
-
 def node(name: str, status: str, tick: int, **data: Any) -> Event:
     return Event("status", tick, tick / 240, {"node": f"tree/{name}", "status": status, **data})
 
@@ -259,16 +213,6 @@ def test_the_first_thing_to_do_where_nobody_knows_of_the_arm_is_to_keep_away() -
     )
 
 
-def test_a_halt_says_what_was_running_what_the_tool_holds_and_what_is_left() -> None:
-    run = FailedRun("sort_overhead", objects=[*CUBE, ("duck", 0.4, -0.1)])
-    run.at_every_step(lambda: run.run.control.stop() if run.fake.world.held and run.height > 0.1 else None)
-    story = run.tell()
-    assert story is not None
-    assert story["running"] == ["Transit of cube-1", "Wait"]
-    assert (story["item"], story["holds"], story["left"]) == ("cube-1", "cube-1", ["cube-1", "duck-1"])
-    assert (story["node"], story["chain"], story["reads"]) == (None, [], [])
-
-
 def test_what_was_let_go_as_the_run_ended_is_to_be_looked_for() -> None:
     run = FailedRun("sort_overhead", objects=CUBE)
 
@@ -297,22 +241,7 @@ def test_a_halt_at_a_question_says_so() -> None:
     assert story["verdict"] == "halted by the user while the operator was asked"
 
 
-def test_a_lost_item_is_told_from_its_last_look_to_its_fall() -> None:
-    run = FailedRun("sort_overhead", objects=CUBE)
-    run.slip(1, vanish=True)
-    story = run.tell()
-    assert story is not None
-    assert (story["reason"], story["verdict"]) == ("lost", "1 object was lost: cube-1")
-    (lost,) = story["lost"]
-    assert lost["item"] == "cube-1"
-    assert lost["look"]["position"] == pytest.approx([0.5, 0.1, 0.025], abs=0.001)
-    assert lost["look"]["clock"] < lost["held"] < lost["dropped"] == lost["failed"]["clock"] < story["clock"]
-    assert lost["failed"]["what"] == "Transit.dropped"
-    assert lost["unseen"] >= 3
-    assert story["left"] == []
-    assert story["next"] == ["look for cube-1 by hand, below where it was dropped"]
-
-
+@pytest.mark.slow
 def test_the_story_is_in_the_result_and_names_a_picture_that_is_there(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("executive.runtime.run.cell_kind", lambda name: Stubborn)
     loaded = FailedRun(PICK).loaded
@@ -332,6 +261,7 @@ class Stubborn(FakeCell):
         self.tool.seals = lambda: False
 
 
+@pytest.mark.slow
 def test_the_memory_of_a_run_does_not_grow_with_its_length() -> None:
     run = FailedRun("sort_overhead")
     events: list[Event] = []
@@ -352,6 +282,7 @@ def test_the_memory_of_a_run_does_not_grow_with_its_length() -> None:
     assert len(before_the_end) > 500
 
 
+@pytest.mark.slow
 @settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     breaks=st.randoms(use_true_random=False),

@@ -10,10 +10,8 @@ import pytest
 from PIL import Image, ImageDraw
 
 from executive.errors import InputError
-from executive.view.film.encoder import GIF_SIZE, write_gif, write_mp4
-from executive.view.film.formats import GIF, MP4, format_of
+from executive.view.film.formats import GIF, GIF_SIZE, MP4, file_for, format_of, write_gif, write_mp4
 from executive.view.film.ink import BACK, SUCCESS
-from executive.view.film.place import file_for
 
 
 @pytest.fixture

@@ -24,7 +24,7 @@ from executive.mission.load import load_mission
 from executive.runtime.outcome import Outcome
 from executive.runtime.run import Run
 from executive.testing.fake_cell import FakeCell
-from executive.view.live.page import WAITING, LivePage
+from executive.view.live.page import MAX_QUEUED_NEWS, LivePage
 
 MISSION = """\
 mission: bring_one
@@ -114,6 +114,7 @@ def test_a_watcher_sees_the_run_to_its_end(tmp_path: Path) -> None:
     assert watch(MISSION, tmp_path, do).status == "SUCCESS"
 
 
+@pytest.mark.slow
 def test_pause_step_and_stop_are_heard(tmp_path: Path) -> None:
     async def do(watched: Watched) -> None:
         await watched.wish(do="step")
@@ -130,6 +131,7 @@ def test_pause_step_and_stop_are_heard(tmp_path: Path) -> None:
     assert watch(MISSION, tmp_path, do).status == "HALTED"
 
 
+@pytest.mark.slow
 def test_what_is_to_be_picked_can_be_said_on_the_page(tmp_path: Path) -> None:
     async def do(watched: Watched) -> None:
         await watched.wish(do="resume")
@@ -142,6 +144,7 @@ def test_what_is_to_be_picked_can_be_said_on_the_page(tmp_path: Path) -> None:
     assert watch(ASKING, tmp_path, do).status == "SUCCESS"
 
 
+@pytest.mark.slow
 def test_nothing_of_it_is_left_when_it_ends() -> None:
     page = LivePage()
     pid = page._server.pid
@@ -152,6 +155,7 @@ def test_nothing_of_it_is_left_when_it_ends() -> None:
     assert page.problem == ""
 
 
+@pytest.mark.slow
 def test_it_listens_on_loopback_only_and_at_one_port() -> None:
     page = LivePage()
     try:
@@ -176,6 +180,7 @@ async def _answered(address: str) -> None:
         assert answer.status == 200
 
 
+@pytest.mark.slow
 def test_a_page_that_died_costs_the_run_nothing(tmp_path: Path) -> None:
     file = tmp_path / "mission.yaml"
     file.write_text(MISSION)
@@ -189,10 +194,11 @@ def test_a_page_that_died_costs_the_run_nothing(tmp_path: Path) -> None:
     run.close()
 
 
+@pytest.mark.slow
 def test_a_page_that_hangs_is_told_no_more_than_so_much_and_costs_a_few_seconds(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("executive.view.live.page.PATIENCE", 0.2)
+    monkeypatch.setattr("executive.view.live.page.SHUTDOWN_TIMEOUT", 0.2)
     page = LivePage()
     asyncio.run(_answered(page.address))
     page._server.send_signal(signal.SIGSTOP)
@@ -202,11 +208,12 @@ def test_a_page_that_hangs_is_told_no_more_than_so_much_and_costs_a_few_seconds(
     )
     for tick in range(200):
         page(Event("look", tick, 0.1, {"frame_object": frame, "found": ()}))
-    assert page._queue.qsize() <= WAITING
+    assert page._queue.qsize() <= MAX_QUEUED_NEWS
     page.finish({"status": "SUCCESS"})
     assert page._server.returncode == -signal.SIGKILL
 
 
+@pytest.mark.slow
 def test_a_server_that_cannot_begin_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
     popen = subprocess.Popen
     monkeypatch.setattr(
