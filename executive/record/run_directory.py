@@ -1,4 +1,4 @@
-"""The directory a run leaves: named by the wall clock, filled with what is needed to repeat the run."""
+"""Directory of a run: named by the wall clock, filled with what is needed to repeat the run."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import contextlib
 import errno
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,45 +20,27 @@ NO_ROOM = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
 """What the system says where more space would help."""
 
 
-@dataclass(frozen=True)
 class RunDirectory:
-    """Where one run keeps its files.
+    """Directory of one run.
 
     Attributes:
         path: `RUNS/<YYYY-MM-DD>/<HH-MM-SS>_<mission>_s<seed>`.
+        journal: File with everything that happened, one JSON object per line.
+        world: File from which a simulated world can be rebuilt as the run left it.
+        tree: File with the tree as it was built.
+        report: File with the page that explains the run.
+        result: File with the object that `executive run --json` prints.
+        frames: Folder of the camera images behind the decisions.
     """
 
-    path: Path
-
-    @property
-    def journal(self) -> Path:
-        """File with everything that happened, one JSON object per line."""
-        return self.path / "journal.jsonl"
-
-    @property
-    def world(self) -> Path:
-        """File from which a simulated world can be rebuilt as the run left it."""
-        return self.path / "world.log"
-
-    @property
-    def tree(self) -> Path:
-        """File with the tree as it was built."""
-        return self.path / "tree.json"
-
-    @property
-    def report(self) -> Path:
-        """File with the page that explains the run."""
-        return self.path / "report.html"
-
-    @property
-    def result(self) -> Path:
-        """File with the object that `executive run --json` prints."""
-        return self.path / "result.json"
-
-    @property
-    def frames(self) -> Path:
-        """Folder of the camera images behind the decisions."""
-        return self.path / "frames"
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.journal = path / "journal.jsonl"
+        self.world = path / "world.log"
+        self.tree = path / "tree.json"
+        self.report = path / "report.html"
+        self.result = path / "result.json"
+        self.frames = path / "frames"
 
     @staticmethod
     def create(runs: Path, *, mission: str, seed: int, started: datetime) -> RunDirectory:

@@ -131,13 +131,6 @@ def test_a_look_that_leads_to_nothing_is_drawn_once(tmp_path, drawn):
     assert (scene.failure, scene.item, scene.chosen) == ("SelectTarget.unseen", "", None)
 
 
-def test_a_look_that_a_decision_shows_is_not_drawn_for_a_later_failure(tmp_path, drawn):
-    frames = Frames(tmp_path)
-    for event in (look(1, CUBE), decision(), skill("Detect", "FAILURE", reason="unsure")):
-        frames(event)
-    assert list(drawn) == ["000012_cube-1.jpg"]
-
-
 def test_what_fails_because_a_skill_failed_is_not_drawn_again(tmp_path, drawn):
     frames = Frames(tmp_path)
     frames(look(1, CUBE))
@@ -183,13 +176,6 @@ def test_pictures_that_come_too_fast_are_told(tmp_path, monkeypatch):
     frames(look(1, CUBE))
     frames(decision())
     assert frames.problem == "pictures left out: 1 that came faster than they can be drawn"
-
-
-def test_a_run_without_decisions_draws_nothing_and_starts_no_process(tmp_path):
-    frames = Frames(tmp_path / "frames")
-    frames(look(1, CUBE))
-    frames.close()
-    assert not (tmp_path / "frames").exists()
 
 
 def test_pictures_that_cannot_be_written_are_told_and_break_nothing(tmp_path):

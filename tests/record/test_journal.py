@@ -8,13 +8,9 @@ import shutil
 from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from pydantic_core import from_json
 
 from executive.errors import Fault, InputError
@@ -67,57 +63,30 @@ def nested(depth: int) -> object:
     return value
 
 
-TEXTS = st.text(st.characters(), max_size=5)  # with halves of surrogate pairs
-ANYTHING = st.recursive(
-    st.none()
-    | st.booleans()
-    | st.integers()
-    | st.integers(2000, 20_000).map(lambda bits: -(1 << bits) + 1)
-    | st.floats()
-    | TEXTS
-    | st.binary(max_size=5)
-    | st.floats(width=32).map(np.float32)
-    | st.integers(0, 255).map(np.uint8)
-    | TEXTS.map(lambda text: Path("a" + text.replace("\0", "")))
-    | st.lists(st.floats(), max_size=3).map(np.array)
-    | st.sampled_from([np.bool_(True), np.clongdouble(1), np.datetime64("now"), np.void(b"a"), 1j, int])
-    | st.sampled_from([Shy, Unfinished, endless]).map(lambda made: made())
-    | st.sampled_from([90, 900, 5000]).map(nested),
-    lambda inner: (
-        st.lists(inner, max_size=3)
-        | st.dictionaries(TEXTS | st.integers() | st.binary(max_size=2), inner, max_size=3)
-        | st.lists(inner, max_size=2).map(lambda values: np.array([*values, None], dtype=object))
-        | st.sets(TEXTS | st.integers() | st.floats(), max_size=3)
-    ),
-    max_leaves=8,
-)
-
-
-@settings(deadline=None, max_examples=40)
-@given(st.dictionaries(st.text(max_size=3), ANYTHING, max_size=3))
-def test_whatever_is_told_becomes_one_line_of_json_that_reads_back(data):
-    event = Event("status", 0, 0.0, data)
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "journal.jsonl"
-        with closing(Journal(path)) as journal:
-            journal(event)
-            journal(Event("end", 1, 0.0, {}))
-        told, end = read_journal(path)
-        lines = path.read_bytes().splitlines()
-    assert len(lines) == 2
-    assert told == entry_of(event)
-    assert end["kind"] == "end"
-    # Python reads more than is JSON.
-    assert from_json(lines[0], allow_inf_nan=False) == told
-
-
 @pytest.mark.parametrize(
-    "value", [Shy(), Unfinished(), endless(), nested(5000)], ids=lambda value: type(value).__name__
+    "value",
+    [
+        Shy(),
+        Unfinished(),
+        endless(),
+        nested(5000),
+        np.array([1, None], dtype=object),
+        np.void(b"a"),
+        "\ud800",
+    ],
+    ids=lambda value: type(value).__name__,
 )
-def test_what_cannot_be_told_is_told_by_the_name_of_its_type(value):
-    entry = entry_of(Event("status", 0, 0.0, {"a": 1, "outputs": value, "b": 2}))
-    assert entry["outputs"] == type(value).__name__
-    assert (entry["a"], entry["b"]) == (1, 2)
+def test_whatever_is_told_becomes_one_line_of_json_that_reads_back(tmp_path, value):
+    event = Event("status", 0, 0.0, {"a": 1, "outputs": value})
+    with closing(Journal(tmp_path / "journal.jsonl")) as journal:
+        journal(event)
+    (line,) = (tmp_path / "journal.jsonl").read_bytes().splitlines()
+    told = entry_of(event)
+    assert read_journal(tmp_path / "journal.jsonl") == [told]
+    # Python reads more than is JSON.
+    assert from_json(line, allow_inf_nan=False) == told
+    if isinstance(value, (Shy, Unfinished, list, dict)):
+        assert told["outputs"] == type(value).__name__
 
 
 @pytest.mark.parametrize(
@@ -164,15 +133,6 @@ def test_a_line_the_disk_takes_a_part_of_is_taken_back(tmp_path, monkeypatch, ta
     assert path.read_text() == '{"tick": 0, "clock": 0.0, "kind": "status"}\n'
 
 
-def test_what_does_not_reach_the_disk_is_a_fault_before_anything_is_done(tmp_path, monkeypatch):
-    journal = Journal(tmp_path / "journal.jsonl")
-    monkeypatch.setattr(os, "fsync", full)
-    journal(Event("status", 0, 0.0, {}))
-    with pytest.raises(Fault, match=r"cannot be written: no space left on device"):
-        journal(Event("intent", 1, 0.0, {"action": "close"}))
-    journal.close()
-
-
 def test_what_reaches_the_disk_only_at_the_close_is_not_believed_unseen(tmp_path, monkeypatch):
     journal = Journal(tmp_path / "journal.jsonl")
     journal(Event("status", 0, 0.0, {}))
@@ -180,13 +140,6 @@ def test_what_reaches_the_disk_only_at_the_close_is_not_believed_unseen(tmp_path
     with pytest.raises(Fault, match=r"may lack its last lines: no space left on device; believe"):
         journal.close()
     journal.close()
-
-
-def test_what_is_on_the_disk_already_is_not_brought_there_again(tmp_path, syncs):
-    journal = Journal(tmp_path / "journal.jsonl")
-    journal(Event("end", 0, 0.0, {}))
-    journal.close()
-    assert len(syncs) == 1
 
 
 @pytest.mark.parametrize("whole", [True, False])
@@ -282,16 +235,6 @@ def test_a_new_run_needs_a_new_journal_and_one_that_goes_on_an_old_one(tmp_path)
     with pytest.raises(InputError, match="the record of another run; a new run needs a directory of its own"):
         Journal(path)
     assert path.read_bytes() == FIRST
-    Journal(path, again=True).close()
-
-
-def test_a_full_disk_is_told_when_a_journal_is_opened_again(tmp_path, monkeypatch):
-    path = tmp_path / "journal.jsonl"
-    path.write_bytes(FIRST + LAST)
-    monkeypatch.setattr(os, "write", full)
-    with pytest.raises(InputError, match=r"cannot open the journal .*: no space left on device"):
-        Journal(path, again=True)
-    monkeypatch.undo()
     Journal(path, again=True).close()
 
 

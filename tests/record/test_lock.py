@@ -82,12 +82,3 @@ def test_the_lock_is_given_up_when_the_journal_is_closed_and_not_before(tmp_path
     with closing(Journal(path)):
         assert f"process {os.getpid()} writes" in refusal(path)
     Journal(path, again=True).close()
-
-
-def test_a_file_system_without_locks_is_told(tmp_path, monkeypatch):
-    def none(file, operation):
-        raise OSError(37, "No locks available")
-
-    monkeypatch.setattr("fcntl.flock", none)
-    with pytest.raises(InputError, match=r"cannot open the journal .*: no locks available"):
-        Journal(tmp_path / "journal.jsonl")

@@ -104,21 +104,3 @@ def test_becomes_plain(value, kept):
 @given(st.recursive(st.floats() | st.integers() | st.text(), lambda inner: st.lists(inner, max_size=3)))
 def test_everything_plain_is_json(value):
     json.dumps(plain(value), allow_nan=False)
-
-
-EXACT = st.recursive(
-    st.none()
-    | st.booleans()
-    | st.integers()
-    | st.floats(allow_nan=False, allow_infinity=False)
-    | st.text(st.characters()),
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(st.characters()), inner, max_size=3),
-    max_leaves=10,
-)
-
-
-@given(EXACT)
-def test_what_is_exact_comes_back_from_json_bit_for_bit(value):
-    assert plain(Exact(value)) is value
-    # A repr tells -0.0 from 0.0 and every float from its neighbours.
-    assert repr(json.loads(json.dumps(plain({"value": Exact(value)})))) == repr({"value": value})

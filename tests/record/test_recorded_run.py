@@ -105,12 +105,6 @@ def test_leaves_a_directory_that_explains_the_run(tmp_path, runtime):
     assert runtime.closed == 1
 
 
-def test_two_runs_have_one_trace(tmp_path, runtime):
-    first, second = (recorded_run(LOADED, {}, seed=7, runs=tmp_path) for _ in range(2))
-    assert first["trace"] == second["trace"]
-    assert first["run"] != second["run"]
-
-
 def test_a_view_is_told_the_tree_first_and_the_end_last(tmp_path, runtime):
     view, other = Watcher(), Watcher()
     recorded_run(LOADED, {}, seed=7, runs=tmp_path, views=[view, other])

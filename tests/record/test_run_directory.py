@@ -38,14 +38,6 @@ def test_latest_points_to_the_last_run_and_survives_moving_the_folder(tmp_path):
     assert (tmp_path / "moved" / "latest" / "mark").exists()
 
 
-def test_keeps_params_and_cell_to_the_last_digit(tmp_path):
-    directory = create(tmp_path)
-    kept = {"step": 1 / 240, "small": 1.5e-7, "none": -0.0, "name": "caf\udce9", "off": None}
-    directory.save_inputs(mission="", params=kept, cell={"arm": kept})
-    assert repr(yaml.safe_load((directory.path / "params.yaml").read_text())) == repr(kept)
-    assert repr(yaml.safe_load((directory.path / "cell.yaml").read_text())) == repr({"arm": kept})
-
-
 def test_what_repeats_a_run_is_on_the_disk_before_it_begins(tmp_path, monkeypatch):
     synced = []
     monkeypatch.setattr(os, "fsync", lambda file: synced.append(os.fstat(file).st_ino))

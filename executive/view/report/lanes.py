@@ -10,14 +10,10 @@ from executive.mission.outline import OutlineNode
 from executive.view.report.course import Span, by_node, counts, last_failure
 from executive.view.text import extent, fitted, render
 
-ROW, HEAD, FOOT = 17, 22, 6
-"""Height of a lane, of the clock above the lanes, and of what is free below [pixel]."""
 SHORTEST, LONGEST = 900.0, 6000.0
 """Between these is the length of the time axis [pixel]."""
 SECOND = 45.0
 """Length of a second where that is neither too short nor too long in all [pixel]."""
-THINNEST = 1.5
-"""Width of what took no time [pixel]."""
 APART, BLOT = 1.0, 3.0
 """What is closer to each other and not longer together is one blot to the eye [pixel]."""
 MOST = 8000
@@ -52,19 +48,8 @@ def timeline(course: Sequence[Span], nodes: Sequence[OutlineNode], end: float) -
         }
         for node in shown
     ]
-    return render(
-        "report/timeline.svg",
-        width=left + length + 12,
-        height=HEAD + ROW * len(shown) + FOOT,
-        left=left,
-        scale=scale,
-        ticks=_ticks(end, scale),
-        lanes=lanes,
-        row=ROW,
-        head=HEAD,
-        foot=FOOT,
-        thinnest=THINNEST,
-    )
+    ticks = _ticks(end, scale)
+    return render("report/timeline.svg", left=left, length=length, scale=scale, ticks=ticks, lanes=lanes)
 
 
 def _ticks(end: float, scale: float) -> Iterator[float]:

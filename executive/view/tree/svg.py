@@ -57,22 +57,10 @@ def svg(nodes: Sequence[OutlineNode], name: str, notes: Mapping[str, Note] = Map
     lines = [_lines(*each) for each in zip(cards, said, strict=True)]
     sizes = [_size(*each) for each in zip(nodes, cards, lines, strict=True)]
     plan = layout([node.depth for node in nodes], below, sizes)
-    drawn = []
-    for index, (node, shown, note) in enumerate(zip(nodes, cards, said, strict=True)):
-        kinds = "node skill" if node.kind == "skill" else f"node control {node.kind}"
-        drawn.append(
-            {
-                "node": node,
-                "card": shown,
-                "kinds": f"{kinds} {note.status.lower()}".rstrip(),
-                "id": identifier(node.path),
-                "tooltip": "\n".join((shown.tooltip, *filter(None, note.lines))),
-                "line": _line(plan, parents[index], index, node.depth) if index in parents else "",
-                "lines": lines[index],
-                "indent": _indent(shown),
-            }
-        )
-    return render("tree/tree.svg", name=name, plan=plan, drawn=drawn)
+    edges = [_edge(plan, parents.get(index), index, node.depth) for index, node in enumerate(nodes)]
+    ids, indents = map(identifier, (node.path for node in nodes)), map(_indent, cards)
+    drawn = list(zip(nodes, cards, said, lines, plan.boxes, edges, ids, indents, strict=True))
+    return render("tree/tree.svg", name=name, plan=plan, nodes=nodes, drawn=drawn)
 
 
 def identifier(path: str) -> str:
@@ -98,8 +86,10 @@ def _indent(shown: Card) -> float:
     return _BADGE + 12 if shown.symbol else _PADDING
 
 
-def _line(plan: Layout, parent: int, child: int, depth: int) -> str:
-    """Return the way of the line from a node's parent."""
+def _edge(plan: Layout, parent: int | None, child: int, depth: int) -> str:
+    """Return the way of the line from a node's parent; "" for the root."""
+    if parent is None:
+        return ""
     source, target, trunk = plan.boxes[parent], plan.boxes[child], plan.trunks[depth]
     way = f"M{source.right:.0f} {source.middle:.0f}"
     down = target.middle - source.middle

@@ -18,7 +18,6 @@ import numpy as np
 import pytest
 
 from executive.discovery import discover
-from executive.errors import InputError
 from executive.events import Event
 from executive.mission.load import load_mission
 from executive.runtime.outcome import Outcome
@@ -145,17 +144,6 @@ def test_what_is_to_be_picked_can_be_said_on_the_page(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_nothing_of_it_is_left_when_it_ends() -> None:
-    page = LivePage()
-    pid = page._server.pid
-    page.finish()
-    page.finish()
-    with pytest.raises(ProcessLookupError):
-        os.kill(pid, 0)
-    assert page.problem == ""
-
-
-@pytest.mark.slow
 def test_it_listens_on_loopback_only_and_at_one_port() -> None:
     page = LivePage()
     try:
@@ -237,12 +225,3 @@ def test_what_goes_wrong_with_it_is_said_and_the_run_goes_on() -> None:
         page(Event("look", 2, 0.2, {"frame_object": object(), "found": ()}))
     finally:
         page.finish()
-
-
-def test_without_its_packages_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("executive.view.live.page.find_spec", lambda name: None if name == "viser" else name)
-    with pytest.raises(InputError) as refused:
-        LivePage()
-    assert str(refused.value) == (
-        '--view needs viser; install the extra: uv sync --extra view, or pip install "executive[view]"'
-    )

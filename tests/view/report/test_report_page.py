@@ -171,13 +171,6 @@ def test_the_page_needs_nothing_from_outside(name, request):
     assert policy.startswith("default-src 'none';")
 
 
-def test_pictures_without_room_are_links_below_the_run_directory(failed, monkeypatch):
-    monkeypatch.setattr("executive.view.report.pictures.ROOM", 0)
-    links = {link for link in page(failed).linked() if not link.startswith("data:")}
-    assert all((failed / link).is_file() for link in links)
-    assert len(links) == 3
-
-
 def test_a_name_that_is_not_utf_8_costs_no_report(done, copy, tmp_path):
     run = copy(done).rename(tmp_path / "run\udcff")
     assert "run�" in write_report(run).read_text(encoding="utf-8")
@@ -196,14 +189,3 @@ def test_the_report_is_written_beside_its_record_whole_or_not_at_all(done, copy)
         "and have the report of the copy made"
     )
     assert not list(run.glob(".*"))
-
-
-def test_on_a_full_disk_space_helps(done, copy, monkeypatch):
-    def full(path: Path, text: str) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("executive.view.report.page.write_whole", full)
-    with pytest.raises(
-        InputError, match="no space left on device; free some space or copy the run directory"
-    ):
-        write_report(copy(done))

@@ -18,7 +18,7 @@ from executive.view.items import ItemTable
 from executive.view.terminal.lines import Lines
 from executive.view.terminal.screen import Terminal
 from executive.view.terminal.summary import repeat_command, summary
-from executive.view.tree.outline import branches, opened, skills
+from executive.view.tree.outline import opened, skills
 
 GRASP = "tree/sort/repeat/Grasp"
 
@@ -47,11 +47,6 @@ def item(state: str, **data) -> Event:
 
 def status(node: str, status: str, clock: float = 1.0, **data) -> Event:
     return Event("status", 1, clock, {"node": node, "status": status, **data})
-
-
-def test_a_branch_ends_where_its_parent_has_no_more_children():
-    tree = node("a", "a", node("b", "a/b"), node("c", "a/c", node("d", "a/c/d")))
-    assert branches(outline(tree)) == ["", "├─ ", "└─ ", "   └─ "]
 
 
 def test_skills_are_the_leaves():
@@ -141,11 +136,6 @@ def test_the_live_view_redraws_ten_times_a_second(monkeypatch):
     time.sleep(0.55)
     assert 3 < len(renders) < 10
     view.close()
-
-
-def test_closing_a_view_that_never_opened_is_harmless():
-    Terminal(Console(file=io.StringIO())).close()
-    Lines(io.StringIO()).close()
 
 
 RESULT = {

@@ -67,14 +67,6 @@ def test_a_skill_tells_what_the_mission_connects_and_what_it_declares():
     assert node.reasons == ("missed", "blocked")
 
 
-def test_a_label_is_the_title_and_leaves_the_kind_as_it_is():
-    nodes = outline(Sequence(Site("tree/pair", "pair"), [pick("tree/pair/first", "first")]))
-    assert [(node.title, node.kind, node.skill) for node in nodes] == [
-        ("pair", "sequence", ""), ("first", "skill", "Pick"),
-    ]  # fmt: skip
-    assert nodes[0].detail == "sequence"
-
-
 def test_every_node_knows_what_it_is_to_its_parent_and_which_subtree_begins_with_it():
     assert [(node.slot, node.title, node.subtrees) for node in outline(tree())] == [
         ("", "try", ()),
@@ -97,13 +89,6 @@ def test_a_node_knows_after_which_failures_it_runs():
     handlers = [([("Pick", "missed")], look("tree/try/catch/1/look"))]
     root = Says(Site("tree/try"), pick("tree/try/Pick"), handlers)
     assert [node.when for node in outline(root)] == ["", "", "on Pick.missed", ""]
-
-
-def test_a_subtree_that_is_one_node_is_told_from_the_node():
-    inner = in_subtree(pick("tree/repeat/do/look/close/Pick"), "look", "close")
-    (_, node) = outline(Retry(Site("tree/repeat"), inner, 2))
-    assert (node.slot, node.title, node.subtree) == ("do", "Pick", "look / close")
-    assert node.name == "do look close: Pick"
 
 
 def test_children_stand_below_their_parents():
