@@ -14,7 +14,7 @@ from executive.record.journal import ending_of, read_journal
 from executive.record.recorded_mission import recorded_mission
 from executive.record.recorded_run import Recording, View
 from executive.record.recorder import Recorder
-from executive.record.replay import Replay, compare
+from executive.record.replay import compare
 from executive.record.result import ENDED
 from executive.record.run_directory import RunDirectory
 from executive.tape.past import Past
@@ -72,7 +72,14 @@ def resumed_run(
         past, seed = _past(directory)
         assert past.start is not None, "a past to take up has begun"
         loaded = recorded_mission(path, past.start, skills)
-        _require_same(compare(loaded, skills, _taken_up(past), seed), path)
+        # Not the step in which it was halted or in which a skill broke: a mended skill may go on there.
+        taken_up = past if past.halt is None else past.before(int(past.halt["tick"]))
+        replay = compare(loaded, skills, taken_up, seed)
+        if not replay.same:
+            raise InputError(
+                f'the run in "{path}" cannot be taken up again: {replay.difference}. The executive or a '
+                "skill has been changed since; go back to what it was run with, or run the mission anew"
+            )
         run = Run(
             loaded, skills, seed=seed, gui=gui, realtime=realtime, requests=past.start["requests"],
             keyboard=keyboard, kind=kind, past=past, takes_up=directory.world,
@@ -110,25 +117,9 @@ def _past(directory: RunDirectory) -> tuple[Past, int]:
     return past, int(past.start["seed"])
 
 
-def _taken_up(past: Past) -> Past:
-    """Return what of a past is taken up: not the step in which it was halted, or in which a skill broke.
-
-    So a skill that was mended since may go on where it went wrong.
-    """
-    return past if past.halt is None else past.before(int(past.halt["tick"]))
-
-
 def _events(past: Past) -> Iterator[Event]:
     """Yield what those who follow a run have to know, and are not told when its past is played."""
     for entry in past.entries:
         if entry["kind"] in UNPLAYED:
             data = {key: value for key, value in entry.items() if key not in ("tick", "clock", "kind")}
             yield Event(entry["kind"], entry["tick"], entry["clock"], data)
-
-
-def _require_same(replay: Replay, path: Path) -> None:
-    if not replay.same:
-        raise InputError(
-            f'the run in "{path}" cannot be taken up again: {replay.difference}. The executive or a skill '
-            "has been changed since; go back to what it was run with, or run the mission anew"
-        )

@@ -139,7 +139,7 @@ def _place(node: Node) -> str:
 
 
 def _look(case: Case) -> dict[str, Any] | None:
-    item = case.course.items.of(case.item)
+    item = case.course.items.items.get(case.item)
     if item is None or item.look is None:
         return case.course.items.last_look
     return {"item": case.item, "attempts": item.row.get("attempts", 0), **item.look}
@@ -155,7 +155,7 @@ def _lost(name: str, item: ItemCourse) -> dict[str, Any]:
 def _picture(case: Case, run: Path) -> str:
     """Return the picture of the failure, or else of what was decided on the item last."""
     reason = case.outcome.reason if case.outcome.status == "FAILURE" else ""
-    item = case.course.items.of(case.item)
+    item = case.course.items.items.get(case.item)
     if case.lost and item is not None and item.failed is not None:
         reason = item.failed[0]
     for about in dict.fromkeys([(case.item, reason.rpartition(".")[2]), (case.item, "")]):
