@@ -1,4 +1,4 @@
-"""The journal: everything that happened in a run, one JSON object per line, never rewritten."""
+"""Journal of a run: everything that happened, one JSON object per line, never rewritten."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from executive.record.lock import lock
 from executive.record.whole_file import reason_of
 
 _ENCODER = json.JSONEncoder(ensure_ascii=False, allow_nan=False, check_circular=False)
-_ESCAPING = json.JSONEncoder(ensure_ascii=True, allow_nan=False, check_circular=False)
 
 
 class Journal:
@@ -105,7 +104,8 @@ class Journal:
 
     def _encode(self, entry: Entry) -> bytes:
         try:
-            return _line_of(entry)
+            # Half a surrogate pair, in a text that is to be kept exactly, becomes an escape of JSON.
+            return (_ENCODER.encode(entry) + "\n").encode(errors="backslashreplace")
         except (TypeError, ValueError, RecursionError) as error:
             raise Fault(
                 f'the journal has no words for an event of kind "{entry["kind"]}": {error}; '
@@ -159,14 +159,6 @@ def ending_of(entries: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
     A run that was taken up again has ended only when it ended again.
     """
     return entries[-1] if entries and entries[-1].get("kind") == "end" else None
-
-
-def _line_of(entry: Entry) -> bytes:
-    try:
-        return (_ENCODER.encode(entry) + "\n").encode()
-    except UnicodeEncodeError:
-        # Half a surrogate pair, in a text that is to be kept exactly, can only be written as an escape.
-        return (_ESCAPING.encode(entry) + "\n").encode()
 
 
 def _entry_in(line: bytes) -> Entry:

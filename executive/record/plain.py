@@ -35,13 +35,7 @@ def plain(value: Any) -> Any:
 
 
 def _text(value: str) -> str:
-    if value.isascii():
-        return value
-    try:
-        value.encode()
-    except UnicodeEncodeError:
-        return value.encode(errors="backslashreplace").decode()
-    return value
+    return value if value.isascii() else value.encode(errors="backslashreplace").decode()
 
 
 def _number(value: Any) -> float | str:

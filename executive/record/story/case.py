@@ -71,19 +71,14 @@ def verdict(case: Case) -> str:
         return outcome.message + (" while the operator was asked" if case.course.asking else during)
     if case.lost:
         were = "object was" if len(case.lost) == 1 else "objects were"
-        return f"{len(case.lost)} {were} lost: {_listed(list(case.lost))}"
+        more = f" and {len(case.lost) - MOST} more" if len(case.lost) > MOST else ""
+        return f"{len(case.lost)} {were} lost: {', '.join(list(case.lost)[:MOST])}{more}"
     if not case.links:
         return outcome.message
     if isinstance(case.node, nodes.SkillNode):
         reason = outcome.reason.rpartition(".")[2]
         return f"{case.named(outcome.node)} failed ({reason}){_tried(case)}: {outcome.message}"
     return f"{case.links[-1].name}{_tried(case)}: {outcome.message}{during}"
-
-
-def _listed(names: Sequence[str]) -> str:
-    """Return names in a sentence, of many only the first."""
-    more = f" and {len(names) - MOST} more" if len(names) > MOST else ""
-    return ", ".join(names[:MOST]) + more
 
 
 def _tried(case: Case) -> str:

@@ -82,6 +82,8 @@ class Story:
         case = Case(self._loaded, self._course, outcome)
         arm = _arm(at_rest) if outcome.status == "FAULT" else "at rest"
         reads = list(self._reads(case))
+        recorded, journal = not case.course.unrecorded, RunDirectory(run).journal
+        begun = journal.exists() and journal.stat().st_size > 0
         told = {
             "status": outcome.status,
             "reason": outcome.reason,
@@ -103,8 +105,8 @@ class Story:
             "arm": arm,
             "holds": outcome.holds,
             "raised_at": case.course.raised_at,
-            "recorded": not case.course.unrecorded,
-            "resumes": outcome.status not in ENDED and not (case.course.unrecorded and _is_empty(run)),
+            "recorded": recorded,
+            "resumes": outcome.status not in ENDED and (recorded or begun),
             "picture": _picture(case, run),
             "next": list(advice(case, arm, reads)),
         }
@@ -119,11 +121,6 @@ class Story:
         names = [name for part in self._skills[node.skill].uses for name in DECIDING.get(part, ())]
         read = [sense for sense in ran.senses if sense.name in names and not sense.raised]
         yield from reversed(refused or read)
-
-
-def _is_empty(run: Path) -> bool:
-    journal = RunDirectory(run).journal
-    return not journal.exists() or journal.stat().st_size == 0
 
 
 def _node(case: Case) -> dict[str, str] | None:

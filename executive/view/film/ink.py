@@ -6,8 +6,8 @@ from functools import lru_cache
 
 from PIL import Image, ImageDraw, ImageFont
 
-BACK, CARD, RULE = "#14181D", "#222932", "#2E3742"
-"""Colours behind everything, of what stands out from it, and of lines."""
+BACK, RULE = "#14181D", "#2E3742"
+"""Colours behind everything, and of lines."""
 INK, DIM, FAINT = "#F3F6F8", "#9AA6B2", "#66727F"
 """Colours of text: what is looked at, what is read, what is at rest."""
 RUNNING, SUCCESS, FAILURE = "#F2A71B", "#45BD70", "#F0685C"

@@ -63,9 +63,6 @@ class Keys:
 
     def _do(self, key: str) -> None:
         if key in PAUSE:
-            if self._control.paused:
-                self._control.resume()
-            else:
-                self._control.pause()
+            (self._control.resume if self._control.paused else self._control.pause)()
         elif key in STEP:
             self._control.step()

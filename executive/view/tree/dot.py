@@ -39,7 +39,9 @@ def _branch(index: int, nodes: Sequence[OutlineNode], below: Sequence[Sequence[i
     node = nodes[index]
     lines = [_node(node)]
     for child in below[index]:
-        lines += [*_branch(child, nodes, below), _edge(node, nodes[child])]
+        slot = f" [label={_quoted(nodes[child].slot)}]" if nodes[child].slot else ""
+        edge = f"{_quoted(node.path)} -> {_quoted(nodes[child].path)}{slot};"
+        lines += [*_branch(child, nodes, below), edge]
     if node.subtrees:
         head = f"subgraph {_quoted(f'cluster {node.path}')} {{"
         lines = [head, f"label={_quoted(node.subtree)}; style=dashed; color=gray;", *lines, "}"]
@@ -53,11 +55,6 @@ def _node(node: OutlineNode) -> str:
     style = ', style="rounded"' if node.kind == "skill" else ""
     tooltip = _quoted(shown.tooltip)
     return f"{_quoted(node.path)} [label={_quoted(label)}, shape={shape}{style}, tooltip={tooltip}];"
-
-
-def _edge(parent: OutlineNode, node: OutlineNode) -> str:
-    label = f" [label={_quoted(node.slot)}]" if node.slot else ""
-    return f"{_quoted(parent.path)} -> {_quoted(node.path)}{label};"
 
 
 def _quoted(text: str) -> str:
