@@ -6,7 +6,6 @@ import os
 
 import pytest
 
-from executive.errors import InputError
 from executive.events import Event
 from executive.record.frames import Frames
 from executive.record.journal import Journal, read_journal
@@ -52,16 +51,6 @@ def test_the_pictures_are_waited_for_whatever_became_of_the_journal(directory, m
     first, second = recorder.problem.split("; believe what you see in the cell rather than the record; ")
     assert "may lack its last lines" in first
     assert second == "no pictures were drawn: file exists"
-
-
-def test_a_run_that_is_taken_up_again_goes_on_with_its_journal(directory):
-    for again in (False, True):
-        recorder = Recorder(directory, frames=False, again=again)
-        recorder(END)
-        recorder.close()
-    assert len(read_journal(directory.journal)) == 2
-    with pytest.raises(InputError, match="the record of another run"):
-        Recorder(directory)
 
 
 def test_the_journal_may_be_of_another_make(directory):

@@ -84,15 +84,6 @@ def test_the_first_decision_of_an_edited_mission_that_differs_is_told(missions: 
     )
 
 
-@pytest.mark.slow
-def test_another_tree_around_the_same_skills_is_no_difference(missions: Path, tmp_path: Path) -> None:
-    path = recorded(missions, tmp_path, "sort_fruit")
-    done = again(
-        path, edited(path, missions, "do: [{use: carry},", "do: [{sequence: [{use: carry}, succeed]},")
-    )
-    assert (done.edited, done.same, done.difference) == (True, True, "")
-
-
 def test_a_mission_that_gives_up_sooner_says_where(missions: Path) -> None:
     file, skills = missions / "sort_overhead.yaml", discover()
     four_times = [during("*/Grasp", seal_fails(), nth=(1, 2, 3, 4))]

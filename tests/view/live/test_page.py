@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import os
 import signal
-import subprocess
 import threading
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -24,14 +23,8 @@ from executive.runtime.outcome import Outcome
 from executive.runtime.run import Run
 from executive.testing.fake_cell import FakeCell
 from executive.view.live.page import MAX_QUEUED_NEWS, LivePage
+from tests.record.conftest import MISSION
 
-MISSION = """\
-mission: bring_one
-description: Bring one object.
-cell: cells/overhead.yaml
-routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}
-tree: [MoveToScan, Detect, Localize, SelectTarget, Approach, Grasp, Transit, Release]
-"""
 ASKING = """\
 mission: ask
 description: Ask what to bring.
@@ -199,18 +192,6 @@ def test_a_page_that_hangs_is_told_no_more_than_so_much_and_costs_a_few_seconds(
     assert page._queue.qsize() <= MAX_QUEUED_NEWS
     page.finish({"status": "SUCCESS"})
     assert page._server.returncode == -signal.SIGKILL
-
-
-@pytest.mark.slow
-def test_a_server_that_cannot_begin_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
-    popen = subprocess.Popen
-    monkeypatch.setattr(
-        "subprocess.Popen", lambda words, **options: popen([*words[:3], "no.such.program"], **options)
-    )
-    page = LivePage()
-    page.finish()
-    assert page.problem.startswith("the page ended before the run: ")
-    assert "No module named" in page.problem
 
 
 def test_what_goes_wrong_with_it_is_said_and_the_run_goes_on() -> None:

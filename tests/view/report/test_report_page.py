@@ -11,7 +11,6 @@ from typing import Any
 import pytest
 from page_reader import SECTIONS, Page
 
-from executive.errors import InputError
 from executive.record.journal import read_journal
 from executive.view.report.facts import Facts
 from executive.view.report.page import report, write_report
@@ -174,18 +173,3 @@ def test_the_page_needs_nothing_from_outside(name, request):
 def test_a_name_that_is_not_utf_8_costs_no_report(done, copy, tmp_path):
     run = copy(done).rename(tmp_path / "run\udcff")
     assert "run�" in write_report(run).read_text(encoding="utf-8")
-
-
-def test_the_report_is_written_beside_its_record_whole_or_not_at_all(done, copy):
-    run = copy(done)
-    file = write_report(run)
-    assert (file, file.read_text()) == (run / "report.html", report(Facts(run)))
-    file.unlink()
-    file.mkdir()
-    with pytest.raises(InputError) as caught:
-        write_report(run)
-    assert str(caught.value) == (
-        f'cannot write the report "{file}": is a directory; copy the run directory to where you may write, '
-        "and have the report of the copy made"
-    )
-    assert not list(run.glob(".*"))
