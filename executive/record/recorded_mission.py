@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import yaml
 from pydantic import TypeAdapter, ValidationError
@@ -11,12 +12,14 @@ from pydantic_core import to_json
 
 from executive.cell_config import CellConfig
 from executive.errors import InputError
-from executive.mission.load import LoadedMission, load_mission
 from executive.mission.outline import OutlineNode
 from executive.mission.parse.read_mission import GivenCell
 from executive.record.whole_file import reason_of
 from executive.skill import Skill
 from executive.tape.past import Entry
+
+if TYPE_CHECKING:
+    from executive.mission.load import LoadedMission
 
 _NODES = TypeAdapter(list[OutlineNode])
 
@@ -36,6 +39,8 @@ def recorded_mission(
         MissionError: Something is wrong with the mission: the skills it uses are others by now.
         InputError: The directory lacks a file.
     """
+    from executive.mission.load import load_mission
+
     overrides = {key: text for key, text in run["overrides"].items() if not key.startswith("cell.")}
     given = GivenCell(recorded_cell(path), Path(run["base"]) / "cell.yaml")
     return load_mission(mission or path / "mission.yaml", skills, overrides, cell=given)
