@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from PIL import Image, ImageColor
@@ -10,7 +12,7 @@ from small_tree import NODES, node, status
 from executive.view.film.course import Course
 from executive.view.film.film import shown_steps
 from executive.view.film.ink import BACK, FAILURE, FAINT, RUNNING, SUCCESS, clipped, font, put_mark, wrapped
-from executive.view.film.page import draw_ending, ending_of
+from executive.view.film.page import draw_ending, draw_page, ending_of
 from executive.view.film.panel import MOST, draw_branch, draw_items, fitted, height, kept
 from executive.view.items import Row
 
@@ -129,3 +131,18 @@ def test_the_end_stands_on_the_picture_and_leaves_the_page_as_it_was() -> None:
 )
 def test_steps_are_shown_at_even_times_up_to_the_last(steps, each, shown) -> None:
     assert shown_steps(steps, each) == shown
+
+
+def test_a_page_shows_picture_camera_caption_and_how_far_the_run_is(tmp_path) -> None:
+    Image.new("RGB", (640, 556), "white").save(tmp_path / "000000_cube-1.jpg")
+    entries = [status(0, "tree", "RUNNING"), status(1, "tree/Grasp", "RUNNING", item="cube-1")]
+    course = Course(entries, NODES, [tmp_path / "000000_cube-1.jpg"])
+    course.go_to(240, 1.0)
+    source = SimpleNamespace(start={"mission": "sort"}, items=0, bins={}, nodes=NODES)
+    picture = np.full((720, 800, 3), 128, np.uint8)
+    page = np.asarray(draw_page(source, picture, course, "seed 5", 4.0))
+    for part, ends in ((np.s_[:360, :800], (20, 20, 205, 251)), (np.s_[360:, :800], (303, 20, 340, 155))):
+        changed = np.argwhere((page[part] != 128).any(axis=2))
+        assert (*changed.min(axis=0), *changed.max(axis=0)) == ends
+    bar = (page[95, 800:] == ImageColor.getrgb(RUNNING)).all(axis=1)
+    assert (bar.argmax(), bar.sum()) == (28, 107)

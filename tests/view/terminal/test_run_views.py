@@ -173,3 +173,16 @@ def test_the_summary_of_a_success_names_the_report_and_its_command_survives_a_sh
         "runs/latest  (repeat: executive run 'my mission.yaml' --seed 0 --set 'a=x y')",
         "report: runs/x/report.html",
     ]
+
+
+def test_the_keys_are_named_beside_the_clock_where_there_is_a_keyboard(monkeypatch):
+    keys = SimpleNamespace(listen=lambda: None, leave=lambda: None)
+    monkeypatch.setattr("executive.view.terminal.screen.Keys", lambda file, control: keys)
+    view, control = Terminal(Console(file=io.StringIO(), force_terminal=True), keyboard=0), RunControl()
+    view.open(SimpleNamespace(root=TREE, control=control))
+    for words in ("p pause, s step, Ctrl-C stop", "paused: p go on, s step, Ctrl-C stop"):
+        page = Console(file=io.StringIO(), width=100)
+        page.print(view.render())
+        assert page.file.getvalue().splitlines()[0].rstrip() == f"  0.0 s   {words}"
+        control.pause()
+    view.close()
