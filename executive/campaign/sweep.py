@@ -65,7 +65,7 @@ def run_job(job: Job) -> Result:
     from executive.discovery import discover
     from executive.mission.load import load_mission
     from executive.record.recorded_run import recorded_run
-    from executive.view.report.leave import leave_report
+    from executive.view.report.page import leave_report
 
     skills = discover()
     loaded = load_mission(job.mission, skills, job.overrides)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from executive.cli.options import json_option, overrides_option
 from executive.cli.output import print_json, stdout_kept_clean
+
+if TYPE_CHECKING:
+    from executive.mission.findings import Finding
+    from executive.mission.flow.endings import Ending
 
 
 @click.command(name="check")
@@ -27,7 +32,6 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
         from executive.mission.findings import Finding, MissionError
         from executive.mission.load import load_mission
         from executive.runtime.cells import cell_kind
-        from executive.view.verdict import verdict
 
         skills = discover()
         reports: list[dict[str, Any]] = []
@@ -39,7 +43,7 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
                 report["findings"] = [asdict(finding) for finding in loaded.warnings]
                 report["endings"] = [asdict(ending) for ending in loaded.endings]
                 report["ok"] = True
-                texts.append(verdict(mission, loaded.warnings, loaded.endings))
+                texts.append(_verdict(mission, loaded.warnings, loaded.endings))
             except MissionError as error:
                 report["findings"] = [asdict(finding) for finding in error.findings]
                 texts.append(str(error))
@@ -53,3 +57,18 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
     else:
         click.echo("\n".join(texts))
     ctx.exit(0 if all(report["ok"] for report in reports) else 2)
+
+
+def _verdict(mission: str, findings: Iterable[Finding], endings: Sequence[Ending]) -> str:
+    """Return the warnings of a mission that can be run, and which failures can still end it."""
+    lines = [*map(str, findings), f"{mission}: ok"]
+    if endings:
+        lines.append("  nothing deals with these failures; each would end the mission:")
+        # A subtree used twice is one place.
+        reasons: dict[tuple[str, str, int], dict[str, None]] = {}
+        for ending in endings:
+            reasons.setdefault((ending.source, ending.path, ending.line), {})[ending.reason] = None
+        names = {place: f"{place[0]}: {', '.join(found)}" for place, found in reasons.items()}
+        width = max(map(len, names.values()))
+        lines += [f"    {name:{width}}  {path}:{line}" for (_, path, line), name in names.items()]
+    return "\n".join(lines)

@@ -40,14 +40,13 @@ def command(
         from executive.record.find_run import find_run
         from executive.record.run_directory import RunDirectory
         from executive.view.film.film import film
-        from executive.view.film.formats import format_of
-        from executive.view.film.place import file_for
+        from executive.view.film.formats import file_for, format_of
         from executive.view.film.source import Source
 
         directory = RunDirectory(find_run(run, runs))
         format = format_of(output, gif)
         file = output or directory.path / f"film{format.suffix}"
-        source = Source.of(directory)
+        source = Source(directory)
         with file_for(file, force=force) as part, bar("frames", quiet=quiet) as progress:
             frames = film(
                 source, part, format, speed=speed or format.speed, workers=workers, progress=progress

@@ -15,7 +15,6 @@ from executive.cli.options import json_option, overrides_option, runs_option, se
 from executive.cli.output import print_json, stdout_kept_clean
 
 if TYPE_CHECKING:
-    from executive.record.recorded_run import View
     from executive.skill import Skill
     from executive.view.live.page import LivePage
     from executive.view.terminal.lines import Lines
@@ -67,26 +66,26 @@ def command(
     with stdout_kept_clean():
         from executive.discovery import discover
         from executive.record.result import EXIT_CODES
-        from executive.view.repeat import repeat_command
-        from executive.view.report.leave import leave_report
-        from executive.view.story import story_lines
-        from executive.view.terminal.summary import summary
-        from executive.view.together import Together
+        from executive.view.report.page import leave_report
+        from executive.view.terminal.summary import repeat_command, story_lines, summary
 
         skills = discover()
         shown = None if quiet else _view()
         with _page(live) as page:
-            views = [view for view in (shown, page) if view is not None]
-            view = Together(views, paused=paused) if views else None
-            options = {"gui": gui, "realtime": realtime, "keyboard": page is None or typing}
+            options: dict[str, Any] = {
+                "views": [view for view in (shown, page) if view is not None],
+                "paused": paused,
+                "gui": gui,
+                "realtime": realtime,
+                "keyboard": page is None or typing,
+            }
             if mission is None:
                 assert resume is not None
-                result, repeat = _resumed(resume, runs, skills, view, **options)
+                result, repeat = _resumed(resume, runs, skills, options)
             else:
                 asked = requests or None
-                result = _fresh(
-                    mission, skills, overrides, view, seed=seed, runs=runs, requests=asked, **options
-                )
+                options |= {"seed": seed, "runs": runs, "requests": asked}
+                result = _fresh(mission, skills, overrides, options)
                 # What was asked for by a person is asked for again.
                 repeat = repeat_command(
                     mission, seed=seed, overrides=overrides, requests=requests or result["requests"]
@@ -95,7 +94,7 @@ def command(
             if page is not None:
                 page.finish(result, report and str(Path(report).resolve()))
                 problem = "; ".join(filter(None, (problem, page.problem)))
-        if problem and (view is not None or result["story"] is not None):
+        if problem and (options["views"] or result["story"] is not None):
             click.echo(f"note: {problem}", err=True)
         if shown is not None:
             click.echo(summary(result, shown.items, repeat, report), err=True, nl=False)
@@ -124,11 +123,7 @@ def _require_sense(ctx: click.Context, mission: str | None, resume: str | None) 
 
 
 def _fresh(
-    mission: str,
-    skills: Mapping[str, type[Skill]],
-    overrides: dict[str, str],
-    view: View | None,
-    **options: Any,
+    mission: str, skills: Mapping[str, type[Skill]], overrides: dict[str, str], options: dict[str, Any]
 ) -> dict[str, Any]:
     """Run a mission from its start and return the result."""
     from executive.mission.load import load_mission
@@ -136,23 +131,23 @@ def _fresh(
     from executive.runtime.cells import cell_kind
 
     loaded = load_mission(mission, skills, overrides, cell_kind)
-    if view is not None:
+    if options["views"]:
         for warning in loaded.warnings:
             click.echo(str(warning), err=True)
-    return recorded_run(loaded, skills, view=view, **options)
+    return recorded_run(loaded, skills, **options)
 
 
 def _resumed(
-    name: str, runs: Path, skills: Mapping[str, type[Skill]], view: View | None, **options: Any
+    name: str, runs: Path, skills: Mapping[str, type[Skill]], options: dict[str, Any]
 ) -> tuple[dict[str, Any], str]:
     """Take up a run again and return the result, and the command that would repeat it."""
     from executive.record.find_run import find_run
     from executive.record.journal import read_journal
     from executive.record.resumed_run import resumed_run
-    from executive.view.repeat import repeat_command
+    from executive.view.terminal.summary import repeat_command
 
     path = find_run(name, runs)
-    result = resumed_run(path, skills, view=view, **options)
+    result = resumed_run(path, skills, **options)
     start, *_ = read_journal(path / "journal.jsonl")
     return result, repeat_command(
         start["file"], seed=start["seed"], overrides=start["overrides"], requests=result["requests"]

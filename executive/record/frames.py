@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from executive.events import Event
-from executive.messages import Detection
+from executive.messages import Detection, Frame
 from executive.record.pictures.drawer import Drawer
 from executive.record.pictures.scene import Scene
 from executive.record.progress import Progress, is_skill, skill_name
@@ -23,18 +20,6 @@ KEPT = 24
 
 MOST = 200
 """Pictures of a run, so that one that goes on for hours does not fill the disk."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Look:
-    """What a picture needs of a look; depth, which it does not need, is three times as large."""
-
-    image: NDArray[np.uint8]
-    visible: NDArray[np.bool_]
-    camera: str
-    detector: str
-    stamp: float
-    found: Sequence[Mapping[str, Any]]
 
 
 class Frames:
@@ -48,7 +33,7 @@ class Frames:
     def __init__(self, folder: Path) -> None:
         self._drawer = Drawer(folder)
         self._progress = Progress()
-        self._looks: dict[int, _Look] = {}
+        self._looks: dict[int, tuple[Frame, Mapping[str, Any]]] = {}
         self._choices: dict[str, Event] = {}
         self._rests_on: int | None = None
         self._unshown: int | None = None
@@ -80,10 +65,9 @@ class Frames:
 
     def _remember(self, event: Event) -> None:
         frame = event.data["frame_object"]
-        self._looks[frame.id] = _Look(
-            frame.image, frame.visible, frame.camera, event.data.get("detector", ""), frame.stamp,
-            event.data.get("found", ()),
-        )  # fmt: skip
+        said = {key: event.data.get(key, "") for key in ("detector", "found")}
+        # Depth, which a picture does not need, is three times as large as the rest.
+        self._looks[frame.id] = replace(frame, depth=None), said
         self._unshown = frame.id
         if len(self._looks) > KEPT:
             # What the last decision rests on is wanted again if the attempt fails, however many looks later.
@@ -110,20 +94,21 @@ class Frames:
         else:
             self._drawn += 1
 
-    def _scene(self, event: Event, look: _Look, choice: Mapping[str, Any]) -> Scene:
+    def _scene(self, event: Event, look: tuple[Frame, Mapping[str, Any]], choice: Mapping[str, Any]) -> Scene:
+        frame, said = look
         item = choice.get("item", "")
         known = self._progress.item(item)
         reason = event.data.get("reason", "")
         return Scene(
-            image=look.image,
-            visible=look.visible,
-            seen=[Detection(box["label"], box["confidence"], tuple(box["box"])) for box in look.found],
-            chosen=_chosen(choice, look.found, choice.get("position", known.get("position"))),
+            image=frame.image,
+            visible=frame.visible,
+            seen=[Detection(box["label"], box["confidence"], tuple(box["box"])) for box in said["found"]],
+            chosen=_chosen(choice, said["found"], choice.get("position", known.get("position"))),
             mission=self._progress.mission,
             clock=event.clock,
-            camera=look.camera,
-            detector=look.detector,
-            age=event.clock - look.stamp,
+            camera=frame.camera,
+            detector=said["detector"],
+            age=event.clock - frame.stamp,
             phase=self._progress.phase,
             item=item,
             bin=choice.get("bin", ""),

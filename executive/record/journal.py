@@ -1,4 +1,4 @@
-"""The journal: everything that happened in a run, one JSON object per line, never rewritten."""
+"""Journal of a run: everything that happened, one JSON object per line, never rewritten."""
 
 from __future__ import annotations
 
@@ -6,16 +6,17 @@ import contextlib
 import errno
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from executive.errors import Fault, InputError, RecordLost
 from executive.events import Event
 from executive.record.entry import Entry, entry_of
 from executive.record.lock import lock
+from executive.record.whole_file import reason_of
 
 _ENCODER = json.JSONEncoder(ensure_ascii=False, allow_nan=False, check_circular=False)
-_ESCAPING = json.JSONEncoder(ensure_ascii=True, allow_nan=False, check_circular=False)
 
 
 class Journal:
@@ -47,7 +48,7 @@ class Journal:
                 os.close(file)
                 raise
         except OSError as error:
-            raise InputError(f'cannot open the journal "{path}": {_reason(error)}') from error
+            raise InputError(f'cannot open the journal "{path}": {reason_of(error)}') from error
         self._file: int | None = file
 
     def __call__(self, event: Event) -> None:
@@ -75,7 +76,7 @@ class Journal:
             with contextlib.suppress(OSError):
                 os.ftruncate(self._file, self._length)
             raise RecordLost(
-                f'the journal "{self._path}" cannot be written: {_reason(error)}; '
+                f'the journal "{self._path}" cannot be written: {reason_of(error)}; '
                 "the run stops because it could not be explained afterwards"
             ) from error
 
@@ -93,7 +94,7 @@ class Journal:
                 self._sync(file)
         except OSError as error:
             raise Fault(
-                f'the journal "{self._path}" may lack its last lines: {_reason(error)}; '
+                f'the journal "{self._path}" may lack its last lines: {reason_of(error)}; '
                 "believe what you see in the cell rather than the record"
             ) from error
         finally:
@@ -103,7 +104,8 @@ class Journal:
 
     def _encode(self, entry: Entry) -> bytes:
         try:
-            return _line_of(entry)
+            # Half a surrogate pair, in a text that is to be kept exactly, becomes an escape of JSON.
+            return (_ENCODER.encode(entry) + "\n").encode(errors="backslashreplace")
         except (TypeError, ValueError, RecursionError) as error:
             raise Fault(
                 f'the journal has no words for an event of kind "{entry["kind"]}": {error}; '
@@ -138,7 +140,7 @@ def read_journal(path: Path) -> list[Entry]:
     try:
         content = path.read_bytes()
     except OSError as error:
-        raise InputError(f'cannot read the journal "{path}": {_reason(error)}') from error
+        raise InputError(f'cannot read the journal "{path}": {reason_of(error)}') from error
     entries = []
     for number, line in enumerate(content[: _whole(content)].splitlines(), start=1):
         try:
@@ -151,20 +153,12 @@ def read_journal(path: Path) -> list[Entry]:
     return entries
 
 
-def ending_of(entries: Sequence[Entry]) -> Entry | None:
+def ending_of(entries: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
     """Return the `end` of a run by its journal, or None: it was cut off, or goes on.
 
     A run that was taken up again has ended only when it ended again.
     """
     return entries[-1] if entries and entries[-1].get("kind") == "end" else None
-
-
-def _line_of(entry: Entry) -> bytes:
-    try:
-        return (_ENCODER.encode(entry) + "\n").encode()
-    except UnicodeEncodeError:
-        # Half a surrogate pair, in a text that is to be kept exactly, can only be written as an escape.
-        return (_ESCAPING.encode(entry) + "\n").encode()
 
 
 def _entry_in(line: bytes) -> Entry:
@@ -218,7 +212,3 @@ def _empty(file: int, path: Path) -> int:
             "for instance below another --runs DIR"
         )
     return 0
-
-
-def _reason(error: OSError) -> str:
-    return (error.strerror or str(error)).lower()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from pathlib import PurePath
 from typing import Any
@@ -34,52 +34,8 @@ def plain(value: Any) -> Any:
     return _rule(value.__class__)(value)
 
 
-@functools.cache
-def _rule(kind: type) -> Callable[[Any], Any]:
-    """Return what makes values of this type plain; found once per type, for events are told within a tick."""
-    if issubclass(kind, Enum):
-        return lambda value: plain(value.value)
-    if issubclass(kind, str):
-        return _text
-    if issubclass(kind, int):
-        return lambda value: value if value.bit_length() <= LONGEST else hex(value)
-    if issubclass(kind, type(None)):
-        return lambda value: value
-    if issubclass(kind, (float, np.floating)):
-        return _number
-    if issubclass(kind, np.generic):
-        return lambda value: plain(value.item())
-    if issubclass(kind, np.ndarray):
-        return lambda value: plain(value.tolist())
-    if issubclass(kind, Frame):
-        return lambda frame: {"frame": frame.id, "camera": frame.camera, "stamp": _number(frame.stamp)}
-    if issubclass(kind, Pose):
-        return lambda pose: pose.rounded(DIGITS)
-    if issubclass(kind, Mapping):
-        return lambda mapping: {_text(str(key)): plain(value) for key, value in mapping.items()}
-    if issubclass(kind, (list, tuple)):
-        return lambda values: [plain(value) for value in values]
-    if issubclass(kind, (set, frozenset)):
-        return lambda values: sorted((plain(value) for value in values), key=repr)
-    if issubclass(kind, Exact):
-        return lambda exact: exact.value
-    if dataclasses.is_dataclass(kind):
-        names = [field.name for field in dataclasses.fields(kind)]
-        return lambda value: {name: plain(getattr(value, name)) for name in names}
-    if issubclass(kind, PurePath):
-        return lambda path: _text(str(path))
-    # A default repr holds a memory address, which would make equal runs look different.
-    return lambda _: kind.__name__
-
-
 def _text(value: str) -> str:
-    if value.isascii():
-        return value
-    try:
-        value.encode()
-    except UnicodeEncodeError:
-        return value.encode(errors="backslashreplace").decode()
-    return value
+    return value if value.isascii() else value.encode(errors="backslashreplace").decode()
 
 
 def _number(value: Any) -> float | str:
@@ -88,3 +44,34 @@ def _number(value: Any) -> float | str:
         return str(number)
     # Adding zero turns -0.0 into 0.0, which compare equal but print differently.
     return round(number, DIGITS) + 0.0
+
+
+_RULES: Sequence[tuple[type | tuple[type, ...], Callable[[Any], Any]]] = (
+    (Enum, lambda value: plain(value.value)),
+    (str, _text),
+    (int, lambda value: value if value.bit_length() <= LONGEST else hex(value)),
+    (type(None), lambda value: value),
+    ((float, np.floating), _number),
+    (np.generic, lambda value: plain(value.item())),
+    (np.ndarray, lambda value: plain(value.tolist())),
+    (Frame, lambda frame: {"frame": frame.id, "camera": frame.camera, "stamp": _number(frame.stamp)}),
+    (Pose, lambda pose: pose.rounded(DIGITS)),
+    (Mapping, lambda mapping: {_text(str(key)): plain(value) for key, value in mapping.items()}),
+    ((list, tuple), lambda values: [plain(value) for value in values]),
+    ((set, frozenset), lambda values: sorted((plain(value) for value in values), key=repr)),
+    (Exact, lambda exact: exact.value),
+    (PurePath, lambda path: _text(str(path))),
+)
+"""Functions that make values of these types plain; the first that fits counts."""
+
+
+@functools.cache
+def _rule(kind: type) -> Callable[[Any], Any]:
+    """Return the function for a type; found once per type, for events are recorded within a tick."""
+    if rule := next((rule for known, rule in _RULES if issubclass(kind, known)), None):
+        return rule
+    if dataclasses.is_dataclass(kind):
+        names = [field.name for field in dataclasses.fields(kind)]
+        return lambda value: {name: plain(getattr(value, name)) for name in names}
+    # A default repr holds a memory address, which would make equal runs look different.
+    return lambda _: kind.__name__

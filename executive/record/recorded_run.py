@@ -12,10 +12,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 from executive.errors import ExecutiveError
 from executive.events import Event, Observer
 from executive.mission.outline import outline
-from executive.record.planning import PlanningTally
-from executive.record.recorded_tree import tree_text
+from executive.record.recorded_mission import tree_text
 from executive.record.recorder import Recorder
-from executive.record.requests import Requests
 from executive.record.result import ENDED, result_of, write_result
 from executive.record.run_directory import RunDirectory
 from executive.record.story.story import Story
@@ -50,7 +48,8 @@ def recorded_run(
     *,
     seed: int,
     runs: Path,
-    view: View | None = None,
+    views: Sequence[View] = (),
+    paused: bool = False,
     gui: bool = False,
     realtime: bool = False,
     requests: Sequence[str] | None = None,
@@ -65,7 +64,8 @@ def recorded_run(
         skills: Installed skills by name.
         seed: Decides everything random.
         runs: Folder of the run directories.
-        view: Shows it.
+        views: Show it.
+        paused: Let it stand still before its first step.
         gui: Show the simulated world in a window.
         realtime: Pace the run by the wall clock.
         requests: What the operator asks for, or None to ask at the terminal.
@@ -84,9 +84,11 @@ def recorded_run(
         loaded, skills, seed=seed, gui=gui, realtime=realtime, requests=requests, keyboard=keyboard, kind=kind
     )
     with closing(run):
+        if paused:
+            run.control.pause()
         directory = new_directory(run, loaded, seed, runs)
         recorder = Recorder(directory, frames=frames)
-        result = Recording(run, loaded, skills, directory, recorder, view).execute(seed, began)
+        result = Recording(run, loaded, skills, directory, recorder, views).execute(seed, began)
     if not frames and result["status"] in ENDED:
         # Of a run that is over nothing can be taken up again, and who wants no pictures wants no film.
         directory.world.unlink(missing_ok=True)
@@ -118,10 +120,10 @@ class Recording:
         run: The run.
         loaded: Its mission.
         skills: Installed skills by name.
-        directory: Where its record is kept.
-        recorder: Keeps it.
-        view: Shows it.
-        past: What is told of before it begins.
+        directory: Directory of its record.
+        recorder: Keeps the record.
+        views: Show the run.
+        past: Events before it begins.
     """
 
     def __init__(
@@ -131,12 +133,12 @@ class Recording:
         skills: Mapping[str, type[Skill]],
         directory: RunDirectory,
         recorder: Recorder,
-        view: View | None,
+        views: Sequence[View] | None = None,
         past: Iterable[Event] = (),
     ) -> None:
         self._run, self._loaded, self._directory = run, loaded, directory
-        self._recorder, self._view, self._past = recorder, view, past
-        self._planning, self._requested = PlanningTally(), Requests()
+        self._recorder, self._views, self._past = recorder, views or (), past
+        self._noted: list[dict[str, Any]] = []
         self._story = Story(loaded, skills)
 
     def execute(self, seed: int, began: float) -> dict[str, Any]:
@@ -151,8 +153,7 @@ class Recording:
         run, path = self._run, self._directory.path
         result = result_of(
             mission=self._loaded.mission.name, seed=seed, outcome=outcome, items=items, audit=audit,
-            planning=self._planning.figures(), requests=self._requested.words,
-            story=self._story.tell(outcome, path, lambda: run.workcell.cell.arm.at_rest),
+            noted=self._noted, story=self._story.tell(outcome, path, lambda: run.workcell.cell.arm.at_rest),
             wall_time=time.perf_counter() - began, trace=self._recorder.trace, run=path,
         )  # fmt: skip
         problems = [self._recorder.problem]
@@ -163,17 +164,22 @@ class Recording:
             if result["status"] != "FAULT":
                 # What `--json` prints is then all that there is of it.
                 result |= {"status": "FAULT", "reason": "fault", "message": str(error), "node": ""}
-        if self._view is not None and any(problems):
-            self._view.note("; ".join(filter(None, problems)))
+        if any(problems):
+            for view in self._views:
+                view.note("; ".join(filter(None, problems)))
         return result
 
+    def _note(self, event: Event) -> None:
+        """Keep the plans and requests, which the result counts."""
+        if event.kind in ("plan", "request"):
+            self._noted.append({"kind": event.kind, **event.data})
+
     def _watched(self) -> tuple[Outcome, dict[str, Any], Mapping[str, int] | None]:
-        """Execute the run before everybody's eyes, and let them go at whatever end."""
-        run, view, completed = self._run, self._view, False
-        watchers: list[Observer] = [self._planning, self._requested, self._story]
+        """Execute the run with all observers attached, and close them at every end."""
+        run, completed = self._run, False
+        watchers: list[Observer] = [self._note, self._story, *self._views]
         try:
-            if view is not None:
-                watchers.append(view)
+            for view in self._views:
                 view.open(run)
             for watcher in watchers:
                 run.observe(watcher)
@@ -184,7 +190,7 @@ class Recording:
             ended = run.execute(), run.items(), run.audit()
             completed = True
         finally:
-            if view is not None:
+            for view in reversed(self._views):
                 view.close()
             # Whoever ends a run by force does not want to wait for its pictures.
             self._recorder.close(wait=completed)

@@ -1,18 +1,23 @@
-"""The result of a run: the object that `result.json` holds and `--json` prints."""
+"""Result of a run: the object that `result.json` holds and `--json` prints."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from executive.errors import ExecutiveError
+from executive.record.journal import ending_of
 from executive.record.plain import plain
-from executive.record.whole_file import write_whole
+from executive.record.run_directory import RunDirectory
+from executive.record.whole_file import reason_of, write_whole
 
 if TYPE_CHECKING:
     from executive.runtime.outcome import Outcome
+
+QUIT = "quit"
+"""Word of the operator who wants nothing more."""
 
 FATES = ("seen", "placed", "rejected", "lost", "phantom")
 """What the ledger counts."""
@@ -34,8 +39,7 @@ def result_of(
     outcome: Outcome,
     items: Mapping[str, Any],
     audit: Mapping[str, int] | None,
-    planning: Mapping[str, float],
-    requests: Sequence[str],
+    noted: Sequence[Mapping[str, Any]],
     story: Mapping[str, Any] | None,
     wall_time: float,
     trace: str,
@@ -43,8 +47,8 @@ def result_of(
 ) -> dict[str, Any]:
     """Return the result as a plain mapping; `wall_time` in seconds, `run` the run directory.
 
-    `audit` is None in a cell that has no ground truth; `planning` as `PlanningTally.figures` gives it,
-    `requests` as `Requests.words` and `story` as `Story.tell` do.
+    `audit` is None in a cell that has no ground truth; `noted` are the entries for plans and requests, and
+    `story` is as `Story.tell` returns it.
     """
     return {
         "mission": mission,
@@ -57,8 +61,8 @@ def result_of(
         "seed": seed,
         "items": {fate: int(items.get(fate, 0)) for fate in FATES},
         "audit": None if audit is None else {place: int(audit[place]) for place in PLACES},
-        "planning": dict(planning),
-        "requests": list(requests),
+        "planning": planning_of(noted),
+        "requests": requests_of(noted),
         "ticks": outcome.ticks,
         "robot_time_s": plain(outcome.robot_time),
         "wall_time_s": round(wall_time, 3),
@@ -78,9 +82,49 @@ def write_result(path: Path, result: Mapping[str, Any]) -> None:
         write_whole(path, json.dumps(result, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
     except OSError as error:
         raise ExecutiveError(
-            f'cannot write the result "{path}": {(error.strerror or str(error)).lower()}; '
+            f'cannot write the result "{path}": {reason_of(error)}; '
             "the journal beside it tells how the run ended, and so does what --json prints"
         ) from error
+
+
+def read_result(directory: RunDirectory, entries: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
+    """Return the result that belongs to a journal, else the journal's end; empty if the run was cut off."""
+    ending = ending_of(entries)
+    try:
+        result = json.loads(directory.result.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        result = None
+    told = result if isinstance(result, dict) else {}
+    if ending is not None:
+        # Of a run that was taken up again it may be that of an end before the last.
+        same = all(told.get(key) == ending[key] for key in ("status", "ticks"))
+        return told if same else ending
+    # Where the disk did not take the end, the result alone knows of it.
+    once = all(entry["kind"] != "resume" for entry in entries)
+    return told if once and told.get("status") in EXIT_CODES else {}
+
+
+def requests_of(entries: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Return the requests that make the operator's answers the same again.
+
+    An operator who is asked after the end of the list wants nothing more: that need not be listed, unless the
+    list would be empty without it.
+    """
+    words = [entry["wanted"] or QUIT for entry in entries if entry["kind"] == "request"]
+    while len(words) > 1 and words[-1] == QUIT:
+        words.pop()
+    return words
+
+
+def planning_of(entries: Iterable[Mapping[str, Any]]) -> dict[str, float]:
+    """Return the number of plans asked for, of those made ahead, and the time waited for plans [s].
+
+    A motion planned again counts once more, and one for which no way was found counts, too.
+    """
+    plans = [entry for entry in entries if entry["kind"] == "plan"]
+    waited = sum(float(plan["waits"]) for plan in plans)
+    ahead = sum(bool(plan["ahead"]) for plan in plans)
+    return {"motions": len(plans), "ahead": ahead, "waited_s": round(waited, 4)}
 
 
 def ledger_agrees(result: Mapping[str, Any]) -> bool:

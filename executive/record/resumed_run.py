@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,7 @@ from executive.record.journal import ending_of, read_journal
 from executive.record.recorded_mission import recorded_mission
 from executive.record.recorded_run import Recording, View
 from executive.record.recorder import Recorder
-from executive.record.replay import Replay, compare
+from executive.record.replay import compare
 from executive.record.result import ENDED
 from executive.record.run_directory import RunDirectory
 from executive.tape.past import Past
@@ -31,7 +31,8 @@ def resumed_run(
     path: Path,
     skills: Mapping[str, type[Skill]],
     *,
-    view: View | None = None,
+    views: Sequence[View] = (),
+    paused: bool = False,
     gui: bool = False,
     realtime: bool = False,
     keyboard: bool = True,
@@ -48,7 +49,8 @@ def resumed_run(
     Args:
         path: The run directory.
         skills: Installed skills by name.
-        view: Shows it.
+        views: Show it.
+        paused: Let it stand still before its first new step.
         gui: Show the simulated world in a window.
         realtime: Pace the run by the wall clock.
         keyboard: Whether somebody can type at the terminal.
@@ -70,7 +72,14 @@ def resumed_run(
         past, seed = _past(directory)
         assert past.start is not None, "a past to take up has begun"
         loaded = recorded_mission(path, past.start, skills)
-        _require_same(compare(loaded, skills, _taken_up(past), seed), path)
+        # Not the step in which it was halted or in which a skill broke: a mended skill may go on there.
+        taken_up = past if past.halt is None else past.before(int(past.halt["tick"]))
+        replay = compare(loaded, skills, taken_up, seed)
+        if not replay.same:
+            raise InputError(
+                f'the run in "{path}" cannot be taken up again: {replay.difference}. The executive or a '
+                "skill has been changed since; go back to what it was run with, or run the mission anew"
+            )
         run = Run(
             loaded, skills, seed=seed, gui=gui, realtime=realtime, requests=past.start["requests"],
             keyboard=keyboard, kind=kind, past=past, takes_up=directory.world,
@@ -79,10 +88,12 @@ def resumed_run(
         recorder.close(wait=False)
         raise
     with closing(run):
+        if paused:
+            run.control.pause()
         assert run.played is not None, "a run that is taken up again plays its past"
         recorder.remember(run.played.entries)
         told = _events(run.played)
-        return Recording(run, loaded, skills, directory, recorder, view, told).execute(seed, began)
+        return Recording(run, loaded, skills, directory, recorder, views, told).execute(seed, began)
 
 
 def _past(directory: RunDirectory) -> tuple[Past, int]:
@@ -106,25 +117,9 @@ def _past(directory: RunDirectory) -> tuple[Past, int]:
     return past, int(past.start["seed"])
 
 
-def _taken_up(past: Past) -> Past:
-    """Return what of a past is taken up: not the step in which it was halted, or in which a skill broke.
-
-    So a skill that was mended since may go on where it went wrong.
-    """
-    return past if past.halt is None else past.before(int(past.halt["tick"]))
-
-
 def _events(past: Past) -> Iterator[Event]:
     """Yield what those who follow a run have to know, and are not told when its past is played."""
     for entry in past.entries:
         if entry["kind"] in UNPLAYED:
             data = {key: value for key, value in entry.items() if key not in ("tick", "clock", "kind")}
             yield Event(entry["kind"], entry["tick"], entry["clock"], data)
-
-
-def _require_same(replay: Replay, path: Path) -> None:
-    if not replay.same:
-        raise InputError(
-            f'the run in "{path}" cannot be taken up again: {replay.difference}. The executive or a skill '
-            "has been changed since; go back to what it was run with, or run the mission anew"
-        )

@@ -1,4 +1,4 @@
-"""The directory a run leaves: named by the wall clock, filled with what is needed to repeat the run."""
+"""Directory of a run: named by the wall clock, filled with what is needed to repeat the run."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import contextlib
 import errno
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,51 +14,33 @@ from typing import Any
 import yaml
 
 from executive.errors import InputError
-from executive.record.whole_file import write_whole
+from executive.record.whole_file import reason_of, write_whole
 
 NO_ROOM = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
 """What the system says where more space would help."""
 
 
-@dataclass(frozen=True)
 class RunDirectory:
-    """Where one run keeps its files.
+    """Directory of one run.
 
     Attributes:
         path: `RUNS/<YYYY-MM-DD>/<HH-MM-SS>_<mission>_s<seed>`.
+        journal: File with everything that happened, one JSON object per line.
+        world: File from which a simulated world can be rebuilt as the run left it.
+        tree: File with the tree as it was built.
+        report: File with the page that explains the run.
+        result: File with the object that `executive run --json` prints.
+        frames: Folder of the camera images behind the decisions.
     """
 
-    path: Path
-
-    @property
-    def journal(self) -> Path:
-        """File with everything that happened, one JSON object per line."""
-        return self.path / "journal.jsonl"
-
-    @property
-    def world(self) -> Path:
-        """File from which a simulated world can be rebuilt as the run left it."""
-        return self.path / "world.log"
-
-    @property
-    def tree(self) -> Path:
-        """File with the tree as it was built."""
-        return self.path / "tree.json"
-
-    @property
-    def report(self) -> Path:
-        """File with the page that explains the run."""
-        return self.path / "report.html"
-
-    @property
-    def result(self) -> Path:
-        """File with the object that `executive run --json` prints."""
-        return self.path / "result.json"
-
-    @property
-    def frames(self) -> Path:
-        """Folder of the camera images behind the decisions."""
-        return self.path / "frames"
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.journal = path / "journal.jsonl"
+        self.world = path / "world.log"
+        self.tree = path / "tree.json"
+        self.report = path / "report.html"
+        self.result = path / "result.json"
+        self.frames = path / "frames"
 
     @staticmethod
     def create(runs: Path, *, mission: str, seed: int, started: datetime) -> RunDirectory:
@@ -131,11 +112,10 @@ def check_place(runs: Path) -> None:
         raise refused(f'make a run directory below "{runs}"', error) from error
 
 
-def refused(what: str, error: OSError) -> InputError:
-    """Return the sentence for what the file system did not let be done, with what may help."""
-    reason = (error.strerror or str(error)).lower()
+def refused(what: str, error: OSError, instead: str = "name another place with --runs DIR") -> InputError:
+    """Return the sentence for an act that the file system refused, with what to do instead."""
     space = "free some space or " if error.errno in NO_ROOM else ""
-    return InputError(f"cannot {what}: {reason}; {space}name another place with --runs DIR")
+    return InputError(f"cannot {what}: {reason_of(error)}; {space}{instead}")
 
 
 def _make_unique(day: Path, name: str) -> Path:

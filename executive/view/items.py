@@ -45,14 +45,12 @@ class ItemTable:
         Of phantoms only the number is told: they are nothing anybody could go and fetch.
         """
         fates: dict[str, list[str]] = defaultdict(list)
-        phantoms = sum(row.state == "phantom" for row in self._rows.values())
+        phantoms = sum(row.state == "phantom" for row in self.rows)
         if phantoms:
             fates["phantom"].append(f"{phantoms} seen, and then no more")
-        for row in self._rows.values():
-            if row.state == "phantom":
-                continue
-            if row.state == "placed":
-                fates[row.bin].append(row.item)
-            else:
-                fates[row.state].append(f"{row.item} ({row.why})" if row.why else row.item)
+        for row in self.rows:
+            if row.state != "phantom":
+                placed = row.state == "placed"
+                name = f"{row.item} ({row.why})" if row.why and not placed else row.item
+                fates[row.bin if placed else row.state].append(name)
         return dict(fates)

@@ -1,10 +1,13 @@
-"""Text in a picture: how long it is, what is left of it where room is short, and what XML can hold."""
+"""Texts of pictures and pages: length, shortening, and templates in which every text is escaped."""
 
 from __future__ import annotations
 
 import re
 import textwrap
 import unicodedata
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
@@ -47,6 +50,18 @@ def fitted(text: str, columns: int, lines: int = 1) -> tuple[str, ...]:
 def writable(text: str) -> str:
     """Return a text with the replacement character for whatever XML cannot hold."""
     return _NOT_XML.sub("�", text)
+
+
+def render(template: str, **values: Any) -> str:
+    """Return a template of this package, filled in; texts are escaped, and replaced where XML lacks them."""
+    environment = Environment(
+        loader=PackageLoader("executive.view", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return writable(environment.get_template(template).render(values))
 
 
 def _advance(character: str) -> float:

@@ -61,7 +61,7 @@ def project(monkeypatch):
     monkeypatch.setattr("executive.mission.load.load_mission", load_mission)
     monkeypatch.setattr("executive.record.recorded_run.recorded_run", recorded_run)
     monkeypatch.setattr("executive.discovery.discover", dict)
-    monkeypatch.setattr("executive.view.report.leave.leave_report", lambda result: ("runs/x/report.html", ""))
+    monkeypatch.setattr("executive.view.report.page.leave_report", lambda result: ("runs/x/report.html", ""))
     return asked
 
 
@@ -139,7 +139,7 @@ def test_a_run_passes_on_everything_it_was_asked_for(project):
         True,
     )
     assert options["requests"] == ("cube", "duck")
-    assert options["view"] is not None
+    assert options["views"]
 
 
 def test_without_requests_the_operator_is_asked(project):
@@ -156,7 +156,7 @@ def test_json_is_the_only_thing_on_standard_output(project, tmp_path):
 def test_quiet_is_silent(project):
     shown = invoke("run", "sort", "--quiet")
     assert shown.output == ""
-    assert project.run[0]["view"] is None
+    assert project.run[0]["views"] == []
 
 
 def test_quiet_tells_the_story_of_a_run_that_does_not_succeed(missions, tmp_path):

@@ -30,7 +30,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         return 30
 
     monkeypatch.setattr(
-        "executive.view.film.source.Source.of", lambda directory: SimpleNamespace(directory=directory)
+        "executive.view.film.source.Source", lambda directory: SimpleNamespace(directory=directory)
     )
     monkeypatch.setattr("executive.view.film.film.film", film)
     return path

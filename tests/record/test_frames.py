@@ -104,14 +104,6 @@ def test_the_chosen_box_is_the_nearest_else_the_only_one_of_its_class(
     assert drawn["000012_cube-1.jpg"].chosen == expected
 
 
-def test_an_item_is_where_the_ledger_last_said(tmp_path, drawn):
-    frames = Frames(tmp_path)
-    frames(item("cube-1", "seen", position=(0.5, -0.1, 0.02)))
-    frames(look(1, CUBE, NEAR))
-    frames(decision())
-    assert drawn["000012_cube-1.jpg"].chosen == 1
-
-
 def test_a_failed_attempt_is_drawn_on_what_was_decided_from(tmp_path, drawn):
     frames = Frames(tmp_path)
     for event in (
@@ -137,13 +129,6 @@ def test_a_look_that_leads_to_nothing_is_drawn_once(tmp_path, drawn):
     assert list(drawn) == ["000020_unseen.jpg"]
     scene = drawn["000020_unseen.jpg"]
     assert (scene.failure, scene.item, scene.chosen) == ("SelectTarget.unseen", "", None)
-
-
-def test_a_look_that_a_decision_shows_is_not_drawn_for_a_later_failure(tmp_path, drawn):
-    frames = Frames(tmp_path)
-    for event in (look(1, CUBE), decision(), skill("Detect", "FAILURE", reason="unsure")):
-        frames(event)
-    assert list(drawn) == ["000012_cube-1.jpg"]
 
 
 def test_what_fails_because_a_skill_failed_is_not_drawn_again(tmp_path, drawn):
@@ -193,13 +178,6 @@ def test_pictures_that_come_too_fast_are_told(tmp_path, monkeypatch):
     assert frames.problem == "pictures left out: 1 that came faster than they can be drawn"
 
 
-def test_a_run_without_decisions_draws_nothing_and_starts_no_process(tmp_path):
-    frames = Frames(tmp_path / "frames")
-    frames(look(1, CUBE))
-    frames.close()
-    assert not (tmp_path / "frames").exists()
-
-
 def test_pictures_that_cannot_be_written_are_told_and_break_nothing(tmp_path):
     (tmp_path / "frames").write_text("a file, no folder")
     frames = Frames(tmp_path / "frames")
@@ -232,7 +210,3 @@ def test_the_last_picture_of_an_item_and_a_reason_is_found_again(tmp_path, item,
         (tmp_path / file).touch()
     found = picture_of(tmp_path, item, reason)
     assert (found and found.name) == name
-
-
-def test_a_run_without_pictures_has_none_of_anything(tmp_path):
-    assert picture_of(tmp_path / "frames", "cube-1", "missed") is None

@@ -8,20 +8,15 @@ import shutil
 from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from pydantic_core import from_json
 
 from executive.errors import Fault, InputError
 from executive.events import Event, Exact
-from executive.record.entry import TRANSIENT, entry_of
+from executive.record.entry import entry_of
 from executive.record.journal import Journal, ending_of, read_journal
-from executive.record.plain import plain
 
 
 @pytest.fixture
@@ -32,42 +27,13 @@ def syncs(monkeypatch):
     return sizes
 
 
-def test_writes_an_object_per_line_with_its_stamp_first(tmp_path):
+def test_writes_an_object_per_line_with_its_stamp_first_and_no_pixels(tmp_path):
     journal = Journal(tmp_path / "journal.jsonl")
-    journal(Event("status", 3, 0.0125, {"node": "a/Grasp", "at": np.array([1 / 3])}))
-    text = (tmp_path / "journal.jsonl").read_text()
+    data = {"node": "größe", "at": np.array([1 / 3]), "tick": 9, "kind": "other", "frame_object": object()}
+    journal(Event("status", 3, 0.0125, data))
     journal.close()
-    assert text == '{"tick": 3, "clock": 0.0125, "kind": "status", "node": "a/Grasp", "at": [0.333333]}\n'
-
-
-VALUES = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text() | st.just(np.array([1 / 3, np.nan])),
-    lambda inner: (
-        st.lists(inner, max_size=3)
-        | st.tuples(inner)
-        | st.dictionaries(st.text(max_size=3), inner, max_size=3)
-    ),
-    max_leaves=6,
-)
-KEYS = st.sampled_from(["node", "status", "outputs", "größe", 'a "key"', "tick", "clock", "kind", *TRANSIENT])
-
-
-@settings(deadline=None)
-@given(
-    st.builds(
-        Event, st.sampled_from(["status", "item", "end"]), st.integers(0), st.floats(0),
-        st.dictionaries(KEYS, VALUES),
-    )
-)  # fmt: skip
-def test_every_line_is_the_json_of_the_stamp_and_of_the_data_made_plain(event):
-    stamp = {"tick": event.tick, "clock": plain(event.clock), "kind": event.kind}
-    data = {key: value for key, value in event.data.items() if key not in (*TRANSIENT, *stamp)}
-    line = json.dumps({**stamp, **plain(data)}, ensure_ascii=False, allow_nan=False) + "\n"
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "journal.jsonl"
-        with closing(Journal(path)) as journal:
-            journal(event)
-        assert path.read_bytes() == line.encode()
+    text = (tmp_path / "journal.jsonl").read_text()
+    assert text == '{"tick": 3, "clock": 0.0125, "kind": "status", "node": "größe", "at": [0.333333]}\n'
 
 
 class Shy(Mapping):
@@ -97,71 +63,30 @@ def nested(depth: int) -> object:
     return value
 
 
-TEXTS = st.text(st.characters(), max_size=5)  # with halves of surrogate pairs
-ANYTHING = st.recursive(
-    st.none()
-    | st.booleans()
-    | st.integers()
-    | st.integers(2000, 20_000).map(lambda bits: -(1 << bits) + 1)
-    | st.floats()
-    | TEXTS
-    | st.binary(max_size=5)
-    | st.floats(width=32).map(np.float32)
-    | st.integers(0, 255).map(np.uint8)
-    | TEXTS.map(lambda text: Path("a" + text.replace("\0", "")))
-    | st.lists(st.floats(), max_size=3).map(np.array)
-    | st.sampled_from([np.bool_(True), np.clongdouble(1), np.datetime64("now"), np.void(b"a"), 1j, int])
-    | st.sampled_from([Shy, Unfinished, endless]).map(lambda made: made())
-    | st.sampled_from([90, 900, 5000]).map(nested),
-    lambda inner: (
-        st.lists(inner, max_size=3)
-        | st.dictionaries(TEXTS | st.integers() | st.binary(max_size=2), inner, max_size=3)
-        | st.lists(inner, max_size=2).map(lambda values: np.array([*values, None], dtype=object))
-        | st.sets(TEXTS | st.integers() | st.floats(), max_size=3)
-    ),
-    max_leaves=8,
-)
-
-
-@settings(deadline=None)
-@given(st.dictionaries(st.text(max_size=3), ANYTHING, max_size=3))
-def test_whatever_is_told_becomes_one_line_of_json_that_reads_back(data):
-    event = Event("status", 0, 0.0, data)
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "journal.jsonl"
-        with closing(Journal(path)) as journal:
-            journal(event)
-            journal(Event("end", 1, 0.0, {}))
-        told, end = read_journal(path)
-        lines = path.read_bytes().splitlines()
-    assert len(lines) == 2
-    assert told == entry_of(event)
-    assert end["kind"] == "end"
-    # Python reads more than is JSON.
-    assert from_json(lines[0], allow_inf_nan=False) == told
-
-
 @pytest.mark.parametrize(
-    "value", [Shy(), Unfinished(), endless(), nested(5000)], ids=lambda value: type(value).__name__
+    "value",
+    [
+        Shy(),
+        Unfinished(),
+        endless(),
+        nested(5000),
+        np.array([1, None], dtype=object),
+        np.void(b"a"),
+        "\ud800",
+    ],
+    ids=lambda value: type(value).__name__,
 )
-def test_what_cannot_be_told_is_told_by_the_name_of_its_type(value):
-    entry = entry_of(Event("status", 0, 0.0, {"a": 1, "outputs": value, "b": 2}))
-    assert entry["outputs"] == type(value).__name__
-    assert (entry["a"], entry["b"]) == (1, 2)
-
-
-def test_leaves_the_pixels_out(tmp_path):
-    journal = Journal(tmp_path / "journal.jsonl")
-    journal(Event("look", 0, 0.0, {"frame": 1, "frame_object": object()}))
-    journal.close()
-    assert list(read_journal(tmp_path / "journal.jsonl")[0]) == ["tick", "clock", "kind", "frame"]
-
-
-def test_data_cannot_overwrite_the_stamp(tmp_path):
-    journal = Journal(tmp_path / "journal.jsonl")
-    journal(Event("item", 5, 1.0, {"tick": 9, "kind": "other"}))
-    journal.close()
-    assert read_journal(tmp_path / "journal.jsonl") == [{"tick": 5, "clock": 1.0, "kind": "item"}]
+def test_whatever_is_told_becomes_one_line_of_json_that_reads_back(tmp_path, value):
+    event = Event("status", 0, 0.0, {"a": 1, "outputs": value})
+    with closing(Journal(tmp_path / "journal.jsonl")) as journal:
+        journal(event)
+    (line,) = (tmp_path / "journal.jsonl").read_bytes().splitlines()
+    told = entry_of(event)
+    assert read_journal(tmp_path / "journal.jsonl") == [told]
+    # Python reads more than is JSON.
+    assert from_json(line, allow_inf_nan=False) == told
+    if isinstance(value, (Shy, Unfinished, list, dict)):
+        assert told["outputs"] == type(value).__name__
 
 
 @pytest.mark.parametrize(
@@ -208,15 +133,6 @@ def test_a_line_the_disk_takes_a_part_of_is_taken_back(tmp_path, monkeypatch, ta
     assert path.read_text() == '{"tick": 0, "clock": 0.0, "kind": "status"}\n'
 
 
-def test_what_does_not_reach_the_disk_is_a_fault_before_anything_is_done(tmp_path, monkeypatch):
-    journal = Journal(tmp_path / "journal.jsonl")
-    monkeypatch.setattr(os, "fsync", full)
-    journal(Event("status", 0, 0.0, {}))
-    with pytest.raises(Fault, match=r"cannot be written: no space left on device"):
-        journal(Event("intent", 1, 0.0, {"action": "close"}))
-    journal.close()
-
-
 def test_what_reaches_the_disk_only_at_the_close_is_not_believed_unseen(tmp_path, monkeypatch):
     journal = Journal(tmp_path / "journal.jsonl")
     journal(Event("status", 0, 0.0, {}))
@@ -224,13 +140,6 @@ def test_what_reaches_the_disk_only_at_the_close_is_not_believed_unseen(tmp_path
     with pytest.raises(Fault, match=r"may lack its last lines: no space left on device; believe"):
         journal.close()
     journal.close()
-
-
-def test_what_is_on_the_disk_already_is_not_brought_there_again(tmp_path, syncs):
-    journal = Journal(tmp_path / "journal.jsonl")
-    journal(Event("end", 0, 0.0, {}))
-    journal.close()
-    assert len(syncs) == 1
 
 
 @pytest.mark.parametrize("whole", [True, False])
@@ -248,15 +157,6 @@ def test_a_journal_deleted_meanwhile_is_a_fault_at_the_next_intent_or_the_end(tm
     with pytest.raises(Fault, match="cannot be written: it was deleted while the run went on; the run stops"):
         journal(Event(kind, 2, 0.0, {}))
     journal.close()
-
-
-def test_a_journal_whose_folder_is_moved_meanwhile_is_written_on(tmp_path):
-    (tmp_path / "run").mkdir()
-    journal = Journal(tmp_path / "run" / "journal.jsonl")
-    (tmp_path / "run").rename(tmp_path / "moved")
-    journal(Event("end", 0, 0.0, {}))
-    journal.close()
-    assert len(read_journal(tmp_path / "moved" / "journal.jsonl")) == 1
 
 
 def test_a_line_the_disk_takes_in_parts_is_whole(tmp_path, monkeypatch):
@@ -295,21 +195,16 @@ ENDS = {
 
 
 @pytest.mark.parametrize("content", ENDS)
-def test_a_torn_end_is_left_out(tmp_path, content):
+def test_a_torn_end_is_left_out_and_cut_off_where_the_journal_goes_on(tmp_path, content):
     path = tmp_path / "journal.jsonl"
     path.write_bytes(content)
-    assert [entry["tick"] for entry in read_journal(path)] == [1, 2][: ENDS[content]]
-
-
-@pytest.mark.parametrize("content", ENDS)
-def test_a_journal_opened_again_goes_on_with_a_line_of_its_own(tmp_path, content):
-    path = tmp_path / "journal.jsonl"
-    path.write_bytes(content)
+    ticks = [1, 2][: ENDS[content]]
+    assert [entry["tick"] for entry in read_journal(path)] == ticks
     journal = Journal(path, again=True)
     journal(Event("resume", 3, 0.0, {}))
     journal.close()
     entries = [json.loads(line) for line in path.read_bytes().splitlines()]
-    assert [entry["tick"] for entry in entries] == [*[1, 2][: ENDS[content]], 3]
+    assert [entry["tick"] for entry in entries] == [*ticks, 3]
     assert read_journal(path) == entries
 
 
@@ -329,28 +224,17 @@ def test_a_line_the_disk_takes_a_part_of_is_taken_back_from_an_old_journal(tmp_p
     assert (tmp_path / "journal.jsonl").read_bytes() == FIRST + LAST + b"\n"
 
 
-def test_a_journal_that_is_not_there_cannot_be_gone_on_with(tmp_path):
-    with pytest.raises(InputError, match=r'cannot open the journal ".*": no such file or directory'):
-        Journal(tmp_path / "journal.jsonl", again=True)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_new_run_does_not_go_on_with_the_journal_of_another(tmp_path):
+def test_a_new_run_needs_a_new_journal_and_one_that_goes_on_an_old_one(tmp_path):
     path = tmp_path / "journal.jsonl"
+    with pytest.raises(InputError, match=r"cannot read the journal .* no such file"):
+        read_journal(path)
+    with pytest.raises(InputError, match=r'cannot open the journal ".*": no such file or directory'):
+        Journal(path, again=True)
+    assert list(tmp_path.iterdir()) == []
     path.write_bytes(FIRST)
     with pytest.raises(InputError, match="the record of another run; a new run needs a directory of its own"):
         Journal(path)
     assert path.read_bytes() == FIRST
-    Journal(path, again=True).close()
-
-
-def test_a_full_disk_is_told_when_a_journal_is_opened_again(tmp_path, monkeypatch):
-    path = tmp_path / "journal.jsonl"
-    path.write_bytes(FIRST + LAST)
-    monkeypatch.setattr(os, "write", full)
-    with pytest.raises(InputError, match=r"cannot open the journal .*: no space left on device"):
-        Journal(path, again=True)
-    monkeypatch.undo()
     Journal(path, again=True).close()
 
 
@@ -389,22 +273,6 @@ def test_a_broken_line_in_the_middle_is_an_error_with_its_number(tmp_path, line,
 def test_a_run_has_ended_where_nothing_comes_after_its_end(kinds, ended):
     entries = [{"tick": number, "kind": kind} for number, kind in enumerate(kinds)]
     assert ending_of(entries) == (None if ended is None else entries[ended])
-
-
-def test_a_missing_journal_is_a_sentence(tmp_path):
-    with pytest.raises(InputError, match=r"cannot read the journal .* no such file"):
-        read_journal(tmp_path / "journal.jsonl")
-
-
-def test_what_is_read_is_what_was_written(tmp_path):
-    journal = Journal(tmp_path / "journal.jsonl")
-    events = [Event("status", tick, tick / 240, {"message": f'"{tick}"\nß'}) for tick in range(50)]
-    for event in events:
-        journal(event)
-    journal.close()
-    entries = read_journal(tmp_path / "journal.jsonl")
-    assert [entry["message"] for entry in entries] == [event.data["message"] for event in events]
-    assert json.dumps(entries)
 
 
 def test_an_exact_value_comes_back_as_it_was(tmp_path):

@@ -39,9 +39,8 @@ def refusal(path: Path, **how: bool) -> str:
     return str(raised.value)
 
 
-@pytest.mark.parametrize("again", [True, False])
-def test_a_second_run_is_told_which_process_writes_there(tmp_path, holder, again):
-    assert refusal(tmp_path / "journal.jsonl", again=again) == (
+def test_a_second_run_is_told_which_process_writes_there(tmp_path, holder):
+    assert refusal(tmp_path / "journal.jsonl") == (
         f'the run directory "{tmp_path}" is in use: process {holder.pid} writes its journal, and two runs '
         f'cannot share it; wait until that run has ended, or end it with "kill {holder.pid}"'
     )
@@ -71,6 +70,7 @@ def test_a_process_that_holds_another_lock_is_not_named(tmp_path, holder, monkey
     assert "another process" in refusal(tmp_path / "journal.jsonl", again=True)
 
 
+@pytest.mark.slow
 def test_a_killed_run_leaves_no_lock(tmp_path, holder):
     holder.send_signal(signal.SIGKILL)
     holder.wait()
@@ -82,28 +82,3 @@ def test_the_lock_is_given_up_when_the_journal_is_closed_and_not_before(tmp_path
     with closing(Journal(path)):
         assert f"process {os.getpid()} writes" in refusal(path)
     Journal(path, again=True).close()
-
-
-def test_a_journal_that_could_not_be_opened_is_locked_by_nobody(tmp_path):
-    path = tmp_path / "journal.jsonl"
-    path.write_text("{}\n")
-    assert "is the record of another run" in refusal(path)
-    Journal(path, again=True).close()
-
-
-def test_a_child_that_outlives_the_run_does_not_keep_the_lock(tmp_path):
-    path = tmp_path / "journal.jsonl"
-    with closing(Journal(path)):
-        child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
-    with child:
-        Journal(path, again=True).close()
-        child.kill()
-
-
-def test_a_file_system_without_locks_is_told(tmp_path, monkeypatch):
-    def none(file, operation):
-        raise OSError(37, "No locks available")
-
-    monkeypatch.setattr("fcntl.flock", none)
-    with pytest.raises(InputError, match=r"cannot open the journal .*: no locks available"):
-        Journal(tmp_path / "journal.jsonl")

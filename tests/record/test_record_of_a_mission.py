@@ -25,14 +25,9 @@ def run(missions, tmp_path, monkeypatch):
     return once
 
 
-def test_the_same_seed_gives_the_same_trace_and_another_one_does_not(run):
-    first, again, other = run(3), run(3), run(4)
-    assert first["trace"] == again["trace"] != other["trace"]
-    assert ledger_agrees(first)
-
-
 def test_every_decision_has_a_picture_and_every_tool_action_an_intent(run, tmp_path):
     result = run(3, frames=True)
+    assert ledger_agrees(result)
     entries = read_journal(tmp_path / "latest" / "journal.jsonl")
     decisions = [entry for entry in entries if entry["kind"] == "decision"]
     pictures = {path.name for path in (tmp_path / "latest" / "frames").iterdir()}

@@ -22,7 +22,7 @@ class PretendedRun:
     error: BaseException | None = None
     closed = 0
     root = py_trees.behaviours.Success("tree")
-    control = "the control"
+    control = SimpleNamespace(pause=lambda: None)
 
     def __init__(self, loaded, skills, *, seed, gui, realtime, requests, keyboard, kind):
         self._observers = []
@@ -105,24 +105,18 @@ def test_leaves_a_directory_that_explains_the_run(tmp_path, runtime):
     assert runtime.closed == 1
 
 
-def test_two_runs_have_one_trace(tmp_path, runtime):
-    first, second = (recorded_run(LOADED, {}, seed=7, runs=tmp_path) for _ in range(2))
-    assert first["trace"] == second["trace"]
-    assert first["run"] != second["run"]
-
-
 def test_a_view_is_told_the_tree_first_and_the_end_last(tmp_path, runtime):
-    view = Watcher()
-    recorded_run(LOADED, {}, seed=7, runs=tmp_path, view=view)
-    assert view.seen == [PretendedRun.root, "run", "decision", "closed"]
+    view, other = Watcher(), Watcher()
+    recorded_run(LOADED, {}, seed=7, runs=tmp_path, views=[view, other])
+    assert view.seen == other.seen == [PretendedRun.root, "run", "decision", "closed"]
 
 
 @pytest.mark.parametrize("error", [InputError("no such weights"), KeyboardInterrupt()])
 def test_whatever_ends_a_run_early_view_journal_and_cell_are_closed(tmp_path, runtime, error):
     runtime.error = error
-    view = Watcher()
+    view, other = Watcher(), Watcher()
     with pytest.raises(type(error)):
-        recorded_run(LOADED, {}, seed=7, runs=tmp_path, view=view)
-    assert view.seen[-1] == "closed"
+        recorded_run(LOADED, {}, seed=7, runs=tmp_path, views=[view, other])
+    assert view.seen[-1] == other.seen[-1] == "closed"
     assert runtime.closed == 1
     assert len(read_journal(tmp_path / "latest" / "journal.jsonl")) == 2

@@ -6,7 +6,6 @@ import os
 
 import pytest
 
-from executive.errors import Fault, InputError
 from executive.events import Event
 from executive.record.frames import Frames
 from executive.record.journal import Journal, read_journal
@@ -38,26 +37,6 @@ def test_a_picture_that_cannot_be_drawn_is_told_and_ends_nothing(directory, monk
     assert len(read_journal(directory.journal)) == 2
 
 
-def test_a_journal_that_cannot_be_written_is_a_fault_and_its_close_is_silent(directory, monkeypatch):
-    recorder = Recorder(directory)
-    monkeypatch.setattr(os, "write", full)
-    with pytest.raises(Fault, match="no space left on device; the run stops"):
-        recorder(STATUS)
-    recorder(END)
-    recorder.close()
-    assert recorder.problem == ""
-
-
-def test_what_does_not_reach_the_disk_at_the_close_is_told(directory, monkeypatch):
-    (directory.path / "frames").write_text("a file, no folder")
-    recorder = Recorder(directory)
-    recorder(STATUS)
-    monkeypatch.setattr(os, "fsync", full)
-    recorder.close()
-    recorder.close()
-    assert recorder.problem.startswith(f'the journal "{directory.journal}" may lack its last lines: no space')
-
-
 def test_the_pictures_are_waited_for_whatever_became_of_the_journal(directory, monkeypatch):
     closed = []
     monkeypatch.setattr(Frames, "close", lambda self: closed.append("frames"))
@@ -72,16 +51,6 @@ def test_the_pictures_are_waited_for_whatever_became_of_the_journal(directory, m
     first, second = recorder.problem.split("; believe what you see in the cell rather than the record; ")
     assert "may lack its last lines" in first
     assert second == "no pictures were drawn: file exists"
-
-
-def test_a_run_that_is_taken_up_again_goes_on_with_its_journal(directory):
-    for again in (False, True):
-        recorder = Recorder(directory, frames=False, again=again)
-        recorder(END)
-        recorder.close()
-    assert len(read_journal(directory.journal)) == 2
-    with pytest.raises(InputError, match="the record of another run"):
-        Recorder(directory)
 
 
 def test_the_journal_may_be_of_another_make(directory):

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from executive.errors import ExecutiveError
-from executive.record.result import ledger_agrees, result_of, write_result
+from executive.record.result import ledger_agrees, planning_of, requests_of, result_of, write_result
 
 
 @dataclass(frozen=True)
@@ -25,14 +25,17 @@ class Ended:
 
 ITEMS = {"seen": 3, "placed": 2, "rejected": 1, "lost": 0, "phantom": 1, "rows": [{}]}
 AUDIT = {"right": 2, "wrong_bin": 0, "left": 1, "elsewhere": 0, "unseen": 0}
-PLANNING = {"motions": 4, "ahead": 1, "waited_s": 0.15}
+NOTED = [
+    {"kind": "plan", "ahead": False, "waits": 0.05}, {"kind": "plan", "ahead": True, "waits": 0.02},
+    {"kind": "plan", "ahead": True, "waits": 0.0}, {"kind": "request", "wanted": "cube"},
+]  # fmt: skip
 STORY = {"verdict": "Grasp failed"}
 
 
 def result(items=ITEMS, audit=AUDIT) -> dict:
     return result_of(
-        mission="sort", seed=7, outcome=Ended(), items=items, audit=audit, planning=PLANNING,
-        requests=["cube"], story=STORY, wall_time=0.5, trace="ab", run=Path("r"),
+        mission="sort", seed=7, outcome=Ended(), items=items, audit=audit, noted=NOTED, story=STORY,
+        wall_time=0.5, trace="ab", run=Path("r"),
     )  # fmt: skip
 
 
@@ -41,8 +44,26 @@ def test_has_every_field_that_is_promised():
     assert set(made) >= {"mission", "status", "reason", "seed", "robot_time_s", "wall_time_s", "trace", "run"}
     assert made["items"] == {"seen": 3, "placed": 2, "rejected": 1, "lost": 0, "phantom": 1}
     assert made["audit"] == AUDIT
-    assert made["planning"] == PLANNING
+    assert made["planning"] == {"motions": 3, "ahead": 2, "waited_s": 0.07}
     assert (made["requests"], made["story"]) == (["cube"], STORY)
+
+
+def test_a_run_without_a_motion_has_no_planning():
+    assert planning_of([]) == {"motions": 0, "ahead": 0, "waited_s": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("wanted", "words"),
+    [
+        ([], []),
+        (["cube", "rescan", "duck"], ["cube", "rescan", "duck"]),
+        (["cube", None, "duck", None, None], ["cube", "quit", "duck"]),
+        ([None], ["quit"]),
+    ],
+)
+def test_the_end_of_the_list_is_a_wish_to_quit_and_goes_without_saying(wanted, words):
+    entries = [{"kind": "request", "wanted": word} for word in wanted]
+    assert requests_of([{"kind": "asking", "choices": ["cube"]}, *entries]) == words
 
 
 def test_is_written_whole_and_can_be_read_again(tmp_path):

@@ -26,13 +26,6 @@ def somewhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-def passed(tree: str, **overrides: str) -> list[tuple[str, str]]:
-    """Run a tree and return which nodes passed its failure on, and why."""
-    story = FailedRun(tree, objects=CUBE, overrides=overrides).tell()
-    assert story is not None
-    return [(link["name"], link["why"]) for link in story["chain"] if link["why"]]
-
-
 def test_a_success_has_no_story() -> None:
     assert FailedRun("sort_overhead").tell() is None
 
@@ -40,89 +33,49 @@ def test_a_success_has_no_story() -> None:
 @pytest.mark.parametrize(
     ("tree", "expected"),
     [
-        (
-            "  retry: {attempts: $attempts, do: IsHolding}\n",
-            [("retry", "all 3 attempts failed: 3 x IsHolding.empty")],
-        ),
-        ("  retry: {attempts: 1, do: IsHolding}\n", [("retry", "has no second attempt")]),
-        (
-            "  retry: {attempts: 4, on: [grip.empty], do: {IsHolding: {}, as: grip}}\n",
-            [("retry", "all 4 attempts failed: 4 x IsHolding.empty")],
-        ),
-        (
-            "  - MoveToScan\n  - Detect\n  - Localize\n"
-            "  - retry: {attempts: 4, on: [SelectTarget.unseen], do: [SelectTarget, IsHolding]}\n",
-            [("retry", "tries again only after SelectTarget.unseen")],
-        ),
-        (
-            "  retry: {attempts: 4, recover: {invert: succeed}, do: IsHolding}\n",
-            [
-                (
-                    "retry",
-                    "gave up after attempt 1 of 4: "
-                    "its recovery failed with invert.inverted: succeed succeeded",
-                )
-            ],
-        ),
-        (
-            "  try: IsHolding\n  finally: {Wait: {seconds: 0.1}}\n",
-            [("try", "has no catch")],
-        ),
-        (
-            "  try: {timeout: {seconds: 0.2, do: {Wait: {seconds: 0.1}}}}\n  finally: IsHolding\n",
-            [("try", "its finally failed")],
-        ),
-        (
-            "  - MoveToScan\n  - try: [Detect, IsHolding]\n    catch: [{on: [Detect.hidden], do: succeed}]\n",
-            [("try", "catches only Detect.hidden")],
-        ),
-        (
-            "  try: IsHolding\n  catch: [{on: [IsHolding.empty], do: {invert: succeed}}]\n",
-            [("try", "caught IsHolding.empty (the sensor feels no seal), but what it did instead failed")],
-        ),
-        (
-            "  - MoveToScan\n  - repeat: {until: [Detect.hidden], do: [Detect, IsHolding]}\n",
-            [("repeat", "ends well only with Detect.hidden")],
-        ),
-        (
-            "  repeat: {times: 3, do: IsHolding}\n",
-            [("repeat", "a failure ends it before its 3 times are over")],
-        ),
-        (
-            "  - MoveToScan\n  - while: {condition: Detect, do: IsHolding}\n",
-            [("while", "a failure of its body ends it")],
-        ),
-        (
-            "  for_each: {each: label, in: [cube, duck], do: IsHolding}\n",
-            [("for_each", "failed at element 1 of 2: cube")],
-        ),
-        (
-            "  timeout: {seconds: 2, do: [{Wait: {seconds: 0.5}}, IsHolding]}\n",
-            [("timeout", "limits only the time: 0.50 of 2 s had passed")],
-        ),
-        ("  timeout: {seconds: 2, do: {Wait: {seconds: 3}}}\n", []),
-        ("  invert: {Wait: {seconds: 0.1}}\n", []),
-        (
-            "  fallback: [{invert: succeed}, IsHolding]\n",
-            [("fallback", "all 2 choices failed; the others with invert.inverted (succeed succeeded)")],
-        ),
-        (
-            "  parallel: [{Wait: {seconds: 0.1}}, IsHolding]\n",
-            [("parallel", "needs all 2 branches")],
-        ),
-        (
-            "  parallel:\n    wait_for: any\n"
-            "    do: [[{Wait: {seconds: 0.1}}, {invert: succeed}], IsHolding]\n",
-            [("parallel", "needs one of its 2 branches; also failed: invert.inverted")],
-        ),
-        (
-            "  parallel:\n    wait_for: lead\n    do: [IsHolding, {Wait: {seconds: 1}}]\n",
-            [("parallel", "ends as its lead does")],
-        ),
+        ("  retry: {attempts: $attempts, do: IsHolding}\n",
+         "retry: all 3 attempts failed: 3 x IsHolding.empty"),
+        ("  retry: {attempts: 1, do: IsHolding}\n", "retry: has no second attempt"),
+        ("  retry: {attempts: 4, on: [grip.empty], do: {IsHolding: {}, as: grip}}\n",
+         "retry: all 4 attempts failed: 4 x IsHolding.empty"),
+        ("  - MoveToScan\n  - Detect\n  - Localize\n"
+         "  - retry: {attempts: 4, on: [SelectTarget.unseen], do: [SelectTarget, IsHolding]}\n",
+         "retry: tries again only after SelectTarget.unseen"),
+        ("  retry: {attempts: 4, recover: {invert: succeed}, do: IsHolding}\n",
+         "retry: gave up after attempt 1 of 4: its recovery failed with invert.inverted: succeed succeeded"),
+        ("  try: IsHolding\n  finally: {Wait: {seconds: 0.1}}\n", "try: has no catch"),
+        ("  try: {timeout: {seconds: 0.2, do: {Wait: {seconds: 0.1}}}}\n  finally: IsHolding\n",
+         "try: its finally failed"),
+        ("  - MoveToScan\n  - try: [Detect, IsHolding]\n    catch: [{on: [Detect.hidden], do: succeed}]\n",
+         "try: catches only Detect.hidden"),
+        ("  try: IsHolding\n  catch: [{on: [IsHolding.empty], do: {invert: succeed}}]\n",
+         "try: caught IsHolding.empty (the sensor feels no seal), but what it did instead failed"),
+        ("  - MoveToScan\n  - repeat: {until: [Detect.hidden], do: [Detect, IsHolding]}\n",
+         "repeat: ends well only with Detect.hidden"),
+        ("  repeat: {times: 3, do: IsHolding}\n", "repeat: a failure ends it before its 3 times are over"),
+        ("  - MoveToScan\n  - while: {condition: Detect, do: IsHolding}\n",
+         "while: a failure of its body ends it"),
+        ("  for_each: {each: label, in: [cube, duck], do: IsHolding}\n",
+         "for_each: failed at element 1 of 2: cube"),
+        ("  timeout: {seconds: 2, do: [{Wait: {seconds: 0.5}}, IsHolding]}\n",
+         "timeout: limits only the time: 0.50 of 2 s had passed"),
+        ("  timeout: {seconds: 2, do: {Wait: {seconds: 3}}}\n", ""),
+        ("  invert: {Wait: {seconds: 0.1}}\n", ""),
+        ("  fallback: [{invert: succeed}, IsHolding]\n",
+         "fallback: all 2 choices failed; the others with invert.inverted (succeed succeeded)"),
+        ("  parallel: [{Wait: {seconds: 0.1}}, IsHolding]\n", "parallel: needs all 2 branches"),
+        ("  parallel:\n    wait_for: any\n    do: [[{Wait: {seconds: 0.1}}, {invert: succeed}], IsHolding]\n",
+         "parallel: needs one of its 2 branches; also failed: invert.inverted"),
+        ("  parallel:\n    wait_for: lead\n    do: [IsHolding, {Wait: {seconds: 1}}]\n",
+         "parallel: ends as its lead does"),
     ],
 )  # fmt: skip
-def test_every_control_node_says_why_it_did_not_stop_a_failure(tree, expected) -> None:
-    assert passed(tree) == expected
+def test_every_control_node_says_why_it_did_not_stop_a_failure(tree: str, expected: str) -> None:
+    story = FailedRun(tree, objects=CUBE).tell()
+    assert story is not None
+    assert [f"{link['name']}: {link['why']}" for link in story["chain"] if link["why"]] == [expected] * bool(
+        expected
+    )
 
 
 def test_a_recovery_that_failed_in_an_earlier_round_explains_nothing() -> None:
@@ -137,52 +90,6 @@ def test_a_recovery_that_failed_in_an_earlier_round_explains_nothing() -> None:
     story = run.tell()
     assert story is not None
     assert story["chain"][2]["why"] == "tries again only after IsHolding.empty"
-
-
-def test_earlier_failures_are_counted_by_reason() -> None:
-    run = FailedRun(PICK, objects=CUBE)
-    seals = iter([False])
-    run.fake.tool.seals = lambda: next(seals, True)
-    run.slip()
-    story = run.tell()
-    assert story is not None
-    assert story["chain"][0]["why"] == "all 3 attempts failed: 1 x Grasp.missed, 2 x Transit.dropped"
-    assert story["verdict"].startswith(
-        "Transit of cube-1 failed (dropped) on the last of 3 attempts: the seal"
-    )
-
-
-def test_the_story_has_the_numbers_of_the_deciding_read_and_of_the_last_look() -> None:
-    run = FailedRun(PICK, objects=CUBE, overrides={"attempts": "2"})
-    run.fake.tool.seals = lambda: False
-    story = run.tell()
-    assert story is not None
-    reads = {read["name"]: (read["value"], read["raised"]) for read in story["reads"]}
-    assert reads == {"tool.touching": (True, ""), "tool.holding": (False, "")}
-    look = story["look"]
-    assert (look["item"], look["frame"], look["label"], look["confidence"]) == ("cube-1", 2, "cube", 0.9)
-    assert look["position"] == pytest.approx([0.5, 0.1, 0.025], abs=0.001)
-    assert (look["looks"], look["attempts"], look["camera"], look["detector"]) == (
-        2,
-        2,
-        "overhead",
-        "embedded",
-    )
-    assert look["clock"] < story["clock"]
-    assert (story["item"], story["left"], story["holds"]) == ("cube-1", ["cube-1"], "")
-    assert story["node"] == {
-        "path": "tree/5:retry/do/Grasp", "name": "Grasp of cube-1", "place": "trial.yaml:15"
-    }  # fmt: skip
-
-
-def test_what_the_cell_refused_is_the_deciding_read() -> None:
-    run = FailedRun("  - MoveToScan\n  - Detect\n", objects=CUBE)
-    run.fake.detector.answers = lambda look, true: "the server is gone"
-    story = run.tell()
-    assert story is not None
-    (read,) = story["reads"]
-    assert (read["name"], read["value"]) == ("detector.embedded", "the server is gone")
-    assert read["raised"] == "Unavailable"
 
 
 def node(name: str, status: str, tick: int, **data: Any) -> Event:
@@ -234,6 +141,10 @@ def test_a_fault_says_where_it_was_raised_and_what_is_known_of_the_arm() -> None
         story = run.story.tell(outcome, Path(), at_rest)
         assert story is not None
         known[word] = story["arm"]
+        if word == "moves":
+            assert story["next"][0].startswith(
+                "keep away from the arm until you have seen it stand still: it"
+            )
         assert story["verdict"] == "Grasp: ZeroDivisionError: vacuum gauge"
         assert story["raised_at"].startswith("record/test_story.py:")
         assert story["raised_at"].endswith(", in broken")
@@ -243,30 +154,6 @@ def test_a_fault_says_where_it_was_raised_and_what_is_known_of_the_arm() -> None
         "moves": "it was told to brake and is not at rest",
         "mute": "it does not say whether it is at rest (ZeroDivisionError: vacuum gauge)",
     }
-
-
-def test_the_first_thing_to_do_where_nobody_knows_of_the_arm_is_to_keep_away() -> None:
-    run = FailedRun("  - {Wait: {seconds: 0.1}}\n", objects=CUBE)
-
-    def broken() -> None:
-        raise OSError("cable")
-
-    run.at_every_step(broken)
-    story = run.story.tell(run.run.execute(), Path(), lambda: False)
-    assert story is not None
-    assert story["next"][0] == (
-        "keep away from the arm until you have seen it stand still: it was told to brake and is not at rest"
-    )
-
-
-def test_a_halt_says_what_was_running_what_the_tool_holds_and_what_is_left() -> None:
-    run = FailedRun("sort_overhead", objects=[*CUBE, ("duck", 0.4, -0.1)])
-    run.at_every_step(lambda: run.run.control.stop() if run.fake.world.held and run.height > 0.1 else None)
-    story = run.tell()
-    assert story is not None
-    assert story["running"] == ["Transit of cube-1", "Wait"]
-    assert (story["item"], story["holds"], story["left"]) == ("cube-1", "cube-1", ["cube-1", "duck-1"])
-    assert (story["node"], story["chain"], story["reads"]) == (None, [], [])
 
 
 def test_what_was_let_go_as_the_run_ended_is_to_be_looked_for() -> None:
@@ -297,22 +184,7 @@ def test_a_halt_at_a_question_says_so() -> None:
     assert story["verdict"] == "halted by the user while the operator was asked"
 
 
-def test_a_lost_item_is_told_from_its_last_look_to_its_fall() -> None:
-    run = FailedRun("sort_overhead", objects=CUBE)
-    run.slip(1, vanish=True)
-    story = run.tell()
-    assert story is not None
-    assert (story["reason"], story["verdict"]) == ("lost", "1 object was lost: cube-1")
-    (lost,) = story["lost"]
-    assert lost["item"] == "cube-1"
-    assert lost["look"]["position"] == pytest.approx([0.5, 0.1, 0.025], abs=0.001)
-    assert lost["look"]["clock"] < lost["held"] < lost["dropped"] == lost["failed"]["clock"] < story["clock"]
-    assert lost["failed"]["what"] == "Transit.dropped"
-    assert lost["unseen"] >= 3
-    assert story["left"] == []
-    assert story["next"] == ["look for cube-1 by hand, below where it was dropped"]
-
-
+@pytest.mark.slow
 def test_the_story_is_in_the_result_and_names_a_picture_that_is_there(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("executive.runtime.run.cell_kind", lambda name: Stubborn)
     loaded = FailedRun(PICK).loaded
@@ -332,6 +204,7 @@ class Stubborn(FakeCell):
         self.tool.seals = lambda: False
 
 
+@pytest.mark.slow
 def test_the_memory_of_a_run_does_not_grow_with_its_length() -> None:
     run = FailedRun("sort_overhead")
     events: list[Event] = []
@@ -352,6 +225,7 @@ def test_the_memory_of_a_run_does_not_grow_with_its_length() -> None:
     assert len(before_the_end) > 500
 
 
+@pytest.mark.slow
 @settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     breaks=st.randoms(use_true_random=False),

@@ -34,11 +34,6 @@ def test_what_was_there_before_stays_where_the_writing_stops(tmp_path, monkeypat
     assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
 
 
-def test_a_folder_that_is_gone_is_told(tmp_path):
-    with pytest.raises(FileNotFoundError):
-        write_whole(tmp_path / "gone" / "a.txt", "text")
-
-
 def test_a_text_that_cannot_be_encoded_leaves_nothing(tmp_path):
     with pytest.raises(UnicodeEncodeError):
         write_whole(tmp_path / "a.txt", "caf\udce9")

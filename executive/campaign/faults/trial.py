@@ -37,7 +37,7 @@ from executive.testing.disturbances import DisturbedCell, disturbed
 from executive.testing.disturbances.objects import ObjectRemoved
 from executive.testing.wrapped_cell import WrappedCell
 from executive.view.figures.fault_trials import Trial
-from executive.view.report.leave import leave_report
+from executive.view.report.page import leave_report
 from executive.workcell import Workcell
 
 Numbered = Mapping[int, Fault]

@@ -1,4 +1,4 @@
-"""What can be done after a run that did not succeed."""
+"""Advice after a run that did not succeed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from executive.mission.model import nodes
 from executive.mission.model.nodes import Node
 from executive.mission.model.values import Value
 from executive.record.story.case import Case
-from executive.record.story.chain import Link, attempts, constant
+from executive.record.story.chain import attempts, constant
 from executive.record.story.course import Sense
 from executive.record.story.items import ItemCourse
 
@@ -57,9 +57,10 @@ def _ways_on(case: Case) -> Iterator[str]:
     """Yield what the mission would have to say for this failure not to end it."""
     if not case.links:
         return
-    passed_by = [link for link in case.links if isinstance(link.node, nodes.TryNode) and _may_catch(link)]
+    tries = [link for link in case.links if isinstance(link.node, nodes.TryNode)]
+    passed_by = [link.node for link in tries if link.below is getattr(link.node, "do", None)]
     if passed_by:
-        yield f"catch it in the try at {case.place(passed_by[-1].node)}"
+        yield f"catch it in the try at {case.place(passed_by[-1])}"
     else:
         yield f"put a try with a catch for it around {case.place(case.links[-1].node)}"
     for link in reversed(case.links):
@@ -75,10 +76,6 @@ def _ways_on(case: Case) -> Iterator[str]:
             if attempt == most:
                 yield f"allow more than {most} attempt{'s' * (most > 1)} {_where(case, node, node.attempts)}"
             return
-
-
-def _may_catch(link: Link) -> bool:
-    return isinstance(link.node, nodes.TryNode) and link.below is link.node.do
 
 
 def _where(case: Case, node: Node, value: Value) -> str:

@@ -1,78 +1,56 @@
-"""What a story is made of, put together once the run is over."""
+"""Case of a run that did not succeed, put together once the run is over, and its verdict."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from executive.mission.model import nodes
 from executive.mission.model.nodes import Node
 from executive.record.progress import skill_name
-from executive.record.story.chain import Link, chain, way
-from executive.record.story.course import Activation, Course
-from executive.record.story.items import ItemCourse
+from executive.record.story.chain import attempts, chain, way
+from executive.record.story.course import Course
 
 if TYPE_CHECKING:
     from executive.mission.load import LoadedMission
     from executive.runtime.outcome import Outcome
 
+MOST = 5
+"""Items that a sentence names one by one."""
 
-@dataclass(frozen=True)
+
 class Case:
     """A run that did not succeed.
 
-    Attributes:
+    Args:
         loaded: The mission.
-        course: What happened.
-        outcome: How it ended.
+        course: Its events.
+        outcome: Its end.
+
+    Attributes:
         links: The way of the failure that ended it, from the root to the node that decided; empty where the
             run ended otherwise.
         lost: The items whose loss ended it, by name.
+        decided: The last activation of the node that decided; None where none did.
+        node: The node that decided, as the mission has it; None where none did.
+        running: Paths of the skills that ran until they were halted, by the end of the run or the deciding
+            node.
+        item: The item it was all about, or "".
     """
 
-    loaded: LoadedMission
-    course: Course
-    outcome: Outcome
-    links: tuple[Link, ...]
-    lost: Mapping[str, ItemCourse]
-
-    @staticmethod
-    def of(loaded: LoadedMission, course: Course, outcome: Outcome) -> Case:
-        """Return the case of a run that is over."""
+    def __init__(self, loaded: LoadedMission, course: Course, outcome: Outcome) -> None:
+        self.loaded, self.course, self.outcome = loaded, course, outcome
         failed = outcome.status == "FAILURE"
-        links = chain(loaded.tree, course, outcome.node, outcome.reason) if failed else ()
-        lost = course.items.lost() if failed and not outcome.node else {}
-        return Case(loaded, course, outcome, links, lost)
-
-    @property
-    def decided(self) -> Activation | None:
-        """The last activation of the node that decided; None where none did."""
-        return self.course.node(self.outcome.node)
-
-    @property
-    def node(self) -> Node | None:
-        """The node that decided, as the mission has it; None where none did."""
-        return next(iter(way(self.loaded.tree, self.outcome.node)[-1:]), None)
-
-    @property
-    def running(self) -> tuple[str, ...]:
-        """Paths of the skills that ran until they were halted, by the end of the run or the deciding node."""
-        if self.outcome.status != "FAILURE":
-            return self.course.cut
-        return self.decided.cut if self.decided is not None else ()
-
-    @property
-    def item(self) -> str:
-        """What it was all about, or ""."""
-        activations = [self.decided, *map(self.course.node, self.running)]
+        self.links = chain(loaded.tree, course, outcome.node, outcome.reason) if failed else ()
+        self.lost = course.items.lost() if failed and not outcome.node else {}
+        self.decided = course.node(outcome.node)
+        self.node = next(iter(way(loaded.tree, outcome.node)[-1:]), None)
+        self.running: Sequence[str] = course.cut
+        if failed:
+            self.running = self.decided.cut if self.decided is not None else ()
+        activations = [self.decided, *map(course.node, self.running)]
         about = [ran.item for ran in activations if ran is not None and ran.item]
-        return next(iter([*about, *self.lost]), "")
-
-    @property
-    def file(self) -> str:
-        """The mission file, as findings call it."""
-        return self.loaded.tree.mark.source.path
+        self.item = next(iter([*about, *self.lost]), "")
 
     def named(self, path: str) -> str:
         """Return what a person calls a skill that ran: `Grasp of cube-1`."""
@@ -83,7 +61,32 @@ class Case:
         """Return where a node stands: the line, and the file where it is not the mission's."""
         return node.mark.place(self.loaded.tree.mark.source)
 
-    @property
-    def is_skill(self) -> bool:
-        """True where a skill decided."""
-        return isinstance(self.node, nodes.SkillNode)
+
+def verdict(case: Case) -> str:
+    """Return in one sentence what ended a run: what failed, on what, how often it was tried, and why."""
+    outcome = case.outcome
+    running = " and ".join(map(case.named, case.running))
+    during = f" during {running}" if running else ""
+    if outcome.status == "HALTED":
+        return outcome.message + (" while the operator was asked" if case.course.asking else during)
+    if case.lost:
+        were = "object was" if len(case.lost) == 1 else "objects were"
+        more = f" and {len(case.lost) - MOST} more" if len(case.lost) > MOST else ""
+        return f"{len(case.lost)} {were} lost: {', '.join(list(case.lost)[:MOST])}{more}"
+    if not case.links:
+        return outcome.message
+    if isinstance(case.node, nodes.SkillNode):
+        reason = outcome.reason.rpartition(".")[2]
+        return f"{case.named(outcome.node)} failed ({reason}){_tried(case)}: {outcome.message}"
+    return f"{case.links[-1].name}{_tried(case)}: {outcome.message}{during}"
+
+
+def _tried(case: Case) -> str:
+    """Return how often it was tried, as the innermost retry counted; "" for the first time."""
+    retry = next((link for link in reversed(case.links) if isinstance(link.node, nodes.RetryNode)), None)
+    if retry is None:
+        return ""
+    attempt, most = attempts(retry)
+    if attempt == 1:
+        return ""
+    return f" on the last of {most} attempts" if attempt == most else f" on attempt {attempt} of {most}"

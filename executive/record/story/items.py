@@ -1,4 +1,4 @@
-"""What happened to every item that is in no bin."""
+"""Histories of the items that are in no bin."""
 
 from __future__ import annotations
 
@@ -46,12 +46,13 @@ class ItemCourses:
     """Follows the `item` and `look` events of a run; forgets what lies in a bin, and what never was.
 
     Attributes:
+        items: What happened to each item, by name.
         last_look: The last look, whatever it showed: as `Look`, with the number of boxes as `found`; or None.
     """
 
     def __init__(self) -> None:
         self.last_look: Look | None = None
-        self._items: dict[str, ItemCourse] = {}
+        self.items: dict[str, ItemCourse] = {}
         self._seen_now: list[str] = []
         self._closed = False
 
@@ -65,7 +66,7 @@ class ItemCourses:
     def failed(self, event: Event) -> None:
         """Take the `status` event of a skill that failed."""
         data = event.data
-        if (item := self._items.get(str(data["item"]))) is not None:
+        if (item := self.items.get(str(data["item"]))) is not None:
             what = f"{skill_name(str(data['node']))}.{data['reason']}"
             item.failed = what, str(data["message"]), event.clock
 
@@ -73,33 +74,26 @@ class ItemCourses:
         """Note that the tree has ended: what is said of items from now on is the closing of the books."""
         self._closed = True
 
-    def of(self, name: str) -> ItemCourse | None:
-        """Return what happened to an item, or None where that is not remembered."""
-        return self._items.get(name)
-
     def lost(self) -> dict[str, ItemCourse]:
         """Return the items that the ledger calls lost, by name."""
-        return {name: item for name, item in self._items.items() if item.row.get("state") == "lost"}
+        return {name: item for name, item in self.items.items() if item.row.get("state") == "lost"}
 
     def open(self, labels: Mapping[str, Any]) -> list[str]:
         """Return the items of these classes that had not been dealt with when the tree ended."""
-        return [
-            name
-            for name, item in self._items.items()
-            if item.state in _OPEN and item.row.get("state") not in _DONE and item.row.get("label") in labels
-        ]
+        left = {name: item for name, item in self.items.items() if item.state in _OPEN}
+        return [name for name, item in left.items() if item.row.get("label") in labels]
 
     def held(self) -> list[str]:
         """Return the items that were believed in the tool when the tree ended."""
-        return [name for name, item in self._items.items() if item.state == "held"]
+        return [name for name, item in self.items.items() if item.state == "held"]
 
     def _item(self, event: Event) -> None:
         row = event.data
         name, state = str(row["item"]), str(row.get("state", ""))
         if state in _DONE:
-            self._items.pop(name, None)
+            self.items.pop(name, None)
             return
-        item = self._items.setdefault(name, ItemCourse())
+        item = self.items.setdefault(name, ItemCourse())
         if row.get("looks", 0) > item.row.get("looks", 0):
             self._seen_now.append(name)
         if state == "held" and item.state != "held":
@@ -116,10 +110,10 @@ class ItemCourses:
         look = {key: data.get(key, "") for key in ("frame", "camera", "detector")} | {"clock": event.clock}
         found = data.get("found", ())
         self.last_look = {**look, "found": len(found)}
-        for item in self._items.values():
+        for item in self.items.values():
             item.unseen += 1
         for name in self._seen_now:
-            if (seen := self._items.get(name)) is not None:
+            if (seen := self.items.get(name)) is not None:
                 box = _nearest(found, seen.row.get("position"))
                 shown = {key: box.get(key) for key in ("label", "confidence", "position")}
                 seen.look, seen.unseen = {**look, **shown, "looks": seen.row.get("looks", 0)}, 0

@@ -1,4 +1,4 @@
-"""The story of a run that did not succeed: why, with what numbers, and what can be done now."""
+"""Story of a run that did not succeed: why, with what numbers, and what can be done now."""
 
 from __future__ import annotations
 
@@ -16,11 +16,10 @@ from executive.record.plain import plain
 from executive.record.result import ENDED
 from executive.record.run_directory import RunDirectory
 from executive.record.story.advice import advice
-from executive.record.story.case import Case
+from executive.record.story.case import Case, verdict
 from executive.record.story.chain import why
 from executive.record.story.course import Course, Sense
 from executive.record.story.items import ItemCourse
-from executive.record.story.verdict import verdict
 
 if TYPE_CHECKING:
     from executive.mission.load import LoadedMission
@@ -80,24 +79,21 @@ class Story:
         """
         if outcome.status == "SUCCESS":
             return None
-        case = Case.of(self._loaded, self._course, outcome)
+        case = Case(self._loaded, self._course, outcome)
         arm = _arm(at_rest) if outcome.status == "FAULT" else "at rest"
         reads = list(self._reads(case))
+        recorded, journal = not case.course.unrecorded, RunDirectory(run).journal
+        begun = journal.exists() and journal.stat().st_size > 0
         told = {
             "status": outcome.status,
             "reason": outcome.reason,
             "clock": outcome.robot_time,
-            "mission": case.file,
+            "mission": self._loaded.tree.mark.source.path,
             "verdict": verdict(case),
             "node": _node(case),
             "item": case.item,
             "chain": [
-                {
-                    "path": link.node.path,
-                    "name": link.name,
-                    "place": _place(link.node),
-                    "why": why(link),
-                }
+                {"path": link.node.path, "name": link.name, "place": _place(link.node), "why": why(link)}
                 for link in case.links
                 if not isinstance(link.node, nodes.UseNode | nodes.SequenceNode)
             ],
@@ -109,8 +105,8 @@ class Story:
             "arm": arm,
             "holds": outcome.holds,
             "raised_at": case.course.raised_at,
-            "recorded": not case.course.unrecorded,
-            "resumes": outcome.status not in ENDED and not (case.course.unrecorded and _is_empty(run)),
+            "recorded": recorded,
+            "resumes": outcome.status not in ENDED and (recorded or begun),
             "picture": _picture(case, run),
             "next": list(advice(case, arm, reads)),
         }
@@ -127,16 +123,11 @@ class Story:
         yield from reversed(refused or read)
 
 
-def _is_empty(run: Path) -> bool:
-    journal = RunDirectory(run).journal
-    return not journal.exists() or journal.stat().st_size == 0
-
-
 def _node(case: Case) -> dict[str, str] | None:
     node = case.node
     if node is None:
         return None
-    name = case.named(node.path) if case.is_skill else name_of(node)
+    name = case.named(node.path) if isinstance(node, nodes.SkillNode) else name_of(node)
     return {"path": node.path, "name": name, "place": _place(node)}
 
 
@@ -145,7 +136,7 @@ def _place(node: Node) -> str:
 
 
 def _look(case: Case) -> dict[str, Any] | None:
-    item = case.course.items.of(case.item)
+    item = case.course.items.items.get(case.item)
     if item is None or item.look is None:
         return case.course.items.last_look
     return {"item": case.item, "attempts": item.row.get("attempts", 0), **item.look}
@@ -154,20 +145,14 @@ def _look(case: Case) -> dict[str, Any] | None:
 def _lost(name: str, item: ItemCourse) -> dict[str, Any]:
     what, message, clock = item.failed or ("", "", 0.0)
     failed = {"what": what, "message": message, "clock": clock} if what else None
-    return {
-        "item": name,
-        "look": item.look,
-        "unseen": item.unseen,
-        "held": item.held,
-        "dropped": item.dropped,
-        "failed": failed,
-    }
+    known = {key: getattr(item, key) for key in ("look", "unseen", "held", "dropped")}
+    return {"item": name, **known, "failed": failed}
 
 
 def _picture(case: Case, run: Path) -> str:
     """Return the picture of the failure, or else of what was decided on the item last."""
     reason = case.outcome.reason if case.outcome.status == "FAILURE" else ""
-    item = case.course.items.of(case.item)
+    item = case.course.items.items.get(case.item)
     if case.lost and item is not None and item.failed is not None:
         reason = item.failed[0]
     for about in dict.fromkeys([(case.item, reason.rpartition(".")[2]), (case.item, "")]):

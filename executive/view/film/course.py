@@ -29,6 +29,7 @@ class Course:
         status: Status of every node that was told of, by path.
         beside: What stands beside a node: the reason why it failed, or the item it is about; by path.
         picture: The last picture; None before the first.
+        clock: Time on the robot's clock [s].
     """
 
     def __init__(
@@ -43,7 +44,7 @@ class Course:
         self._items = ItemTable()
         self._bins: dict[str, str] = {}
         self._trouble: tuple[float, str] = (-TOLD, "")
-        self._clock = 0.0
+        self.clock = 0.0
         self._ended: dict[str, tuple[int, str]] = {}
         self._last = (0, "")
 
@@ -62,7 +63,7 @@ class Course:
     def trouble(self) -> str:
         """What went wrong with an item or the run a moment ago, in a sentence; "" if nothing did."""
         when, sentence = self._trouble
-        return sentence if self._clock < when + TOLD else ""
+        return sentence if self.clock < when + TOLD else ""
 
     @property
     def doing(self) -> str:
@@ -77,7 +78,7 @@ class Course:
 
     def go_to(self, step: int, clock: float) -> None:
         """Take in what happened up to a control step, at which the robot's clock showed `clock` [s]."""
-        self._clock = clock
+        self.clock = clock
         while self._entries and self._entries[-1]["tick"] <= step:
             self._take(self._entries.pop())
         while self._pictures and int(self._pictures[-1].stem.partition("_")[0]) <= step:

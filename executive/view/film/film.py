@@ -1,8 +1,9 @@
-"""A recorded run as a film: the world rebuilt and looked at, beside it what the tree decided."""
+"""Film of a recorded run: the rebuilt world, and beside it the decisions of the tree."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+import math
+from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
 from pathlib import Path
 
@@ -11,78 +12,67 @@ from PIL import Image
 from executive.sim.shots import Shoot, shots, steps_in
 from executive.sim.viewpoint import overview
 from executive.view.film.course import Course
-from executive.view.film.ending import draw_ending
 from executive.view.film.formats import Format
-from executive.view.film.page import Book, draw_page
+from executive.view.film.page import STAGE, draw_ending, draw_page
 from executive.view.film.source import Source
-from executive.view.film.stage import STAGE
-from executive.view.film.timetable import Timetable
 
 SHOWN = (24, 76, 776, 644)
-"""Part of the picture that arm, workspace and bins fill [pixel]; what is written stands around it."""
+"""Part of the picture that arm, workspace and bins fill; texts stand around it [pixel]."""
+HOLD = 2.0
+"""Time for which the end is shown [s]."""
 
 Progress = Callable[[int, int], None]
-"""Told how many frames of how many are done."""
+"""Takes the number of frames that are done, and of all frames."""
 
 
 def film(
     source: Source, file: Path, format: Format, *, speed: float, workers: int, progress: Progress
 ) -> int:
-    """Film a run, and return how many frames that took.
+    """Film a run, and return the number of frames.
 
     Args:
         source: The record of the run.
-        file: Where to write the film.
-        format: What it is to be.
+        file: File of the film.
+        format: Format of the film.
         speed: Seconds on the robot's clock per second of the film.
         workers: Processes that take the pictures.
-        progress: Told how many frames of how many are done.
+        progress: Takes the number of frames that are done, and of all frames.
     """
-    timetable = Timetable(steps_in(source.directory.world), source.start["step"], format.rate, speed)
-    with closing(_pages(source, timetable, workers, progress)) as pages:
-        format.write(file, pages, format.rate)
-    return timetable.frames
+    each = speed / format.rate / source.start["step"]
+    steps = shown_steps(steps_in(source.directory.world), each)
+    held = round(HOLD * format.rate)
+
+    def counted() -> Generator[Image.Image, None, None]:
+        for done, page in enumerate(pages, start=1):
+            progress(done, len(steps) + held)
+            yield page
+
+    with closing(_pages(source, steps, held, speed, workers)) as pages:
+        format.write(file, counted(), format.rate)
+    return len(steps) + held
+
+
+def shown_steps(steps: int, each: float) -> list[int]:
+    """Return the control steps of a run that are shown: every so many, from the first to the last."""
+    return [min(round(frame * each), steps) for frame in range(math.ceil(steps / each) + 1)]
 
 
 def _pages(
-    source: Source, timetable: Timetable, workers: int, progress: Progress
+    source: Source, steps: Sequence[int], held: int, speed: float, workers: int
 ) -> Generator[Image.Image, None, None]:
-    """Yield the frames of a film."""
-    book = _book(source, timetable)
-    course = Course(source.past.entries, source.nodes, list(source.directory.frames.glob("*.jpg")))
-    shoot = Shoot(
-        source.config,
-        int(source.start["seed"]),
-        source.directory.world,
-        overview(source.config, STAGE, SHOWN),
+    """Yield the frames of a film: a page for each of these control steps, and the last one for a while."""
+    start, directory = source.start, source.directory
+    note = f"seed {start['seed']} · cell {source.config.cell}" + (
+        f" · {speed:g}x speed" if speed != 1 else ""
     )
-    with closing(shots(shoot, timetable.shown, workers)) as pictures:
-        for done, (step, picture) in enumerate(zip(timetable.shown, pictures, strict=True), start=1):
-            clock = timetable.clock(step)
-            course.go_to(step, clock)
-            page = draw_page(book, picture, course, clock)
-            progress(done, timetable.frames)
-            yield page
-    last = draw_ending(draw_page(book, picture, course, clock, caption=False), source.ending)
-    for held in range(1, timetable.held + 1):
-        progress(done + held, timetable.frames)
+    length = steps[-1] * start["step"]
+    course = Course(source.entries, source.nodes, list(directory.frames.glob("*.jpg")))
+    view = overview(source.config, STAGE, SHOWN)
+    shoot = Shoot(source.config, int(start["seed"]), directory.world, view)
+    with closing(shots(shoot, steps, workers)) as pictures:
+        for step, picture in zip(steps, pictures, strict=True):
+            course.go_to(step, step * start["step"])
+            yield draw_page(source, picture, course, note, length)
+    last = draw_ending(draw_page(source, picture, course, note, length, caption=False), source.result)
+    for _ in range(held):
         yield last
-
-
-def _book(source: Source, timetable: Timetable) -> Book:
-    """Return what stays the same on every page."""
-    note = [f"seed {source.start['seed']}", f"cell {source.config.cell}"]
-    if timetable.speed != 1:
-        note.append(f"{timetable.speed:g}x speed")
-    bins = {
-        name: "#" + "".join(f"{round(255 * share):02x}" for share in bin.colour)
-        for name, bin in source.config.bins.items()
-    }
-    return Book(
-        title=str(source.start["mission"]),
-        note=" · ".join(note),
-        nodes=source.nodes,
-        items=source.items,
-        bins=bins,
-        length=timetable.clock(timetable.steps),
-    )

@@ -1,81 +1,149 @@
-"""A frame of a film: the cell on the left, what the executive makes of it on the right."""
+"""Frame of a film: the cell on the left, the decisions of the executive on the right."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from executive.mission.outline import OutlineNode
-from executive.view.film import listing
-from executive.view.film.branch import draw_branch
+from executive.record.pictures.strip import HEIGHT as STRIP
+from executive.record.result import FATES
+from executive.view.film import panel
 from executive.view.film.course import Course
-from executive.view.film.ink import BACK, DIM, INK, RULE, RUNNING, clipped, font
-from executive.view.film.listing import draw_items
-from executive.view.film.stage import STAGE, dress
+from executive.view.film.ink import BACK, DIM, FAILURE, INK, RULE, RUNNING, SUCCESS, clipped, font, wrapped
+from executive.view.film.source import Source
 
 WIDTH, HEIGHT = 1280, 720
 """Size of a frame [pixel]."""
+STAGE = (800, 720)
+"""Width and height of the picture of the cell [pixel]."""
 LEFT, RIGHT = STAGE[0] + 28, WIDTH - 28
-"""Where the panel's text begins and ends [pixel]."""
-_TITLE, _NOTE = 26, 14
-_TREE_TOP, _MARGIN = 122, 22
-
-
-@dataclass(frozen=True)
-class Book:
-    """What stays the same on every page.
-
-    Attributes:
-        title: What the film is about.
-        note: What else there is to know: seed, cell, speed.
-        nodes: The tree.
-        items: Items of the whole run, which decide how much room their list has.
-        bins: Colour of each bin, by name.
-        length: Time on the robot's clock in all [s].
-    """
-
-    title: str
-    note: str
-    nodes: Sequence[OutlineNode]
-    items: int
-    bins: Mapping[str, str]
-    length: float
+"""Left and right end of the panel's text [pixel]."""
+INSET = (224, 168)
+"""Largest width and height of the camera's picture [pixel]."""
+CAPTION, CARD = 620, 620
+"""Largest width of a caption's text and of the card at the end [pixel]."""
+_TITLE, _NOTE, _TREE_TOP, _BELOW = 26, 14, 122, 22
+_MARGIN, _PAD, _TYPE, _LABEL, _LINE = 20, 12, 17, 13, 23
+_END_STATUS, _END_TYPE, _END_LINE, _END_PAD = 40, 18, 26, 24
+_COLOURS = {"SUCCESS": SUCCESS, "FAILURE": FAILURE, "FAULT": FAILURE}
 
 
 def draw_page(
-    book: Book, picture: NDArray[np.uint8], course: Course, clock: float, *, caption: bool = True
+    source: Source, picture: NDArray[np.uint8], course: Course, note: str, length: float, caption: bool = True
 ) -> Image.Image:
-    """Return the page that shows a run as `course` has it, `clock` [s] on the robot's clock.
+    """Return the page that shows a run as `course` has it.
 
     Args:
-        book: What stays the same.
-        picture: What the world looks like then, of the size `STAGE`.
-        course: What was done and decided so far.
-        clock: Time on the robot's clock [s].
+        source: The record of the run.
+        picture: Picture of the world, of the size `STAGE`.
+        course: The run so far.
+        note: Second line of the page: seed, cell, speed.
+        length: Time on the robot's clock in all [s].
         caption: Say below the picture what the robot does.
     """
     page = Image.new("RGB", (WIDTH, HEIGHT), BACK)
-    page.paste(dress(picture, course, caption), (0, 0))
-    _draw_head(page, book, clock)
-    top = HEIGHT - _MARGIN - listing.height(book.items)
+    page.paste(Image.fromarray(picture), (0, 0))
+    _draw_camera(page, course.picture)
+    if caption and (course.trouble or course.doing):
+        lines = wrapped(course.trouble, _TYPE, CAPTION, 2) or [clipped(course.doing, _TYPE, CAPTION)]
+        _draw_caption(page, lines, FAILURE if course.trouble else RUNNING)
+    _draw_head(page, str(source.start["mission"]), note, course.clock, length)
+    top = HEIGHT - _BELOW - panel.height(source.items)
     ImageDraw.Draw(page).line((LEFT, top - 10, RIGHT, top - 10), RULE, 1)
-    draw_items(page, (LEFT, top, RIGHT, HEIGHT), course.items, book.bins)
-    draw_branch(page, (LEFT, _TREE_TOP, RIGHT, top - 18), book.nodes, course)
+    panel.draw_items(page, (LEFT, top, RIGHT, HEIGHT), course.items, source.bins)
+    panel.draw_branch(page, (LEFT, _TREE_TOP, RIGHT, top - 18), source.nodes, course)
     return page
 
 
-def _draw_head(page: Image.Image, book: Book, clock: float) -> None:
-    """Draw what it is about, and how far it is."""
+def draw_ending(page: Image.Image, result: Mapping[str, Any]) -> Image.Image:
+    """Return a page with the end of a run, by its result, written over the picture of the cell."""
+    status, sentence, figures = ending_of(result)
+    lines = wrapped(sentence, _END_TYPE, CARD - 2 * _END_PAD, 4)
+    notes = wrapped(figures, _END_TYPE, CARD - 2 * _END_PAD, 2)
+    height = (
+        2 * _END_PAD + _END_STATUS + _END_LINE * (len(lines) + len(notes)) + (10 if lines or notes else 0)
+    )
+    longest = max((font(_END_TYPE).getlength(line) for line in [*lines, *notes]), default=0)
+    width = max(longest, font(_END_STATUS).getlength(status)) + 2 * _END_PAD
+    left, top = STAGE[0] - width - _MARGIN, STAGE[1] - height - _MARGIN
+    colour = _COLOURS.get(status, RUNNING)
+    shown = page.copy()
+    draw = ImageDraw.Draw(shown)
+    draw.rounded_rectangle((left, top, left + width, top + height), 10, BACK)
+    draw.rounded_rectangle((left, top, left + 8, top + height), 4, colour)
+    draw.text((left + _END_PAD, top + _END_PAD + _END_STATUS / 2), status, colour, font(_END_STATUS), "lm")
+    middle = top + _END_PAD + _END_STATUS + 10 + _END_LINE / 2
+    for number, text in enumerate([*lines, *notes]):
+        ink = INK if number < len(lines) else DIM
+        draw.text((left + _END_PAD, middle + _END_LINE * number), text, ink, font(_END_TYPE), "lm")
+    return shown
+
+
+def ending_of(result: Mapping[str, Any]) -> tuple[str, str, str]:
+    """Return status, sentence and figures of the end of a run; without a result the run was cut off."""
+    if not result:
+        return "CUT OFF", "the record ends here; nothing says how the run would have ended", ""
+    figures = ""
+    if items := result.get("items"):
+        fates = ", ".join(f"{items[fate]} {fate}" for fate in FATES if items[fate])
+        figures = f"{fates}; {result['robot_time_s']:.1f} s"
+    story = result.get("story") or {}
+    return result["status"], story.get("verdict") or result["message"], figures
+
+
+def _draw_head(page: Image.Image, title: str, note: str, clock: float, length: float) -> None:
+    """Draw the title, the time, and how far the run is."""
     draw = ImageDraw.Draw(page)
-    time = f"{clock:.1f} s"
-    room = RIGHT - LEFT - font(_TITLE).getlength(f"{book.length:.1f} s") - 24
-    draw.text((LEFT, 50), clipped(book.title, _TITLE, room), INK, font(_TITLE), "ls")
-    draw.text((RIGHT, 50), time, INK, font(_TITLE), "rs")
-    draw.text((LEFT, 76), clipped(book.note, _NOTE, RIGHT - LEFT), DIM, font(_NOTE), "ls")
-    share = clock / book.length if book.length else 1.0
+    room = RIGHT - LEFT - font(_TITLE).getlength(f"{length:.1f} s") - 24
+    draw.text((LEFT, 50), clipped(title, _TITLE, room), INK, font(_TITLE), "ls")
+    draw.text((RIGHT, 50), f"{clock:.1f} s", INK, font(_TITLE), "rs")
+    draw.text((LEFT, 76), clipped(note, _NOTE, RIGHT - LEFT), DIM, font(_NOTE), "ls")
+    share = clock / length if length else 1.0
     draw.rectangle((LEFT, 94, RIGHT, 96), RULE)
     draw.rectangle((LEFT, 94, LEFT + round(share * (RIGHT - LEFT)), 96), RUNNING)
+
+
+def _draw_caption(page: Image.Image, lines: list[str], colour: str) -> None:
+    """Write lines at the bottom of the picture, beside a bar of this colour."""
+    width = max(font(_TYPE).getlength(line) for line in lines) + 2 * _PAD + 8
+    height = _LINE * len(lines) + 14
+    left, top = _MARGIN, STAGE[1] - _MARGIN - height
+    draw = ImageDraw.Draw(page)
+    draw.rounded_rectangle((left, top, left + width, top + height), 6, BACK)
+    draw.rounded_rectangle((left + 6, top + 7, left + 9, top + height - 7), 2, colour)
+    for number, line in enumerate(lines):
+        middle = top + 7 + _LINE * (number + 0.5)
+        draw.text((left + _PAD + 8, middle), line, INK, font(_TYPE), "lm")
+
+
+def _draw_camera(page: Image.Image, picture: Path | None) -> None:
+    """Draw a picture of the camera in the corner, with its subject by its name `<tick>_<item>_<reason>`."""
+    inset = None if picture is None else _inset(picture)
+    if inset is None or picture is None:
+        return
+    width, height = inset.size
+    draw = ImageDraw.Draw(page)
+    draw.rounded_rectangle((_MARGIN, _MARGIN, _MARGIN + width + 7, _MARGIN + height + 31), 6, BACK)
+    page.paste(inset, (_MARGIN + 4, _MARGIN + 4))
+    title = "camera:  " + picture.stem.partition("_")[2].replace("_", " ")
+    place = (_MARGIN + 10, _MARGIN + height + 17)
+    draw.text(place, clipped(title, _LABEL, width - 8), DIM, font(_LABEL), "lm")
+
+
+@lru_cache(maxsize=2)
+def _inset(picture: Path) -> Image.Image | None:
+    """Return the image in a picture, without the strip below it; None where it cannot be read any more."""
+    try:
+        with Image.open(picture) as file:
+            image = file.convert("RGB")
+    except (OSError, ValueError):
+        return None
+    image = image.crop((0, 0, image.width, image.height - STRIP))
+    image.thumbnail(INSET, Image.Resampling.LANCZOS)
+    return image

@@ -58,7 +58,7 @@ function show(news) {
   if (items) table();
   if ("look" in news || "decision" in news || (items && state.look)) picture();
   if ("asking" in news) ask(news.asking);
-  if (news.notes?.length) find("said").textContent = news.notes.at(-1);
+  if (news.note) find("said").textContent = news.note;
   if (nodes) follow();
   if ("result" in news) outcome(news.result);
   else if (!state.result) {

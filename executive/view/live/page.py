@@ -1,4 +1,4 @@
-"""The live page, seen from the run: what it is told, and what it wants."""
+"""Live page, as the run sees it: a view that hands on news, and does what is wanted."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import subprocess
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from typing import Any
 
@@ -21,22 +21,21 @@ from executive.events import Event
 from executive.mission.outline import outline
 from executive.programs import program
 from executive.runtime.run import Run
-from executive.runtime.run_control import RunControl
 from executive.scenery import Scenery
-from executive.view.live.telling import Told, picture, poses, told
+from executive.view.live.telling import News, Teller, picture, poses
 from executive.view.tree.svg import Note, svg
 
 LOOPBACK = "127.0.0.1"
 PERIOD = 1 / 10
 """Time between two looks at where everything is, while somebody watches [s]."""
-SPARING = 2.5
+SPARING_PERIOD = 2.5
 """The same where a browser draws without a graphics card, on the processor that the run needs [s]."""
 GATHER = 0.03
-"""For so long things to tell are gathered, so that they cost the run less [s]."""
-PATIENCE = 3.0
-"""Longest wait for the page's last words [s]."""
-WAITING = 32
-"""Things to tell that may wait; beyond that no image [1 MB] is told of, nor where everything is."""
+"""Time for which news is gathered, so that it costs the run less [s]."""
+SHUTDOWN_TIMEOUT = 3.0
+"""Longest wait for the end of the page's server [s]."""
+MAX_QUEUED_NEWS = 32
+"""Length of the queue beyond which images [1 MB] and poses are left out."""
 NEEDS = ("aiohttp", "trimesh", "viser")
 
 
@@ -71,20 +70,20 @@ class LivePage:
                 # Out of reach of Ctrl-C: it ends when its input does, and says first how the run ended.
                 start_new_session=True,
             )  # fmt: skip
-        self._queue: queue.SimpleQueue[Told | None] = queue.SimpleQueue()
-        self._control: RunControl | None = None
+        self._queue: queue.SimpleQueue[News | None] = queue.SimpleQueue()
+        self._run: Run | None = None
         self._scenery: Scenery | None = None
-        self._clock: Callable[[], float] = lambda: 0.0
         self._gone = False
         self._watched = 0
         self._due = 0.0
         self._period = PERIOD
         self._paused = False
         self._last_look: Event | None = None
+        self._teller = Teller()
         self.problem = ""
         """What went wrong with the page first, or ""."""
         # Not as an argument: those can be read by everybody on the machine.
-        self._tell("secret", token=token, port=port)
+        self._tell(token=token, port=port)
         self._threads = [
             threading.Thread(target=work, name="page", daemon=True) for work in (self._send, self._listen)
         ]
@@ -95,14 +94,13 @@ class LivePage:
         """Begin to show a run."""
         nodes = outline(run.root)
         mission = run.loaded.mission.name
-        self._control = run.control
-        self._clock = lambda: run.workcell.cell.clock.now
+        self._run = run
         with self._harmless():
             self._scenery = run.workcell.scenery()
         # A line in every node for what became of it so far.
         blank = {node.path: Note("", ("",)) for node in nodes}
-        self._tell("tree", mission=mission, svg=svg(nodes, mission, blank))
-        self._tell("shapes", shapes=tuple(self._scenery.shapes) if self._scenery is not None else ())
+        shapes = tuple(self._scenery.shapes) if self._scenery is not None else ()
+        self._tell(tree=svg(nodes, mission, blank), shapes=shapes)
         run.control.between_ticks(self._look_around)
         self._look_around()
 
@@ -112,16 +110,16 @@ class LivePage:
             if event.kind == "look" and event.data.get("frame_object") is not None:
                 self._last_look = event
                 if self._watched and self._keeps_up:
-                    self._put(picture(event))
-            elif (words := told(event)) is not None:
-                self._put(words)
+                    self._tell(**picture(event))
+            elif (news := self._teller.news(event)) is not None:
+                self._tell(**news)
 
     def close(self) -> None:
         """Go on without new events; `finish` says how the run ended."""
 
     def note(self, sentence: str) -> None:
         """Show a sentence about the record."""
-        self._tell("note", sentence=sentence)
+        self._tell(note=sentence)
 
     def finish(self, result: Mapping[str, Any] | None = None, report: str = "") -> None:
         """Say how the run ended, and end the page; more calls do nothing."""
@@ -129,10 +127,10 @@ class LivePage:
             return
         if result is not None:
             keys = ("status", "reason", "message", "story", "run")
-            self._tell("result", **{key: result.get(key) for key in keys}, report=report)
+            self._tell(result={key: result.get(key) for key in keys} | {"report": report})
         self._queue.put(None)
         try:
-            if self._server.wait(PATIENCE) != 0:
+            if self._server.wait(SHUTDOWN_TIMEOUT) != 0:
                 self.problem = self.problem or f"the page ended before the run: {self._last_words()}"
         except subprocess.TimeoutExpired:
             self._server.kill()
@@ -145,26 +143,23 @@ class LivePage:
     def _look_around(self) -> None:
         """Tell, now and then, where everything is; called between two ticks."""
         now = time.monotonic()
-        if now < self._due or self._control is None:
+        if now < self._due or self._run is None:
             return
         self._due = now + self._period
         with self._harmless():
-            if self._control.paused != self._paused:
-                self._paused = self._control.paused
-                self._tell("paused", paused=self._paused)
+            if self._run.control.paused != self._paused:
+                self._paused = not self._paused
+                self._tell(paused=self._paused)
             if self._watched and self._keeps_up and self._scenery is not None:
-                self._put(poses(self._clock(), self._scenery.poses()))
+                self._tell(**poses(self._run.workcell.cell.clock.now, self._scenery.poses()))
 
     @property
     def _keeps_up(self) -> bool:
-        return self._queue.qsize() < WAITING
+        return self._queue.qsize() < MAX_QUEUED_NEWS
 
-    def _tell(self, kind: str, **data: Any) -> None:
-        self._put((kind, data))
-
-    def _put(self, words: Told) -> None:
+    def _tell(self, **news: Any) -> None:
         if not self._gone:
-            self._queue.put(words)
+            self._queue.put(news)
 
     @contextlib.contextmanager
     def _harmless(self) -> Iterator[None]:
@@ -184,7 +179,7 @@ class LivePage:
                 while not self._queue.empty():
                     batch.append(self._queue.get())
                 over = None in batch
-                pickle.dump([words for words in batch if words is not None], pipe, pickle.HIGHEST_PROTOCOL)
+                pickle.dump([news for news in batch if news is not None], pipe, pickle.HIGHEST_PROTOCOL)
                 pipe.flush()
                 if not over:
                     time.sleep(GATHER)
@@ -205,21 +200,14 @@ class LivePage:
         self._watched, self._gone = 0, True
 
     def _do(self, wish: Mapping[str, Any]) -> None:
-        control, what = self._control, wish["do"]
+        control, what = None if self._run is None else self._run.control, wish["do"]
         if what == "watched":
             self._watched = wish["by"]
-            self._period = SPARING if wish["sparing"] else PERIOD
+            self._period = SPARING_PERIOD if wish["sparing"] else PERIOD
             if self._watched and self._last_look is not None:
-                self._put(picture(self._last_look))
-        elif control is None:
-            return
-        elif what == "request":
+                self._tell(**picture(self._last_look))
+        elif control is not None and what == "request":
             control.request(wish["word"])
-        else:
-            do = {
-                "pause": control.pause,
-                "resume": control.resume,
-                "step": control.step,
-                "stop": control.stop,
-            }
-            do[what]()
+        elif control is not None:
+            assert what in ("pause", "resume", "step", "stop")
+            getattr(control, what)()

@@ -1,4 +1,4 @@
-"""The program that serves the live page: told by its standard input, it says on its output what is wanted."""
+"""Program that serves the live page: it reads news from its input and writes wishes to its output."""
 
 from __future__ import annotations
 
@@ -17,10 +17,8 @@ from typing import Any
 from aiohttp import web
 
 from executive.view.live.board import Board
-from executive.view.live.guard import Guard
 from executive.view.live.server import Server, Wish
-from executive.view.live.stage import Stage
-from executive.view.live.telling import Told
+from executive.view.live.telling import News
 from executive.view.live.tunnel import Tunnel
 
 
@@ -44,21 +42,23 @@ def main() -> None:
 async def _serve(listener: socket.socket, path: Path, say: Wish) -> None:
     loop, over = asyncio.get_running_loop(), asyncio.Event()
     first, *rest = pickle.load(sys.stdin.buffer)
-    board, stage = Board(), Stage(path)
-    server = Server(board, Guard(first[1]["token"], first[1]["port"]), Tunnel(stage.ready), say)
+    board, tunnel = Board(), Tunnel(path)
+    server = Server(board, tunnel, say, first["token"], first["port"])
 
-    def take(batch: list[Told]) -> None:
-        for words in batch:
-            if words[0] == "shapes":
-                stage.show(words[1]["shapes"])
-            elif words[0] == "poses":
-                stage.move(words[1]["bodies"])
-            board.take(words)
+    def take(batch: list[News]) -> None:
+        for news in batch:
+            if "shapes" in news:
+                tunnel.show(news.pop("shapes"))
+            if "bodies" in news:
+                tunnel.move(news.pop("bodies"))
+            board.take(news)
 
     def listen() -> None:
         try:
-            for batch in iter(_heard, None):
-                loop.call_soon_threadsafe(take, batch)
+            while True:
+                loop.call_soon_threadsafe(take, pickle.load(sys.stdin.buffer))
+        except EOFError:
+            pass
         finally:
             # A run that was killed in the middle of a word is over, too.
             loop.call_soon_threadsafe(over.set)
@@ -72,11 +72,3 @@ async def _serve(listener: socket.socket, path: Path, say: Wish) -> None:
     await over.wait()
     telling.cancel()
     await server.end()
-
-
-def _heard() -> list[Told] | None:
-    try:
-        batch: list[Told] = pickle.load(sys.stdin.buffer)
-    except EOFError:
-        return None
-    return batch

@@ -1,4 +1,4 @@
-"""The cell in three dimensions, shown by viser behind a socket that no browser can reach by itself."""
+"""Scene of the cell in three dimensions, by viser behind a socket that no browser can reach by itself."""
 
 from __future__ import annotations
 
@@ -24,9 +24,10 @@ class Scene:
 
     Args:
         path: The Unix socket it listens on, and nothing else: viser asks nobody who they are.
+        shapes: The shapes.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, shapes: Sequence[Shape]) -> None:
         with _listening_on(path):
             self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         self._bodies: dict[str, viser.FrameHandle] = {}
@@ -43,9 +44,6 @@ class Scene:
         self._server.gui.configure_theme(control_width="small", show_logo=False, show_share_button=False)
         # There is nothing to be set: the page has the buttons.
         self._server.gui.main_panel.minimize()
-
-    def show(self, shapes: Sequence[Shape]) -> None:
-        """Show these shapes."""
         for number, shape in enumerate(shapes):
             if shape.body and shape.body not in self._bodies:
                 self._bodies[shape.body] = self._server.scene.add_frame(_name(shape.body), show_axes=False)

@@ -1,12 +1,15 @@
-"""What every node of a run did, and when, as its journal tells."""
+"""Activations of every node of a run, with their times, from its journal."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 Entry = Mapping[str, Any]
+
+_WORDS = {"SUCCESS": "done", "FAILURE": "failed", "INVALID": "halted", "RUNNING": "under way"}
 
 
 @dataclass(frozen=True)
@@ -28,35 +31,6 @@ class Span:
     reason: str = ""
     message: str = ""
     item: str = ""
-
-
-@dataclass(frozen=True)
-class Tally:
-    """What became of all the times that one node ran.
-
-    Attributes:
-        ran: How often it was started.
-        succeeded, failed, halted: How often it ended so.
-        status: How it ended last.
-        said: Why it failed last: reason and sentence; "" where it never did.
-    """
-
-    ran: int
-    succeeded: int
-    failed: int
-    halted: int
-    status: str
-    said: str
-
-    @property
-    def counts(self) -> str:
-        """The numbers in a few words: `3 done, 1 failed`."""
-        ended = self.succeeded + self.failed + self.halted
-        told = (
-            (self.succeeded, "done"), (self.failed, "failed"), (self.halted, "halted"),
-            (self.ran - ended, "under way"),
-        )  # fmt: skip
-        return ", ".join(f"{number} {word}" for number, word in told if number)
 
 
 def spans(entries: Iterable[Entry]) -> list[Span]:
@@ -89,18 +63,21 @@ def spans(entries: Iterable[Entry]) -> list[Span]:
     return [span for _, span in sorted(done, key=lambda pair: pair[0])]
 
 
-def tallies(course: Sequence[Span]) -> dict[str, Tally]:
-    """Return what became of each node that ran, by its path."""
-    by_node: dict[str, list[Span]] = {}
+def by_node(course: Iterable[Span]) -> dict[str, list[Span]]:
+    """Return every time that a node ran, by its path."""
+    found: dict[str, list[Span]] = {}
     for span in course:
-        by_node.setdefault(span.node, []).append(span)
-    return {node: _tally(ran) for node, ran in by_node.items()}
+        found.setdefault(span.node, []).append(span)
+    return found
 
 
-def _tally(ran: Sequence[Span]) -> Tally:
-    ends = [span.status for span in ran]
-    said = [": ".join(filter(None, (span.reason, span.message))) for span in ran if span.status == "FAILURE"]
-    return Tally(
-        len(ran), ends.count("SUCCESS"), ends.count("FAILURE"), ends.count("INVALID"),
-        ends[-1], said[-1] if said else "",
-    )  # fmt: skip
+def counts(ran: Iterable[Span]) -> str:
+    """Return how often nodes ended in which way, in a few words: `3 done, 1 failed`."""
+    ends = Counter(span.status for span in ran)
+    return ", ".join(f"{ends[status]} {word}" for status, word in _WORDS.items() if ends[status])
+
+
+def last_failure(ran: Sequence[Span]) -> str:
+    """Return why the last of these failed that did: reason and sentence; "" where none did."""
+    failed = next((span for span in reversed(ran) if span.status == "FAILURE"), None)
+    return ": ".join(filter(None, (failed.reason, failed.message))) if failed else ""

@@ -1,50 +1,45 @@
-"""The report of a run: one HTML file that needs neither scripts nor anything else to be read."""
+"""Report of a run: one HTML file that needs neither scripts nor anything else to be read."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
 from typing import Any
 
 import yaml
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from executive.errors import InputError
+from executive.errors import ExecutiveError
 from executive.record.pictures.palette import PALETTE
-from executive.record.run_directory import NO_ROOM, RunDirectory
+from executive.record.run_directory import RunDirectory, refused
 from executive.record.whole_file import write_whole
-from executive.view import story
-from executive.view.items import Row
-from executive.view.report.course import tallies
-from executive.view.report.facts import Facts, gather
+from executive.view.report.course import by_node, counts, last_failure
+from executive.view.report.facts import Facts
 from executive.view.report.lanes import timeline
-from executive.view.report.pictures import Picture
 from executive.view.report.shares import LOOK, RETRY, WAITING
-from executive.view.text import writable
+from executive.view.terminal import summary
+from executive.view.text import render
 from executive.view.tree.svg import Note, svg
 
 COLOURS = {LOOK: "#56B4E9", RETRY: "#D55E00", WAITING: "#9aa5b4"}
-"""Of the activities that are no skill's; skills have the rest of the palette, in their order."""
+"""Colours of the activities that are no skill's; skills have the rest of the palette, in their order."""
 
 
-@dataclass(frozen=True)
-class Object:
-    """One object of a run.
+def leave_report(result: Mapping[str, Any]) -> tuple[str, str]:
+    """Write the report of a run that has just ended; return its file, or "" and why there is none.
 
-    Attributes:
-        row: What became of it.
-        picture: What the last decision for it was made from, or None.
-        failures: What went wrong with it: when [s], what, why.
-        pictures: Of that.
+    Whatever goes wrong with it, the run ended as it did.
     """
-
-    row: Row
-    picture: Picture | None
-    failures: Sequence[tuple[float, str, str]]
-    pictures: Sequence[Picture]
+    try:
+        return str(write_report(Path(result["run"]))), ""
+    except ExecutiveError as error:
+        return "", f"no report was written: {error}"
+    except Exception as error:
+        return "", (
+            f"no report was written: {type(error).__name__}: {error}; "
+            f"`executive --debug report {result.get('run', 'RUN')}` shows where"
+        )
 
 
 def write_report(path: Path) -> Path:
@@ -54,55 +49,36 @@ def write_report(path: Path) -> Path:
         InputError: The directory lacks journal or tree, or cannot be written to.
     """
     file = RunDirectory(path).report
-    text = report(gather(path))
+    text = report(Facts(path))
     try:
         write_whole(file, text)
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        space = "free some space or " if error.errno in NO_ROOM else ""
-        raise InputError(
-            f'cannot write the report "{file}": {reason}; {space}copy the run directory to where you may '
-            "write, and have the report of the copy made"
-        ) from error
+        instead = "copy the run directory to where you may write, and have the report of the copy made"
+        raise refused(f'write the report "{file}"', error, instead) from error
     return file
 
 
 def report(facts: Facts) -> str:
     """Return the report as HTML. Whatever a mission or a skill says in it is text, and never markup."""
-    environment = Environment(
-        loader=PackageLoader("executive.view", "."),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["sum_of"] = lambda spent: sum(spent.values())
     told = facts.result.get("story")
-    objects = list(_objects(facts))
-    seen = [*facts.pictures.decisions.values(), *facts.pictures.failures]
-    text = environment.get_template("report/report.html").render(
+    items = [row.item for row in facts.objects]
+    params = facts.start["params"]
+    rows = facts.shares.rows
+    return render(
+        "report/report.html",
         facts=facts,
         verdict=_verdict(facts),
         story=told,
-        story_facts=list(story.facts(told)) if told else [],
-        moment=next((picture for picture in seen if told and picture.file == told["picture"]), None),
-        objects=objects,
+        story_facts=list(summary.facts(told)) if told else [],
+        moment=next((each for each in facts.pictures if told and each.file == told["picture"]), None),
+        titles={node.path: node.title for node in facts.nodes},
         colours=_colours(facts.shares.activities),
+        sums={item: sum(spent.values()) for item, spent in rows.items()},
         tree=Markup(svg(facts.nodes, facts.start["mission"], _notes(facts))),
         timeline=Markup(timeline(facts.course, facts.nodes, facts.end)),
-        params=_yaml(facts.start["params"]),
-        other=[
-            picture
-            for picture in facts.pictures.failures
-            if picture.item not in {object.row.item for object in objects}
-        ],
+        params=yaml.safe_dump(dict(params), sort_keys=False, allow_unicode=True) if params else "",
+        other=[each for each in facts.pictures if each.reason and each.item not in items],
     )
-    # A file name that is not UTF-8 may stand in it.
-    return writable(text)
-
-
-def _yaml(params: Mapping[str, Any]) -> str:
-    return yaml.safe_dump(dict(params), sort_keys=False, allow_unicode=True) if params else ""
 
 
 def _verdict(facts: Facts) -> str:
@@ -124,18 +100,6 @@ def _verdict(facts: Facts) -> str:
     return f"{books['placed']} of {books['seen']} objects are in their bins{said}."
 
 
-def _objects(facts: Facts) -> Iterator[Object]:
-    names = {node.path: node.title for node in facts.nodes}
-    for row in facts.objects:
-        failures = [
-            (span.ended, f"{names.get(span.node, span.node)}.{span.reason}", span.message)
-            for span in facts.course
-            if span.item == row.item and span.status == "FAILURE"
-        ]
-        seen = [picture for picture in facts.pictures.failures if picture.item == row.item]
-        yield Object(row, facts.pictures.decisions.get(row.item), failures, seen)
-
-
 def _colours(activities: Sequence[str]) -> dict[str, str]:
     """Return the colour of each activity."""
     free = cycle(colour for colour in PALETTE if colour not in COLOURS.values())
@@ -143,8 +107,8 @@ def _colours(activities: Sequence[str]) -> dict[str, str]:
 
 
 def _notes(facts: Facts) -> dict[str, Note]:
-    """Return what the picture of the tree says of each node."""
+    """Return the note of each node in the picture of the tree."""
     return {
-        path: Note(tally.status, tuple(filter(None, (tally.counts, tally.said))))
-        for path, tally in tallies(facts.course).items()
+        path: Note(ran[-1].status, tuple(filter(None, (counts(ran), last_failure(ran)))))
+        for path, ran in by_node(facts.course).items()
     }

@@ -1,9 +1,9 @@
-"""The pictures of a run, as a page holds them."""
+"""Pictures of a run, for a page that holds them."""
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
@@ -22,7 +22,6 @@ class Picture:
         tick: Control step that it is of.
         item: What it is about, or "".
         reason: What went wrong, or "".
-        inlined: Whether `source` is the picture itself.
     """
 
     source: str
@@ -30,38 +29,28 @@ class Picture:
     tick: int
     item: str
     reason: str
-    inlined: bool
 
 
-@dataclass(frozen=True)
-class Pictures:
-    """The pictures of a run.
+def pictures(folder: Path, items: Collection[str]) -> list[Picture]:
+    """Return the pictures in the folder `frames` of a run.
 
-    Attributes:
-        decisions: Of the last decision for each object, by object.
-        failures: Of what went wrong, in order.
+    First come those of the last decision for each object, which have no reason and are the first to be given
+    room, then those of failures in their order.
     """
-
-    decisions: Mapping[str, Picture]
-    failures: Sequence[Picture]
-
-
-def pictures(folder: Path, items: Collection[str]) -> Pictures:
-    """Return what the folder `frames` of a run holds; decisions are the first to be given room."""
     named = sorted(
         (_named(file, items) for file in folder.glob("*.jpg")), key=lambda each: (each[1], each[0])
     )
-    decided = {item: (file, tick) for file, tick, item, reason in named if item and not reason}
-    failed = [each for each in named if each[3]]
+    decided = {item: (file, tick, item, "") for file, tick, item, reason in named if item and not reason}
     room = ROOM
-    decisions, failures = {}, []
-    for item, (file, tick) in decided.items():
-        decisions[item] = _picture(file, tick, item, "", room)
-        room -= _size(decisions[item])
-    for file, tick, item, reason in failed:
-        failures.append(_picture(file, tick, item, reason, room))
-        room -= _size(failures[-1])
-    return Pictures(decisions, failures)
+    found = []
+    for file, tick, item, reason in [*decided.values(), *(each for each in named if each[3])]:
+        place = f"{file.parent.name}/{file.name}"
+        source = quote(place)
+        if 4 * file.stat().st_size / 3 <= room:
+            source = "data:image/jpeg;base64," + base64.b64encode(file.read_bytes()).decode()
+            room -= len(source)
+        found.append(Picture(source, place, tick, item, reason))
+    return found
 
 
 def _named(file: Path, items: Collection[str]) -> tuple[Path, int, str, str]:
@@ -74,15 +63,3 @@ def _named(file: Path, items: Collection[str]) -> tuple[Path, int, str, str]:
         if rest.startswith(f"{item}_"):
             return file, number, item, rest.removeprefix(f"{item}_")
     return file, number, "", rest
-
-
-def _picture(file: Path, tick: int, item: str, reason: str, room: int) -> Picture:
-    place = f"{file.parent.name}/{file.name}"
-    if 4 * file.stat().st_size / 3 > room:
-        return Picture(quote(place), place, tick, item, reason, False)
-    data = base64.b64encode(file.read_bytes()).decode()
-    return Picture(f"data:image/jpeg;base64,{data}", place, tick, item, reason, True)
-
-
-def _size(picture: Picture) -> int:
-    return len(picture.source) if picture.inlined else 0

@@ -1,4 +1,4 @@
-"""Where the time of a run went, object by object: every instant belongs to one object and one activity."""
+"""Time of a run by object: every instant belongs to one object and one activity."""
 
 from __future__ import annotations
 
@@ -97,11 +97,12 @@ def _next_item(decisions: Sequence[tuple[float, str]], now: float) -> str:
 def _retried(
     ran: Sequence[Span], skills: Mapping[str, OutlineNode], decisions: Sequence[tuple[float, str]]
 ) -> dict[str, tuple[float, float]]:
-    """Return from when to when each object with a failed attempt was tried in vain."""
+    """Return from when to when each object with a failed attempt was tried without success."""
     failed = {
         span.item: span.ended
         for span in ran
-        if span.item and span.status == "FAILURE" and _acts(skills[span.node])
+        if span.item and span.status == "FAILURE"
+        if skills[span.node].uses and not skills[span.node].senses
     }
     retried = {}
     for item, last in failed.items():
@@ -110,7 +111,3 @@ def _retried(
         # Looks that led to the next attempt are the price of the failed one.
         retried[item] = first, next((time for time in decided if time > last), last)
     return retried
-
-
-def _acts(skill: OutlineNode) -> bool:
-    return bool(skill.uses) and not skill.senses

@@ -1,4 +1,4 @@
-"""Keys that let a run pause, go on, and take one step, pressed at the terminal it is watched in."""
+"""Keys of the terminal in which a run is watched: pause, go on, take one step."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import select
 import termios
 import threading
 import tty
-from collections.abc import Callable
 from typing import Any
 
 from executive.runtime.run_control import RunControl
@@ -25,13 +24,11 @@ class Keys:
     Args:
         file: The terminal's file descriptor.
         control: The run's.
-        pressed: Told after every key that meant something.
     """
 
-    def __init__(self, file: int, control: RunControl, pressed: Callable[[], None]) -> None:
+    def __init__(self, file: int, control: RunControl) -> None:
         self._file = file
         self._control = control
-        self._pressed = pressed
         self._lines: list[Any] | None = None
         self._over = threading.Event()
         self._thread: threading.Thread | None = None
@@ -66,12 +63,6 @@ class Keys:
 
     def _do(self, key: str) -> None:
         if key in PAUSE:
-            if self._control.paused:
-                self._control.resume()
-            else:
-                self._control.pause()
+            (self._control.resume if self._control.paused else self._control.pause)()
         elif key in STEP:
             self._control.step()
-        else:
-            return
-        self._pressed()

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from executive.events import Event
 from executive.mission.outline import outline
-from executive.runtime.run import Run
 from executive.view.items import ItemTable
 from executive.view.tree.outline import skills
+
+if TYPE_CHECKING:
+    from executive.runtime.run import Run
 
 _ENDS = {"SUCCESS": "done", "FAILURE": "failed", "INVALID": "halted"}
 

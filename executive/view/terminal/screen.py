@@ -1,4 +1,4 @@
-"""The live view in a terminal: the tree with its running path, the items, and the clock."""
+"""Live view in a terminal: the tree with its running path, the items, and the clock."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from executive.view.items import ItemTable
 from executive.view.terminal.keys import HELP, HELP_PAUSED, Keys
 from executive.view.tree.outline import branches, opened
 
-PAUSE = 0.1
-"""Shortest time between two redraws [s]."""
+REDRAWS_PER_SECOND = 10
+"""Frequency at which the view is drawn [1/s]."""
 
 _MARKS = {
     "RUNNING": ("▶", "bold yellow"),
@@ -31,7 +31,7 @@ _STATES = {"placed": "green", "rejected": "red", "lost": "red", "held": "yellow"
 
 
 class Terminal:
-    """Redraws when something changed, at most ten times a second, from a thread of its own.
+    """Redraws ten times a second, from a thread of its own.
 
     The tick thread only notes what happened, so a slow terminal cannot slow the run down.
 
@@ -51,25 +51,21 @@ class Terminal:
         self._header = ""
         self._clock = 0.0
         self._lock = threading.Lock()
-        self._changed = threading.Event()
-        self._closed = threading.Event()
-        self._live = Live(console=console, auto_refresh=False, transient=True)
-        self._drawing = threading.Lock()
-        self._shown = False
-        self._drawer: threading.Thread | None = None
         self.items = ItemTable()
+        self._live = Live(
+            console=console,
+            get_renderable=self.render,
+            refresh_per_second=REDRAWS_PER_SECOND,
+            transient=True,
+        )
 
     def open(self, run: Run) -> None:
         """Draw the tree and begin to follow the run, and to hand on what keys want of it."""
-        with self._lock:
-            self._outline = outline(run.root)
-        self._control = control = run.control
+        self._outline = outline(run.root)
+        self._control = run.control
         if self._keyboard is not None:
-            self._keys = Keys(self._keyboard, control, self._changed.set)
+            self._keys = Keys(self._keyboard, run.control)
         self._show(True)
-        self._drawer = threading.Thread(target=self._redraw, name="terminal", daemon=True)
-        self._drawer.start()
-        self._changed.set()
 
     def __call__(self, event: Event) -> None:
         """Note what `event` changes; step aside while the operator is asked something."""
@@ -86,18 +82,10 @@ class Terminal:
                 self._why[node] = str(data.get("reason") or data.get("item") or "")
             elif event.kind == "item":
                 self.items(event)
-            else:
-                return
-        self._changed.set()
 
     def close(self) -> None:
         """Take the view away; what remains to be said is the summary's."""
-        self._closed.set()
-        self._changed.set()
-        if self._drawer is not None:
-            self._drawer.join()
-            self._drawer = None
-            self._show(False)
+        self._show(False)
 
     def note(self, sentence: str) -> None:
         """Write `sentence` on a line of its own."""
@@ -114,23 +102,12 @@ class Terminal:
                 head.append(f"   {HELP_PAUSED if paused else HELP}", style="yellow" if paused else "dim")
             return Group(head, page)
 
-    def _redraw(self) -> None:
-        while not self._closed.is_set():
-            self._changed.wait()
-            self._changed.clear()
-            with self._drawing:
-                if self._shown:
-                    self._live.update(self.render(), refresh=True)
-            self._closed.wait(PAUSE)
-
     def _show(self, wanted: bool) -> None:
-        """Take the terminal, or leave it to whoever wants to write there."""
-        with self._drawing:
-            if wanted and not self._shown:
-                self._live.start()
-            elif self._shown and not wanted:
-                self._live.stop()
-            self._shown = wanted
+        """Take the terminal and its keyboard, or leave them to others who want to write and read there."""
+        if wanted:
+            self._live.start()
+        else:
+            self._live.stop()
         if self._keys is not None:
             if wanted:
                 self._keys.listen()

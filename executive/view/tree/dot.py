@@ -1,4 +1,4 @@
-"""A tree as Graphviz text."""
+"""Graphviz text of a tree."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def dot(nodes: Sequence[OutlineNode], name: str) -> str:
         f"digraph {_quoted(name)} {{",
         '  ordering=out; nodesep=0.15; fontname="sans-serif"; fontsize=11;',
         '  node [fontname="sans-serif", fontsize=11]; edge [fontname="sans-serif", fontsize=9];',
-        *_indented(_branch(0, nodes, below)),
+        *(f"  {line}" for line in _branch(0, nodes, below)),
         "}",
     ]
     return "\n".join(lines)
@@ -39,10 +39,12 @@ def _branch(index: int, nodes: Sequence[OutlineNode], below: Sequence[Sequence[i
     node = nodes[index]
     lines = [_node(node)]
     for child in below[index]:
-        lines += [*_branch(child, nodes, below), _edge(node, nodes[child])]
+        slot = f" [label={_quoted(nodes[child].slot)}]" if nodes[child].slot else ""
+        edge = f"{_quoted(node.path)} -> {_quoted(nodes[child].path)}{slot};"
+        lines += [*_branch(child, nodes, below), edge]
     if node.subtrees:
         head = f"subgraph {_quoted(f'cluster {node.path}')} {{"
-        lines = [head, f"  label={_quoted(node.subtree)}; style=dashed; color=gray;", *_indented(lines), "}"]
+        lines = [head, f"label={_quoted(node.subtree)}; style=dashed; color=gray;", *lines, "}"]
     return lines
 
 
@@ -53,15 +55,6 @@ def _node(node: OutlineNode) -> str:
     style = ', style="rounded"' if node.kind == "skill" else ""
     tooltip = _quoted(shown.tooltip)
     return f"{_quoted(node.path)} [label={_quoted(label)}, shape={shape}{style}, tooltip={tooltip}];"
-
-
-def _edge(parent: OutlineNode, node: OutlineNode) -> str:
-    label = f" [label={_quoted(node.slot)}]" if node.slot else ""
-    return f"{_quoted(parent.path)} -> {_quoted(node.path)}{label};"
-
-
-def _indented(lines: Sequence[str]) -> list[str]:
-    return [f"  {line}" for line in lines]
 
 
 def _quoted(text: str) -> str:

@@ -1,4 +1,4 @@
-"""Where everything stands in a picture of a tree that grows from left to right.
+"""Layout of a picture of a tree that grows from left to right.
 
 Every depth is a column as wide as its widest node. Every node owns a band of rows that holds it and all
 that hangs from it, so nothing can overlap; a subtree's band has room for a frame around it. A node stands
@@ -93,16 +93,14 @@ def layout(depths: Sequence[int], children: Sequence[Sequence[int]], sizes: Sequ
 
 def _columns(depths: Sequence[int], sizes: Sequence[Size]) -> tuple[list[float], tuple[float, ...]]:
     """Return where the boxes of every depth begin, and where the lines that lead to them part."""
-    columns, trunks = [MARGIN], [MARGIN]
-    right = MARGIN + sizes[0].width
-    if sizes[0].name:
-        columns, right = [MARGIN + FRAME], right + FRAME
-    for depth in range(1, max(depths) + 1):
+    columns: list[float] = []
+    trunks: list[float] = []
+    right = 0.0
+    for depth in range(max(depths) + 1):
         here = [size for size, at in zip(sizes, depths, strict=True) if at == depth]
-        slot = max(size.slot for size in here)
         frame = FRAME if any(size.name for size in here) else 0.0
-        trunks.append(right + STEM)
-        columns.append(right + 2 * STEM + slot + frame)
+        trunks.append(right + STEM if depth else MARGIN)
+        columns.append(trunks[-1] + (STEM + max(size.slot for size in here) if depth else 0.0) + frame)
         right = columns[-1] + max(size.width for size in here)
     return columns, tuple(trunks)
 

@@ -1,4 +1,4 @@
-"""A tree's outline as a person reads it in a terminal."""
+"""Text of a tree, as a person reads it in a terminal."""
 
 from __future__ import annotations
 
@@ -65,22 +65,20 @@ def skills(nodes: Sequence[OutlineNode]) -> dict[str, str]:
 
     What a skill is to its parent (`recover: Grasp`) is left out.
     """
-    next_depths = [*(node.depth for node in nodes[1:]), 0]
-    return {
-        node.path: node.name.rpartition(": ")[2]
-        for node, next_depth in zip(nodes, next_depths, strict=True)
-        if next_depth <= node.depth
-    }
+    leaves = (node for node, below in zip(nodes, children(nodes), strict=True) if not below)
+    return {node.path: node.name.rpartition(": ")[2] for node in leaves}
 
 
 def folded(nodes: Sequence[OutlineNode]) -> list[OutlineNode]:
     """Return an outline in which every subtree is shown once; where it is used again stands its name."""
     shown: list[OutlineNode] = []
     first: dict[str, list[tuple[int, str, str]]] = {}
-    ends = _ends(nodes)
     index = 0
     while index < len(nodes):
-        node, branch = nodes[index], nodes[index : ends[index]]
+        node = nodes[index]
+        later = range(index + 1, len(nodes))
+        end = next((other for other in later if nodes[other].depth <= node.depth), len(nodes))
+        branch = nodes[index:end]
         known = next((subtree for subtree in node.subtrees if subtree in first), None)
         if known is None:
             first |= {subtree: _content(branch) for subtree in node.subtrees}
@@ -89,7 +87,7 @@ def folded(nodes: Sequence[OutlineNode]) -> list[OutlineNode]:
         else:
             same = first[known] == _content(branch)
             shown.append(_use(node, known, "as above" if same else "as above, other params"))
-            index = ends[index]
+            index = end
     return shown
 
 
@@ -127,15 +125,6 @@ def _said_below(node: OutlineNode, ports: bool, reasons: bool) -> Iterator[str]:
 def _wire(wire: Connection, arrow: str) -> str:
     variable = f"${wire.variable}" + ("" if wire.required else "?")
     return variable if wire.port == wire.variable else f"{wire.port} {arrow} {variable}"
-
-
-def _ends(nodes: Sequence[OutlineNode]) -> list[int]:
-    """Return for each node where what hangs from it ends in the outline."""
-    ends = [index + 1 for index in range(len(nodes))]
-    for index, below in reversed([*enumerate(children(nodes))]):
-        if below:
-            ends[index] = ends[below[-1]]
-    return ends
 
 
 def _content(branch: Sequence[OutlineNode]) -> list[tuple[int, str, str]]:

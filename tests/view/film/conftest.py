@@ -11,14 +11,7 @@ from executive.mission.load import load_mission
 from executive.record.recorded_run import recorded_run
 from executive.record.run_directory import RunDirectory
 from executive.testing.oracle import oracle_cell
-
-MISSION = """\
-mission: bring_one
-description: Bring one object.
-cell: cells/overhead.yaml
-routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}
-tree: [MoveToScan, Detect, Localize, SelectTarget, Approach, Grasp, Transit, Release]
-"""
+from tests.record.conftest import MISSION
 
 
 @pytest.fixture(scope="session")

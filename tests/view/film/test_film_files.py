@@ -10,10 +10,8 @@ import pytest
 from PIL import Image, ImageDraw
 
 from executive.errors import InputError
-from executive.view.film.encoder import GIF_SIZE, write_gif, write_mp4
-from executive.view.film.formats import GIF, MP4, format_of
+from executive.view.film.formats import GIF, GIF_SIZE, MP4, file_for, format_of, write_gif, write_mp4
 from executive.view.film.ink import BACK, SUCCESS
-from executive.view.film.place import file_for
 
 
 @pytest.fixture
@@ -89,12 +87,3 @@ def test_a_file_is_there_whole_or_as_it_was(tmp_path: Path) -> None:
         raise KeyboardInterrupt
     assert [file.name for file in tmp_path.iterdir()] == ["film.mp4"]
     assert out.read_text() == "one"
-
-
-def test_a_place_that_takes_nothing_is_told_before_anything_is_drawn(tmp_path: Path) -> None:
-    out = tmp_path / "nowhere" / "film.mp4"
-    with pytest.raises(InputError) as refused, file_for(out, force=False):
-        pytest.fail("it began")
-    assert str(refused.value) == (
-        f'cannot write the film "{out}": no such file or directory; name another place with -o'
-    )

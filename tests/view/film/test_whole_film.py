@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import re
 import shutil
 from pathlib import Path
 
@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from executive.errors import InputError
-from executive.record.journal import read_journal
 from executive.record.run_directory import RunDirectory
 from executive.sim.beginning import first_world
 from executive.sim.command_log import STEP, read_commands
@@ -23,6 +22,7 @@ from executive.view.film.film import film
 from executive.view.film.formats import MP4
 from executive.view.film.source import Source
 
+pytestmark = pytest.mark.slow
 MP4_HELD = 50
 """Frames for which the end of an MP4 is shown."""
 
@@ -35,7 +35,7 @@ def copy(filmed_run: RunDirectory, tmp_path: Path) -> RunDirectory:
 
 def test_a_run_becomes_a_film(filmed_run: RunDirectory, tmp_path: Path) -> None:
     told: list[tuple[int, int]] = []
-    source = Source.of(filmed_run)
+    source = Source(filmed_run)
     frames = film(
         source, tmp_path / "film", MP4, speed=12.0, workers=1, progress=lambda *done: told.append(done)
     )
@@ -55,8 +55,8 @@ def test_a_run_becomes_a_film(filmed_run: RunDirectory, tmp_path: Path) -> None:
 
 
 def test_picture_and_tree_are_in_step(filmed_run: RunDirectory) -> None:
-    source = Source.of(filmed_run)
-    entries = source.past.entries
+    source = Source(filmed_run)
+    entries = source.entries
     (grasped,) = (e["tick"] for e in entries if e.get("node") == "tree/Grasp" and e["status"] == "SUCCESS")
     (closed,) = (e["tick"] for e in entries if e["kind"] == "intent" and e["action"] == "close")
     world = first_world(source.config, source.start["seed"])
@@ -78,53 +78,40 @@ def test_picture_and_tree_are_in_step(filmed_run: RunDirectory) -> None:
 
 
 def test_the_source_is_the_record(filmed_run: RunDirectory) -> None:
-    source = Source.of(filmed_run)
+    source = Source(filmed_run)
     assert (source.start["mission"], source.start["seed"]) == ("bring_one", 5)
     assert (source.config.cell, source.nodes[0].path) == ("overhead", "tree")
-    assert (source.ending.status, source.items) == ("SUCCESS", 6)
+    assert (source.result["status"], source.items) == ("SUCCESS", 6)
 
 
 def test_a_run_that_was_cut_off_can_be_filmed(copy: RunDirectory) -> None:
-    copy.result.unlink()
     lines = copy.journal.read_text().splitlines(keepends=True)
     copy.journal.write_text("".join(lines[:-1]))
-    assert Source.of(copy).ending.status == "CUT OFF"
     copy.result.write_text("{")
-    assert Source.of(copy).ending.status == "CUT OFF"
-    copy.result.write_text(json.dumps([]))
-    assert Source.of(copy).ending.status == "CUT OFF"
-
-
-def test_without_a_log_of_its_world_a_run_is_refused(copy: RunDirectory) -> None:
-    copy.world.write_text("{}")
-    with pytest.raises(InputError) as refused:
-        Source.of(copy)
-    assert str(refused.value) == (
-        f'the run in "{copy.path}" cannot be filmed: its cell has no simulated world to look at; '
-        "film a run on a cell of `kind: sim`"
-    )
-    copy.world.unlink()
-    with pytest.raises(InputError) as refused:
-        Source.of(copy)
-    assert str(refused.value) == (
-        f'the run in "{copy.path}" cannot be filmed: it has no world.log, from which its world is rebuilt; '
-        "sweeps keep none. Run the mission once more with `executive run` and the same seed, "
-        "and film that run"
-    )
+    assert Source(copy).result == {}
 
 
 @pytest.mark.parametrize(
-    ("broken", "sentence"),
+    ("file", "content", "sentence"),
     [
-        ("tree.json", 'cannot read the tree "'),
-        ("cell.yaml", "holds no cell that can be read"),
-        ("journal.jsonl", "had not begun when it was cut off; there is nothing to film"),
+        ("tree.json", None, 'cannot read the tree "'),
+        ("cell.yaml", None, "holds no cell that can be read"),
+        ("journal.jsonl", "", "had not begun when it was cut off; there is nothing to film"),
+        (
+            "world.log",
+            "{}",
+            "its cell has no simulated world to look at; film a run on a cell of `kind: sim`",
+        ),
+        (
+            "world.log",
+            None,
+            "it has no world.log, from which its world is rebuilt; sweeps keep none. Run the",
+        ),
     ],
 )
-def test_a_record_that_lacks_a_part_is_refused(copy: RunDirectory, broken: str, sentence: str) -> None:
-    (copy.path / broken).unlink()
-    if broken == "journal.jsonl":
-        (copy.path / broken).touch()
-        assert read_journal(copy.journal) == []
-    with pytest.raises(InputError, match=sentence):
-        Source.of(copy)
+def test_a_record_that_lacks_a_part_is_refused(copy, file: str, content: str | None, sentence: str) -> None:
+    (copy.path / file).unlink()
+    if content is not None:
+        (copy.path / file).write_text(content)
+    with pytest.raises(InputError, match=re.escape(sentence)):
+        Source(copy)

@@ -14,6 +14,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
+pytestmark = pytest.mark.slow
 START = 60_000
 """Longest wait for a run to be there [ms]: it loads a simulator and a detector first."""
 

@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import os
 import signal
-import subprocess
 import threading
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -18,21 +17,14 @@ import numpy as np
 import pytest
 
 from executive.discovery import discover
-from executive.errors import InputError
 from executive.events import Event
 from executive.mission.load import load_mission
 from executive.runtime.outcome import Outcome
 from executive.runtime.run import Run
 from executive.testing.fake_cell import FakeCell
-from executive.view.live.page import WAITING, LivePage
+from executive.view.live.page import MAX_QUEUED_NEWS, LivePage
+from tests.record.conftest import MISSION
 
-MISSION = """\
-mission: bring_one
-description: Bring one object.
-cell: cells/overhead.yaml
-routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}
-tree: [MoveToScan, Detect, Localize, SelectTarget, Approach, Grasp, Transit, Release]
-"""
 ASKING = """\
 mission: ask
 description: Ask what to bring.
@@ -114,6 +106,7 @@ def test_a_watcher_sees_the_run_to_its_end(tmp_path: Path) -> None:
     assert watch(MISSION, tmp_path, do).status == "SUCCESS"
 
 
+@pytest.mark.slow
 def test_pause_step_and_stop_are_heard(tmp_path: Path) -> None:
     async def do(watched: Watched) -> None:
         await watched.wish(do="step")
@@ -130,6 +123,7 @@ def test_pause_step_and_stop_are_heard(tmp_path: Path) -> None:
     assert watch(MISSION, tmp_path, do).status == "HALTED"
 
 
+@pytest.mark.slow
 def test_what_is_to_be_picked_can_be_said_on_the_page(tmp_path: Path) -> None:
     async def do(watched: Watched) -> None:
         await watched.wish(do="resume")
@@ -142,16 +136,7 @@ def test_what_is_to_be_picked_can_be_said_on_the_page(tmp_path: Path) -> None:
     assert watch(ASKING, tmp_path, do).status == "SUCCESS"
 
 
-def test_nothing_of_it_is_left_when_it_ends() -> None:
-    page = LivePage()
-    pid = page._server.pid
-    page.finish()
-    page.finish()
-    with pytest.raises(ProcessLookupError):
-        os.kill(pid, 0)
-    assert page.problem == ""
-
-
+@pytest.mark.slow
 def test_it_listens_on_loopback_only_and_at_one_port() -> None:
     page = LivePage()
     try:
@@ -176,6 +161,7 @@ async def _answered(address: str) -> None:
         assert answer.status == 200
 
 
+@pytest.mark.slow
 def test_a_page_that_died_costs_the_run_nothing(tmp_path: Path) -> None:
     file = tmp_path / "mission.yaml"
     file.write_text(MISSION)
@@ -189,10 +175,11 @@ def test_a_page_that_died_costs_the_run_nothing(tmp_path: Path) -> None:
     run.close()
 
 
+@pytest.mark.slow
 def test_a_page_that_hangs_is_told_no_more_than_so_much_and_costs_a_few_seconds(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("executive.view.live.page.PATIENCE", 0.2)
+    monkeypatch.setattr("executive.view.live.page.SHUTDOWN_TIMEOUT", 0.2)
     page = LivePage()
     asyncio.run(_answered(page.address))
     page._server.send_signal(signal.SIGSTOP)
@@ -202,20 +189,9 @@ def test_a_page_that_hangs_is_told_no_more_than_so_much_and_costs_a_few_seconds(
     )
     for tick in range(200):
         page(Event("look", tick, 0.1, {"frame_object": frame, "found": ()}))
-    assert page._queue.qsize() <= WAITING
+    assert page._queue.qsize() <= MAX_QUEUED_NEWS
     page.finish({"status": "SUCCESS"})
     assert page._server.returncode == -signal.SIGKILL
-
-
-def test_a_server_that_cannot_begin_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
-    popen = subprocess.Popen
-    monkeypatch.setattr(
-        "subprocess.Popen", lambda words, **options: popen([*words[:3], "no.such.program"], **options)
-    )
-    page = LivePage()
-    page.finish()
-    assert page.problem.startswith("the page ended before the run: ")
-    assert "No module named" in page.problem
 
 
 def test_what_goes_wrong_with_it_is_said_and_the_run_goes_on() -> None:
@@ -230,12 +206,3 @@ def test_what_goes_wrong_with_it_is_said_and_the_run_goes_on() -> None:
         page(Event("look", 2, 0.2, {"frame_object": object(), "found": ()}))
     finally:
         page.finish()
-
-
-def test_without_its_packages_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("executive.view.live.page.find_spec", lambda name: None if name == "viser" else name)
-    with pytest.raises(InputError) as refused:
-        LivePage()
-    assert str(refused.value) == (
-        '--view needs viser; install the extra: uv sync --extra view, or pip install "executive[view]"'
-    )

@@ -1,24 +1,61 @@
-"""The live page's server: what it serves, to whom, and what it takes from them."""
+"""Server of the live page: who may come, what it serves, and what it takes."""
 
 from __future__ import annotations
 
 import asyncio
-import json
 import socket
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import aiohttp
 import pytest
 from aiohttp import web
+from aiohttp.test_utils import make_mocked_request
 
+from executive.geometry import Pose
+from executive.scenery import Shape
+from executive.view.live import scene
 from executive.view.live.board import Board
-from executive.view.live.guard import Guard
-from executive.view.live.server import Server, understood
+from executive.view.live.server import HEADERS, POLICY, Server, refusal, understood
 from executive.view.live.tunnel import Tunnel
 
 TOKEN = "a-token"
+HOST = "127.0.0.1:8123"
+NO_TOKEN = "the address lacks the token of this run; take it from the terminal that the run is in"
+OTHER_PAGE = "another page may neither see nor command this run"
+
+
+def refused(path: str = f"/{TOKEN}/", **headers: str) -> str:
+    return refusal(make_mocked_request("GET", path, headers={"Host": HOST} | headers), TOKEN, HOST)
+
+
+def test_the_page_itself_is_let_in() -> None:
+    assert refused() == refused(Origin=f"http://{HOST}", Upgrade="websocket") == ""
+
+
+@pytest.mark.parametrize(
+    "path", ["/", "", "*", "/another/", "/a-toke/", "/a-token2/", "//a-token/", "/A-TOKEN/", "/live", "/%ff/"]
+)
+def test_without_the_token_nobody_is_let_in(path: str) -> None:
+    assert refused(path) == NO_TOKEN
+
+
+@pytest.mark.parametrize(
+    "origin",
+    ["http://evil.example", "null", "", f"https://{HOST}", "http://127.0.0.1:8124", f"http://{HOST}.evil"],
+)
+def test_a_page_of_another_origin_is_not_let_in_even_with_the_token(origin: str) -> None:
+    assert refused(Origin=origin) == OTHER_PAGE
+
+
+def test_a_socket_that_does_not_name_its_page_is_not_let_in() -> None:
+    assert refused(Upgrade="WebSocket") == "a connection must say which page it is of"
+
+
+@pytest.mark.parametrize("host", ["evil.example", "localhost:8123", "127.0.0.1", f"{HOST}.evil"])
+def test_a_name_that_leads_here_is_not_let_in(host: str) -> None:
+    assert refused(Host=host) == "this page goes by the address of this machine only"
 
 
 class Site:
@@ -28,27 +65,15 @@ class Site:
         self.server, self.session, self.address, self.board = server, session, address, board
         self.wishes: list[dict[str, Any]] = []
 
-    @property
-    def origin(self) -> dict[str, str]:
-        return {"Origin": self.address}
-
-    async def get(self, path: str, **headers: str) -> tuple[int, str, dict[str, str]]:
-        async with self.session.get(f"{self.address}{path}", headers=headers) as answer:
-            return answer.status, await answer.text(), dict(answer.headers)
-
 
 def serve(do: Callable[[Site], Awaitable[None]]) -> None:
     """Serve a page while something is done with it."""
 
-    async def nowhere() -> Path:
-        raise AssertionError("nobody may get as far as the scene")
-
     async def work() -> None:
         wishes: list[dict[str, Any]] = []
         listener = socket.create_server(("127.0.0.1", 0))
-        port = listener.getsockname()[1]
-        board = Board()
-        server = Server(board, Guard(TOKEN, port), Tunnel(nowhere), lambda wish: wishes.append(dict(wish)))
+        port, board = listener.getsockname()[1], Board()
+        server = Server(board, Tunnel(Path("nowhere")), lambda wish: wishes.append(dict(wish)), TOKEN, port)
         runner = web.AppRunner(server.app)
         await runner.setup()
         await web.SockSite(runner, listener).start()
@@ -61,75 +86,63 @@ def serve(do: Callable[[Site], Awaitable[None]]) -> None:
     asyncio.run(work())
 
 
-def test_serves_the_page_and_nothing_else() -> None:
+def test_serves_the_page_to_the_page_and_nothing_else() -> None:
+    async def get(site: Site, path: str) -> tuple[int, str, dict[str, str]]:
+        async with site.session.get(f"{site.address}{path}") as answer:
+            return answer.status, await answer.text(), dict(answer.headers)
+
     async def look(site: Site) -> None:
         for file, kind in (
-            ("", "text/html"),
-            ("page.js", "text/javascript"),
-            ("page.css", "text/css"),
+            ("", "text/html"), ("page.js", "text/javascript"), ("page.css", "text/css"),
             ("colours.css", "text/css"),
-        ):
-            status, text, headers = await site.get(f"/{TOKEN}/{file}")
+        ):  # fmt: skip
+            status, text, headers = await get(site, f"/{TOKEN}/{file}")
             assert (status, headers["Content-Type"]) == (200, f"{kind}; charset=utf-8")
             assert text
-            assert headers["Referrer-Policy"] == "no-referrer"
-            assert headers["Cache-Control"] == "no-store"
-            assert "default-src 'none'" in headers["Content-Security-Policy"]
+            assert headers.items() >= (HEADERS | {"Content-Security-Policy": POLICY}).items()
         for path in ("page.py", "../guard.py", "%2e%2e/guard.py", "scene.py"):
-            status, text, _ = await site.get(f"/{TOKEN}/{path}")
+            status, text, _ = await get(site, f"/{TOKEN}/{path}")
             assert (status, text) in [(404, "there is no such thing here\n"), (403, text)]
-
-    serve(look)
-
-
-@pytest.mark.parametrize("path", ["/", "/live", "/scene", "/wrong/", "/wrong/live", "/wrong/scene/"])
-def test_refuses_whoever_lacks_the_token(path: str) -> None:
-    async def look(site: Site) -> None:
-        status, text, headers = await site.get(path)
-        assert status == 403
-        assert text.startswith("the address lacks the token of this run")
-        assert headers["Referrer-Policy"] == "no-referrer"
-
-    serve(look)
-
-
-@pytest.mark.parametrize("path", ["live", "scene"])
-@pytest.mark.parametrize("origin", [None, "http://evil.example", "null"])
-def test_refuses_the_sockets_of_other_pages(path: str, origin: str | None) -> None:
-    async def look(site: Site) -> None:
-        headers = {} if origin is None else {"Origin": origin}
-        with pytest.raises(aiohttp.WSServerHandshakeError) as refused:
-            await site.session.ws_connect(f"{site.address}/{TOKEN}/{path}", headers=headers)
-        assert refused.value.status == 403
+        for path in ("/", "/live", "/scene", "/wrong/", "/wrong/live", "/wrong/scene/"):
+            status, text, headers = await get(site, path)
+            assert (status, text) == (403, f"{NO_TOKEN}\n")
+            assert headers.items() >= HEADERS.items()
+        for path in ("live", "scene"):
+            for origin in ({}, {"Origin": "http://evil.example"}, {"Origin": "null"}):
+                with pytest.raises(aiohttp.WSServerHandshakeError) as refused:
+                    await site.session.ws_connect(f"{site.address}/{TOKEN}/{path}", headers=origin)
+                assert refused.value.status == 403
         assert site.wishes == []
 
     serve(look)
 
 
+def test_the_policy_and_the_headers_keep_the_page_to_itself() -> None:
+    assert POLICY.startswith("default-src 'none'; script-src 'self'; ")
+    assert "frame-ancestors 'none'" in POLICY
+    assert HEADERS["Referrer-Policy"] == "no-referrer"
+    assert HEADERS["Cache-Control"] == "no-store"
+
+
 def test_a_watcher_is_told_everything_then_news_and_is_heard() -> None:
     async def look(site: Site) -> None:
-        site.board.take(("run", {"clock": 0.0, "mission": "sort", "seed": 3}))
-        async with site.session.ws_connect(f"{site.address}/{TOKEN}/live", headers=site.origin) as socket:
+        site.board.take({"run": {"mission": "sort", "seed": 3}})
+        origin = {"Origin": site.address}
+        async with site.session.ws_connect(f"{site.address}/{TOKEN}/live", headers=origin) as socket:
             assert (await socket.receive_json())["run"] == {"mission": "sort", "seed": 3}
             assert site.wishes == [{"do": "watched", "by": 1, "sparing": False}]
             site.board.news()
-            site.board.take(("paused", {"paused": True}))
+            site.board.take({"paused": True})
             await site.server.tell()
             assert await socket.receive_json() == {"paused": True}
-            for said in (
-                '{"do": "spare"}',
-                '{"do": "pause"}',
-                "rubbish",
-                '{"do": "request", "word": "cube"}',
-                '{"do": "fly"}',
-            ):
+            wishes = ('{"do": "spare"}', '{"do": "pause"}', "rubbish", '{"do": "request", "word": "cube"}')
+            for said in (*wishes, '{"do": "fly"}', '{"do": "stop"}'):
                 await socket.send_str(said)
-            await socket.send_str('{"do": "stop"}')
             while site.wishes[-1] != {"do": "stop"}:
                 await asyncio.sleep(0)
-            site.board.take(("end", {"clock": 1.0}))
+            site.board.take({"over": True})
             await site.server.end()
-            assert (await socket.receive_json())["over"] is True
+            assert await socket.receive_json() == {"over": True}
             assert (await socket.receive()).type is aiohttp.WSMsgType.CLOSE
         while site.wishes[-1] != {"do": "watched", "by": 0, "sparing": False}:
             await asyncio.sleep(0)
@@ -140,13 +153,52 @@ def test_a_watcher_is_told_everything_then_news_and_is_heard() -> None:
 
 
 @pytest.mark.parametrize(
-    "text",
-    ["", "[]", "null", '"pause"', '{"do": "watched", "by": 7}', '{"do": ["pause"]}', '{"do": "request"}',
-     '{"do": "request", "word": 3}', "{", json.dumps({"do": None})],
+    ("text", "wish"),
+    [
+        ("", None), ("[]", None), ("null", None), ('"pause"', None), ("{", None), ('{"do": null}', None),
+        ('{"do": "watched", "by": 7}', None), ('{"do": ["pause"]}', None), ('{"do": "request"}', None),
+        ('{"do": "request", "word": 3}', None), ('{"do": "stop", "word": "x"}', {"do": "stop"}),
+    ],
 )  # fmt: skip
-def test_what_nobody_can_want_is_not_heard(text: str) -> None:
-    assert understood(text) is None
+def test_wishes_that_nobody_can_have_are_dropped(text: str, wish: object) -> None:
+    assert understood(text) == wish
 
 
-def test_more_than_a_wish_is_dropped() -> None:
-    assert understood('{"do": "stop", "word": "x", "by": 2}') == {"do": "stop"}
+BOX = Shape("", "box", (0.1, 0.1, 0.1), Pose.identity(), (1.0, 0.0, 0.0))
+PLACE = (0.5, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0)
+
+
+class Built:
+    """Stands for a scene, and notes what it is told."""
+
+    made: ClassVar[list[Built]] = []
+
+    def __init__(self, path: Path, shapes: object) -> None:
+        self.told: list[object] = [path, shapes]
+        self.made.append(self)
+
+    def move(self, bodies: object) -> None:
+        self.told.append(bodies)
+
+
+@pytest.mark.parametrize("looked_at", [True, False])
+def test_the_scene_is_built_once_when_somebody_looks_and_it_is_known_what_to_show(
+    monkeypatch, looked_at
+) -> None:
+    monkeypatch.setattr(Built, "made", [])
+    monkeypatch.setattr(scene, "Scene", Built)
+
+    async def work() -> None:
+        tunnel = Tunnel(Path("socket"))
+        early = asyncio.create_task(tunnel.session()) if looked_at else None
+        await asyncio.sleep(0.02)
+        assert not Built.made
+        tunnel.show((BOX,))
+        tunnel.move({"tool": PLACE})
+        if early is not None:
+            for session in (await early, await tunnel.session()):
+                await session.close()
+            tunnel.move({})
+
+    asyncio.run(work())
+    assert [one.told for one in Built.made] == [[Path("socket"), (BOX,), {"tool": PLACE}, {}]] * looked_at

@@ -13,7 +13,7 @@ from executive.errors import InputError
 from executive.mission.text.files import shipped_folder
 from executive.record.resumed_run import resumed_run
 from executive.testing.fake_cell import FakeCell
-from executive.view.report.facts import CUT_OFF, gather
+from executive.view.report.facts import CUT_OFF, Facts
 
 
 def append(run: Path, **entry: object) -> None:
@@ -27,19 +27,20 @@ def without_end(run: Path) -> None:
 
 
 def test_a_run_that_ended_is_told_by_its_result(failed):
-    facts = gather(failed)
+    facts = Facts(failed)
     assert facts.result == json.loads((failed / "result.json").read_text())
     assert (facts.status, facts.end) == ("FAILURE", facts.result["robot_time_s"])
     assert facts.resume == ""
-    assert set(facts.pictures.decisions) == {"sphere-1"}
+    assert {each.item for each in facts.pictures if not each.reason} == {"sphere-1"}
     assert {span.node for span in facts.course} <= {node.path for node in facts.nodes}
 
 
+@pytest.mark.slow
 def test_a_run_that_was_cut_off_and_taken_up_again_is_told_as_one(killed, copy):
     run = copy(killed)
-    assert gather(run).status == CUT_OFF
+    assert Facts(run).status == CUT_OFF
     resumed_run(run, discover(), frames=False, kind=FakeCell)
-    facts = gather(run)
+    facts = Facts(run)
     assert (facts.status, facts.resume) == ("SUCCESS", "")
     transits = [span for span in facts.course if span.node.endswith("/Transit")]
     assert [span.status for span in transits] == ["INVALID", "SUCCESS"]
@@ -50,11 +51,11 @@ def test_a_run_that_was_cut_off_and_taken_up_again_is_told_as_one(killed, copy):
 def test_a_result_from_before_the_run_was_taken_up_again_is_not_its_end(failed, copy):
     run = copy(failed)
     append(run, tick=310, clock=1.3, kind="resume", ticked=310, intent=None)
-    facts = gather(run)
+    facts = Facts(run)
     assert (facts.status, facts.result, facts.end) == (CUT_OFF, {}, 1.3)
     end = {"status": "HALTED", "reason": "halted", "message": "halted by the user", "ticks": 400}
     append(run, tick=400, clock=1.6, kind="end", **end)
-    facts = gather(run)
+    facts = Facts(run)
     assert (facts.status, facts.result["message"]) == ("HALTED", "halted by the user")
     assert facts.resume == shlex.join(["executive", "run", "--resume", str(run)])
 
@@ -64,7 +65,7 @@ def test_a_run_whose_end_the_disk_did_not_take_is_told_by_its_result(failed, cop
     without_end(run)
     result = json.loads((run / "result.json").read_text()) | {"status": "FAULT"}
     (run / "result.json").write_text(json.dumps(result))
-    facts = gather(run)
+    facts = Facts(run)
     assert (facts.status, facts.result) == ("FAULT", result)
 
 
@@ -72,10 +73,10 @@ def test_a_run_whose_end_the_disk_did_not_take_is_told_by_its_result(failed, cop
 def test_a_result_that_is_none_tells_nothing(failed, copy, content):
     run = copy(failed)
     (run / "result.json").write_bytes(content.encode(errors="surrogatepass"))
-    facts = gather(run)
+    facts = Facts(run)
     assert (facts.status, facts.result["kind"]) == ("FAILURE", "end")
     without_end(run)
-    assert (gather(run).status, gather(run).result) == (CUT_OFF, {})
+    assert (Facts(run).status, Facts(run).result) == (CUT_OFF, {})
 
 
 def test_a_shipped_mission_is_repeated_by_its_name_and_with_what_was_asked_for(done, copy):
@@ -85,7 +86,7 @@ def test_a_shipped_mission_is_repeated_by_its_name_and_with_what_was_asked_for(d
     (run / "journal.jsonl").write_text("\n".join([json.dumps(shipped), *others]) + "\n")
     append(run, tick=400, clock=1.7, kind="request", wanted="apple")
     append(run, tick=401, clock=1.8, kind="disturbance", what="object removed")
-    facts = gather(run)
+    facts = Facts(run)
     assert facts.repeat == "executive run sort_fruit --seed 3 --request apple"
     assert facts.replay == shlex.join(["executive", "replay", str(run)])
     assert (facts.requests, facts.disturbances) == (["apple"], [(1.8, "object removed")])
@@ -93,27 +94,16 @@ def test_a_shipped_mission_is_repeated_by_its_name_and_with_what_was_asked_for(d
 
 def test_a_phantom_is_no_object(done, copy):
     run = copy(done)
-    before = [row.item for row in gather(run).objects]
+    before = [row.item for row in Facts(run).objects]
     append(run, tick=400, clock=1.7, kind="item", item="cube-9", label="cube", state="phantom", why="nothing")
-    assert [row.item for row in gather(run).objects] == before
+    assert [row.item for row in Facts(run).objects] == before
 
 
 def test_a_run_that_had_not_begun_has_nothing_to_report(done, copy):
     run = copy(done)
     (run / "journal.jsonl").write_text("")
     with pytest.raises(InputError) as caught:
-        gather(run)
+        Facts(run)
     assert str(caught.value) == (
         f'the run in "{run}" had not begun when it was cut off; there is nothing to report'
-    )
-
-
-def test_a_run_without_a_tree_says_since_when_runs_leave_one(done, copy):
-    run = copy(done)
-    (run / "tree.json").unlink()
-    with pytest.raises(InputError) as caught:
-        gather(run)
-    assert str(caught.value) == (
-        f'cannot read the tree "{run / "tree.json"}": no such file or directory; every run leaves one beside '
-        "its journal since version 0.1"
     )

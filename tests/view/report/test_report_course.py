@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from made_up_runs import told
 
-from executive.view.report.course import Span, spans, tallies
+from executive.view.report.course import Span, by_node, counts, last_failure, spans
 
 
 def test_every_time_that_a_node_ran_is_told_in_the_order_in_which_they_began():
@@ -65,13 +65,6 @@ def test_a_tally_counts_the_ends_of_a_node_and_keeps_its_last_failure():
         told(0.6, "tree/Grasp", "RUNNING"), told(0.7, "tree/Grasp", "SUCCESS"),
         told(0.8, "tree/Wait", "RUNNING"),
     ])  # fmt: skip
-    grasp, wait = tallies(course).values()
-    assert (grasp.ran, grasp.succeeded, grasp.failed, grasp.halted) == (4, 1, 2, 1)
-    assert (grasp.status, grasp.said) == ("SUCCESS", "blocked")
-    assert grasp.counts == "1 done, 2 failed, 1 halted"
-    assert (wait.status, wait.said, wait.counts) == ("RUNNING", "", "1 under way")
-
-
-def test_what_is_under_way_is_counted_beside_what_was_done_before():
-    course = [Span("tree/Wait", 0.0, 1.0, "SUCCESS"), Span("tree/Wait", 2.0, 3.0, "RUNNING")]
-    assert tallies(course)["tree/Wait"].counts == "1 done, 1 under way"
+    grasp, wait = by_node(course).values()
+    assert (counts(grasp), last_failure(grasp)) == ("1 done, 2 failed, 1 halted", "blocked")
+    assert (counts(wait), last_failure(wait)) == ("1 under way", "")

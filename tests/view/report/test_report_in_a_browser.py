@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from executive.discovery import discover
 from executive.mission.load import load_mission
 from executive.record.recorded_run import recorded_run
 from executive.view.report.page import write_report
 
+pytestmark = pytest.mark.slow
 MISSION = Path(__file__).parents[3] / "missions" / "sort_wrist.yaml"
 
 

@@ -11,9 +11,8 @@ from typing import Any
 import pytest
 from page_reader import SECTIONS, Page
 
-from executive.errors import InputError
 from executive.record.journal import read_journal
-from executive.view.report.facts import gather
+from executive.view.report.facts import Facts
 from executive.view.report.page import report, write_report
 
 NASTY = """</style></title><script>alert("x")</script><img src=x onerror='y'> & {{ 7 * 7 }} {% raw %} \x00"""
@@ -22,7 +21,7 @@ WORDS = {"kind", "status", "state", "file", "node", "path", "item", "origin", "p
 
 
 def page(run: Path) -> Page:
-    return Page(report(gather(run)))
+    return Page(report(Facts(run)))
 
 
 def change(file: Path, change: Any) -> None:
@@ -65,7 +64,7 @@ def test_a_success_has_no_story_and_says_what_is_in_the_bins(done):
 
 
 def test_every_object_is_there_with_its_fate_its_time_its_picture_and_what_went_wrong(failed):
-    found, facts = page(failed), gather(failed)
+    found, facts = page(failed), Facts(failed)
     told = found.texts["objects"]
     assert all(f"{row.item} rejected" in told for row in facts.objects)
     assert [row.item for row in facts.objects] == ["sphere-1", "sphere-2"]
@@ -81,7 +80,7 @@ def test_the_rows_of_time_sum_up_to_the_time_of_the_run(failed, done, killed, co
     change(braked / "journal.jsonl", lambda entry: entry | ({"clock": 2.5} if entry["kind"] == "end" else {}))
     assert "no object" in page(braked).texts["objects"]
     for run in (failed, done, killed, braked):
-        facts = gather(run)
+        facts = Facts(run)
         rows = re.findall(r"</td><td>([0-9.]+)</td>\s*<td class=\"bar\">", report(facts))
         assert len(rows) == len(facts.shares.rows)
         assert sum(map(float, rows)) == pytest.approx(facts.end, abs=0.01 * len(rows))
@@ -126,12 +125,6 @@ def test_a_run_whose_result_is_gone_has_the_verdict_of_its_journal(failed, done,
     assert "It came to its end; only the journal is left of its result." in page(run).texts["header"]
 
 
-def test_a_mission_that_saw_nothing_says_so(done, copy):
-    run = copy(done)
-    change(run / "result.json", lambda result: result | {"items": dict.fromkeys(result["items"], 0)})
-    assert page(run).texts["header"].startswith("SUCCESS The mission was done; no object was seen.")
-
-
 def test_the_time_and_the_pictures_of_what_was_no_object_are_shown_all_the_same(failed, copy):
     run = copy(failed)
     phantom = {"state": "phantom"}
@@ -151,7 +144,7 @@ def test_whatever_a_mission_says_is_text(failed, copy):
     odd.rename(run / "frames" / "000001_<script>'{{ 7 * 7 }}\".jpg")
     for name in ("journal.jsonl", "tree.json", "result.json"):
         change(run / name, nasty)
-    text = report(gather(run))
+    text = report(Facts(run))
     found = Page(text)
     assert found.shape == plain.shape
     assert found.raw == plain.raw
@@ -164,7 +157,7 @@ def test_whatever_a_mission_says_is_text(failed, copy):
 
 @pytest.mark.parametrize("name", ["done", "failed", "killed"])
 def test_the_page_needs_nothing_from_outside(name, request):
-    text = report(gather(request.getfixturevalue(name)))
+    text = report(Facts(request.getfixturevalue(name)))
     found = Page(text)
     tags = {tag for tag, _ in found.elements}
     assert not tags & {"script", "iframe", "object", "embed", "base", "form", "image", "use", "foreignobject"}
@@ -177,39 +170,6 @@ def test_the_page_needs_nothing_from_outside(name, request):
     assert policy.startswith("default-src 'none';")
 
 
-def test_pictures_without_room_are_links_below_the_run_directory(failed, monkeypatch):
-    monkeypatch.setattr("executive.view.report.pictures.ROOM", 0)
-    links = {link for link in page(failed).linked() if not link.startswith("data:")}
-    assert all((failed / link).is_file() for link in links)
-    assert len(links) == 3
-
-
 def test_a_name_that_is_not_utf_8_costs_no_report(done, copy, tmp_path):
     run = copy(done).rename(tmp_path / "run\udcff")
     assert "run�" in write_report(run).read_text(encoding="utf-8")
-
-
-def test_the_report_is_written_beside_its_record_whole_or_not_at_all(done, copy):
-    run = copy(done)
-    file = write_report(run)
-    assert (file, file.read_text()) == (run / "report.html", report(gather(run)))
-    file.unlink()
-    file.mkdir()
-    with pytest.raises(InputError) as caught:
-        write_report(run)
-    assert str(caught.value) == (
-        f'cannot write the report "{file}": is a directory; copy the run directory to where you may write, '
-        "and have the report of the copy made"
-    )
-    assert not list(run.glob(".*"))
-
-
-def test_on_a_full_disk_space_helps(done, copy, monkeypatch):
-    def full(path: Path, text: str) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("executive.view.report.page.write_whole", full)
-    with pytest.raises(
-        InputError, match="no space left on device; free some space or copy the run directory"
-    ):
-        write_report(copy(done))

@@ -47,12 +47,6 @@ def test_what_runs_at_the_same_time_is_the_time_of_what_began_first_and_is_about
     assert told.rows["duck-1"] == near({"approach": 1.0})
 
 
-def test_a_look_that_fails_is_no_failed_attempt():
-    course = [ran("Approach", 0.0, 1.0, "cube-1"), ran("Detect", 1.0, 2.0, "cube-1", "FAILURE")]
-    told = shares(course, TREE, [(0.0, "cube-1")], 2.0)
-    assert told.rows == {"cube-1": near({"approach": 1.0, "detect": 1.0})}
-
-
 def test_an_attempt_that_was_the_last_was_in_vain_up_to_its_end():
     course = [
         ran("Approach", 0.5, 1.0, "cube-1"), ran("Grasp", 1.0, 1.2, "cube-1", "FAILURE"),
@@ -67,21 +61,11 @@ def test_the_time_before_the_first_skill_and_after_the_last_belongs_to_the_run()
     assert told.rows == {"cube-1": near({WAITING: 1.0, "transit": 1.0}), NOBODY: near({WAITING: 0.4})}
 
 
-def test_a_run_that_took_no_time_has_no_shares():
-    told = shares([ran("SelectTarget", 0.0, 0.0, "cube-1")], TREE, [(0.0, "cube-1")], 0.0)
-    assert (told.rows, told.activities) == ({}, ())
-
-
 def test_a_skill_that_is_called_like_another_activity_has_no_column_of_its_own():
     tree = [*TREE, skill("Look", "arm")]
     told = shares([ran("Look", 0.0, 1.0, "cube-1"), ran("Detect", 1.0, 2.0)], tree, [], 2.0)
     assert told.activities == (LOOK,)
     assert told.rows == {"cube-1": near({LOOK: 1.0}), NOBODY: near({LOOK: 1.0})}
-
-
-def test_what_control_nodes_do_is_what_their_skills_do():
-    course = [Span("tree", 0.0, 3.0, "SUCCESS"), ran("Approach", 0.0, 3.0, "cube-1")]
-    assert shares(course, TREE, [], 3.0).rows == {"cube-1": near({"approach": 3.0})}
 
 
 TIMES = st.integers(0, 240).map(lambda ticks: ticks / 24)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import itertools
 import time
 from types import SimpleNamespace
 
@@ -16,11 +15,10 @@ from executive.events import Event
 from executive.mission.outline import outline
 from executive.runtime.run_control import RunControl
 from executive.view.items import ItemTable
-from executive.view.repeat import repeat_command
 from executive.view.terminal.lines import Lines
 from executive.view.terminal.screen import Terminal
-from executive.view.terminal.summary import summary
-from executive.view.tree.outline import branches, drawn, opened, skills
+from executive.view.terminal.summary import repeat_command, summary
+from executive.view.tree.outline import opened, skills
 
 GRASP = "tree/sort/repeat/Grasp"
 
@@ -49,21 +47,6 @@ def item(state: str, **data) -> Event:
 
 def status(node: str, status: str, clock: float = 1.0, **data) -> Event:
     return Event("status", 1, clock, {"node": node, "status": status, **data})
-
-
-def test_the_tree_is_drawn_with_every_node_under_its_parent():
-    assert drawn(outline(TREE)).splitlines() == [
-        "sort",
-        "├─ repeat",
-        "│  ├─ Detect",
-        "│  └─ Grasp",
-        "└─ Release  (slot: 1)",
-    ]
-
-
-def test_a_branch_ends_where_its_parent_has_no_more_children():
-    tree = node("a", "a", node("b", "a/b"), node("c", "a/c", node("d", "a/c/d")))
-    assert branches(outline(tree)) == ["", "├─ ", "└─ ", "   └─ "]
 
 
 def test_skills_are_the_leaves():
@@ -142,37 +125,17 @@ def test_the_live_view_shows_the_running_path_the_items_and_the_clock():
     assert "cube-1" in shown and "placed" in shown and "red_bin" in shown
 
 
-def test_the_live_view_redraws_on_change_only_and_at_most_ten_times_a_second(monkeypatch):
-    view = Terminal(Console(file=io.StringIO(), force_terminal=True, width=100))
+def test_the_live_view_redraws_ten_times_a_second(monkeypatch):
     renders = []
-    render = view.render
-    monkeypatch.setattr(view, "render", lambda: renders.append(time.perf_counter()) or render())
+    render = Terminal.render
+    monkeypatch.setattr(Terminal, "render", lambda self: renders.append(time.perf_counter()) or render(self))
+    view = Terminal(Console(file=io.StringIO(), force_terminal=True, width=100))
     view.open(RUN)
     for tick in range(300):
         view(status("tree/sort/repeat/Detect", "RUNNING", tick / 240))
-        time.sleep(0.001)
-    time.sleep(0.35)
-    settled = len(renders)
-    time.sleep(0.25)
-    assert 1 < settled == len(renders) < 20
+    time.sleep(0.55)
+    assert 3 < len(renders) < 10
     view.close()
-    gaps = [later - earlier for earlier, later in itertools.pairwise(renders)]
-    assert min(gaps) > 0.09
-
-
-def test_the_live_view_writes_nothing_where_nobody_watches():
-    stream = io.StringIO()
-    view = Terminal(Console(file=stream, force_terminal=False))
-    view.open(RUN)
-    view(status("tree/sort", "RUNNING"))
-    time.sleep(0.15)
-    view.close()
-    assert stream.getvalue() == ""
-
-
-def test_closing_a_view_that_never_opened_is_harmless():
-    Terminal(Console(file=io.StringIO())).close()
-    Lines(io.StringIO()).close()
 
 
 RESULT = {
@@ -201,19 +164,25 @@ def test_the_summary_says_how_it_ended_how_long_it_took_and_how_to_repeat_it():
     ]
 
 
-def test_the_summary_ends_with_the_report_where_there_is_one():
-    assert (
-        summary(RESULT, ItemTable(), "", "runs/x/report.html").splitlines()[-1]
-        == "report: runs/x/report.html"
-    )
-
-
-def test_a_success_has_nothing_to_explain():
+def test_the_summary_of_a_success_names_the_report_and_its_command_survives_a_shell():
     result = {**RESULT, "status": "SUCCESS", "reason": "", "node": "", "message": ""}
-    assert summary(result, ItemTable(), "").splitlines()[0] == "SUCCESS"
+    repeat = repeat_command("my mission.yaml", seed=0, overrides={"a": "x y"})
+    assert summary(result, ItemTable(), repeat, "runs/x/report.html").splitlines() == [
+        "SUCCESS",
+        "34.2 s on the robot's clock, 6.8 s by the wall clock",
+        "runs/latest  (repeat: executive run 'my mission.yaml' --seed 0 --set 'a=x y')",
+        "report: runs/x/report.html",
+    ]
 
 
-def test_the_repeat_command_survives_a_shell():
-    assert repeat_command("my mission.yaml", seed=0, overrides={"a": "x y"}) == (
-        "executive run 'my mission.yaml' --seed 0 --set 'a=x y'"
-    )
+def test_the_keys_are_named_beside_the_clock_where_there_is_a_keyboard(monkeypatch):
+    keys = SimpleNamespace(listen=lambda: None, leave=lambda: None)
+    monkeypatch.setattr("executive.view.terminal.screen.Keys", lambda file, control: keys)
+    view, control = Terminal(Console(file=io.StringIO(), force_terminal=True), keyboard=0), RunControl()
+    view.open(SimpleNamespace(root=TREE, control=control))
+    for words in ("p pause, s step, Ctrl-C stop", "paused: p go on, s step, Ctrl-C stop"):
+        page = Console(file=io.StringIO(), width=100)
+        page.print(view.render())
+        assert page.file.getvalue().splitlines()[0].rstrip() == f"  0.0 s   {words}"
+        control.pause()
+    view.close()

@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import re
-import sys
 
 import pytest
 
-from executive.events import Event
-from executive.record.requests import Requests
-from executive.view.items import ItemTable
-from executive.view.repeat import repeat_command
-from executive.view.story import WIDTH, story_lines
-from executive.view.terminal.summary import summary
+from executive.view.terminal.summary import WIDTH, story_lines
 from tests.record.failed_runs import PICK, FailedRun
 
 CUBE = [("cube", 0.5, 0.1)]
@@ -48,40 +41,6 @@ def gone(look: int, true: object) -> str:
     return "the server is gone"
 
 
-def test_a_cup_that_never_seals(abroad) -> None:
-    run = FailedRun(PICK, objects=CUBE)
-    run.fake.tool.seals = lambda: False
-    expected = """\
-FAILURE after 1.70 s: Grasp of cube-1 failed (missed) on the last of 3 attempts: no seal on cube-1 0.10 s
-  after contact
-why nothing in trial.yaml stopped it, from the root down:
-  retry            all 3 attempts failed: 3 x Grasp.missed (line 11)
-  Grasp of cube-1  tree/5:retry/do/Grasp (line 15)
-the cell    tool.touching = True (1.60 s), tool.holding = False (0.57 s)
-last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 3, camera overhead, by embedded, at 1.24 s;
-            3 looks, 3 failed attempts in all
-now         the arm is at rest, the tool is empty
-left to do  1: cube-1
-next        to let the mission go on after Grasp.missed: put a try with a catch for it around line 15, or
-            allow more than 3 attempts with --set attempts=...
-record      runs/latest
-repeat      executive run trial
-"""
-    assert text(run) == expected
-
-
-def test_the_report_is_named_between_the_record_and_the_command_that_repeats_the_run(abroad) -> None:
-    run = FailedRun(PICK, objects=CUBE)
-    run.fake.tool.seals = lambda: False
-    story = run.tell()
-    assert story is not None
-    assert story_lines(story, "runs/latest", "executive run trial", "runs/latest/report.html")[-3:] == [
-        "record      runs/latest",
-        "report      runs/latest/report.html",
-        "repeat      executive run trial",
-    ]
-
-
 def test_an_object_that_slips_out_of_the_cup_every_time(abroad) -> None:
     run = FailedRun(PICK, objects=CUBE)
     seals = iter([False])
@@ -100,29 +59,6 @@ now         the arm is at rest, the tool is empty
 left to do  1: cube-1
 next        to let the mission go on after Transit.dropped: put a try with a catch for it around line 15, or
             allow more than 3 attempts with --set attempts=...
-record      runs/latest
-repeat      executive run trial
-"""
-    assert text(run) == expected
-
-
-def test_an_object_that_falls_and_is_not_found_again_by_the_recovery(abroad) -> None:
-    run = FailedRun(PICK, objects=CUBE)
-    run.slip(vanish=True)
-    expected = """\
-FAILURE after 0.80 s: Transit of cube-1 failed (dropped): the seal on cube-1 broke on the way to red_bin, near
-  (0.50, 0.10, 0.12) m
-why nothing in trial.yaml stopped it, from the root down:
-  retry              gave up after attempt 1 of 3: its recovery failed with SelectTarget.unseen: no cube-1 is
-                     in sight, and the table is not known to be empty (line 11)
-  Transit of cube-1  tree/5:retry/do/Transit (line 15)
-the cell    tool.holding = False (0.75 s), tool.bears = 7.9 (0.57 s), tool.touching = True (0.57 s)
-last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera overhead, by embedded, at 0.05 s;
-            1 look, 1 failed attempt in all
-now         the arm is at rest, the tool is empty
-left to do  1: cube-1
-next        to let the mission go on after Transit.dropped: put a try with a catch for it around line 15, or
-            deal with SelectTarget.unseen in the recovery at line 14
 record      runs/latest
 repeat      executive run trial
 """
@@ -255,47 +191,6 @@ repeat      executive run trial
     assert text(run, numbered=False) == expected
 
 
-def test_the_command_repeats_what_was_asked_for_at_the_terminal(at_home, monkeypatch) -> None:
-    reading, writing = os.pipe()
-    typed = iter(["cube", "s", "duck"])
-
-    def answer(event: Event) -> None:
-        if event.kind == "asking":
-            os.write(writing, f"{next(typed)}\n".encode())
-
-    with os.fdopen(reading) as keyboard:
-        monkeypatch.setattr(sys, "stdin", keyboard)
-        run = FailedRun("pick_on_request", objects=[*CUBE, *DUCK], requests=None)
-        requests = Requests()
-        for observer in (requests, answer):
-            run.run.observe(observer)
-        run.at_every_step(lambda: setattr(run.fake.detector, "answers", gone) if requests.words else None)
-        story = run.tell()
-    os.close(writing)
-    assert story is not None
-    repeat = repeat_command("pick_on_request", seed=3, overrides={}, requests=requests.words)
-    assert story_lines(story, "runs/latest", repeat)[-1] == (
-        "repeat      executive run pick_on_request --seed 3 --request cube --request rescan"
-    )
-
-
-def test_the_summary_ends_with_the_story(abroad) -> None:
-    run = FailedRun(PICK, objects=CUBE)
-    items = ItemTable()
-    run.run.observe(lambda event: items(event) if event.kind == "item" else None)
-    run.fake.tool.seals = lambda: False
-    story = run.tell()
-    assert story is not None
-    result = {"robot_time_s": 1.7, "wall_time_s": 0.42, "run": "runs/latest", "story": story}
-    lines = summary(result, items, "executive run trial").splitlines()
-    assert lines[:3] == [
-        "1.7 s on the robot's clock, 0.4 s by the wall clock",
-        "  rejected: cube-1 (the run ended before its turn)",
-        "",
-    ]
-    assert lines[3:] == story_lines(story, "runs/latest", "executive run trial")
-
-
 STORY = {
     "status": "FAILURE", "reason": "Grasp.missed", "clock": 1.0, "mission": "trial.yaml", "item": "",
     "verdict": "Grasp failed (missed): no seal", "chain": [], "reads": [], "look": None, "lost": [],
@@ -319,7 +214,8 @@ def test_long_texts_are_wrapped_and_cut_but_a_command_is_neither() -> None:
         "picture": "frames/000001_cube-1_missed.jpg",
     }
     repeat = "executive run trial" + " --set a=b" * 30
-    lines = story_lines(story, "runs/latest", repeat)
+    lines = story_lines(story, "runs/latest", repeat, "report.html")
+    assert lines[-2] == "report      report.html"
     assert lines[-1] == f"repeat      {repeat}"
     assert max(map(len, lines[:-1])) <= WIDTH
     assert lines[3] == "why nothing in trial.yaml stopped it, from the root down, 4 nodes above left out:"

@@ -7,9 +7,7 @@ import random
 
 import pytest
 
-from executive.view.tree.layout import GAP, MARGIN, Layout, Rectangle, Size, layout
-
-LEAF = Size(60, 28)
+from executive.view.tree.layout import Layout, Rectangle, Size, layout
 
 
 def drawn_by_chance(seed: int) -> tuple[list[int], list[Size]]:
@@ -26,7 +24,7 @@ def drawn_by_chance(seed: int) -> tuple[list[int], list[Size]]:
     return depths, [size() for _ in depths]
 
 
-@pytest.fixture(params=range(12))
+@pytest.fixture(params=range(8))
 def tree(request: pytest.FixtureRequest) -> tuple[list[int], list[Size]]:
     return drawn_by_chance(request.param)
 
@@ -65,34 +63,20 @@ def laid_out(depths: list[int], nodes: list[Size]) -> Layout:
     return layout(depths, below(depths), nodes)
 
 
-def test_nothing_overlaps(tree):
-    boxes = laid_out(*tree).boxes
-    assert not any(overlap(one, other) for one, other in itertools.combinations(boxes, 2))
-
-
-def test_a_node_stands_right_of_its_parent_and_of_what_leads_to_it(tree):
+def test_nodes_stand_clear_of_each_other_in_their_order_and_level_with_their_first_child(tree):
     depths, nodes = tree
     plan = laid_out(depths, nodes)
+    assert not any(overlap(one, other) for one, other in itertools.combinations(plan.boxes, 2))
     for parent, among in enumerate(below(depths)):
+        middles = [plan.boxes[child].middle for child in among]
+        assert middles == sorted(middles)
         for child in among:
             trunk = plan.trunks[depths[child]]
             assert plan.boxes[parent].right < trunk < plan.boxes[child].x - nodes[child].slot
-
-
-def test_siblings_stand_in_their_order(tree):
-    depths, nodes = tree
-    plan = laid_out(depths, nodes)
-    for among in below(depths):
-        middles = [plan.boxes[child].middle for child in among]
-        assert middles == sorted(middles)
-
-
-def test_a_node_is_level_with_its_first_child(tree):
-    depths, nodes = tree
-    plan = laid_out(depths, nodes)
-    for parent, among in enumerate(below(depths)):
         if among and not nodes[parent].name:
-            assert abs(plan.boxes[parent].middle - plan.boxes[among[0]].middle) < 1e-6
+            assert abs(plan.boxes[parent].middle - middles[0]) < 1e-6
+    whole = Rectangle(0, 0, plan.width, plan.height)
+    assert all(contains(whole, part) for part in (*plan.boxes, *plan.frames.values()))
 
 
 def test_a_frame_holds_its_subtree_and_nothing_else(tree):
@@ -108,18 +92,13 @@ def test_a_frame_holds_its_subtree_and_nothing_else(tree):
             assert overlap(frame, another) == (other in within or index in inside(other, depths))
 
 
-def test_everything_is_within_the_picture(tree):
-    plan = laid_out(*tree)
-    whole = Rectangle(0, 0, plan.width, plan.height)
-    assert all(contains(whole, part) for part in (*plan.boxes, *plan.frames.values()))
-
-
-def test_a_single_node_stands_in_the_corner():
-    plan = laid_out([0], [LEAF])
-    assert plan.boxes == (Rectangle(MARGIN, MARGIN, 60, 28),)
-    assert (plan.width, plan.height) == (60 + 2 * MARGIN, 28 + 2 * MARGIN)
-
-
-def test_leaves_stand_below_each_other_without_waste():
-    plan = laid_out([0, 1, 1], [LEAF, LEAF, LEAF])
-    assert plan.boxes[2].y - plan.boxes[1].y == 28 + GAP
+def test_a_small_tree_stands_exactly_there():
+    sizes = [Size(60, 28), Size(50, 28, slot=20), Size(40, 42, name=90), Size(30, 28)]
+    plan = layout([0, 1, 1, 2], [[1, 2], [], [3], []], sizes)
+    assert plan.boxes == (
+        Rectangle(16, 16, 60, 28), Rectangle(137, 16, 50, 28), Rectangle(137, 74, 40, 42),
+        Rectangle(219, 81, 30, 28),
+    )  # fmt: skip
+    assert plan.trunks == (16, 92, 203)
+    assert plan.frames == {2: Rectangle(128, 54, 130, 71)}
+    assert (plan.width, plan.height) == (274, 141)

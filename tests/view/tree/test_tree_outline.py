@@ -67,25 +67,6 @@ def test_a_skill_tells_what_the_mission_connects_and_what_it_declares():
     assert node.reasons == ("missed", "blocked")
 
 
-def test_a_skill_tells_what_it_uses_and_whether_it_senses():
-    class Look(Pick):
-        senses: ClassVar = True
-        uses: ClassVar = ("camera", "arm")
-
-    (node,) = outline(SkillNode(Site("tree/Look"), "Look", Look, Wiring(), CELL, Scope()))
-    (other,) = outline(pick("tree/Pick"))
-    assert (node.senses, node.uses) == (True, ("camera", "arm"))
-    assert (other.senses, other.uses) == (False, ())
-
-
-def test_a_label_is_the_title_and_leaves_the_kind_as_it_is():
-    nodes = outline(Sequence(Site("tree/pair", "pair"), [pick("tree/pair/first", "first")]))
-    assert [(node.title, node.kind, node.skill) for node in nodes] == [
-        ("pair", "sequence", ""), ("first", "skill", "Pick"),
-    ]  # fmt: skip
-    assert nodes[0].detail == "sequence"
-
-
 def test_every_node_knows_what_it_is_to_its_parent_and_which_subtree_begins_with_it():
     assert [(node.slot, node.title, node.subtrees) for node in outline(tree())] == [
         ("", "try", ()),
@@ -110,18 +91,6 @@ def test_a_node_knows_after_which_failures_it_runs():
     assert [node.when for node in outline(root)] == ["", "", "on Pick.missed", ""]
 
 
-def test_a_subtree_that_is_one_node_is_told_from_the_node():
-    inner = in_subtree(pick("tree/repeat/do/look/close/Pick"), "look", "close")
-    (_, node) = outline(Retry(Site("tree/repeat"), inner, 2))
-    assert (node.slot, node.title, node.subtree) == ("do", "Pick", "look / close")
-    assert node.name == "do look close: Pick"
-
-
-def test_a_bare_list_is_its_slot():
-    body = Sequence(Site("tree/retry/do"), [pick("tree/retry/do/2:Pick")])
-    assert [node.slot for node in outline(Retry(Site("tree/retry"), body, 2))] == ["", "do", ""]
-
-
 def test_children_stand_below_their_parents():
     assert children(outline(tree())) == [[1, 5, 7], [2, 4], [3], [], [], [6], [], [8], []]
 
@@ -137,18 +106,6 @@ def test_ports_and_reasons_stand_below_the_skill():
         "      reads $seen, only <- $item?; writes held -> $thing",
         "      may fail: missed, blocked",
     ]
-
-
-def test_what_is_not_asked_for_is_not_told():
-    nodes = outline(pick("tree/Pick"))
-    assert len(drawn(nodes).splitlines()) == 1
-    assert "may fail" not in drawn(nodes, ports=True)
-    assert "reads" not in drawn(nodes, reasons=True)
-
-
-def test_a_skill_without_ports_or_reasons_has_nothing_below_it():
-    nodes = [OutlineNode("tree/Wait", "Wait", 0, "", "skill", "Wait", skill="Wait")]
-    assert drawn(nodes, ports=True, reasons=True) == "Wait"
 
 
 def test_a_catch_tells_what_it_is_for_with_the_reasons():
@@ -194,8 +151,3 @@ def test_a_folded_subtree_stays_within_those_around_it():
     first, second = look("tree/1:look"), look("tree/2:wide/look")
     shown = folded(outline(Sequence(Site("tree"), [first, in_subtree(second, "wide", "look")])))
     assert [(node.title, node.subtrees) for node in shown[2:]] == [("Pick", ()), ("look", ("wide",))]
-
-
-def test_a_tree_without_subtrees_is_not_folded():
-    nodes = outline(Sequence(Site("tree"), [pick("tree/1:Pick"), pick("tree/2:Pick")]))
-    assert folded(nodes) == nodes

@@ -1,0 +1,148 @@
+"""Frames of a film: what is left out where there is no room, marks, the end, and the steps shown."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from PIL import Image, ImageColor
+from small_tree import NODES, node, status
+
+from executive.view.film.course import Course
+from executive.view.film.film import shown_steps
+from executive.view.film.ink import BACK, FAILURE, FAINT, RUNNING, SUCCESS, clipped, font, put_mark, wrapped
+from executive.view.film.page import draw_ending, draw_page, ending_of
+from executive.view.film.panel import MOST, draw_branch, draw_items, fitted, height, kept
+from executive.view.items import Row
+
+
+def course_of(*entries) -> Course:
+    course = Course(entries, NODES, [])
+    course.go_to(1000, 0.0)
+    return course
+
+
+def test_what_never_ran_gives_way_first_then_what_rests() -> None:
+    nodes = [
+        node("t", 0, "try"), node("t/A", 1), node("t/do", 1, "sequence"), node("t/do/B", 2), node("t/C", 1)
+    ]  # fmt: skip
+    course = course_of(
+        status(0, "t", "RUNNING"), status(0, "t/A", "SUCCESS"), status(1, "t/do", "RUNNING"),
+        status(1, "t/do/B", "RUNNING"),
+    )  # fmt: skip
+    names = [[one.path for one in fitted(nodes, course, rows)] for rows in (9, 4, 3)]
+    assert names == [
+        ["t", "t/A", "t/do", "t/do/B", "t/C"], ["t", "t/A", "t/do", "t/do/B"], ["t", "t/do", "t/do/B"]
+    ]  # fmt: skip
+
+
+def test_nothing_is_drawn_outside_of_its_box() -> None:
+    deep = [node("/".join("abcdefghijklmnop"[: n + 1]) + "long" * n, n, "sequence") for n in range(16)]
+    course = course_of(*(status(0, one.path, "RUNNING", reason="x" * 200) for one in deep))
+    page = Image.new("RGB", (400, 300), BACK)
+    draw_branch(page, (20, 20, 300, 220), deep, course)
+    rows = [Row("item-" + "9" * 60, "class" * 9, "placed", "bin" * 30, "")] * 30
+    draw_items(page, (20, 225, 300, 300), rows[:2], {})
+    drawn = np.argwhere((np.asarray(page) != np.asarray(Image.new("RGB", (1, 1), BACK))).any(axis=2))
+    (top, left), (bottom, right) = drawn.min(axis=0), drawn.max(axis=0)
+    assert left >= 20
+    assert right <= 300
+    assert top >= 20
+    assert bottom < 225 + height(2)
+
+
+def test_settled_items_give_way_to_those_still_to_do() -> None:
+    rows = [Row(f"cube-{n}", "cube", "placed" if n % 2 else "seen", "", "") for n in range(MOST + 3)]
+    names = [row.item for row in kept(rows)]
+    assert len(names) == MOST
+    assert not {"cube-1", "cube-3", "cube-5"} & set(names)
+    assert names == sorted(names, key=lambda name: int(name[5:]))
+    assert kept(rows[:3]) == rows[:3]
+    assert (height(3), height(MOST), height(MOST + 20)) == (80, 200, 200)
+
+
+def test_lines_are_as_wide_as_they_may_be() -> None:
+    assert clipped("short", 14, 100) == "short"
+    cut = clipped("a word and then another one", 14, 100)
+    assert cut.endswith("…")
+    assert font(14).getlength(cut) <= 100
+    assert clipped("anything", 14, 3) == ""
+    text = "no seal on sphere-1 0.10 s after contact, and neither the second nor the third went any better"
+    assert " ".join(wrapped(text, 14, 300, 9)) == text
+    two = wrapped(text, 14, 300, 2)
+    assert len(two) == 2
+    assert all(font(14).getlength(line) <= 300 for line in two)
+    assert two[1].endswith("…")
+    assert wrapped("", 14, 300, 2) == []
+
+
+@pytest.mark.parametrize(
+    ("status", "colour", "covered"),
+    [("RUNNING", RUNNING, 38.8), ("SUCCESS", SUCCESS, 25.6), ("FAILURE", FAILURE, 40.9), ("", FAINT, 10.9)],
+)
+def test_a_mark_has_the_colour_of_its_status_and_covers_so_much(
+    status: str, colour: str, covered: float
+) -> None:
+    image = Image.new("RGB", (21, 21), "black")
+    put_mark(image, status, (10.5, 10.5), 11)
+    full = np.array(ImageColor.getrgb(colour), float)
+    share = np.asarray(image).astype(float) @ full / (full @ full)
+    assert share.sum() == pytest.approx(covered, abs=0.1)
+    assert share[5:16, 5:16].sum() == pytest.approx(share.sum())
+
+
+ITEMS = {"seen": 6, "placed": 5, "rejected": 1, "lost": 0, "phantom": 0}
+RESULT = {"status": "SUCCESS", "message": "", "items": ITEMS, "robot_time_s": 15.54, "story": None}
+
+
+@pytest.mark.parametrize(
+    ("result", "ending"),
+    [
+        (RESULT, ("SUCCESS", "", "6 seen, 5 placed, 1 rejected; 15.5 s")),
+        (
+            {**RESULT, "status": "FAILURE", "message": "x", "story": {"verdict": "Grasp failed: no seal"}},
+            ("FAILURE", "Grasp failed: no seal", "6 seen, 5 placed, 1 rejected; 15.5 s"),
+        ),
+        ({"status": "HALTED", "message": "by the user"}, ("HALTED", "by the user", "")),
+        ({}, ("CUT OFF", "the record ends here; nothing says how the run would have ended", "")),
+    ],
+)
+def test_an_end_is_told_by_the_story_else_the_message_and_the_items(result, ending) -> None:
+    assert ending_of(result) == ending
+
+
+def test_the_end_stands_on_the_picture_and_leaves_the_page_as_it_was() -> None:
+    page = Image.new("RGB", (1280, 720), "#808080")
+    message = "a long sentence about what went wrong " * 12
+    shown = draw_ending(page, {**RESULT, "status": "FAILURE", "message": message})
+    assert page.getcolors() == [(1280 * 720, (128, 128, 128))]
+    (top, left), (bottom, right) = (
+        each(np.argwhere((np.asarray(shown) != 128).any(axis=2)), axis=0) for each in (np.min, np.max)
+    )
+    assert (bottom, right) == (700, 780)
+    assert (top, left) == (472, 168)
+    assert shown.getpixel((700, 690)) == ImageColor.getrgb(BACK)
+
+
+@pytest.mark.parametrize(
+    ("steps", "each", "shown"),
+    [(48, 9.6, [0, 10, 19, 29, 38, 48]), (50, 19.2, [0, 19, 38, 50]), (0, 48.0, [0])],
+)
+def test_steps_are_shown_at_even_times_up_to_the_last(steps, each, shown) -> None:
+    assert shown_steps(steps, each) == shown
+
+
+def test_a_page_shows_picture_camera_caption_and_how_far_the_run_is(tmp_path) -> None:
+    Image.new("RGB", (640, 556), "white").save(tmp_path / "000000_cube-1.jpg")
+    entries = [status(0, "tree", "RUNNING"), status(1, "tree/Grasp", "RUNNING", item="cube-1")]
+    course = Course(entries, NODES, [tmp_path / "000000_cube-1.jpg"])
+    course.go_to(240, 1.0)
+    source = SimpleNamespace(start={"mission": "sort"}, items=0, bins={}, nodes=NODES)
+    picture = np.full((720, 800, 3), 128, np.uint8)
+    page = np.asarray(draw_page(source, picture, course, "seed 5", 4.0))
+    for part, ends in ((np.s_[:360, :800], (20, 20, 205, 251)), (np.s_[360:, :800], (303, 20, 340, 155))):
+        changed = np.argwhere((page[part] != 128).any(axis=2))
+        assert (*changed.min(axis=0), *changed.max(axis=0)) == ends
+    bar = (page[95, 800:] == ImageColor.getrgb(RUNNING)).all(axis=1)
+    assert (bar.argmax(), bar.sum()) == (28, 107)
