@@ -17,11 +17,12 @@ from executive.testing.disturbances import (
     after,
     disturbed,
     during,
+    object_removed,
     seal_fails,
     table_bumped,
     workspace_hidden,
 )
-from executive.testing.disturbances.hands import hand_of
+from executive.testing.disturbances.hand import hand_of
 from executive.testing.fake_cell import FakeCell, SilentOperator, bare_table
 from executive.testing.wrapped_cell import WrappedCell
 from executive.workcell import CellOptions
@@ -97,12 +98,12 @@ def test_a_cell_of_an_unknown_kind_needs_a_hand_of_its_own() -> None:
             """Do nothing."""
 
     strange: Any = Strange()
-    cell = DisturbedCell(strange, [after(0.0, seal_fails())])
+    cell = DisturbedCell(strange, [after(0.0, object_removed(1))])
     with pytest.raises(
         InputError, match="nobody knows how to reach into a Strange; give `disturbed` a `hand`"
     ):
         cell.advance()
     kind = disturbed(
-        lambda **options: strange, [after(0.0, seal_fails())], hand=lambda _: hand_of(FakeCell())
+        lambda **options: strange, [after(0.0, object_removed(1))], hand=lambda _: hand_of(FakeCell())
     )
     kind().advance()

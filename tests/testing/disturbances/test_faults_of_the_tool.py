@@ -75,9 +75,11 @@ def test_what_sticks_is_in_the_tool_when_the_mission_gives_up() -> None:
 def test_what_sticks_comes_off_when_the_tool_is_opened_once_more() -> None:
     fake = FakeCell()
     fake.world.held = fake.world.put("cube", 0.5, 0.0)
-    fake.tool.sticks = True
-    fake.tool.open()
-    fake.tool.sticks = False
+    cell = DisturbedCell(fake, [between(0.0, 0.1, tool_sticks())])
+    cell.cell.tool.open()
     assert fake.tool.holding
-    fake.tool.open()
+    while cell.cell.clock.now < 0.1:
+        cell.advance()
+    assert fake.tool.holding
+    cell.cell.tool.open()
     assert not fake.tool.holding

@@ -23,7 +23,7 @@ from executive.testing.disturbances import (
     tool_sticks,
 )
 from executive.testing.disturbances.effect import Effect
-from executive.testing.disturbances.hands import hand_of
+from executive.testing.disturbances.hand import hand_of
 from executive.testing.oracle import oracle_cell
 from executive.testing.run_mission import MissionResult, run_mission
 
