@@ -1,20 +1,19 @@
-"""A skill on trial: everything its checks look at, each found out once."""
+"""All runs of one skill that its checks look at, each made once."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from executive.skill import Skill
-from executive.testing.conformance.adversities import NOTHING, Adversity, adversities
+from executive.testing.conformance.adversities import Adversity, adversities
 from executive.testing.conformance.rehearsal import Rehearsal, rehearse
-from executive.testing.conformance.situations import Arrange, NotArranged, NotTried, Scene, situations
+from executive.testing.conformance.situations import Arrange, NotArranged, NotTried, Scene, scenes
 
-BUDGET = 100_000
+MAX_HALT_STEPS = 100_000
 """Control steps that the halts of one scene may take together: up to 440 ticks that is one halt at each."""
 
 
@@ -23,30 +22,21 @@ class GotStuck(NotTried):
 
 
 class Case:
-    """What the checks of one skill share.
+    """The runs that the checks of one skill share.
 
     Args:
-        name: What the skill is called.
+        name: Name of the skill.
         skill: Its class.
         arrange: What its author wants to be otherwise on the stage.
 
     Attributes:
-        tries: Runs that were begun.
+        tries: Number of runs that were begun.
     """
 
     def __init__(self, name: str, skill: type[Skill], arrange: Arrange) -> None:
         self.name, self.skill, self._arrange = name, skill, arrange
         self.tries = 0
         self._stuck = ""
-
-    @cached_property
-    def _stages(self) -> list[Scene] | NotArranged:
-        try:
-            scenes = [Scene(self.skill, situation, self._arrange) for situation in situations(self.skill)]
-        except NotArranged as problem:
-            return problem
-        # Where the author says what a param is, its other values are not wanted.
-        return [scene for scene in scenes if not scene.given & set(scene.situation.params)]
 
     @property
     def scenes(self) -> list[Scene]:
@@ -55,14 +45,21 @@ class Case:
         Raises:
             NotArranged: One cannot be.
         """
-        if isinstance(self._stages, NotArranged):
-            raise self._stages
-        return self._stages
+        if isinstance(self._scenes, NotArranged):
+            raise self._scenes
+        return self._scenes
+
+    @cached_property
+    def _scenes(self) -> list[Scene] | NotArranged:
+        try:
+            return scenes(self.skill, self._arrange)
+        except NotArranged as problem:
+            return problem
 
     @cached_property
     def twice(self) -> list[tuple[Rehearsal, Rehearsal]]:
         """Two runs to the end in every scene, nothing going wrong."""
-        return [(self._tried(scene), self._tried(scene)) for scene in self.scenes]
+        return [(self._run(scene), self._run(scene)) for scene in self.scenes]
 
     @property
     def plain(self) -> list[Rehearsal]:
@@ -71,20 +68,20 @@ class Case:
 
     @cached_property
     def hard(self) -> list[Rehearsal]:
-        """A run to the end in every scene for everything that may go wrong."""
+        """A run to the end in every scene under every adversity."""
         return [
-            self._tried(scene, adversity).lean()
+            self._run(scene, adversity).without_arguments()
             for scene, plain in zip(self.scenes, self.plain, strict=True)
-            # What never ends where all is well would not end here, either.
+            # A run that never ends where all is well would not end here, either.
             if plain.ending.status != "RUNNING"
-            for adversity in adversities(self.skill, plain.ticks)
+            for adversity in adversities(self.skill, plain.ticks, holding=plain.held)
         ]
 
     @cached_property
     def halted(self) -> list[Rehearsal]:
-        """A run for every moment of every scene at which the skill may be taken away."""
+        """A run for every moment of every scene at which the skill may be halted."""
         return [
-            self._tried(scene, halt_at=tick).lean()
+            self._run(scene, halt_at=tick).without_arguments()
             for scene, plain in zip(self.scenes, self.plain, strict=True)
             for tick in _moments(plain)
         ]
@@ -96,14 +93,14 @@ class Case:
 
     @property
     def defaults(self) -> Mapping[str, Any]:
-        """The params that a mission need not say."""
+        """The params that a mission need not give."""
         return {name: param.default for name, param in self.skill.params.items() if not param.required}
 
-    def _tried(self, scene: Scene, adversity: Adversity = NOTHING, halt_at: int | None = None) -> Rehearsal:
-        """Return what a run was like.
+    def _run(self, scene: Scene, adversity: Adversity | None = None, halt_at: int | None = None) -> Rehearsal:
+        """Run the skill once.
 
         Raises:
-            GotStuck: It did not come back, or one before it: to wait once is enough.
+            GotStuck: It did not come back, or a run before it: to wait once is enough.
         """
         if self._stuck:
             raise GotStuck(self._stuck)
@@ -117,16 +114,12 @@ class Case:
                 "and leave long work to a detector."
             )
             raise GotStuck(self._stuck)
-        # What the skill leaves comes up again, or with its first run; what another thread of this process
-        # happens to open meanwhile does not.
-        if rehearsal.left and self.tries > 1 and not rehearse(self.skill, scene, adversity, halt_at).left:
-            return replace(rehearsal, left=())
         return rehearsal
 
 
 def _moments(plain: Rehearsal) -> list[int]:
     """Return every tick at which a run may be halted; of a long one those of its calls and some between."""
-    count = min(plain.ticks, 2 * BUDGET // max(1, plain.ticks))
+    count = min(plain.ticks, 2 * MAX_HALT_STEPS // max(1, plain.ticks))
     spread = np.linspace(1, plain.ticks, count, dtype=int).tolist()
     around = {call.tick + step for call in plain.calls for step in (0, 1)} if count < plain.ticks else set()
     return sorted(tick for tick in {*spread, *sorted(around)[:count]} if 1 <= tick <= plain.ticks)

@@ -1,37 +1,40 @@
-"""One run of a skill in a scene: to its end, or to where it is taken away, with everything noted."""
+"""One run of a skill in a scene, to its end or until it is halted, with everything noted."""
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from time import perf_counter
 from traceback import extract_tb
 from typing import Any
 
+from executive.errors import Fault
+from executive.events import Event
 from executive.messages import Item
-from executive.skill import Direction, Skill, SkillFailed
-from executive.testing.conformance.adversities import NOTHING, Adversity
-from executive.testing.conformance.outside import clocks_watched, open_things
+from executive.skill import Skill, SkillFailed
+from executive.skill_steps import SkillRun
+from executive.testing.conformance.adversities import Adversity
 from executive.testing.conformance.patience import Stuck, patience
-from executive.testing.conformance.same import same
+from executive.testing.conformance.same import is_same
 from executive.testing.conformance.situations import Scene
 from executive.testing.conformance.source import place_in
 from executive.testing.conformance.watch import Call, Watch
+from executive.testing.disturbances import DisturbedCell, during
 from executive.testing.fake_world import STEP
 
-LONGEST = 60.0
+MAX_TIME = 60.0
 """Time on the run's clock after which a skill must have ended [s]: nothing takes so long on a fake table."""
 
 
 @dataclass(frozen=True)
 class Ending:
-    """How a skill ended.
+    """The end of a run.
 
     Attributes:
         status: `SUCCESS`, `FAILURE`, `HALTED`, `RUNNING` if it did not end, `STUCK` if a tick did not, or
             `FAULT`.
-        reason: Of a failure, declared or not.
-        message: The sentence of a failure, or what a fault was and where, or where a tick got stuck.
+        reason: Reason of a failure.
+        message: Sentence of a failure or fault, or where a tick got stuck.
     """
 
     status: str
@@ -47,27 +50,22 @@ class Ending:
 
 @dataclass(frozen=True)
 class Rehearsal:
-    """What a run of a skill was like.
+    """Everything noted of one run.
 
     Attributes:
         where: The situation, and what went wrong in it, for a sentence.
-        ending: How it ended.
+        ending: Its end.
         ticks: Control steps it took, that of its end left out.
         given: Those of its params and inputs that are plain values.
         outputs: Its outputs that were set at the end.
-        written: Other public attributes that it set.
-        rebound: Params and inputs that it set to something else.
-        mutated: Params and inputs that are no longer what they were.
-        handed: Type of what `run` returned.
+        mutated: Names of the params and inputs that are no longer what they were.
         calls: Every call it made of the cell.
         durations: Computing time of every tick, by the wall clock [s].
         held: The tool held something when it began.
         holds: The tool holds something at the end.
-        believed: The item that the ledger then believes in the tool, or None.
-        at_rest: The arm has nothing left to do of what the skill told it to.
-        names: What the cell has of each sort of name at the end: `item`, `bin`, `class`.
-        left: Threads, files and processes left behind.
-        clocks: Who asked the wall clock.
+        believed: Item that the ledger then believes in the tool, or None.
+        at_rest: The arm has nothing left to do at the end.
+        names: Names of the cell by their kind: `item`, `bin`, `class`.
     """
 
     where: str
@@ -75,10 +73,7 @@ class Rehearsal:
     ticks: int
     given: Mapping[str, Any]
     outputs: Mapping[str, Any]
-    written: tuple[str, ...]
-    rebound: tuple[str, ...]
     mutated: tuple[str, ...]
-    handed: type
     calls: tuple[Call, ...]
     durations: tuple[float, ...]
     held: bool
@@ -86,52 +81,48 @@ class Rehearsal:
     believed: Item | None
     at_rest: bool
     names: Mapping[str, tuple[str, ...]]
-    left: tuple[str, ...]
-    clocks: tuple[str, ...]
 
     @property
     def seconds(self) -> float:
-        """How long it took on the run's clock [s]."""
+        """Time it took on the run's clock [s]."""
         return self.ticks * STEP
+
+    @property
+    def when(self) -> str:
+        """How and where it ended, for a sentence."""
+        halted = f" at tick {self.ticks}" if self.ending.status == "HALTED" else ""
+        return f"{self.where} {self.ending}{halted}"
 
     @property
     def moved(self) -> bool:
         """True if it started the arm."""
         return any(call.name == "arm.start" for call in self.calls)
 
-    def lean(self) -> Rehearsal:
+    def without_arguments(self) -> Rehearsal:
         """Return this without the arguments of its calls, which may be large: frames are among them."""
         return replace(self, calls=tuple(replace(call, arguments=()) for call in self.calls))
 
 
 def rehearse(
-    skill: type[Skill], scene: Scene, adversity: Adversity = NOTHING, halt_at: int | None = None
+    skill: type[Skill], scene: Scene, adversity: Adversity | None = None, halt_at: int | None = None
 ) -> Rehearsal:
-    """Return what a run was like; with `halt_at`, one that is taken away after so many control steps."""
+    """Run a skill; with `halt_at`, halt it after so many control steps."""
     values = scene.begin()
     before, fake = scene.copied(values), scene.cell
-    held, opened = fake.tool.holding, open_things()
-    actor = _Actor(skill, values, scene)
-    clocks: list[str] = []
-    with clocks_watched(clocks):
-        try:
-            with patience(skill, lambda: actor.ticks):
-                ending = actor.act(adversity, halt_at)
-        except Stuck as stuck:
-            ending = Ending("STUCK", message=str(stuck))
-    attributes = vars(actor.instance) if actor.instance else {}
-    outputs = [name for name, port in skill.ports.items() if port.direction is Direction.OUT]
-    known = {*skill.params, *skill.ports}
+    held = fake.tool.holding
+    actor = _Actor(skill, values, scene, adversity)
+    try:
+        with patience(skill, lambda: actor.ticks):
+            ending = actor.act(halt_at)
+    except Stuck as stuck:
+        ending = Ending("STUCK", message=str(stuck))
     return Rehearsal(
-        where=" ".join(filter(None, (scene.situation.name, adversity.name))),
+        where=" ".join(filter(None, (scene.situation.name, adversity.name if adversity else ""))),
         ending=ending,
         ticks=actor.ticks,
         given={name: value for name, value in values.items() if isinstance(value, str | float | None)},
-        outputs={name: attributes[name] for name in outputs if name in attributes},
-        written=tuple(name for name in attributes if name not in known and not name.startswith("_")),
-        rebound=tuple(name for name in values if name in attributes and attributes[name] is not values[name]),
-        mutated=tuple(name for name in values if not same(values[name], before[name])),
-        handed=actor.handed,
+        outputs=actor.outputs,
+        mutated=tuple(name for name in values if not is_same(values[name], before[name])),
         calls=tuple(actor.watch.calls),
         durations=tuple(actor.durations),
         held=held,
@@ -143,80 +134,67 @@ def rehearse(
             "bin": tuple(fake.cell.bins),
             "class": tuple(fake.cell.classes),
         },
-        left=tuple(sorted(open_things() - opened)),
-        clocks=tuple(dict.fromkeys(clocks)),
     )
 
 
 class _Actor:
-    """Drives one skill as the tree would.
+    """One run, driven as the tree would.
 
     Attributes:
-        watch: Stands between it and its cell.
-        instance: The skill, once it was made.
-        handed: Type of what its `run` returned.
+        watch: Stands between the skill and its cell.
+        outputs: Its outputs, once it has succeeded.
         ticks: Control steps since it was started.
         durations: Computing time of every tick [s].
     """
 
-    def __init__(self, skill: type[Skill], values: Mapping[str, Any], scene: Scene) -> None:
-        self._skill, self._values, self._fake = skill, values, scene.cell
-        self.watch = Watch(scene.cell.cell)
-        self.instance: Skill | None = None
-        self.handed: type = type(None)
+    def __init__(
+        self, skill: type[Skill], values: Mapping[str, Any], scene: Scene, adversity: Adversity | None
+    ) -> None:
+        self._skill, self._values, self._adversity = skill, values, adversity
+        script = [during("*", adversity.effect)] * adversity.times if adversity else []
+        self._cell = DisturbedCell(scene.cell, script)
+        self.watch = Watch(self._cell.cell)
+        self.outputs: Mapping[str, Any] = {}
         self.ticks = 0
         self.durations: list[float] = []
-        self._steps: Iterator[Any] = iter(())
+        self._run: SkillRun | None = None
 
-    def act(self, adversity: Adversity, halt_at: int | None) -> Ending:
-        """Return how the skill ended; nothing it does is an error here but what ends a program."""
+    def act(self, halt_at: int | None) -> Ending:
+        """Run the skill and return its end."""
         try:
-            while self.ticks < LONGEST / STEP:
-                if self.ticks == halt_at:
-                    return self._halted()
-                if self.ticks == adversity.tick:
-                    adversity.strike(self._fake, self.watch)
+            while self.ticks < MAX_TIME / STEP:
+                if self._run is not None and self.ticks == halt_at:
+                    self._run.halt()
+                    return Ending("HALTED")
+                if self._adversity is not None and self.ticks == self._adversity.tick:
+                    self._cell.hear(Event("status", 0, 0.0, {"node": "skill", "status": "RUNNING"}))
                 self.watch.tick = self.ticks
-                if self._is_over():
+                if self._step():
                     return Ending("SUCCESS")
-                self._fake.advance()
+                self._cell.advance()
                 self.ticks += 1
         except SkillFailed as failure:
             return Ending("FAILURE", failure.reason, failure.message)
         except Exception as error:
-            return Ending("FAULT", message=self._told(error))
+            return Ending("FAULT", message=self._described(error))
         return Ending("RUNNING")
 
-    def _is_over(self) -> bool:
-        """Take one step, the first of which starts it."""
+    def _step(self) -> bool:
+        """Take one step, the first of which starts the skill; return True once it has succeeded."""
         began = perf_counter()
         try:
-            if self.instance is None:
-                self.instance = self._skill(**self._values)
-                handed = self.instance.run(self.watch.cell)
-                self.handed, self._steps = type(handed), iter(handed or ())
-            yielded = next(self._steps, self)
+            if self._run is None:
+                self._run = SkillRun(self._skill(**self._values), self.watch.cell)
+            has_succeeded = self._run.step()
         finally:
             self.durations.append(perf_counter() - began)
-        if yielded is not None and yielded is not self:
-            kind = type(yielded).__name__
-            raise TypeError(f'it yielded a {kind}; to run the steps of others write "yield from"')
-        return yielded is self
+        if has_succeeded:
+            self.outputs = self._run.outputs()
+        return has_succeeded
 
-    def _halted(self) -> Ending:
-        try:
-            if isinstance(self._steps, Generator):
-                self._steps.close()
-        except RuntimeError as error:
-            if "GeneratorExit" not in str(error):
-                raise
-            return Ending("FAULT", message='it yielded in "finally"')
-        except SkillFailed as failure:
-            return Ending("FAULT", message=f'it failed with "{failure.reason}"')
-        return Ending("HALTED")
-
-    def _told(self, error: Exception) -> str:
-        """Return what an error says, and where in the skill's own files it came from."""
+    def _described(self, error: Exception) -> str:
+        """Return the text of an error, and where in the skill's own files it was raised."""
         frames = ((frame.filename, frame.lineno or 0) for frame in reversed(extract_tb(error.__traceback__)))
         place = place_in(self._skill, frames)
-        return f"{type(error).__name__}{place and f' in {place}'}: {error}"
+        kind = "" if isinstance(error, Fault) else f"{type(error).__name__}: "
+        return f"{kind}{error}" + (f" ({place})" if place else "")

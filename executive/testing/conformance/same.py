@@ -1,4 +1,4 @@
-"""Whether two values are the same to the last field, arrays and objects of any class included."""
+"""Comparison of two values part by part, arrays and objects of any class included."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 
-def same(one: Any, other: Any) -> bool:
-    """Tell whether two values are of one type and equal, part by part; NaN is the same as NaN."""
-    return _same(one, other, set())
+def is_same(one: Any, other: Any) -> bool:
+    """Return True if two values are of one type and equal, part by part; NaN is the same as NaN."""
+    return _is_same(one, other, set())
 
 
-def _same(one: Any, other: Any, compared: set[tuple[int, int]]) -> bool:
+def _is_same(one: Any, other: Any, compared: set[tuple[int, int]]) -> bool:
     if one is other:
         return True
     if type(one) is not type(other):
@@ -24,15 +24,15 @@ def _same(one: Any, other: Any, compared: set[tuple[int, int]]) -> bool:
         return one.dtype == other.dtype and bool(np.array_equal(one, other, equal_nan=nan))
     if isinstance(one, float):
         return one == other or (math.isnan(one) and math.isnan(other))
-    # What is met again while its own parts are compared differs by no more than these.
+    # A pair that is met again while its own parts are compared differs by no more than these.
     pair = id(one), id(other)
     if pair in compared:
         return True
     compared.add(pair)
     if isinstance(one, Mapping):
-        return list(one) == list(other) and all(_same(one[key], other[key], compared) for key in one)
+        return list(one) == list(other) and all(_is_same(one[key], other[key], compared) for key in one)
     if isinstance(one, list | tuple):
-        return len(one) == len(other) and all(_same(a, b, compared) for a, b in zip(one, other, strict=True))
+        return len(one) == len(other) and all(map(lambda a, b: _is_same(a, b, compared), one, other))
     if hasattr(one, "__dict__") and not callable(one):
-        return _same(vars(one), vars(other), compared)
+        return _is_same(vars(one), vars(other), compared)
     return bool(one == other)

@@ -1,27 +1,26 @@
-"""The situations in which a skill is tried, and how each is arranged as often as wanted."""
+"""The situations in which a skill is tried, each arranged as often as wanted."""
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from executive.skill import ANY, EMPTY, HOLDING, Direction, Param, Port, Skill
 from executive.testing.conformance.patience import Stuck
 from executive.testing.conformance.stage import Stage, set_up
-from executive.testing.conformance.values import CannotMakeUp, made_up, others
+from executive.testing.conformance.values import CannotMakeUp, made_up, other_values
 
 Arrange = Callable[[Stage], Mapping[str, Any]]
-"""Arranges a stage for a skill and returns values for its params and inputs, those it has an opinion on."""
+"""Changes a stage for a skill and returns values for some of its params and inputs."""
 
-
-_GRIPS: Mapping[Any, tuple[bool, ...]] = {EMPTY: (False,), HOLDING: (True,), ANY: (False, True)}
+_HOLDING: Mapping[Any, tuple[bool, ...]] = {EMPTY: (False,), HOLDING: (True,), ANY: (False, True)}
 _NAMES = {False: "with an empty tool", True: "with an item in the tool"}
 
 
 class NotTried(Exception):
-    """What a check looks at cannot be found out; the text says why."""
+    """A check cannot be made; the text says why."""
 
 
 class NotArranged(NotTried):
@@ -33,28 +32,28 @@ class Situation:
     """One way to begin.
 
     Attributes:
-        name: For a sentence: `with an empty tool`.
+        name: Its name, for a sentence: `with an empty tool`.
         holding: The tool holds an object.
         params: Params that differ from their defaults.
-        whole: Inputs that may be left out are given, too.
+        has_all_inputs: Inputs that may be left out are given, too.
     """
 
     name: str
     holding: bool
     params: Mapping[str, Any] = field(default_factory=dict)
-    whole: bool = False
+    has_all_inputs: bool = False
 
 
 class Scene:
-    """A situation arranged for a skill on a fake cell; begins anew as often as wanted.
+    """A situation arranged for a skill on a fake cell; it begins again as often as wanted.
 
     Args:
-        skill: Who is to act in it.
-        situation: What it is like.
-        arrange: What its author wants to be otherwise.
+        skill: The skill that is to act in it.
+        situation: The situation.
+        arrange: What the skill's author wants to be otherwise.
 
     Attributes:
-        situation: What it is like.
+        situation: The situation.
         cell: The fake cell; its parts are new with every beginning.
         given: Names of the params and inputs that `arrange` gave.
 
@@ -64,7 +63,7 @@ class Scene:
 
     def __init__(self, skill: type[Skill], situation: Situation, arrange: Arrange) -> None:
         stage = set_up(skill, holding=situation.holding)
-        given = _asked(skill, arrange, stage)
+        given = _arranged(skill, arrange, stage)
         self.situation, self.cell, self.given = situation, stage.cell, frozenset(given)
         values = {**_made_up(skill, situation, stage, given), **situation.params, **given}
         try:
@@ -76,7 +75,7 @@ class Scene:
             ) from error
 
     def begin(self) -> dict[str, Any]:
-        """Bring the cell back to where it began, and return the values to start the skill with."""
+        """Bring the cell back to its beginning, and return the values to start the skill with."""
         parts, values = self.copied(self._beginning)
         vars(self.cell).clear()
         vars(self.cell).update(parts)
@@ -84,35 +83,44 @@ class Scene:
 
     def copied(self, state: Any) -> Any:
         """Return a copy of a state of the cell, or of values that belong to it."""
-        # The cell itself stays who it is: its parts, and whoever arranged it, reach each other through it.
+        # The cell itself is not copied: its parts, and the functions of its author, reach each other through it.
         return copy.deepcopy(state, {id(self.cell): self.cell})
+
+
+def scenes(skill: type[Skill], arrange: Arrange) -> list[Scene]:
+    """Return every situation in which a skill is tried, arranged.
+
+    With the tool as the skill needs it, or both empty and not where it needs neither; with defaults alone,
+    with all its inputs, and with every other choice of a param that its author does not give.
+
+    Raises:
+        NotArranged: One cannot be arranged.
+    """
+    found = [Scene(skill, situation, arrange) for situation in situations(skill)]
+    return [scene for scene in found if not scene.given & set(scene.situation.params)]
 
 
 def situations(skill: type[Skill]) -> Iterator[Situation]:
     """Yield the situations in which a skill is tried.
 
-    With what it needs the tool to hold, or both with nothing and with something where that is no matter;
-    with defaults alone, with all its inputs, and with every other choice of a param.
-
     Raises:
-        NotArranged: It does not say what it needs.
+        NotArranged: It does not say what it needs of the tool.
     """
-    if not isinstance(skill.tool_state, Sequence) or not skill.tool_state:
-        raise NotArranged(f"its tool_state is {skill.tool_state!r}; it must say what it needs and leaves")
-    if (needs := skill.tool_state[0]) not in _GRIPS:
-        raise NotArranged(f"its tool_state begins with {needs!r}; it must say ANY, EMPTY or HOLDING")
-    first, *more = _GRIPS[needs]
-    yield Situation(_NAMES[first], first)
-    yield from (Situation(_NAMES[holding], holding) for holding in more)
+    state = skill.tool_state
+    if not isinstance(state, tuple) or not state or state[0] not in _HOLDING:
+        raise NotArranged(f"its tool_state is {state!r}; it must begin with ANY, EMPTY or HOLDING")
+    first = _HOLDING[state[0]][0]
+    for holding in _HOLDING[state[0]]:
+        yield Situation(_NAMES[holding], holding)
     if any(not port.required for port in _inputs(skill).values()):
-        yield Situation(f"{_NAMES[first]} and every input given", first, whole=True)
+        yield Situation(f"{_NAMES[first]} and every input given", first, has_all_inputs=True)
     stage = set_up(skill, holding=first)
     for param in skill.params.values():
-        for value in others(param, stage):
+        for value in other_values(param, stage):
             yield Situation(f"{_NAMES[first]} and {param.name}: {value}", first, {param.name: value})
 
 
-def _asked(skill: type[Skill], arrange: Arrange, stage: Stage) -> dict[str, Any]:
+def _arranged(skill: type[Skill], arrange: Arrange, stage: Stage) -> dict[str, Any]:
     try:
         given = dict(arrange(stage))
     except Stuck as stuck:
@@ -135,8 +143,8 @@ def _made_up(
     values, missing = {}, {}
     declarations: list[Param | Port] = [*skill.params.values(), *_inputs(skill).values()]
     for declared in declarations:
-        may = situation.whole and isinstance(declared, Port)
-        if declared.name in {**given, **situation.params} or not (declared.required or may):
+        is_optional = situation.has_all_inputs and isinstance(declared, Port)
+        if declared.name in {**given, **situation.params} or not (declared.required or is_optional):
             continue
         try:
             values[declared.name] = made_up(declared, stage)

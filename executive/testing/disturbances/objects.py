@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -52,7 +51,7 @@ class ObjectDisturbed(Effect):
 class ObjectRemoved(ObjectDisturbed):
     """An object is taken out of the world."""
 
-    name: ClassVar = "object_removed"
+    name = "object_removed"
 
     def disturb(self, now: Occasion, thing: Thing) -> bool:
         """Take it away."""
@@ -65,7 +64,7 @@ class ObjectRemoved(ObjectDisturbed):
 class ObjectMoved(ObjectDisturbed):
     """An object is put elsewhere."""
 
-    name: ClassVar = "object_moved"
+    name = "object_moved"
     by: tuple[float, float]
 
     def disturb(self, now: Occasion, thing: Thing) -> bool:
@@ -83,7 +82,7 @@ class ObjectBumped(ObjectDisturbed):
         x, y: The part of the table in which it stays [m].
     """
 
-    name: ClassVar = "object_moved"
+    name = "object_moved"
     x: Range
     y: Range
 
@@ -121,7 +120,7 @@ class ObjectRefuses(Effect):
         number: Number of the object, from 1.
     """
 
-    name: ClassVar = "seal_fails"
+    name = "seal_fails"
     number: int
 
     def close(self, do: Callable[[], None], now: Occasion) -> None:

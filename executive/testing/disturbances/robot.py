@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from executive.testing.disturbances.effect import Effect, Occasion, checked_shar
 class SealFails(Effect):
     """Nothing seals to the tool; an object that hangs there already stays."""
 
-    name: ClassVar = "seal_fails"
+    name = "seal_fails"
 
     def close(self, do: Callable[[], None], now: Occasion) -> None:
         """Leave the tool as it is."""
@@ -31,7 +30,7 @@ class SealFails(Effect):
 class SealBreaks(Effect):
     """The seal gives way, once, when the arm has carried an object so far."""
 
-    name: ClassVar = "seal_breaks"
+    name = "seal_breaks"
     share: float
 
     def act(self, now: Occasion) -> bool:
@@ -48,7 +47,7 @@ class SealBreaks(Effect):
 class SealBreaksOverWrongBin(Effect):
     """The seal gives way, once, when the object hangs over a bin that is wrong for it."""
 
-    name: ClassVar = "seal_breaks"
+    name = "seal_breaks"
 
     def act(self, now: Occasion) -> bool:
         """Part tool and object there."""
@@ -68,7 +67,7 @@ class SealBreaksOverWrongBin(Effect):
 class ToolSticks(Effect):
     """The tool does not let go of what hangs there when it opens."""
 
-    name: ClassVar = "tool_sticks"
+    name = "tool_sticks"
 
     def open(self, do: Callable[[], None], now: Occasion) -> None:
         """Leave the tool closed, if it holds something."""
@@ -82,7 +81,7 @@ class ToolSticks(Effect):
 class ArmRunsInto(Effect):
     """The arm runs into something, once, when it has gone so far."""
 
-    name: ClassVar = "arm_runs_into"
+    name = "arm_runs_into"
     what: str
     share: float
 
@@ -99,7 +98,7 @@ class ArmRunsInto(Effect):
 class NoWay(Effect):
     """The planner finds no motion."""
 
-    name: ClassVar = "no_way"
+    name = "no_way"
     is_blocked: bool
 
     def plan(self, ask: Callable[[], Planning], now: Occasion) -> Planning:
@@ -131,7 +130,7 @@ class PlanInVain:
 class WorkspaceHidden(Effect):
     """The arm hides everything from the camera."""
 
-    name: ClassVar = "workspace_hidden"
+    name = "workspace_hidden"
 
     def sees_table(self, ask: Callable[[], bool], now: Occasion) -> bool:
         """Say no."""
@@ -150,7 +149,7 @@ class WorkspaceHidden(Effect):
 class DepthMissing(Effect):
     """No detection can be localized."""
 
-    name: ClassVar = "no_depth"
+    name = "no_depth"
 
     def locate(self, ask: Callable[[], Array], now: Occasion) -> Array:
         """Raise NoDepth."""
@@ -163,7 +162,7 @@ class DepthMissing(Effect):
 class TableBumped(Effect):
     """Something bumps the table, once, and the ledger is informed: nothing need be where it was."""
 
-    name: ClassVar = "table_bumped"
+    name = "table_bumped"
 
     def act(self, now: Occasion) -> bool:
         """Put every position in doubt."""
