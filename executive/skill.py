@@ -2,8 +2,9 @@
 
 A skill reads top to bottom. `run` is a generator: every `yield` hands back the tick (RUNNING),
 returning is SUCCESS, raising `self.failed(reason, sentence)` is FAILURE, and `finally` runs on every
-end, pre-emption included. A `run` that never waits may be a plain function. The declarations are made once, in the class body, and feed the mission
-checker, the JSON Schema, the documentation and the runtime alike.
+end, pre-emption included; a `run` that never waits may be a plain function. The declarations are made
+once, in the class body, and feed the mission checker, the JSON Schema, the documentation and the runtime
+alike.
 """
 
 from __future__ import annotations

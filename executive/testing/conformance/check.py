@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from traceback import extract_tb
 from typing import Any
 
 from executive.skill import Skill
@@ -13,7 +12,6 @@ from executive.testing.conformance import conduct, declarations
 from executive.testing.conformance.case import Case
 from executive.testing.conformance.patience import Stuck, patience
 from executive.testing.conformance.situations import Arrange, NotTried
-from executive.testing.conformance.source import place_in
 from executive.testing.conformance.stage import Stage
 
 Rule = Callable[[Case], Iterator[str]]
@@ -37,16 +35,11 @@ RULES: tuple[Rule, ...] = (
     conduct.halts_at_once,
     conduct.repeats_itself,
     conduct.ticks_are_quick,
-    conduct.never_sooner_than_shortest,
 )
 
 
 class NotConforming(AssertionError):
     """A skill does not do what every skill must; the text says what, where, and what to do."""
-
-
-class Interrupted(KeyboardInterrupt):
-    """The user did not want to wait any longer; the text says which check was under way, and where."""
 
 
 @dataclass(frozen=True)
@@ -94,11 +87,7 @@ class Check:
         return (inspect.getdoc(self.rule) or "").partition("\n")[0]
 
     def verdict(self) -> Verdict:
-        """Return what the check finds.
-
-        Raises:
-            Interrupted: The user pressed Ctrl-C meanwhile.
-        """
+        """Return what the check finds."""
         try:
             with patience(self.case.skill, lambda: self.case.tries):
                 problems = tuple(self.rule(self.case))
@@ -106,10 +95,6 @@ class Check:
             return Verdict(self.case.name, self.name, self.doc, "not run", (str(problem),))
         except Stuck as stuck:
             problems = (f"what {self} asks of it {stuck}. A skill answers every question at once.",)
-        except KeyboardInterrupt as interrupt:
-            trace = reversed(extract_tb(interrupt.__traceback__))
-            place = place_in(self.case.skill, ((frame.filename, frame.lineno or 0) for frame in trace))
-            raise Interrupted(f"{self} was under way{place and f', at {place}'}") from interrupt
         return Verdict(self.case.name, self.name, self.doc, "failed" if problems else "ok", problems)
 
     def __call__(self) -> None:

@@ -1,24 +1,23 @@
-"""One run of a skill in a scene, to its end or until it is halted, with everything noted."""
+"""One run of a skill in a situation, to its end or until it is halted, with everything noted."""
 
 from __future__ import annotations
 
+import copy
+import pickle
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from time import perf_counter
 from traceback import extract_tb
 from typing import Any
 
 from executive.errors import Fault
 from executive.events import Event
-from executive.messages import Item
 from executive.skill import Skill, SkillFailed
 from executive.skill_steps import SkillRun
 from executive.testing.conformance.adversities import Adversity
 from executive.testing.conformance.patience import Stuck, patience
-from executive.testing.conformance.same import is_same
-from executive.testing.conformance.situations import Scene
+from executive.testing.conformance.situations import Arrange, Situation, begin
 from executive.testing.conformance.source import place_in
-from executive.testing.conformance.watch import Call, Watch
+from executive.testing.conformance.watch import Watch
 from executive.testing.disturbances import DisturbedCell, during
 from executive.testing.fake_world import STEP
 
@@ -26,175 +25,123 @@ MAX_TIME = 60.0
 """Time on the run's clock after which a skill must have ended [s]: nothing takes so long on a fake table."""
 
 
-@dataclass(frozen=True)
-class Ending:
-    """The end of a run.
+class Rehearsal:
+    """One run of a skill, driven as the tree would.
+
+    Args:
+        skill: Its class.
+        situation: The situation in which it begins.
+        arrange: What its author wants to be otherwise on the stage.
+        adversity: What goes wrong; None for nothing.
+        halt_at: Control step before which it is halted; None for a run to its end.
 
     Attributes:
-        status: `SUCCESS`, `FAILURE`, `HALTED`, `RUNNING` if it did not end, `STUCK` if a tick did not, or
-            `FAULT`.
+        where: The situation, and what goes wrong in it, for a sentence.
+        status: `SUCCESS`, `FAILURE`, `HALTED`, `RUNNING` if it did not end, `STUCK` if a tick did not come
+            back, or `FAULT`.
         reason: Reason of a failure.
         message: Sentence of a failure or fault, or where a tick got stuck.
-    """
-
-    status: str
-    reason: str = ""
-    message: str = ""
-
-    def __str__(self) -> str:
-        if self.status == "FAILURE":
-            return f'it failed with "{self.reason}" ({self.message})'
-        words = {"SUCCESS": "it succeeded", "HALTED": "it was halted", "RUNNING": "it was not over"}
-        return words.get(self.status) or f"it ended as a fault: {self.message}"
-
-
-@dataclass(frozen=True)
-class Rehearsal:
-    """Everything noted of one run.
-
-    Attributes:
-        where: The situation, and what went wrong in it, for a sentence.
-        ending: Its end.
         ticks: Control steps it took, that of its end left out.
-        given: Those of its params and inputs that are plain values.
-        outputs: Its outputs that were set at the end.
-        mutated: Names of the params and inputs that are no longer what they were.
+        outputs: Its outputs after success.
         calls: Every call it made of the cell.
         durations: Computing time of every tick, by the wall clock [s].
+        changed: Names of the params and inputs that are no longer what they were.
         held: The tool held something when it began.
         holds: The tool holds something at the end.
-        believed: Item that the ledger then believes in the tool, or None.
+        is_known: The ledger believes an item in the tool at the end.
         at_rest: The arm has nothing left to do at the end.
-        names: Names of the cell by their kind: `item`, `bin`, `class`.
-    """
-
-    where: str
-    ending: Ending
-    ticks: int
-    given: Mapping[str, Any]
-    outputs: Mapping[str, Any]
-    mutated: tuple[str, ...]
-    calls: tuple[Call, ...]
-    durations: tuple[float, ...]
-    held: bool
-    holds: bool
-    believed: Item | None
-    at_rest: bool
-    names: Mapping[str, tuple[str, ...]]
-
-    @property
-    def seconds(self) -> float:
-        """Time it took on the run's clock [s]."""
-        return self.ticks * STEP
-
-    @property
-    def when(self) -> str:
-        """How and where it ended, for a sentence."""
-        halted = f" at tick {self.ticks}" if self.ending.status == "HALTED" else ""
-        return f"{self.where} {self.ending}{halted}"
-
-    @property
-    def moved(self) -> bool:
-        """True if it started the arm."""
-        return any(call.name == "arm.start" for call in self.calls)
-
-    def without_arguments(self) -> Rehearsal:
-        """Return this without the arguments of its calls, which may be large: frames are among them."""
-        return replace(self, calls=tuple(replace(call, arguments=()) for call in self.calls))
-
-
-def rehearse(
-    skill: type[Skill], scene: Scene, adversity: Adversity | None = None, halt_at: int | None = None
-) -> Rehearsal:
-    """Run a skill; with `halt_at`, halt it after so many control steps."""
-    values = scene.begin()
-    before, fake = scene.copied(values), scene.cell
-    held = fake.tool.holding
-    actor = _Actor(skill, values, scene, adversity)
-    try:
-        with patience(skill, lambda: actor.ticks):
-            ending = actor.act(halt_at)
-    except Stuck as stuck:
-        ending = Ending("STUCK", message=str(stuck))
-    return Rehearsal(
-        where=" ".join(filter(None, (scene.situation.name, adversity.name if adversity else ""))),
-        ending=ending,
-        ticks=actor.ticks,
-        given={name: value for name, value in values.items() if isinstance(value, str | float | None)},
-        outputs=actor.outputs,
-        mutated=tuple(name for name in values if not is_same(values[name], before[name])),
-        calls=tuple(actor.watch.calls),
-        durations=tuple(actor.durations),
-        held=held,
-        holds=fake.tool.holding,
-        believed=fake.ledger.in_tool(),
-        at_rest=fake.arm.at_rest,
-        names={
-            "item": tuple(record.item for record in fake.ledger.records),
-            "bin": tuple(fake.cell.bins),
-            "class": tuple(fake.cell.classes),
-        },
-    )
-
-
-class _Actor:
-    """One run, driven as the tree would.
-
-    Attributes:
-        watch: Stands between the skill and its cell.
-        outputs: Its outputs, once it has succeeded.
-        ticks: Control steps since it was started.
-        durations: Computing time of every tick [s].
     """
 
     def __init__(
-        self, skill: type[Skill], values: Mapping[str, Any], scene: Scene, adversity: Adversity | None
+        self,
+        skill: type[Skill],
+        situation: Situation,
+        arrange: Arrange,
+        adversity: Adversity | None = None,
+        halt_at: int | None = None,
     ) -> None:
-        self._skill, self._values, self._adversity = skill, values, adversity
+        stage, values = begin(skill, situation, arrange)
+        fake = stage.cell
+        before = values if halt_at else copy.deepcopy(values, {id(fake): fake})
         script = [during("*", adversity.effect)] * adversity.times if adversity else []
-        self._cell = DisturbedCell(scene.cell, script)
-        self.watch = Watch(self._cell.cell)
-        self.outputs: Mapping[str, Any] = {}
+        cell = DisturbedCell(fake, script)
+        watch = Watch(cell.cell)
+        self.where = " ".join(filter(None, (situation.name, adversity.name if adversity else "")))
+        self.reason = self.message = ""
         self.ticks = 0
-        self.durations: list[float] = []
-        self._run: SkillRun | None = None
+        self.outputs: Mapping[str, Any] = {}
+        self.calls, self.durations = watch.calls, list[float]()
+        disturbed_at = adversity.tick if adversity else 0
+        self.held = fake.tool.holding
+        try:
+            with patience(skill, lambda: self.ticks):
+                self.status = self._act(
+                    skill, values, cell, watch, adversity.tick if adversity else 0, halt_at
+                )
+        except Stuck as stuck:
+            self.status, self.message = "STUCK", str(stuck)
+        self.changed = [name for name in values if not is_same(values[name], before[name])]
+        self.holds, self.is_known = fake.tool.holding, fake.ledger.in_tool() is not None
+        self.at_rest = fake.arm.at_rest
 
-    def act(self, halt_at: int | None) -> Ending:
-        """Run the skill and return its end."""
+    @property
+    def end(self) -> str:
+        """Where and how it ended, for a sentence."""
+        words = {
+            "SUCCESS": "it succeeded",
+            "FAILURE": f'it failed with "{self.reason}" ({self.message})',
+            "HALTED": f"it was halted at tick {self.ticks}",
+            "RUNNING": "it was not over",
+        }
+        return f"{self.where} {words.get(self.status, f'it ended as a fault: {self.message}')}"
+
+    @property
+    def has_moved(self) -> bool:
+        """True if it started the arm."""
+        return any(call.name == "arm.start" for call in self.calls)
+
+    def _act(
+        self,
+        skill: type[Skill],
+        values: Mapping[str, Any],
+        cell: DisturbedCell,
+        watch: Watch,
+        disturbed_at: int,
+        halt_at: int | None,
+    ) -> str:
+        """Run the skill and return its status at the end."""
+        run: SkillRun | None = None
         try:
             while self.ticks < MAX_TIME / STEP:
-                if self._run is not None and self.ticks == halt_at:
-                    self._run.halt()
-                    return Ending("HALTED")
-                if self._adversity is not None and self.ticks == self._adversity.tick:
-                    self._cell.hear(Event("status", 0, 0.0, {"node": "skill", "status": "RUNNING"}))
-                self.watch.tick = self.ticks
-                if self._step():
-                    return Ending("SUCCESS")
-                self._cell.advance()
+                if run is not None and self.ticks == halt_at:
+                    run.halt()
+                    return "HALTED"
+                if self.ticks == disturbed_at:
+                    cell.hear(Event("status", 0, 0.0, {"node": "skill", "status": "RUNNING"}))
+                watch.tick, began = self.ticks, perf_counter()
+                run = run or SkillRun(skill(**values), watch.cell)
+                has_succeeded = run.step()
+                self.durations.append(perf_counter() - began)
+                if has_succeeded:
+                    self.outputs = run.outputs()
+                    return "SUCCESS"
+                cell.advance()
                 self.ticks += 1
         except SkillFailed as failure:
-            return Ending("FAILURE", failure.reason, failure.message)
+            self.reason, self.message = failure.reason, failure.message
+            return "FAILURE"
         except Exception as error:
-            return Ending("FAULT", message=self._described(error))
-        return Ending("RUNNING")
+            frames = extract_tb(error.__traceback__)
+            place = place_in(skill, ((frame.filename, frame.lineno or 0) for frame in reversed(frames)))
+            kind = "" if isinstance(error, Fault) else f"{type(error).__name__}: "
+            self.message = f"{kind}{error}" + (f" ({place})" if place else "")
+            return "FAULT"
+        return "RUNNING"
 
-    def _step(self) -> bool:
-        """Take one step, the first of which starts the skill; return True once it has succeeded."""
-        began = perf_counter()
-        try:
-            if self._run is None:
-                self._run = SkillRun(self._skill(**self._values), self.watch.cell)
-            has_succeeded = self._run.step()
-        finally:
-            self.durations.append(perf_counter() - began)
-        if has_succeeded:
-            self.outputs = self._run.outputs()
-        return has_succeeded
 
-    def _described(self, error: Exception) -> str:
-        """Return the text of an error, and where in the skill's own files it was raised."""
-        frames = ((frame.filename, frame.lineno or 0) for frame in reversed(extract_tb(error.__traceback__)))
-        place = place_in(self._skill, frames)
-        kind = "" if isinstance(error, Fault) else f"{type(error).__name__}: "
-        return f"{kind}{error}" + (f" ({place})" if place else "")
+def is_same(one: Any, other: Any) -> bool:
+    """Return True if two values are equal part by part; values that cannot be taken apart count as equal."""
+    try:
+        return pickle.dumps(one) == pickle.dumps(other)
+    except (pickle.PicklingError, TypeError, AttributeError):
+        return True

@@ -16,7 +16,6 @@ from executive.skill import Skill, SkillFailed
 
 _CUSTOMARY: Mapping[str, Any] = {"cell": Cell, "clock": Clock, "skill": Skill}
 """Types of the arguments and local names that every skill calls so."""
-_BY_NAME: Mapping[str, Any] = {"SkillFailed": SkillFailed, "Steps": Iterator, "Iterator[None]": Iterator}
 
 
 @dataclass(frozen=True)
@@ -108,8 +107,7 @@ def _returned(callee: Any) -> Any:
     try:
         return get_type_hints(callee).get("return")
     except (NameError, AttributeError, TypeError):
-        # A type that is imported for type checkers alone is known by its name.
-        return _BY_NAME.get(str(callee.__annotations__.get("return")))
+        return None  # A type that is imported for type checkers alone is not known.
 
 
 def _member(owner: Any, name: str) -> Any:
