@@ -75,9 +75,7 @@ class Rehearsal:
         self.held = fake.tool.holding
         try:
             with patience(skill, lambda: self.ticks):
-                self.status = self._act(
-                    skill, values, cell, watch, adversity.tick if adversity else 0, halt_at
-                )
+                self.status = self._act(skill, values, cell, watch, disturbed_at, halt_at)
         except Stuck as stuck:
             self.status, self.message = "STUCK", str(stuck)
         self.changed = [name for name in values if not is_same(values[name], before[name])]
