@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +72,13 @@ def record(subject: Subject, rehearsal: Rehearsal, faults: Numbered, runs: Path)
         return trying.judged(outcome), directory.path
 
 
+def empty_trial(faults: Numbered) -> Trial:
+    """Return the trial of a run of which nothing is known yet."""
+    last = list(faults.values())[-1]
+    told = tuple(map(str, faults.values()))
+    return Trial(tuple(faults), told, last.name, last.place, last.what, last.when)
+
+
 class _StoppingCell(WrappedCell):
     """A work cell with something to do after every control step."""
 
@@ -110,7 +118,7 @@ class _Trying:
 
     def judged(self, outcome: Outcome) -> Trial:
         """Return what came of the run, which is over."""
-        run, last = self.run, list(self._faults.values())[-1]
+        run = self.run
         items, audit = run.items(), run.audit()
         raised = any(self._raised(fault) for fault in self._faults.values() if fault.ends_run)
         faults = tuple(self._faults.values())
@@ -124,15 +132,10 @@ class _Trying:
             *check_tool(outcome, run.workcell),
             *check_rest(run.workcell),
         ]
-        return Trial(
-            numbers=tuple(self._faults),
-            told=tuple(map(str, faults)),
-            name=last.name,
-            place=last.place,
-            what=last.what,
-            when=last.when,
+        return replace(
+            empty_trial(self._faults),
             happened=all(map(self._happened, faults)),
-            raised=self._raised(last),
+            raised=self._raised(faults[-1]),
             cut=outcome.status == "HALTED" and not self._stopped,
             status=outcome.status,
             reason=outcome.reason,

@@ -65,6 +65,7 @@ class Case:
         return [
             self._run(situation, halt_at=tick)
             for situation, first, _ in self.twice
+            if first.status != "RUNNING"
             for tick in _halt_ticks(first)
         ]
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
-import re
 from collections.abc import Iterator, Sequence
-from typing import Any, get_args
 
 from executive.mission.model.typed import WrongType, convert
 from executive.skill import Param, Port
@@ -25,15 +23,11 @@ FOREIGN = (
     "asyncio",
 )  # fmt: skip
 """Packages that no skill may import: it runs on the tick thread, on the run's clock, on any cell."""
-RATIO = "[-]"
-"""Mark in the doc of a number without a unit."""
 HALT = "halt"
-
-_REASON = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 
 
 def documented(case: Case) -> Iterator[str]:
-    """The class and every param and port say what they are; a number that is not whole has a unit."""
+    """The docstring of the class begins with a sentence, and every param and port says what it is."""
     doc = vars(case.skill).get("__doc__") or ""
     summary = inspect.cleandoc(doc).partition("\n")[0]
     if not summary.endswith("."):
@@ -46,12 +40,6 @@ def documented(case: Case) -> Iterator[str]:
         if not declared.doc.strip():
             declare = "param" if isinstance(declared, Param) else "port"
             yield f'{case.name}.{name} has no doc. Write {declare}(..., doc="what it is").'
-        has_unit = not isinstance(declared, Param) or declared.unit or RATIO in declared.doc
-        if not has_unit and _is_bare_number(declared.type):
-            yield (
-                f"{case.name}.{name} is a float without a unit. Declare it as Seconds, Metres or "
-                f'Annotated[float, "N"]; if it is a ratio, write {RATIO} into its doc.'
-            )
 
 
 def defaults_allowed(case: Case) -> Iterator[str]:
@@ -65,17 +53,11 @@ def defaults_allowed(case: Case) -> Iterator[str]:
 
 
 def reasons_declared(case: Case) -> Iterator[str]:
-    """Reasons are lower_snake words, each declared once, and none is raised that is not declared."""
+    """Its reasons are a tuple, and none is raised that is not declared."""
     reasons = case.skill.reasons
     if isinstance(reasons, str):
         yield f'{case.name}.reasons is the text "{reasons}". Write a tuple: ("{reasons}",).'
         return
-    for reason in dict.fromkeys(reasons):
-        if not _REASON.fullmatch(reason) or reason == HALT or list(reasons).count(reason) > 1:
-            yield (
-                f'{case.name} declares the reason "{reason}". '
-                f'Declare it once, as a lower_snake word other than "{HALT}".'
-            )
     for written in functions_reached(case.skill):
         for reason, node in _raised(written.tree):
             if reason not in reasons:
@@ -124,13 +106,6 @@ def calls_take_effect(case: Case) -> Iterator[str]:
                 )
             elif returns_failure(callee):
                 yield f'{where} calls {text} and does not raise it, so nothing fails. Write "raise {text}".'
-
-
-def _is_bare_number(declared: Any) -> bool:
-    """Return True if a type is float, or has it among its alternatives, without a unit."""
-    if hasattr(declared, "__metadata__"):
-        return False
-    return declared is float or any(map(_is_bare_number, get_args(declared)))
 
 
 def _default_fault(param: Param) -> str:

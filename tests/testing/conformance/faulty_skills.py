@@ -70,8 +70,6 @@ class Careful(Pause):
 
 class Undocumented(Pause):
     gap: Metres = param(0.1)
-    force: float = param(1.0, doc="how hard")
-    share: float | None = param(0.5, doc="how much of it [-]")
     target: In[Target]
 
 
@@ -86,10 +84,8 @@ class BadDefaults(Pause):
     limit: float | None = param(None, ge=1, doc="at most [-]")
 
 
-class BadReasons(Pause):
+class RaisesUndeclared(Pause):
     """Wait."""
-
-    reasons: ClassVar = ("tooTired", "halt", "lost", "lost")
 
     def run(self, cell: Cell) -> Steps:
         yield

@@ -41,19 +41,11 @@ def unraised(text: str) -> str:
     )
 
 
-def reason(name: str) -> str:
-    return (
-        f'BadReasons declares the reason "{name}". Declare it once, as a lower_snake word other than "halt".'
-    )
-
-
 FAULTY: list[tuple[str, type[Skill], list[str]]] = [
     ("documented", faulty.Undocumented, [
         'the docstring of Undocumented begins with "", which is no sentence. Say in its first line what is '
         "true when the skill has succeeded.",
         'Undocumented.gap has no doc. Write param(..., doc="what it is").',
-        "Undocumented.force is a float without a unit. Declare it as Seconds, Metres or "
-        'Annotated[float, "N"]; if it is a ratio, write [-] into its doc.',
         'Undocumented.target has no doc. Write port(..., doc="what it is").',
     ]),
     ("defaults_allowed", faulty.BadDefaults, [
@@ -64,10 +56,9 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
             "gap has the default 'wide': must be a number, not the text \"wide\"",
         )
     ]),
-    ("reasons_declared", faulty.BadReasons, [
-        reason("tooTired"), reason("halt"), reason("lost"),
-        'faulty_skills.py:N fails with "no_bins", which BadReasons does not declare. '
-        "Add it to reasons; there are: tooTired, halt, lost, lost.",
+    ("reasons_declared", faulty.RaisesUndeclared, [
+        'faulty_skills.py:N fails with "no_bins", which RaisesUndeclared does not declare. '
+        "Add it to reasons; there are: tired.",
     ]),
     ("reasons_declared", faulty.TextForTuple, [
         'TextForTuple.reasons is the text "tired". Write a tuple: ("tired",).',
