@@ -87,12 +87,13 @@ def begin(skill: type[Skill], situation: Situation, arrange: Arrange) -> tuple[S
         is_wanted = declared.required or (situation.has_all_inputs and isinstance(declared, Port))
         if declared.name in values or not is_wanted:
             continue
-        values[declared.name] = _made_up(declared, stage)
-        if values[declared.name] is None:
+        if (value := _made_up(declared, stage)) is not None:
+            values[declared.name] = value
+        elif declared.required:
             missing.append(declared)
-    if wanting := [declared for declared in missing if declared.required]:
-        told = " and ".join(f'"{declared.name}" ({called(declared.type)})' for declared in wanting)
-        given = ", ".join(f'"{declared.name}": ...' for declared in wanting)
+    if missing:
+        told = " and ".join(f'"{declared.name}" ({called(declared.type)})' for declared in missing)
+        given = ", ".join(f'"{declared.name}": ...' for declared in missing)
         raise NotArranged(
             f"no value can be made up for {told}. Give it in a test: "
             f"conformance({skill.__name__}, lambda stage: {{{given}}}), as skills/README.md shows."
