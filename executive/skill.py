@@ -2,8 +2,9 @@
 
 A skill reads top to bottom. `run` is a generator: every `yield` hands back the tick (RUNNING),
 returning is SUCCESS, raising `self.failed(reason, sentence)` is FAILURE, and `finally` runs on every
-end, pre-emption included. The declarations are made once, in the class body, and feed the mission
-checker, the JSON Schema, the documentation and the runtime alike.
+end, pre-emption included; a `run` that never waits may be a plain function. The declarations are made
+once, in the class body, and feed the mission checker, the JSON Schema, the documentation and the runtime
+alike.
 """
 
 from __future__ import annotations
@@ -216,7 +217,7 @@ class Skill:
                 raise InputError(f'{type(self).__name__} needs a value for "{name}"')
             setattr(self, name, value)
 
-    def run(self, cell: Cell) -> Iterator[None]:
+    def run(self, cell: Cell) -> Iterator[None] | None:
         """Do the work; see the module's docstring for what yielding, returning and raising mean."""
         raise NotImplementedError
 

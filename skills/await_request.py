@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from executive.cell import Cell, Steps
+from executive.cell import Cell
 from executive.skill import Out, Skill, port
 
 
@@ -15,9 +15,8 @@ class AwaitRequest(Skill):
     reasons: ClassVar = ("rescan", "quit")
     senses: ClassVar = True
 
-    def run(self, cell: Cell) -> Steps:
+    def run(self, cell: Cell) -> None:
         """Ask once."""
-        yield from ()
         answer = cell.operator.ask(tuple(cell.routes))
         if answer is None:
             raise self.failed("quit", "the operator asked for nothing more")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from executive.cell import Cell, Steps
+from executive.cell import Cell
 from executive.messages import Item
 from executive.skill import ANY, EMPTY, HOLDING, Out, Skill, port
 
@@ -23,9 +23,8 @@ class IsHolding(Skill):
     tool_state: ClassVar = (ANY, HOLDING)
     tool_left: ClassVar = {"empty": EMPTY}
 
-    def run(self, cell: Cell) -> Steps:
+    def run(self, cell: Cell) -> None:
         """Ask once."""
-        yield from ()
         believed = cell.ledger.in_tool()
         if cell.tool.holding and believed is not None:
             self.held = believed

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import ClassVar
 
-from executive.cell import Cell, Steps
+from executive.cell import Cell
 from executive.errors import NoDepth
 from executive.messages import Detections, Glimpse, Target
 from executive.skill import In, Out, Skill, port
@@ -24,9 +24,8 @@ class Localize(Skill):
     )
     reasons: ClassVar = ("stale", "no_depth")
 
-    def run(self, cell: Cell) -> Steps:
+    def run(self, cell: Cell) -> None:
         """Locate every detection, then let the ledger say who is who."""
-        yield from ()
         frame = self.detections.frame
         if not cell.ledger.is_current(frame):
             raise self.failed(

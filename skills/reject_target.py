@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from executive.cell import Cell, Steps
+from executive.cell import Cell
 from executive.messages import Item
 from executive.skill import In, Skill, param, port
 
@@ -20,9 +20,8 @@ class RejectTarget(Skill):
     after: int = param(0, ge=0, doc="failed attempts from which it is given up")
     reasons: ClassVar = ()
 
-    def run(self, cell: Cell) -> Steps:
+    def run(self, cell: Cell) -> None:
         """Tell the ledger."""
-        yield from ()
         failures = cell.ledger.attempts(self.item)
         if failures < self.after:
             return

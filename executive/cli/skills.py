@@ -59,22 +59,14 @@ def _conform(skills: Mapping[str, type[Skill]], as_json: bool) -> bool:
     """Check skills, print what is found as soon as it is, and tell whether all is well."""
     with stdout_kept_clean():
         from executive.testing.conformance import conformance
-        from executive.testing.conformance.check import Interrupted
         from executive.view.figures.conformance import conformance_lines, conformance_total
 
-    verdicts = []
+    verdicts: list[Verdict] = []
     for name, skill in skills.items():
-        found: list[Verdict] = []
-        try:
-            with stdout_kept_clean():
-                for check in conformance(skill, name=name):
-                    found.append(check.verdict())
-        except Interrupted as interrupt:
-            click.echo(str(interrupt), err=True)
-            raise
-        finally:
-            if found and not as_json:
-                click.echo("\n".join(conformance_lines(found)))
+        with stdout_kept_clean():
+            found = [check.verdict() for check in conformance(skill, name=name)]
+        if not as_json:
+            click.echo("\n".join(conformance_lines(found)))
         verdicts += found
     if as_json:
         print_json([asdict(verdict) for verdict in verdicts])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,6 +16,7 @@ from executive.control.scope import Scope
 from executive.errors import Fault
 from executive.messages import Target
 from executive.skill import Skill, SkillFailed
+from executive.skill_steps import SkillRun
 
 
 @dataclass(frozen=True)
@@ -54,8 +55,7 @@ class SkillNode(Behaviour):
         self.failure: Failure | None = None
         self._emit = site.emit
         self.skill_type, self.wiring, self._cell, self._scope = skill, wiring, cell, scope
-        self._skill: Skill | None = None
-        self._steps: Iterator[Any] = iter(())
+        self._run: SkillRun | None = None
         self._item = ""
         # An item that may be left out narrows a choice; what the skill works on it always has.
         self._item_ports = tuple(
@@ -79,20 +79,16 @@ class SkillNode(Behaviour):
             Fault: The skill raised anything but a declared failure.
         """
         try:
-            if self.status is not Status.RUNNING:
-                self._start()
-            yielded = next(self._steps, self)
+            run = self._start() if self._run is None else self._run
+            has_succeeded = run.step()
         except SkillFailed as failed:
             self._fail(failed)
         except Exception as error:
             text = str(error) if isinstance(error, Fault) else f"{type(error).__name__}: {error}"
             raise self._fault(text) from error
         else:
-            if yielded is self:
-                self._succeed()
-            elif yielded is not None:
-                kind = type(yielded).__name__
-                raise self._fault(f'it yielded a {kind}; to run steps of others write "yield from"')
+            if has_succeeded:
+                self._succeed(run.outputs())
 
     def update(self) -> Status:
         """Go on by one tick and return the status: py_trees' name for it."""
@@ -113,28 +109,23 @@ class SkillNode(Behaviour):
         if self.status is not Status.RUNNING:
             self.status = new_status
             return
-        steps = self._steps
+        run = self._run
         self._close(new_status)
         try:
-            if isinstance(steps, Generator):
-                steps.close()
-        except RuntimeError as error:
-            if "GeneratorExit" not in str(error):
-                raise self._fault(f"RuntimeError while it was halted: {error}") from error
-            raise self._fault('it yielded while it was halted; nothing may wait in "finally"') from error
-        except Exception as error:
-            raise self._fault(f"{type(error).__name__} while it was halted: {error}") from error
+            if run is not None:
+                run.halt()
+        except Fault as fault:
+            raise self._fault(str(fault)) from fault
         self._tell(new_status.value)
 
-    def _start(self) -> None:
+    def _start(self) -> SkillRun:
         self.failure = None
         self.status = Status.RUNNING
         inputs = self._read()
         self._item = self._item_of(inputs)
         self._tell("RUNNING")
-        self._skill = self.skill_type(**self.wiring.constants, **inputs)
-        # A `run` without any yield is a plain function: it has done its work already.
-        self._steps = iter(self._skill.run(self._cell) or ())
+        self._run = SkillRun(self.skill_type(**self.wiring.constants, **inputs), self._cell)
+        return self._run
 
     def _read(self) -> dict[str, Any]:
         inputs = {}
@@ -155,23 +146,14 @@ class SkillNode(Behaviour):
                 return value.item
         return next((values[port] for port in self._item_ports if values.get(port)), "")
 
-    def _succeed(self) -> None:
-        skill = self._skill
-        unset = [port for port in self.wiring.outputs if not hasattr(skill, port)]
-        if unset:
-            raise self._fault(f"it succeeded without setting its output {', '.join(unset)}")
-        outputs = {port: getattr(skill, port) for port in self.wiring.outputs}
+    def _succeed(self, values: Mapping[str, Any]) -> None:
+        outputs = {port: values[port] for port in self.wiring.outputs}
         self._scope.write({self.wiring.outputs[port]: value for port, value in outputs.items()})
         self._item = self._item_of(outputs) or self._item
         self._close(Status.SUCCESS)
         self._tell("SUCCESS", outputs=outputs)
 
     def _fail(self, failed: SkillFailed) -> None:
-        if failed.reason not in self.skill_type.reasons:
-            declared = ", ".join(self.skill_type.reasons) or "none"
-            raise self._fault(
-                f'it failed with the undeclared reason "{failed.reason}"; it declares: {declared}'
-            ) from failed
         labels = (self.label,) if self.label else ()
         self.failure = Failure(failed.reason, failed.message, self.skill_name, self.path, labels)
         self._close(Status.FAILURE)
@@ -183,7 +165,7 @@ class SkillNode(Behaviour):
         return Fault(f"{self.name}: {message}", self.path)
 
     def _close(self, status: Status) -> None:
-        self.status, self._steps, self._skill = status, iter(()), None
+        self.status, self._run = status, None
 
     def _tell(self, status: str, reason: str = "", message: str = "", **more: Any) -> None:
         self._emit(

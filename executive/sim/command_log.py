@@ -21,13 +21,13 @@ from executive.motion.trajectory import Trajectory
 
 MAGIC = b"executive world 1\n"
 """Begins every log; the number is that of the format."""
-STEP, IDLE, CLOSE, OPEN, PART, JOINTS_TO, MOTION, DONE, PLACE, REMOVE, LEAKS, STICKS = b"SICOPJMDXRLK"
+STEP, IDLE, CLOSE, OPEN, PART, JOINTS_TO, MOTION, DONE, PLACE, REMOVE = b"SICOPJMDXR"
 """Kinds of commands: a physics step of the run, and one between two parts of a run; vacuum on and off; a seal
 that gives way; joint targets; a motion that begins, and one that is over; an object that is put elsewhere,
-and one that is taken away; whether the cup leaks, and whether it sticks to what it let go."""
+and one that is taken away."""
 _BODIES = {
     STEP: "", IDLE: "", CLOSE: "", OPEN: "", PART: "", DONE: "", JOINTS_TO: f"{1 + JOINTS}d", MOTION: "2dI",
-    PLACE: "i7d", REMOVE: "i", LEAKS: "?", STICKS: "?",
+    PLACE: "i7d", REMOVE: "i",
 }  # fmt: skip
 _STATE = 3 * JOINTS
 

@@ -81,10 +81,6 @@ class Rebuilding:
             world.remove_object(int(numbers[0]))
         elif kind == log.PART:
             tool.part()
-        elif kind == log.LEAKS:
-            tool.leaks = bool(numbers[0])
-        elif kind == log.STICKS:
-            tool.sticks = bool(numbers[0])
 
 
 def rebuild(world: World, tool: SuctionTool, commands: Iterable[Command]) -> UnderWay:

@@ -56,8 +56,6 @@ class SuctionTool:
         self._parting: int | None = None
         self._felt = (-1, False)
         self.fallen: set[int] = set()
-        self._leaks = False
-        self._sticks = False
 
     @property
     def touching(self) -> bool:
@@ -88,26 +86,6 @@ class SuctionTool:
         """The low-passed pull on the seal [N], 0 when nothing is held; the truth, as `held_body`."""
         return 0.0 if self._grip is None else float(np.linalg.norm(self._grip.pull))
 
-    @property
-    def leaks(self) -> bool:
-        """True keeps it from sealing anything; for fault scripts to say, as is `sticks`."""
-        return self._leaks
-
-    @leaks.setter
-    def leaks(self, leaks: bool) -> None:
-        self._world.log.note(command_log.LEAKS, leaks)
-        self._leaks = leaks
-
-    @property
-    def sticks(self) -> bool:
-        """True keeps it from letting go when it is opened."""
-        return self._sticks
-
-    @sticks.setter
-    def sticks(self, sticks: bool) -> None:
-        self._world.log.note(command_log.STICKS, sticks)
-        self._sticks = sticks
-
     def close(self) -> None:
         """Switch the vacuum on: what is within reach is sealed on if the seal bears enough."""
         self._world.log.note(command_log.CLOSE)
@@ -120,8 +98,7 @@ class SuctionTool:
         self._world.log.note(command_log.OPEN)
         self._vacuum = False
         self._parting = None
-        if not self._sticks:
-            self._let_go()
+        self._let_go()
 
     def part(self) -> None:
         """Let the seal give way, as it does under too much pull; what hung there falls."""
@@ -147,8 +124,6 @@ class SuctionTool:
 
     def _seal(self) -> None:
         """Seal the cup to what is within reach, if anything is and the seal bears enough."""
-        if self._leaks:
-            return
         near = set(self._near(self._config.reach))
         if self._parting not in near:
             self._parting = None

@@ -180,8 +180,6 @@ class FakeTool:
     Attributes:
         seals: Tells whether the cup seals what it is on.
         strength: The pull that its seals bear [N].
-        leaks: True keeps it from sealing anything; for fault scripts to say, as is `sticks`.
-        sticks: True keeps it from letting go when it is opened.
     """
 
     def __init__(self, world: FakeWorld, tip: Callable[[], Array]) -> None:
@@ -189,8 +187,6 @@ class FakeTool:
         self._tip = tip
         self.seals: Callable[[], bool] = lambda: True
         self.strength = BEARS
-        self.leaks = False
-        self.sticks = False
 
     @property
     def touching(self) -> bool:
@@ -210,13 +206,12 @@ class FakeTool:
     def close(self) -> None:
         """Seal what the cup is on."""
         thing = self._world.under(self._tip())
-        if thing is not None and not self.leaks and self.seals():
+        if thing is not None and self.seals():
             self._world.held, thing.fell = thing, False
 
     def open(self) -> None:
         """Let go; the object falls straight down."""
-        if not self.sticks:
-            self._let_go()
+        self._let_go()
 
     def part(self) -> None:
         """Let the seal give way; what hung there falls straight down, and off what it falls on."""

@@ -8,8 +8,7 @@ from pathlib import Path
 
 from executive.events import ignore
 from executive.mission.load import LoadedMission
-from executive.testing.disturbances.hand import Hand
-from executive.testing.disturbances.hands import hand_of
+from executive.testing.disturbances.hand import Hand, hand_of
 from executive.testing.fake_cell import SilentOperator
 from executive.workcell import CellOptions, CellPast, Workcell
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from executive.cell import Cell
-from executive.errors import Fault, InputError
-from executive.skill import Direction, Skill, SkillFailed
+from executive.errors import InputError
+from executive.skill import Skill, SkillFailed
+from executive.skill_steps import SkillRun
 from executive.testing.commands import written_down
 from executive.workcell import Workcell
 
@@ -63,25 +63,20 @@ def run_skill(
     Raises:
         InputError: An input is missing or unknown.
         Fault: The skill broke its own declarations: it succeeded without setting an output, failed with a
-            reason that it does not declare, or yielded something.
+            reason that it does not declare, yielded something, or raised while it was halted.
     """
-    skill = _instance(skill, inputs)
     commanded: list[str] = []
-    steps = _steps(skill, written_down(workcell.cell, commanded))
+    run = SkillRun(_instance(skill, inputs), written_down(workcell.cell, commanded))
     for tick in range(ticks):
         if tick == halt_at:
-            steps.close()
+            run.halt()
             return SkillResult("HALTED", ticks=tick, commanded=commanded, braking=_braking(workcell))
         try:
-            yielded = next(steps)
-        except StopIteration:
-            return SkillResult("SUCCESS", outputs=_outputs(skill), ticks=tick, commanded=commanded)
+            has_succeeded = run.step()
         except SkillFailed as failure:
-            skill.failed(failure.reason, failure.message)
             return SkillResult("FAILURE", failure.reason, failure.message, ticks=tick, commanded=commanded)
-        if yielded is not None:
-            kind = type(yielded).__name__
-            raise Fault(f'{type(skill).__name__} yielded a {kind}; to run steps of others write "yield from"')
+        if has_succeeded:
+            return SkillResult("SUCCESS", outputs=run.outputs(), ticks=tick, commanded=commanded)
         workcell.advance()
     return SkillResult("RUNNING", ticks=ticks, commanded=commanded)
 
@@ -93,18 +88,6 @@ def _instance(skill: Skill | type[Skill], inputs: Mapping[str, Any] | None) -> S
         name = type(skill).__name__
         raise InputError(f"this {name} has its inputs already; pass the class {name} with them, or none")
     return skill
-
-
-def _steps(skill: Skill, cell: Cell) -> Generator[Any, None, None]:
-    """Yield what the skill yields; a `run` without any yield is a plain function."""
-    yield from skill.run(cell) or ()
-
-
-def _outputs(skill: Skill) -> dict[str, Any]:
-    names = [name for name, port in skill.ports.items() if port.direction is Direction.OUT]
-    if unset := [name for name in names if not hasattr(skill, name)]:
-        raise Fault(f"{type(skill).__name__} succeeded without setting its output {', '.join(unset)}")
-    return {name: getattr(skill, name) for name in names}
 
 
 def _braking(workcell: Workcell) -> int | None:

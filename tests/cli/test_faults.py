@@ -88,6 +88,7 @@ def test_the_list_runs_nothing_but_the_undisturbed_mission():
     assert [entry["fault"] for entry in listed] == list(range(1, len(lines) + 1))
 
 
+@pytest.mark.slow
 def test_one_fault_is_repeated_and_recorded(tmp_path: Path):
     lines = invoke(*FAKE, "--list").stdout.splitlines()
     number = next(line.split()[0] for line in lines if "Grasp missed, first: nothing seals" in line)

@@ -16,8 +16,7 @@ from executive.record.journal import read_journal
 from executive.record.recorded_run import recorded_run
 from executive.record.replay import Replay, compare, replay
 from executive.tape.past import Past
-from executive.testing.disturbances.script import during
-from executive.testing.disturbances.tool import seal_fails
+from executive.testing.disturbances import during, seal_fails
 from executive.testing.fake_cell import FakeCell
 from executive.testing.oracle import oracle_cell
 from executive.testing.run_mission import run_mission

@@ -26,18 +26,16 @@ def test_it_reads_what_was_written_bit_by_bit(path: Path) -> None:
     written.note(log.JOINTS_TO, *joints)
     written.note(log.STEP)
     written.note(log.PLACE, 7, *joints[:7])
-    written.note(log.LEAKS, True)
     written.close()
     again = CommandLog(path, again=True)
     again.note(log.IDLE)
     again.close()
     read = list(read_commands(path))
     assert [one.kind for one in read] == [
-        log.CLOSE, log.JOINTS_TO, log.STEP, log.PLACE, log.LEAKS, log.IDLE,
+        log.CLOSE, log.JOINTS_TO, log.STEP, log.PLACE, log.IDLE,
     ]  # fmt: skip
     assert read[1].numbers == joints
     assert read[3].numbers == (7, *joints[:7])
-    assert read[4].numbers == (True,)
 
 
 def test_a_motion_comes_back_state_by_state(path: Path, rig) -> None:

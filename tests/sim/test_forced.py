@@ -44,38 +44,6 @@ def test_where_there_is_no_seal_none_gives_way(rig: Rig) -> None:
     assert not rig.tool.holding
 
 
-def test_a_leaking_tool_seals_nothing_and_a_sound_one_does(rig: Rig) -> None:
-    body = rig.add("cube", *CUBE)
-    rig.step(60)
-    rig.touch_down(ONTO)
-    rig.tool.leaks = True
-    rig.tool.close()
-    rig.step(24)
-    assert rig.tool.touching
-    assert not rig.tool.holding
-    rig.tool.leaks = False
-    rig.step()
-    assert rig.tool.held_body == body, "the vacuum is on still"
-
-
-def test_a_leak_takes_nothing_that_is_held(rig: Rig, held: int) -> None:
-    rig.tool.leaks = True
-    rig.step(24)
-    assert rig.tool.held_body == held
-
-
-def test_what_sticks_comes_off_when_the_tool_is_opened_once_more(rig: Rig, held: int) -> None:
-    rig.tool.sticks = True
-    rig.tool.open()
-    rig.step(60)
-    assert rig.tool.held_body == held
-    rig.tool.sticks = False
-    rig.step(60)
-    assert rig.tool.held_body == held
-    rig.tool.open()
-    assert not rig.tool.holding
-
-
 def test_an_arm_that_runs_into_something_brakes_and_says_what(rig: Rig) -> None:
     rig.arm.start(rig.planned(OVER))
     rig.step(60)

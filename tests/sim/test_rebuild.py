@@ -24,7 +24,7 @@ from executive.sim.command_log import read_commands
 from executive.sim.rebuild import Rebuilding
 from executive.sim.tool import SuctionTool
 from executive.sim.world import STEP
-from executive.testing.disturbances.hands import hand_of
+from executive.testing.disturbances.hand import hand_of
 from executive.testing.fake_cell import SilentOperator
 from executive.testing.meanwhile import meanwhile
 from executive.testing.oracle import oracle_cell

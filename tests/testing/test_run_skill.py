@@ -109,8 +109,8 @@ def test_inputs_are_checked_by_name_as_in_a_mission(
 @pytest.mark.parametrize(
     ("way", "sentence"),
     [
-        ("forget", "Worker succeeded without setting its output made"),
-        ("yield", 'Worker yielded a tuple_iterator; to run steps of others write "yield from"'),
+        ("forget", "it succeeded without setting its output made"),
+        ("yield", 'it yielded a tuple_iterator; to run steps of others write "yield from"'),
     ],
 )
 def test_what_would_be_a_fault_in_a_mission_is_one_here(fake: FakeCell, way: str, sentence: str) -> None:
@@ -133,7 +133,7 @@ def test_a_reason_that_is_not_declared_is_a_fault_however_it_is_raised(fake: Fak
             yield
             raise Worker(given="").failed("bad", "")
 
-    with pytest.raises(Fault, match='Sly raised the undeclared reason "bad"; it declares: none'):
+    with pytest.raises(Fault, match='it failed with the undeclared reason "bad"; it declares: none'):
         run_skill(Sly, fake, inputs={"given": "stone"})
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from executive.errors import InputError
+from executive.errors import Fault, InputError
 from executive.messages import Target
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_mission import run_mission
@@ -115,7 +115,7 @@ def test_a_bug_comes_up_as_often_as_it_was_told_to(fake: FakeCell) -> None:
 
 def test_a_bug_in_finally_comes_up_in_a_halt_and_not_without_one(fake: FakeCell, target: Target) -> None:
     broken = raising_when_halted(Approach, ValueError("in finally"))
-    with pytest.raises(ValueError, match="in finally"):
+    with pytest.raises(Fault, match="ValueError while it was halted: in finally"):
         run_skill(broken, fake, inputs={"target": target}, halt_at=40)
     assert fake.arm.commanded == ["start", "stop"], "the skill's own finally ran before"
     assert run_skill(broken, fake, inputs={"target": target}).status == "SUCCESS"

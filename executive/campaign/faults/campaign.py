@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from executive.campaign.faults.branches import branches
 from executive.campaign.faults.fault import Fault
 from executive.campaign.faults.listing import list_faults
 from executive.campaign.faults.rehearsal import Rehearsal, rehearse
-from executive.campaign.faults.trial import try_out
+from executive.campaign.faults.trial import empty_trial, try_out
 from executive.campaign.pool import do_all
 from executive.campaign.subject import Subject
 from executive.errors import InputError
@@ -167,14 +167,6 @@ def do(job: Job) -> Trial:
 
 def _broken(job: Job, error: BaseException) -> Trial:
     """Return the trial of a run that told nothing."""
-    fault = job.faults[-1]
-    return Trial(
-        job.numbers,
-        tuple(map(str, job.faults)),
-        fault.name,
-        fault.place,
-        fault.what,
-        fault.when,
-        status="FAULT",
-        problems=(f"the run broke: {type(error).__name__}: {error}",),
-    )
+    numbered = dict(zip(job.numbers, job.faults, strict=True))
+    problem = f"the run broke: {type(error).__name__}: {error}"
+    return replace(empty_trial(numbered), status="FAULT", problems=(problem,))

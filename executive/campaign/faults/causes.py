@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from executive.campaign.faults.effects import ObjectBumped
 from executive.cell_config import TableConfig
 from executive.skill import Skill
 from executive.testing.disturbances import (
@@ -14,6 +13,7 @@ from executive.testing.disturbances import (
     detector_unsure,
     no_depth,
     no_way,
+    object_bumped,
     operator_asks_rescan,
     operator_quits,
     seal_breaks,
@@ -49,7 +49,7 @@ class Cause:
 
 def causes(table: TableConfig) -> Mapping[str, Cause]:
     """Return what makes skills fail, by the name of the reason; of one that is missing nobody knows."""
-    aside = ObjectBumped("node", 0.0, table.x, table.y)
+    aside = object_bumped(table.x, table.y)
     return {
         "missed": Cause(seal_fails(), "nothing seals", "tool"),
         "dropped": Cause(seal_breaks(), "the seal breaks half-way", "moves"),

@@ -6,12 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from executive.campaign.faults.causes import causes
-from executive.campaign.faults.effects import (
-    DetectorGivenUp,
-    ObjectBumped,
-    ObjectRefuses,
-    SealBreaksOverBin,
-)
 from executive.campaign.faults.fault import Breakage, Fault, When
 from executive.campaign.faults.rehearsal import Rehearsal
 from executive.campaign.subject import Subject
@@ -22,12 +16,16 @@ from executive.testing.disturbances import (
     after,
     between,
     detector_dead,
+    detector_given_up,
     detector_hangs,
     detector_slow,
     detector_unsure,
     during,
+    object_bumped,
+    object_refuses,
     object_removed,
     seal_breaks,
+    seal_breaks_over_wrong_bin,
     seal_fails,
 )
 from executive.testing.disturbances.script import Disturbance
@@ -127,7 +125,7 @@ class _Listing:
                 yield _detector(f"hangs for {lasts:g} s", when, hangs)
                 yield _detector(f"unsure for {lasts:g} s", when, unsure, "unsure")
                 yield _detector(f"dead for {lasts:g} s", when, dead)
-            yield _detector("hangs for ever", when, after(start, DetectorGivenUp(LONG)))
+            yield _detector("hangs for ever", when, after(start, detector_given_up(LONG)))
             yield _detector("dead for ever", when, after(start, detector_dead()))
             yield _detector("unsure for ever", when, after(start, detector_unsure()), "unsure")
 
@@ -136,7 +134,7 @@ class _Listing:
         table = self._table
         for when, share in QUARTERS:
             start = share * self._rehearsal.robot_time
-            bumped = ObjectBumped("nearest", 0.0, table.x, table.y)
+            bumped = object_bumped(table.x, table.y, "nearest")
             yield _other("object", "taken", when, after(start, object_removed("nearest")))
             yield _other("object", "bumped", when, after(start, bumped))
         for node in self._nodes:
@@ -145,7 +143,7 @@ class _Listing:
             nth = 1 + len(self._rehearsal.activations[node.path]) // 2
             for when, share in QUARTERS:
                 taken = object_removed("node", share)
-                bumped = ObjectBumped("node", share, table.x, table.y)
+                bumped = object_bumped(table.x, table.y, "node", share)
                 for what, effect in (("target taken", taken), ("target bumped", bumped)):
                     happening = during(node.path, effect, nth=nth)
                     yield self._fault(node, what, when, means=f"at {share:g}", happenings=(happening,))
@@ -158,7 +156,7 @@ class _Listing:
             for when, share in CARRIES:
                 happening = during(node.path, seal_breaks(share), nth=1)
                 yield self._fault(node, "lets go", when, means=f"at {share:g}", happenings=(happening,))
-            over = during(node.path, SealBreaksOverBin())
+            over = during(node.path, seal_breaks_over_wrong_bin())
             yield self._fault(
                 node, "lets go over another bin", "lasting", means="every time", happenings=(over,)
             )
@@ -167,7 +165,7 @@ class _Listing:
             happening = between(half, half + lasts, seal_fails())
             yield _other("tool", f"no seal for {lasts:g} s", "middle", happening)
         for number in (1, 2):
-            refuses = after(0.0, ObjectRefuses(number))
+            refuses = after(0.0, object_refuses(number))
             yield _other("tool", f"no seal on object {number}", "lasting", refuses)
 
     def _fault(self, node: nodes.SkillNode, what: str, when: When, **more: object) -> Fault:

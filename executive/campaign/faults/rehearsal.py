@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass
@@ -34,21 +34,30 @@ class Rehearsal:
         return 60.0 + 10 * self.robot_time
 
 
-class _Activations:
-    """Follows how long nodes run; an observer."""
+class Activations:
+    """Observer of the activations of nodes.
+
+    Attributes:
+        counts: Number of activations of every node that ran, by path.
+        began: Tick at which every running node was started.
+        lasted: Control steps of every activation that is over, by path.
+    """
 
     def __init__(self) -> None:
-        self.found: dict[str, list[int]] = defaultdict(list)
-        self._began: dict[str, int] = {}
+        self.counts: Counter[str] = Counter()
+        self.began: dict[str, int] = {}
+        self.lasted: dict[str, list[int]] = defaultdict(list)
 
     def __call__(self, event: Event) -> None:
+        """Note an event."""
         if event.kind != "status":
             return
         node = event.data["node"]
         if event.data["status"] == "RUNNING":
-            self._began[node] = event.tick
-        elif node in self._began:
-            self.found[node].append(event.tick - self._began.pop(node))
+            self.counts[node] += 1
+            self.began[node] = event.tick
+        elif node in self.began:
+            self.lasted[node].append(event.tick - self.began.pop(node))
 
 
 def rehearse(subject: Subject) -> Rehearsal:
@@ -58,7 +67,7 @@ def rehearse(subject: Subject) -> Rehearsal:
         InputError: It does not succeed, or its books are wrong.
         KeyboardInterrupt: The user ended it.
     """
-    activations = _Activations()
+    activations = Activations()
     run = Run(
         subject.loaded,
         subject.skills,
@@ -83,7 +92,7 @@ def rehearse(subject: Subject) -> Rehearsal:
             f"{undisturbed} leaves books that are not the world: the ledger says {_counts(items)}; the audit "
             f"{_counts(audit or {})}; choose another seed, or a mission that looks at the whole table"
         )
-    found = {node: tuple(ticks) for node, ticks in activations.found.items()}
+    found = {node: tuple(ticks) for node, ticks in activations.lasted.items()}
     return Rehearsal(outcome.robot_time, items["placed"], found)
 
 

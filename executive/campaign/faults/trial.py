@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from executive.campaign.faults.judgement import (
     remark,
 )
 from executive.campaign.faults.listing import skill_nodes
-from executive.campaign.faults.rehearsal import Rehearsal
+from executive.campaign.faults.rehearsal import Activations, Rehearsal
 from executive.campaign.halt_checks import check_journal, check_rest, check_tool
 from executive.campaign.subject import Subject
 from executive.events import Event
@@ -72,6 +72,13 @@ def record(subject: Subject, rehearsal: Rehearsal, faults: Numbered, runs: Path)
         return trying.judged(outcome), directory.path
 
 
+def empty_trial(faults: Numbered) -> Trial:
+    """Return the trial of a run of which nothing is known yet."""
+    last = list(faults.values())[-1]
+    told = tuple(map(str, faults.values()))
+    return Trial(tuple(faults), told, last.name, last.place, last.what, last.when)
+
+
 class _StoppingCell(WrappedCell):
     """A work cell with something to do after every control step."""
 
@@ -92,8 +99,7 @@ class _Trying:
         self._subject, self._rehearsal, self._faults = subject, rehearsal, faults
         self._events: list[Event] = []
         self._breakages = [breakage for fault in faults.values() for breakage in fault.breakages]
-        self._activations: Counter[str] = Counter()
-        self._began: dict[str, int] = {}
+        self._activations = Activations()
         self._stopped = False
         happenings = [happening for fault in faults.values() for happening in fault.happenings]
         own = {node.path: subject.skills[node.skill] for node in skill_nodes(subject)}
@@ -101,7 +107,7 @@ class _Trying:
             subject.loaded,
             subject.skills,
             seed=subject.seed,
-            observers=[self._see],
+            observers=[self._see, self._activations],
             requests=subject.requests,
             kind=disturbed(self._kind, happenings),
             substitutes=broken_skills(self._breakages, own),
@@ -112,7 +118,7 @@ class _Trying:
 
     def judged(self, outcome: Outcome) -> Trial:
         """Return what came of the run, which is over."""
-        run, last = self.run, list(self._faults.values())[-1]
+        run = self.run
         items, audit = run.items(), run.audit()
         raised = any(self._raised(fault) for fault in self._faults.values() if fault.ends_run)
         faults = tuple(self._faults.values())
@@ -126,15 +132,10 @@ class _Trying:
             *check_tool(outcome, run.workcell),
             *check_rest(run.workcell),
         ]
-        return Trial(
-            numbers=tuple(self._faults),
-            told=tuple(map(str, faults)),
-            name=last.name,
-            place=last.place,
-            what=last.what,
-            when=last.when,
+        return replace(
+            empty_trial(self._faults),
             happened=all(map(self._happened, faults)),
-            raised=self._raised(last),
+            raised=self._raised(faults[-1]),
             cut=outcome.status == "HALTED" and not self._stopped,
             status=outcome.status,
             reason=outcome.reason,
@@ -144,7 +145,7 @@ class _Trying:
             items={name: count for name, count in items.items() if name != "rows"},
             audit=audit,
             robot_time=outcome.robot_time,
-            entered=frozenset(self._entered()),
+            entered=frozenset(self._activations.counts),
             problems=tuple(problems),
             remark=remark(outcome, faults),
         )
@@ -157,11 +158,6 @@ class _Trying:
     def _see(self, event: Event) -> None:
         if event.kind != "sense":
             self._events.append(event)
-        if event.kind == "status" and event.data["status"] == "RUNNING":
-            self._activations[event.data["node"]] += 1
-            self._began[event.data["node"]] = event.tick
-        elif event.kind == "status":
-            self._began.pop(event.data["node"], None)
 
     def _stop_if_due(self) -> None:
         """Wish a stop where a skill is to be halted."""
@@ -170,9 +166,9 @@ class _Trying:
             self.run.control.stop()
 
     def _due(self, breakage: Breakage) -> bool:
-        began = self._began.get(breakage.node)
-        this = self._activations[breakage.node] in breakage.starts
-        return began is not None and this and self.run.tick >= began + breakage.after
+        began = self._activations.began.get(breakage.node)
+        is_meant = self._activations.counts[breakage.node] in breakage.starts
+        return began is not None and is_meant and self.run.tick >= began + breakage.after
 
     def _hidden(self) -> Hidden:
         workcell = self.run.workcell
@@ -201,11 +197,6 @@ class _Trying:
         for event in self._events:
             if event.kind == "status" and (event.data["node"], event.data["status"]) == (fault.about, status):
                 yield event
-
-    def _entered(self) -> Iterator[str]:
-        for event in self._events:
-            if event.kind == "status" and event.data["status"] == "RUNNING":
-                yield event.data["node"]
 
 
 def _entry(event: Event) -> dict[str, Any]:

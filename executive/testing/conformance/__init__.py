@@ -1,8 +1,8 @@
-"""Checks that any skill must pass, generated from what it declares."""
+"""Checks that any skill must pass, generated from its declarations."""
 
 from __future__ import annotations
 
-from executive.testing.conformance.checks import conformance
+from executive.testing.conformance.check import conformance
 from executive.testing.conformance.stage import Stage
 
 __all__ = ["Stage", "conformance"]

@@ -1,21 +1,19 @@
-"""A skill on trial: everything its checks look at, each found out once."""
+"""All runs of one skill that its checks look at, each made once."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from executive.skill import Skill
-from executive.testing.conformance.adversities import NOTHING, Adversity, adversities
-from executive.testing.conformance.rehearsal import Rehearsal, rehearse
-from executive.testing.conformance.situations import Arrange, NotArranged, NotTried, Scene, situations
+from executive.testing.conformance.adversities import Adversity, adversities
+from executive.testing.conformance.rehearsal import Rehearsal
+from executive.testing.conformance.situations import Arrange, NotTried, Situation, situations
 
-BUDGET = 100_000
-"""Control steps that the halts of one scene may take together: up to 440 ticks that is one halt at each."""
+MAX_HALTS = 40
+"""Number of halts spread over a run, and of those at its calls."""
 
 
 class GotStuck(NotTried):
@@ -23,15 +21,15 @@ class GotStuck(NotTried):
 
 
 class Case:
-    """What the checks of one skill share.
+    """The runs that the checks of one skill share.
 
     Args:
-        name: What the skill is called.
+        name: Name of the skill.
         skill: Its class.
         arrange: What its author wants to be otherwise on the stage.
 
     Attributes:
-        tries: Runs that were begun.
+        tries: Number of runs that were begun.
     """
 
     def __init__(self, name: str, skill: type[Skill], arrange: Arrange) -> None:
@@ -40,93 +38,64 @@ class Case:
         self._stuck = ""
 
     @cached_property
-    def _stages(self) -> list[Scene] | NotArranged:
-        try:
-            scenes = [Scene(self.skill, situation, self._arrange) for situation in situations(self.skill)]
-        except NotArranged as problem:
-            return problem
-        # Where the author says what a param is, its other values are not wanted.
-        return [scene for scene in scenes if not scene.given & set(scene.situation.params)]
-
-    @property
-    def scenes(self) -> list[Scene]:
-        """Every situation, arranged.
-
-        Raises:
-            NotArranged: One cannot be.
-        """
-        if isinstance(self._stages, NotArranged):
-            raise self._stages
-        return self._stages
+    def situations(self) -> list[Situation]:
+        """Every situation in which the skill is tried; raises NotArranged."""
+        return list(situations(self.skill, self._arrange))
 
     @cached_property
-    def twice(self) -> list[tuple[Rehearsal, Rehearsal]]:
-        """Two runs to the end in every scene, nothing going wrong."""
-        return [(self._tried(scene), self._tried(scene)) for scene in self.scenes]
-
-    @property
-    def plain(self) -> list[Rehearsal]:
-        """One run to the end in every scene."""
-        return [first for first, _ in self.twice]
+    def twice(self) -> list[tuple[Situation, Rehearsal, Rehearsal]]:
+        """Two runs to the end in every situation, nothing going wrong."""
+        return [(one, self._run(one), self._run(one)) for one in self.situations]
 
     @cached_property
-    def hard(self) -> list[Rehearsal]:
-        """A run to the end in every scene for everything that may go wrong."""
-        return [
-            self._tried(scene, adversity).lean()
-            for scene, plain in zip(self.scenes, self.plain, strict=True)
-            # What never ends where all is well would not end here, either.
-            if plain.ending.status != "RUNNING"
-            for adversity in adversities(self.skill, plain.ticks)
+    def ended(self) -> list[Rehearsal]:
+        """A run to the end in every situation, with nothing going wrong, and under every adversity."""
+        plain = [first for _, first, _ in self.twice]
+        return plain + [
+            self._run(situation, adversity)
+            for situation, first, _ in self.twice
+            # A run that never ends where all is well would not end here, either.
+            if first.status != "RUNNING"
+            for adversity in adversities(self.skill, first.ticks, holding=first.held)
         ]
 
     @cached_property
     def halted(self) -> list[Rehearsal]:
-        """A run for every moment of every scene at which the skill may be taken away."""
+        """A run for every moment of every situation at which the skill may be halted."""
         return [
-            self._tried(scene, halt_at=tick).lean()
-            for scene, plain in zip(self.scenes, self.plain, strict=True)
-            for tick in _moments(plain)
+            self._run(situation, halt_at=tick)
+            for situation, first, _ in self.twice
+            if first.status != "RUNNING"
+            for tick in _halt_ticks(first)
         ]
 
-    @property
-    def ended(self) -> list[Rehearsal]:
-        """Every run to the end."""
-        return [*self.plain, *self.hard]
-
-    @property
-    def defaults(self) -> Mapping[str, Any]:
-        """The params that a mission need not say."""
-        return {name: param.default for name, param in self.skill.params.items() if not param.required}
-
-    def _tried(self, scene: Scene, adversity: Adversity = NOTHING, halt_at: int | None = None) -> Rehearsal:
-        """Return what a run was like.
+    def _run(
+        self, situation: Situation, adversity: Adversity | None = None, halt_at: int | None = None
+    ) -> Rehearsal:
+        """Run the skill once.
 
         Raises:
-            GotStuck: It did not come back, or one before it: to wait once is enough.
+            GotStuck: It did not come back, or a run before it: to wait once is enough.
         """
         if self._stuck:
             raise GotStuck(self._stuck)
         self.tries += 1
-        rehearsal = rehearse(self.skill, scene, adversity, halt_at)
-        if rehearsal.ending.status == "STUCK":
+        rehearsal = Rehearsal(self.skill, situation, self._arrange, adversity, halt_at)
+        if rehearsal.status == "STUCK":
             halted = ", halted there," if rehearsal.ticks == halt_at else ""
             self._stuck = (
-                f"{rehearsal.where} at tick {rehearsal.ticks}{halted} {self.name} "
-                f"{rehearsal.ending.message}. The arm waits for every tick: yield in each loop that waits, "
-                "and leave long work to a detector."
+                f"{rehearsal.where} at tick {rehearsal.ticks}{halted} {self.name} {rehearsal.message}. "
+                "The arm waits for every tick: yield in each loop that waits, or leave work to a detector."
             )
             raise GotStuck(self._stuck)
-        # What the skill leaves comes up again, or with its first run; what another thread of this process
-        # happens to open meanwhile does not.
-        if rehearsal.left and self.tries > 1 and not rehearse(self.skill, scene, adversity, halt_at).left:
-            return replace(rehearsal, left=())
+        if adversity is not None or halt_at is not None:
+            # The arguments of calls may be large: frames are among them.
+            rehearsal.calls = [replace(call, arguments=()) for call in rehearsal.calls]
         return rehearsal
 
 
-def _moments(plain: Rehearsal) -> list[int]:
-    """Return every tick at which a run may be halted; of a long one those of its calls and some between."""
-    count = min(plain.ticks, 2 * BUDGET // max(1, plain.ticks))
-    spread = np.linspace(1, plain.ticks, count, dtype=int).tolist()
-    around = {call.tick + step for call in plain.calls for step in (0, 1)} if count < plain.ticks else set()
-    return sorted(tick for tick in {*spread, *sorted(around)[:count]} if 1 <= tick <= plain.ticks)
+def _halt_ticks(first: Rehearsal) -> list[int]:
+    """Return the ticks at which a run is halted: those of its calls, those after them, and some between."""
+    spread = np.linspace(1, first.ticks, min(first.ticks, MAX_HALTS), dtype=int).tolist()
+    around = sorted({call.tick + step for call in first.calls for step in (0, 1)})
+    return sorted(tick for tick in {*spread, *around[:MAX_HALTS]} if 1 <= tick <= first.ticks)

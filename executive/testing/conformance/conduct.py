@@ -1,114 +1,231 @@
-"""How a skill behaves on the tick thread: always the same, quick, on one clock, and tidy."""
+"""Checks of how a skill behaves in every situation, under every adversity, and halted at any moment."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+import types
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, Union, get_args, get_origin
 
+from executive.mission.model.port_types import called, element_of
+from executive.skill import ANY, EMPTY, HOLDING, ToolState
 from executive.testing.conformance.case import Case, GotStuck
-from executive.testing.conformance.rehearsal import Rehearsal
-from executive.testing.conformance.same import same
-from executive.testing.fake_cell import FakeCell, bare_table
+from executive.testing.conformance.declarations import HALT
+from executive.testing.conformance.rehearsal import MAX_TIME, Rehearsal, is_same
+from executive.testing.conformance.situations import NotArranged
 
-QUICK = 0.05
+MAX_TICK_TIME = 0.05
 """Computing time that a tick may take [s]; a control step is 1/240 s of the run's time."""
 
+_PARTS: Mapping[str, str] = {
+    "arm.start": "arm",
+    "arm.stop": "arm",
+    "tool.open": "tool",
+    "tool.close": "tool",
+    "camera.capture": "camera",
+}
+"""Part that a skill uses by a call."""
+_SENSES = ("camera.capture", "operator.ask")
+"""Calls by which a skill takes in something new."""
 
-def repeats_itself(case: Case) -> Iterator[str]:
-    """In the same situation it makes the same calls at the same ticks and ends alike."""
-    for first, second in case.twice:
-        if difference := _difference(first, second):
-            yield (
-                f"{first.where}, twice the same, {difference}. Nothing may depend on chance, on time, on an "
-                "object's address, or on what an earlier run has left; a seed may be a param."
-            )
+
+def arranged(case: Case) -> Iterator[str]:
+    """It can be tried, and it succeeds in one situation at least."""
+    try:
+        _ = case.situations
+    except NotArranged as problem:
+        yield f"{case.name} cannot be tried: {problem}"
+        return
+    if not any(rehearsal.status == "SUCCESS" for rehearsal in case.ended):
+        yield (
+            f"{case.name} never succeeded; {case.ended[0].end}. Arrange a stage on which it can: "
+            f"conformance({case.skill.__name__}, lambda stage: ...), as skills/README.md shows."
+        )
 
 
-def ticks_come_back(case: Case) -> Iterator[str]:
-    """Every tick comes back, whatever goes wrong and wherever it is halted: none loops or waits for ever."""
+def comes_to_an_end(case: Case) -> Iterator[str]:
+    """Every tick comes back, and it ends within a minute on the run's clock."""
     try:
         _ = case.ended, case.halted
     except GotStuck as problem:
         yield str(problem)
+        return
+    for rehearsal in case.ended:
+        if rehearsal.status == "RUNNING":
+            yield (
+                f"{rehearsal.where} {case.name} was not over after {MAX_TIME:g} s. "
+                "Whatever it waits for may never come: wait for so long at most, then fail with a reason."
+            )
+
+
+def ends_as_declared(case: Case) -> Iterator[str]:
+    """Whatever goes wrong, it succeeds with all outputs, or fails with a declared reason and a sentence."""
+    for rehearsal in case.ended:
+        where = f"{rehearsal.where} at tick {rehearsal.ticks}"
+        if rehearsal.status == "FAULT":
+            yield (
+                f"{where} {rehearsal.message}. That is a fault, which ends the run: fail with a declared "
+                "reason where this can happen, or mend it."
+            )
+        elif rehearsal.status == "FAILURE" and not rehearsal.message.strip():
+            yield (
+                f'{where} it failed with "{rehearsal.reason}" and no sentence. '
+                "Say what happened, with the numbers: it is all that the operator will read."
+            )
+
+
+def outputs_fit(case: Case) -> Iterator[str]:
+    """Every output is of the type that it declares."""
+    for rehearsal in case.ended:
+        for name, value in rehearsal.outputs.items():
+            declared = case.skill.ports[name].type
+            if not _is_of(value, declared):
+                yield (
+                    f"{rehearsal.where} {case.name}.{name} is of the type {type(value).__name__}, not "
+                    f"{called(declared)}. Set what it declares, or declare what it is."
+                )
+
+
+def inputs_unchanged(case: Case) -> Iterator[str]:
+    """Its params and inputs are afterwards what they were."""
+    for rehearsal in case.ended:
+        for name in rehearsal.changed:
+            yield (
+                f"{rehearsal.where} it changed what self.{name} holds. "
+                "Others read the same value after it: work on a copy."
+            )
+
+
+def uses_only_what_it_declares(case: Case) -> Iterator[str]:
+    """It commands only what it says it uses, moves only if it moves, and senses only if it senses."""
+    skill = case.skill
+    for name in dict.fromkeys(call.name for rehearsal in case.ended for call in rehearsal.calls):
+        part = _PARTS.get(name)
+        if part is not None and part not in skill.uses:
+            yield f'{case.name} calls cell.{name} and does not use the {part}. Add "{part}" to uses.'
+        if name == "arm.start" and not skill.moves:
+            yield f"{case.name} calls cell.{name} and does not say that it moves. Add moves = True."
+        if name in _SENSES and not skill.senses:
+            yield f"{case.name} calls cell.{name} and does not say that it senses. Add senses = True."
+
+
+def tool_left_as_declared(case: Case) -> Iterator[str]:
+    """After success, every failure and a halt at any tick the tool holds what is declared."""
+    for rehearsal in _first_wrong([*case.ended, *case.halted], lambda one: bool(_tool_fault(case, one))):
+        yield _tool_fault(case, rehearsal)
+
+
+def arm_left_at_rest(case: Case) -> Iterator[str]:
+    """Where it started the arm, the arm is at rest when it ends or is halted."""
+    for rehearsal in _first_wrong([*case.ended, *case.halted], _leaves_arm_moving):
+        yield (
+            f"{rehearsal.end}, and the arm still moves. "
+            "Call cell.arm.stop() in finally, or use follow of executive.moving."
+        )
+
+
+def halts_at_once(case: Case) -> Iterator[str]:
+    """Halted at any tick, it ends there and then, and raises nothing."""
+    for rehearsal in _first_wrong(case.halted, lambda one: one.status == "FAULT"):
+        yield (
+            f"{rehearsal.where} at tick {rehearsal.ticks} {rehearsal.message}. "
+            "What finally does must be done at once and cannot fail."
+        )
+
+
+def repeats_itself(case: Case) -> Iterator[str]:
+    """In the same situation it makes the same calls at the same ticks and ends alike."""
+    for _, first, second in case.twice:
+        if difference := _difference(first, second):
+            yield (
+                f"{first.where}, twice the same, {difference}. "
+                "Nothing may depend on chance, on time, or on an earlier run; a seed may be a param."
+            )
 
 
 def ticks_are_quick(case: Case) -> Iterator[str]:
     """No tick computes for longer than 50 ms, the quicker of two runs counted."""
-    for first, second in case.twice:
+    for _, first, second in case.twice:
         least = [min(pair) for pair in zip(first.durations, second.durations, strict=False)]
-        slowest = max(range(len(least)), key=least.__getitem__)
-        if least[slowest] > QUICK:
+        longest = max(least, default=0.0)
+        if longest > MAX_TICK_TIME:
             yield (
-                f"{first.where} it computed for {least[slowest] * 1000:.0f} ms in tick {slowest}, which "
-                "holds up the arm. Spread the work over ticks by yield, or let a detector do it beside."
+                f"{first.where} it computed for {longest * 1000:.0f} ms in tick {least.index(longest)}, "
+                "which holds up the arm. Spread the work over ticks by yield, or let a detector do it."
             )
-
-
-def never_sooner_than_shortest(case: Case) -> Iterator[str]:
-    """What shortest promises is no more than any success took."""
-    least = FakeCell.least_times(bare_table())
-    for given in (case.defaults, *(_said(case, rehearsal) for rehearsal in case.plain)):
-        try:
-            seconds = case.skill.shortest(least, given)
-        except Exception as error:
-            yield (
-                f"{case.name}.shortest raises {type(error).__name__}: {error}, asked with no more than a "
-                f"mission may say ({', '.join(given) or 'nothing'}). Return 0 where nothing is known."
-            )
-            return
-        if not seconds >= 0:
-            yield f"{case.name}.shortest is {seconds} s. Return 0 where nothing is known."
-    for rehearsal in case.ended:
-        if rehearsal.ending.status == "SUCCESS":
-            seconds = case.skill.shortest(least, _said(case, rehearsal))
-            if seconds > rehearsal.seconds + 1e-9:
-                yield (
-                    f"{rehearsal.where} it took {rehearsal.seconds:.3f} s, less than the {seconds:.3f} s "
-                    "that shortest promises. executive check refuses timeouts by it: return a bound that "
-                    "holds on every cell."
-                )
-
-
-def keeps_to_the_clock(case: Case) -> Iterator[str]:
-    """It never asks the wall clock, and never sleeps on it."""
-    for rehearsal in case.ended:
-        if rehearsal.clocks:
-            yield (
-                f"{rehearsal.where} it called {' and '.join(rehearsal.clocks)}. "
-                "The only clock is cell.clock: now, and sleep to yield from."
-            )
-
-
-def leaves_nothing_open(case: Case) -> Iterator[str]:
-    """It leaves no thread, no open file and no process behind, to its end or halted."""
-    for rehearsal in (*case.ended, *case.halted):
-        if rehearsal.left:
-            halted = f" halted at tick {rehearsal.ticks}" if rehearsal.ending.status == "HALTED" else ""
-            yield (
-                f"{rehearsal.where}{halted} it left {' and '.join(rehearsal.left)}. "
-                "Close it in finally; what works beside the ticks is a detector."
-            )
-
-
-def _said(case: Case, rehearsal: Rehearsal) -> dict[str, Any]:
-    """Return what a mission would have said for a run: all params, and the inputs that no item is."""
-    inputs = {name: port for name, port in case.skill.ports.items() if port.refers != "item"}
-    known = {**case.skill.params, **inputs}
-    return {**case.defaults, **{name: value for name, value in rehearsal.given.items() if name in known}}
 
 
 def _difference(one: Rehearsal, other: Rehearsal) -> str:
-    """Return how two runs differ, or ""; of two that end as a fault that fault is told, not its traces."""
-    if one.ending.status == other.ending.status == "FAULT" and one.ticks == other.ticks:
-        return ""
+    """Return how two runs differ, or ""."""
     for first, second in zip(one.calls, other.calls, strict=False):
         if (first.tick, first.name) != (second.tick, second.name):
             return f"it called {first.name} at tick {first.tick} and then {second.name} at tick {second.tick}"
-        if not same(first.arguments, second.arguments):
+        if not is_same(first.arguments, second.arguments):
             return f"it called {first.name} at tick {first.tick} with different arguments"
-    if (one.ticks, str(one.ending)) != (other.ticks, str(other.ending)):
-        return f"{one.ending} after {one.ticks} ticks and then {other.ending} after {other.ticks}"
-    if len(one.calls) != len(other.calls):
-        return f"it made {len(one.calls)} calls of the cell and then {len(other.calls)}"
-    unlike = [name for name in one.outputs if not same(one.outputs[name], other.outputs.get(name))]
-    return f"it set {unlike[0]} to different values" if unlike else ""
+    if (one.ticks, one.status) != (other.ticks, other.status):
+        return (
+            f"it ended as {one.status} after {one.ticks} ticks and then as {other.status} after {other.ticks}"
+        )
+    return "" if is_same(one.outputs, other.outputs) else "it set its outputs to different values"
+
+
+def _first_wrong(
+    rehearsals: Iterable[Rehearsal], is_wrong: Callable[[Rehearsal], bool]
+) -> Iterable[Rehearsal]:
+    """Return the first run of each situation that is wrong: one halt is as good as the next."""
+    found: dict[str, Rehearsal] = {}
+    for rehearsal in filter(is_wrong, rehearsals):
+        found.setdefault(rehearsal.where, rehearsal)
+    return found.values()
+
+
+def _leaves_arm_moving(rehearsal: Rehearsal) -> bool:
+    has_ended = rehearsal.status in ("SUCCESS", "FAILURE", "HALTED")
+    return has_ended and rehearsal.has_moved and not rehearsal.at_rest
+
+
+def _tool_fault(case: Case, rehearsal: Rehearsal) -> str:
+    """Return what is wrong with the tool at the end of a run, or ""."""
+    if rehearsal.status not in ("SUCCESS", "FAILURE", "HALTED"):
+        return ""
+    wanted, why = _wanted_tool(case, rehearsal)
+    if wanted is not ANY and (wanted is HOLDING) != rehearsal.holds:
+        holds = "holds something" if rehearsal.holds else "is empty"
+        should = "hold something" if wanted is HOLDING else "be empty"
+        return (
+            f"{rehearsal.end}, and the tool {holds}. It should {should}: {why}. "
+            "Leave the tool as declared, or declare how it is left."
+        )
+    if rehearsal.holds and not rehearsal.is_known:
+        return (
+            f"{rehearsal.end}, and the tool holds an object that the ledger does not know of. "
+            "Tell it by cell.ledger.held, or open the tool in finally."
+        )
+    return ""
+
+
+def _wanted_tool(case: Case, rehearsal: Rehearsal) -> tuple[ToolState, str]:
+    """Return what the tool must hold at the end of a run, and why."""
+    before = HOLDING if rehearsal.held else EMPTY
+    if rehearsal.status == "SUCCESS":
+        after = case.skill.tool_state[1]
+        return (before, "tool_state says as before") if after is ANY else (after, "tool_state says so")
+    name = HALT if rehearsal.status == "HALTED" else rehearsal.reason
+    if name in case.skill.tool_left:
+        return case.skill.tool_left[name], f'tool_left says so of "{name}"'
+    return before, f'as before, for tool_left says nothing of "{name}"'
+
+
+def _is_of(value: Any, declared: Any) -> bool:
+    """Return True if a value is of a declared type, element by element."""
+    if declared is Any:
+        return True
+    origin = get_origin(declared)
+    if origin in (Union, types.UnionType):
+        return any(_is_of(value, part) for part in get_args(declared))
+    if declared is float:
+        return isinstance(value, float | int)
+    kind = origin or declared
+    if isinstance(kind, type) and not isinstance(value, kind):
+        return False
+    element = None if isinstance(value, str | Mapping) else element_of(declared)
+    return element is None or all(_is_of(one, element) for one in value)

@@ -1,50 +1,40 @@
-"""What a skill declares, as far as it can be judged without running it."""
+"""Checks of a skill's declarations and source text; nothing is run."""
 
 from __future__ import annotations
 
 import ast
 import inspect
-import re
-from collections.abc import Iterator
-from typing import Any, get_args
+from collections.abc import Iterator, Sequence
 
-from executive.mission.model.typed import WrongType, convert, is_plain
-from executive.skill import Param, Port, ToolState
+from executive.mission.model.typed import WrongType, convert
+from executive.skill import Param, Port
 from executive.testing.conformance.case import Case
-from executive.testing.conformance.source import class_trees_of, trees_of
+from executive.testing.conformance.source import (
+    Written,
+    files_of,
+    functions_reached,
+    returns_failure,
+    returns_steps,
+)
 
 RESOURCES = ("arm", "tool", "camera")
-FOREIGN = ("py_trees", "pybullet", "ruckig", "threading", "time", "asyncio")
+FOREIGN = (
+    "py_trees", "pybullet", "ruckig", "threading", "multiprocessing", "concurrent", "subprocess", "time",
+    "asyncio",
+)  # fmt: skip
 """Packages that no skill may import: it runs on the tick thread, on the run's clock, on any cell."""
-RATIO = "[-]"
-"""What the doc of a number without a unit says."""
 HALT = "halt"
 
-_NAME = re.compile(r"[A-Z][A-Za-z0-9]*")
-_REASON = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 
-
-def named_for_missions(case: Case) -> Iterator[str]:
-    """Its name is one that a mission can say: letters and digits, a capital first."""
-    if not _NAME.fullmatch(case.name):
-        yield f'no mission can name a skill "{case.name}". Call it in CamelCase, for instance PointAt.'
-
-
-def class_documented(case: Case) -> Iterator[str]:
-    """The docstring of the class begins with a sentence."""
+def documented(case: Case) -> Iterator[str]:
+    """The docstring of the class begins with a sentence, and every param and port says what it is."""
     doc = vars(case.skill).get("__doc__") or ""
     summary = inspect.cleandoc(doc).partition("\n")[0]
-    if not summary:
-        yield f"{case.name} has no docstring. Say in a sentence what is true when it has succeeded."
-    elif not summary.endswith("."):
+    if not summary.endswith("."):
         yield (
             f'the docstring of {case.name} begins with "{summary}", which is no sentence. '
-            "End the first line with a full stop."
+            "Say in its first line what is true when the skill has succeeded."
         )
-
-
-def settings_documented(case: Case) -> Iterator[str]:
-    """Every param and every port says in its doc what it is."""
     declarations: dict[str, Param | Port] = {**case.skill.params, **case.skill.ports}
     for name, declared in declarations.items():
         if not declared.doc.strip():
@@ -52,109 +42,80 @@ def settings_documented(case: Case) -> Iterator[str]:
             yield f'{case.name}.{name} has no doc. Write {declare}(..., doc="what it is").'
 
 
-def numbers_have_units(case: Case) -> Iterator[str]:
-    """Every number that is not whole has a unit, or its doc says that it is a ratio."""
-    for param in case.skill.params.values():
-        if not param.unit and _is_bare_number(param.type) and RATIO not in param.doc:
-            yield (
-                f"{case.name}.{param.name} is a float without a unit. Declare it as Seconds, Metres or "
-                f'Annotated[float, "N"]; if it is a ratio, write {RATIO} into its doc.'
-            )
-
-
 def defaults_allowed(case: Case) -> Iterator[str]:
     """Every default is one that a mission could give: of the type, inside the bounds, among the choices."""
     for param in case.skill.params.values():
-        where = f"{case.name}.{param.name}"
-        if not is_plain(param.type):
+        if not param.required and (problem := _default_fault(param)):
             yield (
-                f"{where} is a {getattr(param.type, '__name__', param.type)}, which no mission can say. "
-                "Declare a text with choices, a number or a list of them."
+                f"{case.name}.{param.name} has the default {param.default!r}{problem}. "
+                "Mend the default, or its limits."
             )
-        elif not param.required and (problem := _default_fault(param)):
-            yield f"{where} {problem}. Mend the default, or what it is checked against."
 
 
 def reasons_declared(case: Case) -> Iterator[str]:
-    """Reasons are lower_snake words, each declared once, and none is raised that is not declared."""
+    """Its reasons are a tuple, and none is raised that is not declared."""
     reasons = case.skill.reasons
     if isinstance(reasons, str):
         yield f'{case.name}.reasons is the text "{reasons}". Write a tuple: ("{reasons}",).'
         return
-    for reason in dict.fromkeys(reasons):
-        if not _REASON.fullmatch(reason) or reason == HALT:
-            yield (
-                f'{case.name} declares the reason "{reason}". '
-                f'Call it by a lower_snake word other than "{HALT}".'
-            )
-        if list(reasons).count(reason) > 1:
-            yield f'{case.name} declares the reason "{reason}" twice. Leave one out.'
-    for path, tree in class_trees_of(case.skill):
-        for reason, line in _raised(tree):
+    for written in functions_reached(case.skill):
+        for reason, node in _raised(written.tree):
             if reason not in reasons:
                 yield (
-                    f'{path.name}:{line} fails with "{reason}", which {case.name} does not declare. '
+                    f'{written.place(node)} fails with "{reason}", which {case.name} does not declare. '
                     f"Add it to reasons; there are: {', '.join(reasons) or 'none'}."
                 )
 
 
 def resources_declared(case: Case) -> Iterator[str]:
-    """What it uses are arm, tool and camera, and it uses the arm if it moves."""
-    uses = case.skill.uses
-    if isinstance(uses, str):
-        yield f'{case.name}.uses is the text "{uses}". Write a tuple: ("{uses}",).'
-        return
-    for part in uses:
-        if part not in RESOURCES:
-            yield f'{case.name} uses "{part}", which no cell has. There are: {", ".join(RESOURCES)}.'
-    if case.skill.moves and "arm" not in uses:
-        yield f'{case.name} moves the arm but does not use it. Add "arm" to uses, or leave moves out.'
-
-
-def tool_declared(case: Case) -> Iterator[str]:
-    """What the tool holds before and after, and after every way to fail, is said in known words."""
-    state, left = case.skill.tool_state, case.skill.tool_left
-    if not (isinstance(state, tuple) and len(state) == 2 and all(isinstance(s, ToolState) for s in state)):
-        yield f"{case.name}.tool_state is {state!r}. Write two of ANY, EMPTY and HOLDING: before and after."
-    for ending, after in left.items():
-        if ending not in (*case.skill.reasons, HALT):
-            known = ", ".join((*case.skill.reasons, HALT))
-            yield f'{case.name}.tool_left tells of "{ending}", which is no ending of it. There are: {known}.'
-        if not isinstance(after, ToolState):
-            yield f'{case.name}.tool_left["{ending}"] is {after!r}. Write ANY, EMPTY or HOLDING.'
+    """It uses arm, tool and camera, the arm if it moves, and says how the tool is left by its own reasons."""
+    skill, name = case.skill, case.name
+    unknown = [repr(skill.uses)] if isinstance(skill.uses, str) else sorted(set(skill.uses) - set(RESOURCES))
+    if unknown:
+        yield f"{name} uses {', '.join(unknown)}. Write a tuple of {', '.join(RESOURCES)}."
+    if skill.moves and "arm" not in skill.uses:
+        yield f'{name} moves the arm but does not use it. Add "arm" to uses, or leave moves out.'
+    known = (*skill.reasons, HALT)
+    for ending in skill.tool_left:
+        if ending not in known:
+            yield f'{name}.tool_left has "{ending}", which is no ending of it. There are: {", ".join(known)}.'
 
 
 def imports_allowed(case: Case) -> Iterator[str]:
     """Its file imports nothing that has another clock, other threads, or one sort of cell only."""
-    for path, tree in trees_of(case.skill):
-        for node in ast.walk(tree):
-            for package in _imported(node):
-                if package in FOREIGN:
+    for path in filter(lambda path: path.is_file(), files_of(case.skill)):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            for package in FOREIGN:
+                if package in _imported(node):
                     yield (
-                        f"{path.name}:{node.lineno} imports {package}. "  # type: ignore[attr-defined]
+                        f"{path.name}:{getattr(node, 'lineno', 0)} imports {package}. "
                         "A skill waits on cell.clock and acts through cell alone; find there what it needs."
                     )
 
 
-def _is_bare_number(declared: Any) -> bool:
-    """Tell whether a type is float, or has it among its alternatives, without a unit."""
-    if hasattr(declared, "__metadata__"):
-        return False
-    return declared is float or any(_is_bare_number(part) for part in get_args(declared))
+def calls_take_effect(case: Case) -> Iterator[str]:
+    """No call is without effect: steps are yielded from, and failures are raised."""
+    for written in functions_reached(case.skill):
+        for call in _dropped(written):
+            callee, text = written.called(call), f"{ast.unparse(call.func)}(...)"
+            where = written.place(call)
+            if returns_steps(callee):
+                yield (
+                    f"{where} calls {text} and makes none of its steps, so it does nothing. "
+                    f'Write "yield from {text}".'
+                )
+            elif returns_failure(callee):
+                yield f'{where} calls {text} and does not raise it, so nothing fails. Write "raise {text}".'
 
 
 def _default_fault(param: Param) -> str:
-    """Return what is wrong with a default, to follow the param's name, or ""."""
+    """Return what is wrong with a default, to follow its value, or ""."""
     try:
         value = convert(param.default, param.type)
-        limits = "" if value is None else _outside(value, param)
     except (WrongType, TypeError) as problem:
-        limits = f": {problem}"
-    return limits and f"has the default {param.default!r}{limits}"
-
-
-def _outside(value: Any, param: Param) -> str:
-    """Return in which way a value is not allowed, or ""."""
+        return f": {problem}"
+    if value is None:
+        return ""
     if param.ge is not None and value < param.ge:
         return f", which is less than {param.ge!r}"
     if param.le is not None and value > param.le:
@@ -165,18 +126,36 @@ def _outside(value: Any, param: Param) -> str:
     return ""
 
 
-def _raised(tree: ast.ClassDef) -> Iterator[tuple[str, int]]:
-    """Yield every reason that stands in the text of a class as `self.failed("reason", ...)`, and its line."""
+def _raised(tree: ast.AST) -> Iterator[tuple[str, ast.expr]]:
+    """Yield every reason that stands in a function as `self.failed("reason", ...)`."""
     for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and ast.unparse(node.func) == "self.failed" and node.args:
-            reason = node.args[0]
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("self.failed", "skill.failed"):
+            reason = node.args[0] if node.args else None
             if isinstance(reason, ast.Constant) and isinstance(reason.value, str):
-                yield reason.value, node.lineno
+                yield reason.value, node
 
 
-def _imported(node: ast.AST) -> Iterator[str]:
-    """Yield the outermost packages that a statement imports."""
+def _imported(node: ast.AST) -> Sequence[str]:
+    """Return the outermost packages that a statement imports."""
     if isinstance(node, ast.Import):
-        yield from (alias.name.partition(".")[0] for alias in node.names)
-    elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-        yield node.module.partition(".")[0]
+        return [alias.name.partition(".")[0] for alias in node.names]
+    if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+        return [node.module.partition(".")[0]]
+    return []
+
+
+def _dropped(written: Written) -> Iterator[ast.Call]:
+    """Yield the calls in a function of which the value is not used."""
+    nodes = list(ast.walk(written.tree))
+    read = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
+    # The value that `run` returns is dropped if it is a generator; of another function its caller may use it.
+    is_run = written.function.__name__ == "run" and inspect.isgeneratorfunction(written.function)
+    for node in nodes:
+        if isinstance(node, ast.Expr) or (is_run and isinstance(node, ast.Return)):
+            is_dropped = True
+        elif isinstance(node, ast.Assign):
+            is_dropped = not any(not isinstance(t, ast.Name) or t.id in read for t in node.targets)
+        else:
+            continue
+        if is_dropped and isinstance(node.value, ast.Call):
+            yield node.value

@@ -1,4 +1,4 @@
-"""Nobody waits for ever for a skill: what does not come back is broken off, and where it was is told."""
+"""A limit on the time that a skill may take to answer, by the wall clock."""
 
 from __future__ import annotations
 
@@ -6,25 +6,21 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from time import monotonic
 from traceback import walk_stack
 from types import FrameType
 
 from executive.skill import Skill
 from executive.testing.conformance.source import place_in
 
-PATIENCE = 10.0
-"""Time by the wall clock after which what gets no further is believed to be stuck [s]."""
+STUCK_TIMEOUT = 10.0
+"""Time by the wall clock after which a skill that gets no further is stuck [s]."""
 
 LOOKS = 2
-"""Looks in this time: a machine that slept has let one pass at most."""
-
-_SOON = 1e-3
-"""When another's timer goes off whose time was over meanwhile [s]."""
+"""Number of looks in this time: a machine that slept has let one pass at most."""
 
 
 class Stuck(BaseException):
-    """What belongs to a skill did not come back; the text, to follow its name, says for how long and where.
+    """A skill did not come back; the text, to follow its name, says for how long and where.
 
     It is no Exception, so that a skill that catches those is broken off like any other.
     """
@@ -32,10 +28,9 @@ class Stuck(BaseException):
 
 @contextmanager
 def patience(skill: type[Skill], progress: Callable[[], object]) -> Iterator[None]:
-    """Break off what is done inside as soon as `progress` returns the same for `PATIENCE`.
+    """Break off what is done inside as soon as `progress` returns the same for `STUCK_TIMEOUT`.
 
-    The run's clock stands still meanwhile, so this is the wall clock's. Python hands signals to its main
-    thread alone: in another one nothing is broken off.
+    Python hands signals to its main thread alone: in another one nothing is broken off.
 
     Raises:
         Stuck: It was broken off.
@@ -51,16 +46,12 @@ def patience(skill: type[Skill], progress: Callable[[], object]) -> Iterator[Non
         looks, last = (looks + 1 if now == last else 0), now
         if looks >= LOOKS:
             where = place_in(skill, ((f.f_code.co_filename, line) for f, line in walk_stack(frame)))
-            raise Stuck(f"did not come back for {PATIENCE:g} s{where and f', at {where}'}")
+            raise Stuck(f"did not come back for {STUCK_TIMEOUT:g} s{where and f', at {where}'}")
 
-    began = monotonic()
     answered = signal.signal(signal.SIGALRM, look)
-    left, interval = signal.setitimer(signal.ITIMER_REAL, PATIENCE / LOOKS, PATIENCE / LOOKS)
+    before = signal.setitimer(signal.ITIMER_REAL, STUCK_TIMEOUT / LOOKS, STUCK_TIMEOUT / LOOKS)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.setitimer(signal.ITIMER_REAL, *before)
         signal.signal(signal.SIGALRM, answered or signal.SIG_DFL)
-        if left:
-            # Somebody else waits too, for a whole test for instance; that time has not stood still.
-            signal.setitimer(signal.ITIMER_REAL, max(_SOON, left - (monotonic() - began)), interval)

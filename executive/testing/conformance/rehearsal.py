@@ -1,222 +1,145 @@
-"""One run of a skill in a scene: to its end, or to where it is taken away, with everything noted."""
+"""One run of a skill in a situation, to its end or until it is halted, with everything noted."""
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Mapping
-from dataclasses import dataclass, replace
+import copy
+import pickle
+from collections.abc import Mapping
 from time import perf_counter
 from traceback import extract_tb
 from typing import Any
 
-from executive.messages import Item
-from executive.skill import Direction, Skill, SkillFailed
-from executive.testing.conformance.adversities import NOTHING, Adversity
-from executive.testing.conformance.outside import clocks_watched, open_things
+from executive.errors import Fault
+from executive.events import Event
+from executive.skill import Skill, SkillFailed
+from executive.skill_steps import SkillRun
+from executive.testing.conformance.adversities import Adversity
 from executive.testing.conformance.patience import Stuck, patience
-from executive.testing.conformance.same import same
-from executive.testing.conformance.situations import Scene
+from executive.testing.conformance.situations import Arrange, Situation, begin
 from executive.testing.conformance.source import place_in
-from executive.testing.conformance.watch import Call, Watch
+from executive.testing.conformance.watch import Watch
+from executive.testing.disturbances import DisturbedCell, during
 from executive.testing.fake_world import STEP
 
-LONGEST = 60.0
+MAX_TIME = 60.0
 """Time on the run's clock after which a skill must have ended [s]: nothing takes so long on a fake table."""
 
 
-@dataclass(frozen=True)
-class Ending:
-    """How a skill ended.
-
-    Attributes:
-        status: `SUCCESS`, `FAILURE`, `HALTED`, `RUNNING` if it did not end, `STUCK` if a tick did not, or
-            `FAULT`.
-        reason: Of a failure, declared or not.
-        message: The sentence of a failure, or what a fault was and where, or where a tick got stuck.
-    """
-
-    status: str
-    reason: str = ""
-    message: str = ""
-
-    def __str__(self) -> str:
-        if self.status == "FAILURE":
-            return f'it failed with "{self.reason}" ({self.message})'
-        words = {"SUCCESS": "it succeeded", "HALTED": "it was halted", "RUNNING": "it was not over"}
-        return words.get(self.status) or f"it ended as a fault: {self.message}"
-
-
-@dataclass(frozen=True)
 class Rehearsal:
-    """What a run of a skill was like.
+    """One run of a skill, driven as the tree would.
+
+    Args:
+        skill: Its class.
+        situation: The situation in which it begins.
+        arrange: What its author wants to be otherwise on the stage.
+        adversity: What goes wrong; None for nothing.
+        halt_at: Control step before which it is halted; None for a run to its end.
 
     Attributes:
-        where: The situation, and what went wrong in it, for a sentence.
-        ending: How it ended.
+        where: The situation, and what goes wrong in it, for a sentence.
+        status: `SUCCESS`, `FAILURE`, `HALTED`, `RUNNING` if it did not end, `STUCK` if a tick did not come
+            back, or `FAULT`.
+        reason: Reason of a failure.
+        message: Sentence of a failure or fault, or where a tick got stuck.
         ticks: Control steps it took, that of its end left out.
-        given: Those of its params and inputs that are plain values.
-        outputs: Its outputs that were set at the end.
-        written: Other public attributes that it set.
-        rebound: Params and inputs that it set to something else.
-        mutated: Params and inputs that are no longer what they were.
-        handed: Type of what `run` returned.
+        outputs: Its outputs after success.
         calls: Every call it made of the cell.
         durations: Computing time of every tick, by the wall clock [s].
+        changed: Names of the params and inputs that are no longer what they were.
         held: The tool held something when it began.
         holds: The tool holds something at the end.
-        believed: The item that the ledger then believes in the tool, or None.
-        at_rest: The arm has nothing left to do of what the skill told it to.
-        names: What the cell has of each sort of name at the end: `item`, `bin`, `class`.
-        left: Threads, files and processes left behind.
-        clocks: Who asked the wall clock.
+        is_known: The ledger believes an item in the tool at the end.
+        at_rest: The arm has nothing left to do at the end.
     """
 
-    where: str
-    ending: Ending
-    ticks: int
-    given: Mapping[str, Any]
-    outputs: Mapping[str, Any]
-    written: tuple[str, ...]
-    rebound: tuple[str, ...]
-    mutated: tuple[str, ...]
-    handed: type
-    calls: tuple[Call, ...]
-    durations: tuple[float, ...]
-    held: bool
-    holds: bool
-    believed: Item | None
-    at_rest: bool
-    names: Mapping[str, tuple[str, ...]]
-    left: tuple[str, ...]
-    clocks: tuple[str, ...]
+    def __init__(
+        self,
+        skill: type[Skill],
+        situation: Situation,
+        arrange: Arrange,
+        adversity: Adversity | None = None,
+        halt_at: int | None = None,
+    ) -> None:
+        stage, values = begin(skill, situation, arrange)
+        fake = stage.cell
+        before = values if halt_at else copy.deepcopy(values, {id(fake): fake})
+        script = [during("*", adversity.effect)] * adversity.times if adversity else []
+        cell = DisturbedCell(fake, script)
+        watch = Watch(cell.cell)
+        self.where = " ".join(filter(None, (situation.name, adversity.name if adversity else "")))
+        self.reason = self.message = ""
+        self.ticks = 0
+        self.outputs: Mapping[str, Any] = {}
+        self.calls, self.durations = watch.calls, list[float]()
+        disturbed_at = adversity.tick if adversity else 0
+        self.held = fake.tool.holding
+        try:
+            with patience(skill, lambda: self.ticks):
+                self.status = self._act(skill, values, cell, watch, disturbed_at, halt_at)
+        except Stuck as stuck:
+            self.status, self.message = "STUCK", str(stuck)
+        self.changed = [name for name in values if not is_same(values[name], before[name])]
+        self.holds, self.is_known = fake.tool.holding, fake.ledger.in_tool() is not None
+        self.at_rest = fake.arm.at_rest
 
     @property
-    def seconds(self) -> float:
-        """How long it took on the run's clock [s]."""
-        return self.ticks * STEP
+    def end(self) -> str:
+        """Where and how it ended, for a sentence."""
+        words = {
+            "SUCCESS": "it succeeded",
+            "FAILURE": f'it failed with "{self.reason}" ({self.message})',
+            "HALTED": f"it was halted at tick {self.ticks}",
+            "RUNNING": "it was not over",
+        }
+        return f"{self.where} {words.get(self.status, f'it ended as a fault: {self.message}')}"
 
     @property
-    def moved(self) -> bool:
+    def has_moved(self) -> bool:
         """True if it started the arm."""
         return any(call.name == "arm.start" for call in self.calls)
 
-    def lean(self) -> Rehearsal:
-        """Return this without the arguments of its calls, which may be large: frames are among them."""
-        return replace(self, calls=tuple(replace(call, arguments=()) for call in self.calls))
-
-
-def rehearse(
-    skill: type[Skill], scene: Scene, adversity: Adversity = NOTHING, halt_at: int | None = None
-) -> Rehearsal:
-    """Return what a run was like; with `halt_at`, one that is taken away after so many control steps."""
-    values = scene.begin()
-    before, fake = scene.copied(values), scene.cell
-    held, opened = fake.tool.holding, open_things()
-    actor = _Actor(skill, values, scene)
-    clocks: list[str] = []
-    with clocks_watched(clocks):
+    def _act(
+        self,
+        skill: type[Skill],
+        values: Mapping[str, Any],
+        cell: DisturbedCell,
+        watch: Watch,
+        disturbed_at: int,
+        halt_at: int | None,
+    ) -> str:
+        """Run the skill and return its status at the end."""
+        run: SkillRun | None = None
         try:
-            with patience(skill, lambda: actor.ticks):
-                ending = actor.act(adversity, halt_at)
-        except Stuck as stuck:
-            ending = Ending("STUCK", message=str(stuck))
-    attributes = vars(actor.instance) if actor.instance else {}
-    outputs = [name for name, port in skill.ports.items() if port.direction is Direction.OUT]
-    known = {*skill.params, *skill.ports}
-    return Rehearsal(
-        where=" ".join(filter(None, (scene.situation.name, adversity.name))),
-        ending=ending,
-        ticks=actor.ticks,
-        given={name: value for name, value in values.items() if isinstance(value, str | float | None)},
-        outputs={name: attributes[name] for name in outputs if name in attributes},
-        written=tuple(name for name in attributes if name not in known and not name.startswith("_")),
-        rebound=tuple(name for name in values if name in attributes and attributes[name] is not values[name]),
-        mutated=tuple(name for name in values if not same(values[name], before[name])),
-        handed=actor.handed,
-        calls=tuple(actor.watch.calls),
-        durations=tuple(actor.durations),
-        held=held,
-        holds=fake.tool.holding,
-        believed=fake.ledger.in_tool(),
-        at_rest=fake.arm.at_rest,
-        names={
-            "item": tuple(record.item for record in fake.ledger.records),
-            "bin": tuple(fake.cell.bins),
-            "class": tuple(fake.cell.classes),
-        },
-        left=tuple(sorted(open_things() - opened)),
-        clocks=tuple(dict.fromkeys(clocks)),
-    )
-
-
-class _Actor:
-    """Drives one skill as the tree would.
-
-    Attributes:
-        watch: Stands between it and its cell.
-        instance: The skill, once it was made.
-        handed: Type of what its `run` returned.
-        ticks: Control steps since it was started.
-        durations: Computing time of every tick [s].
-    """
-
-    def __init__(self, skill: type[Skill], values: Mapping[str, Any], scene: Scene) -> None:
-        self._skill, self._values, self._fake = skill, values, scene.cell
-        self.watch = Watch(scene.cell.cell)
-        self.instance: Skill | None = None
-        self.handed: type = type(None)
-        self.ticks = 0
-        self.durations: list[float] = []
-        self._steps: Iterator[Any] = iter(())
-
-    def act(self, adversity: Adversity, halt_at: int | None) -> Ending:
-        """Return how the skill ended; nothing it does is an error here but what ends a program."""
-        try:
-            while self.ticks < LONGEST / STEP:
-                if self.ticks == halt_at:
-                    return self._halted()
-                if self.ticks == adversity.tick:
-                    adversity.strike(self._fake, self.watch)
-                self.watch.tick = self.ticks
-                if self._is_over():
-                    return Ending("SUCCESS")
-                self._fake.advance()
+            while self.ticks < MAX_TIME / STEP:
+                if run is not None and self.ticks == halt_at:
+                    run.halt()
+                    return "HALTED"
+                if self.ticks == disturbed_at:
+                    cell.hear(Event("status", 0, 0.0, {"node": "skill", "status": "RUNNING"}))
+                watch.tick, began = self.ticks, perf_counter()
+                run = run or SkillRun(skill(**values), watch.cell)
+                has_succeeded = run.step()
+                self.durations.append(perf_counter() - began)
+                if has_succeeded:
+                    self.outputs = run.outputs()
+                    return "SUCCESS"
+                cell.advance()
                 self.ticks += 1
         except SkillFailed as failure:
-            return Ending("FAILURE", failure.reason, failure.message)
+            self.reason, self.message = failure.reason, failure.message
+            return "FAILURE"
         except Exception as error:
-            return Ending("FAULT", message=self._told(error))
-        return Ending("RUNNING")
+            frames = extract_tb(error.__traceback__)
+            place = place_in(skill, ((frame.filename, frame.lineno or 0) for frame in reversed(frames)))
+            kind = "" if isinstance(error, Fault) else f"{type(error).__name__}: "
+            self.message = f"{kind}{error}" + (f" ({place})" if place else "")
+            return "FAULT"
+        return "RUNNING"
 
-    def _is_over(self) -> bool:
-        """Take one step, the first of which starts it."""
-        began = perf_counter()
-        try:
-            if self.instance is None:
-                self.instance = self._skill(**self._values)
-                handed = self.instance.run(self.watch.cell)
-                self.handed, self._steps = type(handed), iter(handed or ())
-            yielded = next(self._steps, self)
-        finally:
-            self.durations.append(perf_counter() - began)
-        if yielded is not None and yielded is not self:
-            kind = type(yielded).__name__
-            raise TypeError(f'it yielded a {kind}; to run the steps of others write "yield from"')
-        return yielded is self
 
-    def _halted(self) -> Ending:
-        try:
-            if isinstance(self._steps, Generator):
-                self._steps.close()
-        except RuntimeError as error:
-            if "GeneratorExit" not in str(error):
-                raise
-            return Ending("FAULT", message='it yielded in "finally"')
-        except SkillFailed as failure:
-            return Ending("FAULT", message=f'it failed with "{failure.reason}"')
-        return Ending("HALTED")
-
-    def _told(self, error: Exception) -> str:
-        """Return what an error says, and where in the skill's own files it came from."""
-        frames = ((frame.filename, frame.lineno or 0) for frame in reversed(extract_tb(error.__traceback__)))
-        place = place_in(self._skill, frames)
-        return f"{type(error).__name__}{place and f' in {place}'}: {error}"
+def is_same(one: Any, other: Any) -> bool:
+    """Return True if two values are equal part by part; values that cannot be taken apart count as equal."""
+    try:
+        return pickle.dumps(one) == pickle.dumps(other)
+    except (pickle.PicklingError, TypeError, AttributeError):
+        return True

@@ -1,27 +1,29 @@
-"""The situations in which a skill is tried, and how each is arranged as often as wanted."""
+"""The situations in which a skill is tried, and the values that it is given there."""
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import types
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Union, get_args, get_origin
 
+from executive.messages import Detections, Target
+from executive.mission.model.port_types import called
 from executive.skill import ANY, EMPTY, HOLDING, Direction, Param, Port, Skill
-from executive.testing.conformance.patience import Stuck
 from executive.testing.conformance.stage import Stage, set_up
-from executive.testing.conformance.values import CannotMakeUp, made_up, others
 
 Arrange = Callable[[Stage], Mapping[str, Any]]
-"""Arranges a stage for a skill and returns values for its params and inputs, those it has an opinion on."""
+"""Changes a stage for a skill and returns values for some of its params and inputs."""
 
+SMALL_NUMBER = 0.1
+"""A number that is made up, where its bounds allow it; in seconds, this is soon over."""
 
-_GRIPS: Mapping[Any, tuple[bool, ...]] = {EMPTY: (False,), HOLDING: (True,), ANY: (False, True)}
+_HOLDING: Mapping[Any, tuple[bool, ...]] = {EMPTY: (False,), HOLDING: (True,), ANY: (False, True)}
 _NAMES = {False: "with an empty tool", True: "with an item in the tool"}
 
 
 class NotTried(Exception):
-    """What a check looks at cannot be found out; the text says why."""
+    """A check cannot be made; the text says why."""
 
 
 class NotArranged(NotTried):
@@ -33,124 +35,118 @@ class Situation:
     """One way to begin.
 
     Attributes:
-        name: For a sentence: `with an empty tool`.
+        name: Its name, for a sentence: `with an empty tool`.
         holding: The tool holds an object.
         params: Params that differ from their defaults.
-        whole: Inputs that may be left out are given, too.
+        has_all_inputs: Inputs that may be left out are given, too.
     """
 
     name: str
     holding: bool
     params: Mapping[str, Any] = field(default_factory=dict)
-    whole: bool = False
+    has_all_inputs: bool = False
 
 
-class Scene:
-    """A situation arranged for a skill on a fake cell; begins anew as often as wanted.
-
-    Args:
-        skill: Who is to act in it.
-        situation: What it is like.
-        arrange: What its author wants to be otherwise.
-
-    Attributes:
-        situation: What it is like.
-        cell: The fake cell; its parts are new with every beginning.
-        given: Names of the params and inputs that `arrange` gave.
-
-    Raises:
-        NotArranged: A value that the skill needs is given by nobody, or none can be copied.
-    """
-
-    def __init__(self, skill: type[Skill], situation: Situation, arrange: Arrange) -> None:
-        stage = set_up(skill, holding=situation.holding)
-        given = _asked(skill, arrange, stage)
-        self.situation, self.cell, self.given = situation, stage.cell, frozenset(given)
-        values = {**_made_up(skill, situation, stage, given), **situation.params, **given}
-        try:
-            self._beginning = self.copied((vars(stage.cell), values))
-        except Exception as error:
-            raise NotArranged(
-                f"the beginning cannot be kept to be repeated: {type(error).__name__}: {error}. "
-                "Give inputs that copy.deepcopy can copy."
-            ) from error
-
-    def begin(self) -> dict[str, Any]:
-        """Bring the cell back to where it began, and return the values to start the skill with."""
-        parts, values = self.copied(self._beginning)
-        vars(self.cell).clear()
-        vars(self.cell).update(parts)
-        return values
-
-    def copied(self, state: Any) -> Any:
-        """Return a copy of a state of the cell, or of values that belong to it."""
-        # The cell itself stays who it is: its parts, and whoever arranged it, reach each other through it.
-        return copy.deepcopy(state, {id(self.cell): self.cell})
-
-
-def situations(skill: type[Skill]) -> Iterator[Situation]:
+def situations(skill: type[Skill], arrange: Arrange) -> Iterator[Situation]:
     """Yield the situations in which a skill is tried.
 
-    With what it needs the tool to hold, or both with nothing and with something where that is no matter;
-    with defaults alone, with all its inputs, and with every other choice of a param.
+    With the tool as the skill needs it, or both empty and not where it needs neither; with defaults alone,
+    with all its inputs, and with every other choice of a param that its author does not give.
 
     Raises:
-        NotArranged: It does not say what it needs.
+        NotArranged: It does not say what it needs of the tool, or a value for it cannot be made up.
     """
-    if not isinstance(skill.tool_state, Sequence) or not skill.tool_state:
-        raise NotArranged(f"its tool_state is {skill.tool_state!r}; it must say what it needs and leaves")
-    if (needs := skill.tool_state[0]) not in _GRIPS:
-        raise NotArranged(f"its tool_state begins with {needs!r}; it must say ANY, EMPTY or HOLDING")
-    first, *more = _GRIPS[needs]
-    yield Situation(_NAMES[first], first)
-    yield from (Situation(_NAMES[holding], holding) for holding in more)
-    if any(not port.required for port in _inputs(skill).values()):
-        yield Situation(f"{_NAMES[first]} and every input given", first, whole=True)
-    stage = set_up(skill, holding=first)
+    state = skill.tool_state
+    if not isinstance(state, tuple) or not state or state[0] not in _HOLDING:
+        raise NotArranged(f"its tool_state is {state!r}; it must begin with ANY, EMPTY or HOLDING")
+    first = _HOLDING[state[0]][0]
+    for holding in _HOLDING[state[0]]:
+        yield Situation(_NAMES[holding], holding)
+    if any(not port.required for port in _inputs(skill)):
+        yield Situation(f"{_NAMES[first]} and every input given", first, has_all_inputs=True)
+    stage, values = begin(skill, Situation("", first), arrange)
     for param in skill.params.values():
-        for value in others(param, stage):
+        for value in () if param.name in values else _choices(param, stage):
             yield Situation(f"{_NAMES[first]} and {param.name}: {value}", first, {param.name: value})
 
 
-def _asked(skill: type[Skill], arrange: Arrange, stage: Stage) -> dict[str, Any]:
+def begin(skill: type[Skill], situation: Situation, arrange: Arrange) -> tuple[Stage, dict[str, Any]]:
+    """Return a fresh stage and the values with which a skill starts there.
+
+    Raises:
+        NotArranged: A value that the skill needs is given by nobody.
+    """
+    stage = set_up(skill, holding=situation.holding)
     try:
-        given = dict(arrange(stage))
-    except Stuck as stuck:
-        raise NotArranged(f"what arranges it {stuck}") from None
+        values = {**situation.params, **arrange(stage)}
     except Exception as error:
         raise NotArranged(f"what arranges it raised {type(error).__name__}: {error}") from error
-    known = {**skill.params, **_inputs(skill)}
-    if unknown := [name for name in given if name not in known]:
-        raise NotArranged(
-            f'what arranges it gives a value for "{unknown[0]}", which is neither a param nor an input; '
-            f"it has: {', '.join(known) or 'none'}"
-        )
-    return given
-
-
-def _made_up(
-    skill: type[Skill], situation: Situation, stage: Stage, given: Mapping[str, Any]
-) -> dict[str, Any]:
-    """Return values for what nobody has given: what has no default, and where it is wanted all inputs."""
-    values, missing = {}, {}
-    declarations: list[Param | Port] = [*skill.params.values(), *_inputs(skill).values()]
+    declarations: list[Param | Port] = [*skill.params.values(), *_inputs(skill)]
+    missing = []
     for declared in declarations:
-        may = situation.whole and isinstance(declared, Port)
-        if declared.name in {**given, **situation.params} or not (declared.required or may):
+        is_wanted = declared.required or (situation.has_all_inputs and isinstance(declared, Port))
+        if declared.name in values or not is_wanted:
             continue
-        try:
-            values[declared.name] = made_up(declared, stage)
-        except CannotMakeUp as problem:
-            if declared.required:
-                missing[declared.name] = str(problem)
+        if (value := _made_up(declared, stage)) is not None:
+            values[declared.name] = value
+        elif declared.required:
+            missing.append(declared)
     if missing:
-        wanted = ", ".join(f'"{name}": ...' for name in missing)
+        told = " and ".join(f'"{declared.name}" ({called(declared.type)})' for declared in missing)
+        given = ", ".join(f'"{declared.name}": ...' for declared in missing)
         raise NotArranged(
-            f"no value can be made up for {' and '.join(missing.values())}. Give it in a test: "
-            f"conformance({skill.__name__}, lambda stage: {{{wanted}}}), as skills/README.md shows."
+            f"no value can be made up for {told}. Give it in a test: "
+            f"conformance({skill.__name__}, lambda stage: {{{given}}}), as skills/README.md shows."
         )
-    return values
+    return stage, values
 
 
-def _inputs(skill: type[Skill]) -> dict[str, Port]:
-    return {name: port for name, port in skill.ports.items() if port.direction is Direction.IN}
+def _choices(param: Param, stage: Stage) -> list[Any]:
+    """Return the further values of a param that make a skill do something else: choices, names, truths."""
+    values = [False, True] if param.type is bool else list(param.choices or ())
+    values += [_named(param.refers, stage)] if param.refers else []
+    return [value for value in values if value not in (param.default, None)]
+
+
+def _made_up(declared: Param | Port, stage: Stage) -> Any:
+    """Return a value that a param, or an input, may have; None if nothing is known that it could be."""
+    if isinstance(declared, Port):
+        return _on_stage(declared.type, declared.refers, stage)
+    if declared.choices:
+        return declared.choices[0]
+    if declared.refers:
+        return _named(declared.refers, stage)
+    if declared.type not in (int, float):
+        return {str: f"some {declared.name}", bool: False}.get(declared.type)
+    number = 1 if declared.type is int else SMALL_NUMBER
+    least = number if declared.ge is None else max(number, declared.ge)
+    return declared.type(least if declared.le is None else min(least, declared.le))
+
+
+def _on_stage(kind: Any, refers: str, stage: Stage) -> Any:
+    """Return something on the stage of a type, or None."""
+    if kind is str:
+        return _named(refers, stage)
+    if get_origin(kind) in (Union, types.UnionType):
+        return _on_stage(get_args(kind)[0], refers, stage)
+    if kind == list[Target]:
+        return list(stage.targets)
+    return {Target: stage.targets[0], Detections: stage.detections}.get(kind)
+
+
+def _named(refers: str, stage: Stage) -> str | None:
+    """Return the name of something on the stage, or None."""
+    fake = stage.cell
+    label = fake.ledger.label(stage.item)
+    names = {
+        "item": stage.item,
+        "class": label,
+        "bin": fake.routes[label][0],
+        "detector": next(iter(fake.detectors)),
+        "pose": list(fake.arm.poses)[-1],
+    }
+    return names.get(refers)
+
+
+def _inputs(skill: type[Skill]) -> list[Port]:
+    return [port for port in skill.ports.values() if port.direction is Direction.IN]

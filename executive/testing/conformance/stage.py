@@ -1,8 +1,7 @@
-"""A fake cell with something on its table, or in its tool, for a skill to work on."""
+"""A fake cell with objects on its table, or one in its tool, for a skill to work on."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,9 +20,10 @@ class Stage:
 
     Attributes:
         cell: The cell: one object of every class in a row on its table, an operator who wants one of each.
-        detections: What the look found: everything but what the tool holds.
-        targets: Where that is, one target each.
-        item: What the skill is about: the item in the tool if it needs one there, else the first target's.
+        detections: Result of the look: everything but the object in the tool.
+        targets: One target per detection.
+        item: The item that the skill is about: that in the tool if the skill needs one there, else the first
+            target's.
     """
 
     cell: FakeCell
@@ -36,49 +36,35 @@ def set_up(skill: type[Skill], *, holding: bool) -> Stage:
     """Return a stage for a skill.
 
     The cup rests on the first target if the skill works on a target with the tool but without the arm:
-    somebody else has brought it there. It rests on what it holds, too.
+    another skill has brought it there.
 
     Args:
-        skill: Who is to act on it.
+        skill: The skill that is to act on it.
         holding: The tool holds an object, and the ledger knows; else it is empty.
     """
     fake = FakeCell(options=CellOptions(SilentOperator(list(ROUTES)), base=Path()))
-    _furnish(fake)
-    detections, targets = look(fake)
-    if holding or _works_on_target(skill):
-        _touch(fake, targets[0])
-    if holding:
-        held = targets[0].item
-        fake.tool.close()
-        fake.ledger.touched(held)
-        fake.ledger.held(held)
-        detections, targets = look(fake)
-        if skill.tool_state[0] is HOLDING:
-            return Stage(fake, detections, targets, held)
-    return Stage(fake, detections, targets, targets[0].item)
-
-
-def _works_on_target(skill: type[Skill]) -> bool:
-    inputs = (port.type for port in skill.ports.values() if port.direction is Direction.IN)
-    return "tool" in skill.uses and "arm" not in skill.uses and Target in inputs
-
-
-def _furnish(fake: FakeCell) -> None:
-    """Stand one object of every class in a row on the table."""
     table, labels = bare_table().table, list(fake.cell.classes)
-    x, (low, high) = sum(table.x) / 2, table.y
-    for label, y in zip(labels, _spread(low, high, len(labels)), strict=True):
-        fake.world.put(label, x, y)
+    for label, y in zip(labels, np.linspace(*table.y, len(labels) + 2)[1:-1], strict=True):
+        fake.world.put(label, sum(table.x) / 2, float(y))
+    detections, targets = look(fake)
+    item = targets[0].item
+    if holding or _works_on_target(skill):
+        kind = fake.cell.classes[targets[0].label]
+        top = targets[0].position + np.array([kind.ring, 0.0, kind.height / 2])
+        fake.arm.put(tool_down(top, 0.0))
+    if holding:
+        fake.tool.close()
+        fake.ledger.touched(item)
+        fake.ledger.held(item)
+        detections, targets = look(fake)
+        if skill.tool_state[0] is not HOLDING:
+            item = targets[0].item
+    return Stage(fake, detections, targets, item)
 
 
-def _spread(low: float, high: float, count: int) -> Iterable[float]:
-    """Return so many numbers between two, none of them at the edge."""
-    return (float(y) for y in np.linspace(low, high, count + 2)[1:-1])
-
-
-def look(fake: FakeCell, view: str = "table") -> tuple[Detections, list[Target]]:
-    """Return what the first detector sees in a view, and where the ledger now takes everything to be."""
-    camera = fake.camera
+def look(fake: FakeCell) -> tuple[Detections, list[Target]]:
+    """Return what the first detector sees on the table, and where the ledger takes everything to be."""
+    camera, view = fake.camera, "table"
     frame = camera.capture()
     request = fake.detector.request(frame, view)
     while not request.ready:
@@ -89,8 +75,6 @@ def look(fake: FakeCell, view: str = "table") -> tuple[Detections, list[Target]]
     return detections, list(fake.ledger.observe(detections, positions))
 
 
-def _touch(fake: FakeCell, target: Target) -> None:
-    """Put the cup onto a target."""
-    kind = fake.cell.classes[target.label]
-    top = target.position + np.array([kind.ring, 0.0, kind.height / 2])
-    fake.arm.put(tool_down(top, 0.0))
+def _works_on_target(skill: type[Skill]) -> bool:
+    inputs = [port.type for port in skill.ports.values() if port.direction is Direction.IN]
+    return "tool" in skill.uses and "arm" not in skill.uses and Target in inputs

@@ -1,4 +1,4 @@
-"""Fault scripts: what happens to a cell while a mission runs in it, physically, and when.
+"""Fault scripts: disturbances of a cell in which a mission or a skill runs, and when they happen.
 
 A script is a list of disturbances, for `run_mission(disturbances=[...])`:
 
@@ -8,20 +8,35 @@ A script is a list of disturbances, for `run_mission(disturbances=[...])`:
 * now and then something falls: `with_probability(0.1, "*/Transit", seal_breaks(), seed=1)`
 """
 
-from executive.testing.disturbances.arm import arm_runs_into, no_way
 from executive.testing.disturbances.detector import (
+    detector_blind,
     detector_dead,
+    detector_given_up,
     detector_hangs,
     detector_slow,
     detector_unsure,
 )
 from executive.testing.disturbances.disturbed_cell import DisturbedCell, disturbed
-from executive.testing.disturbances.objects import object_moved, object_removed
-from executive.testing.disturbances.operator import operator_asks_rescan, operator_quits
+from executive.testing.disturbances.objects import (
+    object_bumped,
+    object_moved,
+    object_refuses,
+    object_removed,
+)
+from executive.testing.disturbances.robot import (
+    arm_runs_into,
+    no_depth,
+    no_way,
+    operator_asks_rescan,
+    operator_quits,
+    seal_breaks,
+    seal_breaks_over_wrong_bin,
+    seal_fails,
+    table_bumped,
+    tool_sticks,
+    workspace_hidden,
+)
 from executive.testing.disturbances.script import Disturbance, after, between, during, with_probability
-from executive.testing.disturbances.sight import no_depth, workspace_hidden
-from executive.testing.disturbances.table import table_bumped
-from executive.testing.disturbances.tool import seal_breaks, seal_fails, tool_sticks
 
 __all__ = [
     "Disturbance",
@@ -29,7 +44,9 @@ __all__ = [
     "after",
     "arm_runs_into",
     "between",
+    "detector_blind",
     "detector_dead",
+    "detector_given_up",
     "detector_hangs",
     "detector_slow",
     "detector_unsure",
@@ -37,11 +54,14 @@ __all__ = [
     "during",
     "no_depth",
     "no_way",
+    "object_bumped",
     "object_moved",
+    "object_refuses",
     "object_removed",
     "operator_asks_rescan",
     "operator_quits",
     "seal_breaks",
+    "seal_breaks_over_wrong_bin",
     "seal_fails",
     "table_bumped",
     "tool_sticks",

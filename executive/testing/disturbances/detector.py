@@ -1,6 +1,6 @@
-"""What can happen to a detector: dead, hanging, slow, or unsure of everything.
+"""Effects on detectors: dead, hanging, slow, blind, or unsure of everything.
 
-Every request made while it lasts is affected; what was asked before is answered as it would have been.
+Every request made while an effect lasts is affected; requests made before are answered as ever.
 """
 
 from __future__ import annotations
@@ -8,146 +8,89 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 from executive.cell import Request
 from executive.errors import InputError, Unavailable
 from executive.messages import Answer
 from executive.testing.disturbances.effect import Effect, Occasion
-from executive.testing.disturbances.scene import Scene
 
 DOUBT = 0.9
 """Highest confidence of a detector that is unsure, as a share of its threshold."""
-EARLY = 1e-9
+TIME_TOLERANCE = 1e-9
 """Rounding allowed when two times on the clock are compared [s]."""
 
 
-@dataclass(frozen=True)
-class DetectorDead(Effect):
-    """The detector gives no answer."""
+def unchanged(answer: Answer) -> Answer:
+    """Return an answer as it is."""
+    return answer
 
-    name: ClassVar = "detector_dead"
+
+def refuse(answer: Answer) -> Answer:
+    """Raise Unavailable."""
+    del answer
+    raise Unavailable("the detector is dead, as the test wants it")
+
+
+def doubt(answer: Answer) -> Answer:
+    """Return an answer whose confidences are below the threshold."""
+    most = DOUBT * answer.reliability.threshold
+    found = tuple(replace(one, confidence=min(one.confidence, most)) for one in answer.found)
+    return replace(answer, found=found)
+
+
+def overlook(answer: Answer) -> Answer:
+    """Return an answer in which nothing was found."""
+    return replace(answer, found=())
+
+
+@dataclass(frozen=True)
+class DetectorDisturbed(Effect):
+    """A detector that answers late, wrongly, or not at all.
+
+    Attributes:
+        name: Name of the effect in the record.
+        change: Returns the answer instead of the true one; raises Unavailable for none.
+        delay: Time by which the answer is late [s].
+        until: Time on the clock before which nothing is answered while the effect lasts [s].
+    """
+
+    name: str
+    change: Callable[[Answer], Answer] = unchanged
+    delay: float = 0.0
+    until: float = 0.0
 
     def request(self, ask: Callable[[], Request], now: Occasion) -> Request:
-        """Ask in vain."""
+        """Ask the detector, and disturb its answer."""
         now.tell()
-        return Dead(ask())
-
-
-@dataclass(frozen=True)
-class DetectorHangs(Effect):
-    """The detector answers only when it hangs no longer."""
-
-    name: ClassVar = "detector_hangs"
-    until: float
-
-    def request(self, ask: Callable[[], Request], now: Occasion) -> Request:
-        """Ask, and wait for the end."""
-        now.tell()
-        return Late(ask(), lambda: now.over or now.scene.now >= self.until - EARLY)
-
-
-@dataclass(frozen=True)
-class DetectorSlow(Effect):
-    """The detector's answers take longer."""
-
-    name: ClassVar = "detector_slow"
-    by: float
-
-    def request(self, ask: Callable[[], Request], now: Occasion) -> Request:
-        """Ask, and wait longer than one would."""
-        now.tell()
-        return Slow(ask(), self.by, now.scene)
-
-
-@dataclass(frozen=True)
-class DetectorUnsure(Effect):
-    """The detector is sure of nothing."""
-
-    name: ClassVar = "detector_unsure"
-
-    def request(self, ask: Callable[[], Request], now: Occasion) -> Request:
-        """Ask, and believe nothing much."""
-        now.tell()
-        return Unsure(ask())
-
-
-@dataclass(frozen=True)
-class Dead:
-    """A request that is not answered; implements `Request`, as the others here."""
-
-    asked: Request
-
-    @property
-    def ready(self) -> bool:
-        """True when an answer would be due."""
-        return self.asked.ready
-
-    def result(self) -> Answer:
-        """Raise Unavailable."""
-        raise Unavailable("the detector is dead, as the test wants it")
-
-
-@dataclass(frozen=True)
-class Late:
-    """A request whose answer waits for something."""
-
-    asked: Request
-    come: Callable[[], bool]
-
-    @property
-    def ready(self) -> bool:
-        """True once that has come, too."""
-        return self.come() and self.asked.ready
-
-    def result(self) -> Answer:
-        """Return what the detector says."""
-        return self.asked.result()
+        return DisturbedRequest(ask(), self, now)
 
 
 @dataclass
-class Slow:
-    """A request whose answer is due later than it would be."""
+class DisturbedRequest:
+    """A request to a disturbed detector; implements `Request`."""
 
     asked: Request
-    by: float
-    scene: Scene
+    effect: DetectorDisturbed
+    now: Occasion
     _due: float = math.inf
 
     @property
     def ready(self) -> bool:
-        """True once the time is over that it takes longer."""
+        """True once the answer is due, its delay is over, and the detector does not hang any longer."""
+        time = self.now.scene.now
         if math.isinf(self._due) and self.asked.ready:
-            self._due = self.scene.now + self.by
-        return self.scene.now >= self._due - EARLY
+            self._due = time + self.effect.delay
+        does_hang = not self.now.over and time < self.effect.until - TIME_TOLERANCE
+        return time >= self._due - TIME_TOLERANCE and not does_hang
 
     def result(self) -> Answer:
-        """Return what the detector says."""
-        return self.asked.result()
-
-
-@dataclass(frozen=True)
-class Unsure:
-    """A request whose answer has confidences under the threshold only."""
-
-    asked: Request
-
-    @property
-    def ready(self) -> bool:
-        """True when the answer is due."""
-        return self.asked.ready
-
-    def result(self) -> Answer:
-        """Return what the detector says, and how little it believes it."""
-        answer = self.asked.result()
-        most = DOUBT * answer.reliability.threshold
-        found = tuple(replace(one, confidence=min(one.confidence, most)) for one in answer.found)
-        return replace(answer, found=found)
+        """Return the disturbed answer, or raise Unavailable."""
+        return self.effect.change(self.asked.result())
 
 
 def detector_dead() -> Effect:
     """Requests are not answered: `Detect` is `unavailable`."""
-    return DetectorDead()
+    return DetectorDisturbed("detector_dead", refuse)
 
 
 def detector_hangs(until: float = math.inf) -> Effect:
@@ -156,23 +99,37 @@ def detector_hangs(until: float = math.inf) -> Effect:
     Args:
         until: Time on the run's clock at which they are answered in any case [s].
     """
-    return DetectorHangs(until)
+    return DetectorDisturbed("detector_hangs", until=until)
+
+
+def detector_given_up(deadline: float) -> Effect:
+    """Requests are not answered, and given up at their deadline: `Detect` is `unavailable`.
+
+    Args:
+        deadline: Time by which that is later than an answer would be [s].
+    """
+    return DetectorDisturbed("detector_hangs", refuse, delay=deadline)
 
 
 def detector_slow(by: float) -> Effect:
     """Requests are answered later than they would be.
 
     Args:
-        by: How much later [s].
+        by: The delay [s].
 
     Raises:
         InputError: The answer would come sooner.
     """
     if by < 0:
         raise InputError(f"a slow detector answers later, not by {by:g} s")
-    return DetectorSlow(by)
+    return DetectorDisturbed("detector_slow", delay=by)
 
 
 def detector_unsure() -> Effect:
     """Everything is seen with less confidence than counts: `Detect` is `unsure`."""
-    return DetectorUnsure()
+    return DetectorDisturbed("detector_unsure", doubt)
+
+
+def detector_blind() -> Effect:
+    """Nothing is seen: `Detect` succeeds with an empty list."""
+    return DetectorDisturbed("detector_blind", overlook)

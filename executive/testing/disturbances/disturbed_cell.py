@@ -10,8 +10,7 @@ from typing import Any
 from executive.cell import Cell
 from executive.errors import InputError
 from executive.events import Emit, Event, ignore
-from executive.testing.disturbances.hand import Hand
-from executive.testing.disturbances.hands import hand_of
+from executive.testing.disturbances.hand import Hand, hand_of
 from executive.testing.disturbances.scene import Scene
 from executive.testing.disturbances.schedule import Schedule
 from executive.testing.disturbances.script import Disturbance, DuringNode

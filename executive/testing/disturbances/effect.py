@@ -1,36 +1,28 @@
-"""What happens to a cell: the base of everything that can disturb one."""
+"""Base of everything that can disturb a cell, and one occurrence of it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
 
-from executive.arm import Planning
-from executive.cell import Request
-from executive.geometry import Array
-from executive.messages import Frame
+from executive.errors import InputError
 from executive.testing.disturbances.hand import Thing
 from executive.testing.disturbances.scene import Scene
 
 
 class Effect:
-    """Something that happens to a cell while it lasts; a subclass says what, and leaves the rest as it is.
+    """Something that happens to a cell while it lasts; a subclass defines it.
 
-    An effect is a value without a state of its own: what belongs to one time at which it happens is in its
-    `Occasion`. The methods below `act` stand between the skills and the cell: each gets the question that
-    was asked, and returns the answer.
+    An effect is a value without state: the state of one occurrence is in its `Occasion`. A subclass acts by
+    itself (`act`), or between the skills and the cell: it then defines `close`, `open` (tool), `plan` (arm),
+    `sees_table`, `capture` (camera), `request` (detector), `locate` (localizer) or `ask` (operator). Each of
+    these methods gets a function that asks the cell, and the occasion, and returns the answer.
 
     Attributes:
-        name: What happens, for the record.
-        leaks: Nothing seals to the tool meanwhile.
-        sticks: The tool does not let go meanwhile.
+        name: Name of the effect in the record.
     """
 
-    name: ClassVar[str]
-    leaks: ClassVar[bool] = False
-    sticks: ClassVar[bool] = False
+    name: str
 
     def act(self, now: Occasion) -> bool:
         """Do something to the cell, once; return False as long as it cannot be done yet.
@@ -40,57 +32,17 @@ class Effect:
         del now
         return False
 
-    def close(self, do: Callable[[], None], now: Occasion) -> None:
-        """Close the tool."""
-        del now
-        do()
-
-    def open(self, do: Callable[[], None], now: Occasion) -> None:
-        """Open the tool."""
-        del now
-        do()
-
-    def plan(self, ask: Callable[[], Planning], now: Occasion) -> Planning:
-        """Begin to plan a motion."""
-        del now
-        return ask()
-
-    def sees_table(self, ask: Callable[[], bool], now: Occasion) -> bool:
-        """Tell whether the whole workspace is in view."""
-        del now
-        return ask()
-
-    def capture(self, ask: Callable[[], Frame], now: Occasion) -> Frame:
-        """Return a frame."""
-        del now
-        return ask()
-
-    def request(self, ask: Callable[[], Request], now: Occasion) -> Request:
-        """Ask a detector."""
-        del now
-        return ask()
-
-    def locate(self, ask: Callable[[], Array], now: Occasion) -> Array:
-        """Localize a detection."""
-        del now
-        return ask()
-
-    def ask(self, ask: Callable[[], str | None], now: Occasion) -> str | None:
-        """Ask the operator."""
-        del now
-        return ask()
-
 
 @dataclass(eq=False)
 class Occasion:
-    """One time at which an effect happens.
+    """One occurrence of an effect.
 
     Attributes:
-        effect: What happens.
-        scene: Where.
+        effect: The effect.
+        scene: The cell and its world.
         node: Path of the node during which it happens, or "".
-        item: What that node is about, or "".
-        until: Time at which it ends, whatever runs then [s].
+        item: Item that this node is about, or "".
+        until: Time at which it ends [s].
         done: True once it has acted.
         over: True once it is over.
     """
@@ -105,7 +57,7 @@ class Occasion:
     _told: float = -math.inf
 
     def tell(self, thing: Thing | None = None) -> None:
-        """Tell the run that the cell is disturbed now, and which object of it; once a control step."""
+        """Emit a `disturbance` of the cell, or of one object in it; at most one per control step."""
         if self._told == self.scene.now:
             return
         self._told = self.scene.now
@@ -117,3 +69,14 @@ class Occasion:
             object=thing.label if thing else "",
             position=[round(float(value), 4) for value in thing.position] if thing else [],
         )
+
+
+def checked_share(share: float | None) -> float:
+    """Return the share of its motion after which the arm is disturbed; 0 for None: at once, at rest too.
+
+    Raises:
+        InputError: It is not more than 0 and less than 1.
+    """
+    if share is not None and not 0.0 < share < 1.0:
+        raise InputError(f"a share of a motion is more than 0 and less than 1, not {share:g}")
+    return share or 0.0

@@ -1,4 +1,4 @@
-"""What reaches into a cell past the robot: the truth about its objects, and brute force."""
+"""Access to the world of a cell past the robot: its true objects, and brute force."""
 
 from __future__ import annotations
 
@@ -6,7 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+import numpy as np
+
+from executive.errors import InputError
 from executive.geometry import Array
+from executive.testing.fake_cell import FakeCell
+from executive.testing.fake_world import FakeObject
+from executive.testing.wrapped_cell import innermost
+from executive.workcell import Workcell
 
 
 @dataclass(frozen=True, eq=False)
@@ -14,7 +21,7 @@ class Thing:
     """An object as it lies, hangs or falls now.
 
     Attributes:
-        body: What the world knows it by.
+        body: Identity of the object in its world.
         label: Its class.
         position: Its centre `(3,)` [m].
     """
@@ -33,7 +40,7 @@ class Hand(Protocol):
 
     @property
     def held(self) -> Thing | None:
-        """What hangs at the tool, or None."""
+        """The object that hangs at the tool, or None."""
 
     def remove(self, thing: Thing) -> None:
         """Take an object out of the world, out of the tool too."""
@@ -42,16 +49,79 @@ class Hand(Protocol):
         """Put an object elsewhere, `by` `(x, y)` [m], out of the tool too; it is at rest there."""
 
     def part(self) -> None:
-        """Let the seal of the tool give way; what hangs there falls."""
-
-    def leak(self, leaks: bool) -> None:
-        """Keep the tool from sealing anything, or no longer."""
-
-    def stick(self, sticks: bool) -> None:
-        """Keep the tool from letting go when it is opened, or no longer."""
+        """Let the seal of the tool give way; the object that hangs there falls."""
 
     def stand_in_the_way(self, what: str) -> None:
         """Let the arm run into `what` now: it breaks off its motion."""
 
     def settle(self) -> None:
-        """Let time pass that is none of a run's: the arm comes to rest, and so does what was moved."""
+        """Let time pass that is none of a run's: the arm and the objects come to rest."""
+
+
+class FakeHand:
+    """Access to a fake cell; implements `Hand`."""
+
+    def __init__(self, fake: FakeCell) -> None:
+        self._fake = fake
+
+    @property
+    def things(self) -> Sequence[Thing]:
+        """Every object."""
+        return [_thing(one) for one in self._fake.world.objects]
+
+    @property
+    def held(self) -> Thing | None:
+        """The object that hangs at the tool, or None."""
+        held = self._fake.world.held
+        return None if held is None else _thing(held)
+
+    def remove(self, thing: Thing) -> None:
+        """Take an object out of the world."""
+        self._loosen(thing)
+        self._fake.world.remove(thing.body)
+
+    def move(self, thing: Thing, by: tuple[float, float]) -> None:
+        """Put an object elsewhere."""
+        self._loosen(thing)
+        thing.body.position[:2] += np.array(by)
+        thing.body.stood.append(thing.body.position.copy())
+
+    def part(self) -> None:
+        """Let the seal give way."""
+        self._fake.tool.part()
+
+    def stand_in_the_way(self, what: str) -> None:
+        """Let the arm run into something."""
+        self._fake.arm.run_into(what)
+
+    def settle(self) -> None:
+        """Have the log say what is there: nothing in a fake world moves by itself."""
+        self._fake.note()
+
+    def _loosen(self, thing: Thing) -> None:
+        if self._fake.world.held is thing.body:
+            self.part()
+
+
+def hand_of(workcell: Workcell) -> Hand:
+    """Return the access to the world of a fake or a simulated cell.
+
+    Raises:
+        InputError: It is neither.
+    """
+    inner = innermost(workcell)
+    if isinstance(inner, FakeCell):
+        return FakeHand(inner)
+    # These bring the simulator along, which a fake cell never needs.
+    from executive.sim.cell import SimCell
+    from executive.testing.disturbances.sim_hand import SimHand
+
+    if isinstance(inner, SimCell):
+        return SimHand(inner)
+    raise InputError(
+        f"nobody knows how to reach into a {type(inner).__name__}; give `disturbed` a `hand` that does"
+    )
+
+
+def _thing(one: FakeObject) -> Thing:
+    return Thing(one, one.label, one.position.copy())

@@ -1,102 +1,190 @@
-"""What can happen to the objects: somebody takes one away, or puts it elsewhere."""
+"""Effects on objects: one is taken away, put elsewhere, bumped aside, or takes no seal."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import ClassVar
+
+import numpy as np
 
 from executive.errors import InputError
-from executive.testing.disturbances.effect import Effect, Occasion
+from executive.testing.disturbances.effect import Effect, Occasion, checked_share
 from executive.testing.disturbances.hand import Thing
 from executive.testing.disturbances.scene import Scene, Which
-from executive.testing.disturbances.share import checked_share
+
+BUMP_DISTANCE = 0.06
+"""Distance by which an object is bumped aside [m]."""
+BUMP_DIRECTIONS = 8
+"""Number of directions in which an object may be bumped; the first free one is taken."""
+MAX_TOOL_OFFSET = 0.03
+"""Horizontal distance between an object and the tool up to which the tool is on it [m]."""
+
+Range = tuple[float, float]
+"""Smallest and largest coordinate [m]."""
 
 
 @dataclass(frozen=True)
-class ObjectDisturbed(Effect, ABC):
+class ObjectDisturbed(Effect):
     """Something is done to an object, once; a subclass says what.
 
     Attributes:
-        which: Which one.
-        share: How much of its motion the arm must have behind it; 0 needs no motion.
+        which: The object.
+        share: Share of its motion that the arm must have behind it; 0 needs no motion.
     """
 
     which: Which
     share: float
 
-    @abstractmethod
-    def deed(self, scene: Scene, thing: Thing) -> Callable[[], None] | None:
-        """Return what does it; None as long as it cannot be done."""
+    def disturb(self, now: Occasion, thing: Thing) -> bool:
+        """Emit the disturbance and do it to an object; return False as long as it cannot be done."""
+        raise NotImplementedError
 
     def act(self, now: Occasion) -> bool:
         """Do it, as soon as the arm is so far and there is such an object."""
-        thing = now.scene.find(self.which, now.item) if now.scene.progress >= self.share else None
-        do = None if thing is None else self.deed(now.scene, thing)
-        if do is None:
+        if now.scene.progress < self.share or (thing := now.scene.find(self.which, now.item)) is None:
             return False
-        now.tell(thing)
-        do()
-        return True
+        return self.disturb(now, thing)
 
 
 @dataclass(frozen=True)
 class ObjectRemoved(ObjectDisturbed):
     """An object is taken out of the world."""
 
-    name: ClassVar = "object_removed"
+    name = "object_removed"
 
-    def deed(self, scene: Scene, thing: Thing) -> Callable[[], None]:
-        """Return what takes it away."""
-        return partial(scene.hand.remove, thing)
+    def disturb(self, now: Occasion, thing: Thing) -> bool:
+        """Take it away."""
+        now.tell(thing)
+        now.scene.hand.remove(thing)
+        return True
 
 
 @dataclass(frozen=True)
 class ObjectMoved(ObjectDisturbed):
     """An object is put elsewhere."""
 
-    name: ClassVar = "object_moved"
+    name = "object_moved"
     by: tuple[float, float]
 
-    def deed(self, scene: Scene, thing: Thing) -> Callable[[], None]:
-        """Return what moves it."""
-        return partial(scene.hand.move, thing, self.by)
+    def disturb(self, now: Occasion, thing: Thing) -> bool:
+        """Move it."""
+        now.tell(thing)
+        now.scene.hand.move(thing, self.by)
+        return True
+
+
+@dataclass(frozen=True)
+class ObjectBumped(ObjectDisturbed):
+    """An object is bumped aside, to a free place.
+
+    Attributes:
+        x, y: The part of the table in which it stays [m].
+    """
+
+    name = "object_moved"
+    x: Range
+    y: Range
+
+    def disturb(self, now: Occasion, thing: Thing) -> bool:
+        """Bump it, if there is room beside it."""
+        by = self._free_way(now.scene, thing)
+        if by is None:
+            return False
+        now.tell(thing)
+        now.scene.hand.move(thing, by)
+        return True
+
+    def _free_way(self, scene: Scene, thing: Thing) -> tuple[float, float] | None:
+        radius = scene.cell.classes[thing.label].radius
+        others = [
+            (other.position[:2], scene.cell.classes[other.label].radius + radius)
+            for other in scene.hand.things
+            if other.body != thing.body
+        ]
+        for number in range(BUMP_DIRECTIONS):
+            angle = 2 * math.pi * number / BUMP_DIRECTIONS
+            by = np.array([math.cos(angle), math.sin(angle)]) * BUMP_DISTANCE
+            x, y = thing.position[:2] + by
+            is_inside = self.x[0] <= x <= self.x[1] and self.y[0] <= y <= self.y[1]
+            if is_inside and all(math.dist((x, y), place) > apart for place, apart in others):
+                return float(by[0]), float(by[1])
+        return None
+
+
+@dataclass(frozen=True)
+class ObjectRefuses(Effect):
+    """One object takes no seal.
+
+    Attributes:
+        number: Number of the object, from 1.
+    """
+
+    name = "seal_fails"
+    number: int
+
+    def close(self, do: Callable[[], None], now: Occasion) -> None:
+        """Leave the tool as it is on that object."""
+        thing = now.scene.find(self.number, "")
+        here = now.scene.cell.arm.tool_pose.position
+        if thing is None or math.dist(thing.position[:2], here[:2]) > MAX_TOOL_OFFSET:
+            do()
+        else:
+            now.tell(thing)
 
 
 def object_removed(which: Which = "node", share: float | None = None) -> Effect:
-    """Somebody takes an object away, once; what the tool holds, out of the tool.
+    """Somebody takes an object away, once, out of the tool too.
 
     Args:
-        which: Which one; by default what the node is about.
-        share: How much of its motion the arm has behind it then, 0 to 1; by default at once.
+        which: The object; by default the one that the node is about.
+        share: Share of its motion that the arm has then behind it, 0 to 1; by default at once.
 
     Raises:
         InputError: No object has such a number, or there is no such share.
     """
-    return ObjectRemoved(_checked(which), _share(share))
+    return ObjectRemoved(_checked(which), checked_share(share))
 
 
 def object_moved(by: tuple[float, float], which: Which = "node", share: float | None = None) -> Effect:
     """Somebody puts an object elsewhere, once.
 
     Args:
-        by: How far along x and y [m]; what stands there already is pushed aside, or flies.
-        which: Which one; by default what the node is about.
-        share: How much of its motion the arm has behind it then, 0 to 1; by default at once.
+        by: Displacement along x and y [m]; an object that stands there is pushed aside, or flies.
+        which: The object; by default the one that the node is about.
+        share: Share of its motion that the arm has then behind it, 0 to 1; by default at once.
 
     Raises:
         InputError: No object has such a number, or there is no such share.
     """
-    return ObjectMoved(_checked(which), _share(share), by)
+    return ObjectMoved(_checked(which), checked_share(share), by)
+
+
+def object_bumped(x: Range, y: Range, which: Which = "node", share: float | None = None) -> Effect:
+    """Something bumps an object aside, once, to a free place.
+
+    Args:
+        x: The part of the table in which it stays [m].
+        y: The same along y [m].
+        which: The object; by default the one that the node is about.
+        share: Share of its motion that the arm has then behind it, 0 to 1; by default at once.
+
+    Raises:
+        InputError: No object has such a number, or there is no such share.
+    """
+    return ObjectBumped(_checked(which), checked_share(share), x, y)
+
+
+def object_refuses(number: int) -> Effect:
+    """Nothing seals to one object.
+
+    Args:
+        number: Number of the object, from 1.
+    """
+    return ObjectRefuses(number)
 
 
 def _checked(which: Which) -> Which:
     if isinstance(which, int) and which < 1:
         raise InputError(f"objects are counted from 1, and which is {which}")
     return which
-
-
-def _share(share: float | None) -> float:
-    return 0.0 if share is None else checked_share(share)

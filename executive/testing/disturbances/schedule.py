@@ -1,4 +1,4 @@
-"""Which disturbances of a script are happening in a run."""
+"""Schedule of a fault script: the disturbances that are happening in a run."""
 
 from __future__ import annotations
 
@@ -30,7 +30,6 @@ class Schedule:
         self._to_come = [(one.what, one.when) for one in script if isinstance(one.when, DuringTime)]
         self._activations: Counter[int] = Counter()
         self._happening: list[Occasion] = []
-        self._leaks = self._sticks = False
 
     def hear(self, event: Event) -> None:
         """Begin and end what happens while a node runs."""
@@ -58,7 +57,9 @@ class Schedule:
         self.step()
         ask: Callable[[], Any] = partial(question, *arguments, **named)
         for occasion in self._happening:
-            ask = partial(getattr(occasion.effect, hook), ask, occasion)
+            disturb = getattr(occasion.effect, hook, None)
+            if disturb is not None:
+                ask = partial(disturb, ask, occasion)
         return ask()
 
     def _node_begins(self, path: str, item: str) -> None:
@@ -70,7 +71,6 @@ class Schedule:
 
     def _begin(self, occasion: Occasion) -> None:
         self._happening.append(occasion)
-        self._hold_tool()
         self._act(occasion)
 
     def _end(self, ends: Callable[[Occasion], bool]) -> None:
@@ -78,19 +78,7 @@ class Schedule:
         for occasion in ended:
             occasion.over = True
             self._happening.remove(occasion)
-        if ended:
-            self._hold_tool()
 
     def _act(self, occasion: Occasion) -> None:
         if not occasion.done:
             occasion.done = occasion.effect.act(occasion)
-
-    def _hold_tool(self) -> None:
-        """Keep the tool from sealing and letting go as long as something that happens does."""
-        leaks = any(occasion.effect.leaks for occasion in self._happening)
-        sticks = any(occasion.effect.sticks for occasion in self._happening)
-        if leaks != self._leaks:
-            self._scene.hand.leak(leaks)
-        if sticks != self._sticks:
-            self._scene.hand.stick(sticks)
-        self._leaks, self._sticks = leaks, sticks

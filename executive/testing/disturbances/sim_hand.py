@@ -53,14 +53,6 @@ class SimHand:
         """Let the seal give way."""
         self._tool.part()
 
-    def leak(self, leaks: bool) -> None:
-        """Keep the tool from sealing anything, or no longer."""
-        self._tool.leaks = leaks
-
-    def stick(self, sticks: bool) -> None:
-        """Keep the tool from letting go, or no longer."""
-        self._tool.sticks = sticks
-
     def stand_in_the_way(self, what: str) -> None:
         """Let the arm run into something."""
         self._arm.run_into(what)

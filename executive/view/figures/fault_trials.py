@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 
@@ -130,14 +130,12 @@ class FaultFigures:
 
 def as_plain(figures: FaultFigures) -> dict[str, Any]:
     """Return the figures as plain values; times in s."""
+    plain = {
+        name: getattr(figures, name) for name in ("mission", "cell", "seed", "listed", "pairs", "complete")
+    }
     return {
-        "mission": figures.mission,
-        "cell": figures.cell,
-        "seed": figures.seed,
+        **plain,
         "robot_time_s": figures.robot_time,
-        "listed": figures.listed,
-        "pairs": figures.pairs,
-        "complete": figures.complete,
         "runs": len(figures.trials),
         "failed": len(figures.failed),
         "branches": [
@@ -150,23 +148,8 @@ def as_plain(figures: FaultFigures) -> dict[str, Any]:
 
 def trial_as_plain(trial: Trial) -> dict[str, Any]:
     """Return one run as plain values."""
-    return {
-        "fault": trial.label,
-        "told": list(trial.told),
-        "what": trial.what,
-        "when": trial.when,
-        "place": trial.place,
-        "happened": trial.happened,
-        "raised": trial.raised,
-        "verdict": trial.verdict,
-        "status": trial.status,
-        "reason": trial.reason,
-        "message": trial.message,
-        "node": trial.node,
-        "missing": trial.missing,
-        "items": dict(trial.items),
-        "audit": None if trial.audit is None else dict(trial.audit),
-        "robot_time_s": trial.robot_time,
-        "problems": list(trial.problems),
-        "remark": trial.remark,
-    }
+    plain = asdict(trial)
+    for name in ("numbers", "name", "cut", "entered", "robot_time"):
+        del plain[name]
+    more = {"fault": trial.label, "verdict": trial.verdict, "robot_time_s": trial.robot_time}
+    return {**plain, **more, "told": list(trial.told), "problems": list(trial.problems)}

@@ -102,6 +102,7 @@ def test_a_way_that_no_run_took_is_told_with_its_place(figures: FaultFigures, sm
     ]
 
 
+@pytest.mark.slow
 def test_pairs_are_drawn_by_the_seed_and_come_in_the_same_order_from_any_number_of_workers(
     small: Subject, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -126,6 +127,7 @@ def interrupt(*progress: int) -> None:
     os.kill(os.getpid(), signal.SIGINT)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("sigint")
 def test_after_ctrl_c_the_trials_so_far_are_told(small: Subject) -> None:
     told: list[str] = []

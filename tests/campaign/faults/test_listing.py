@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pickle
-from pathlib import Path
 
 import pytest
 
@@ -14,12 +13,10 @@ from executive.discovery import discover
 from executive.mission.load import load_mission
 from executive.testing.fake_cell import FakeCell
 
-MISSIONS = sorted((Path(__file__).parents[3] / "missions").glob("*.yaml"))
 
-
-@pytest.mark.parametrize("path", MISSIONS, ids=lambda path: path.stem)
-def test_every_reason_of_every_node_is_there_once_and_lasting_and_so_is_a_bug_in_each(path: Path) -> None:
-    subject = Subject(load_mission(path, discover()), discover(), FakeCell, "fake", 0)
+@pytest.mark.parametrize("mission", ["sort_overhead", "pick_on_request"])
+def test_every_reason_of_every_node_is_there_once_and_lasting_and_so_is_a_bug_in_each(mission: str) -> None:
+    subject = Subject(load_mission(mission, discover()), discover(), FakeCell, "fake", 0)
     listed = {(fault.about, fault.what, fault.when) for fault in Campaign(subject).faults}
     nodes = skill_nodes(subject)
     assert len(nodes) >= 20

@@ -40,20 +40,11 @@ def tried(campaign: Campaign, *numbers: int) -> Trial:
         ("Grasp", "missed", "first", "ok"),
         ("Grasp", "missed", "lasting", "ok -6"),
         ("Approach", "no_contact", "middle", "ok"),
-        ("Approach", "blocked", "middle", "ok"),
         ("Approach", "unreachable", "middle", "ok -1"),
-        ("Approach", "stale", "first", "ok"),
-        ("Transit", "dropped", "middle", "ok"),
-        ("Transit", "blocked", "first", "ok"),
-        ("Release", "stuck", "first", "ok"),
         ("Release", "stuck", "lasting", "FAILURE Release.stuck"),
-        ("Detect", "unsure", "first", "ok"),
         ("Detect", "unavailable", "lasting", "FAILURE Detect.unavailable"),
-        ("Localize", "stale", "first", "ok"),
         ("SelectTarget", "doubtful", "middle", "ok"),
         ("Approach", "target taken", "middle", "FAILURE lost"),
-        ("Transit", "lets go", "late", "ok"),
-        ("detector", "slow by 5 s", "first", "ok"),
         ("detector", "dead for 0.5 s", "first", "ok"),
         ("detector", "hangs for ever", "middle", "FAILURE Detect.unavailable"),
         ("object", "taken", "late", "FAILURE lost"),
@@ -67,8 +58,10 @@ def test_a_fault_is_dealt_with(campaign: Campaign, name: str, what: str, when: s
     assert (trial.verdict, trial.happened, trial.raised) == (verdict, True, True)
 
 
-@pytest.mark.parametrize("name", ["Approach", "Grasp", "Transit", "Release", "Detect", "Wait"])
-@pytest.mark.parametrize(("what", "when"), [("raises", "first"), ("raises", "middle"), ("halted", "middle")])
+@pytest.mark.parametrize(
+    ("name", "what", "when"),
+    [("Grasp", "raises", "first"), ("Transit", "raises", "middle"), ("Detect", "halted", "middle")],
+)
 def test_a_bug_ends_the_run_as_a_fault_of_its_node(
     campaign: Campaign, name: str, what: str, when: str
 ) -> None:
@@ -140,6 +133,7 @@ def test_what_is_not_as_it_has_to_be_is_found(campaign: Campaign, kind: type[Fak
     assert trial.problems[0].startswith(problem)
 
 
+@pytest.mark.slow
 def test_a_fault_repeated_is_recorded(campaign: Campaign, tmp_path: Path) -> None:
     numbers = (number_of(campaign, "Grasp", "missed"),)
     trial, path = record(campaign.subject, campaign.rehearsal, campaign.these(numbers), tmp_path)
@@ -150,26 +144,15 @@ def test_a_fault_repeated_is_recorded(campaign: Campaign, tmp_path: Path) -> Non
     assert (path / "report.html").is_file()
 
 
-def test_a_skill_goes_wrong_in_the_activations_named() -> None:
-    skills = discover()
-    path = "tree/2:repeat/do/carry/try/retry/do/1:sequence/Grasp"
-    breakages = [Breakage(path, "fails", "missed", (2, 3))]
-    result = run_mission("sort_overhead", substitutes=broken_skills(breakages, {path: skills["Grasp"]}))
-    ends = [
-        event.data["reason"]
-        for event in result.events
-        if event.kind == "status" and event.data["node"] == path and event.data["status"] != "RUNNING"
-    ]
-    assert (ends[:5], result.status) == (["", "missed", "missed", "", ""], "SUCCESS")
-
-
-def test_a_skill_that_says_that_it_dropped_something_has_let_it_fall() -> None:
+def test_a_skill_that_says_in_its_second_start_that_it_dropped_something_has_let_it_fall() -> None:
     skills = discover()
     path = "tree/2:repeat/do/carry/try/retry/do/2:parallel/1:sequence/1:retry/do/Transit"
-    breakages = [Breakage(path, "fails", "dropped", (1,))]
+    breakages = [Breakage(path, "fails", "dropped", (2,))]
     result = run_mission("sort_overhead", substitutes=broken_skills(breakages, {path: skills["Transit"]}))
     states: list[Mapping[str, Any]] = [event.data for event in result.events if event.kind == "item"]
     assert "dropped" in {state["state"] for state in states}
+    ends = [event.data for event in result.events if event.kind == "status" and event.data["node"] == path]
+    assert [end["reason"] for end in ends if end["status"] != "RUNNING"][:3] == ["", "dropped", ""]
     assert (result.status, result.agrees) == ("SUCCESS", True)
 
 

@@ -23,7 +23,7 @@ from executive.testing.disturbances import (
     tool_sticks,
 )
 from executive.testing.disturbances.effect import Effect
-from executive.testing.disturbances.hands import hand_of
+from executive.testing.disturbances.hand import hand_of
 from executive.testing.oracle import oracle_cell
 from executive.testing.run_mission import MissionResult, run_mission
 
@@ -66,6 +66,7 @@ def holding(cell: SimCell, event: Event) -> bool:
     return cell.cell.tool.holding
 
 
+@pytest.mark.slow
 def test_where_nothing_seals_the_object_stays_on_the_table(watched: Watched) -> None:
     result = watched.run(during("*/Grasp", seal_fails(), nth=2), holding)
     assert (result.status, result.reasons("*/Grasp")) == ("SUCCESS", ["missed"])
@@ -73,6 +74,7 @@ def test_where_nothing_seals_the_object_stays_on_the_table(watched: Watched) -> 
     assert result.agrees
 
 
+@pytest.mark.slow
 def test_when_a_seal_breaks_in_mid_carry_the_object_falls_and_is_picked_up_again(watched: Watched) -> None:
     result = watched.run(during("*/Transit", seal_breaks(), nth=2), places)
     (told,) = result.disturbances()
@@ -86,6 +88,7 @@ def test_when_a_seal_breaks_in_mid_carry_the_object_falls_and_is_picked_up_again
     assert (result.status, result.reasons("*/Transit")) == ("SUCCESS", ["dropped"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", [seal_breaks(), arm_runs_into(), no_way()], ids=lambda effect: effect.name)
 def test_what_falls_or_is_put_down_is_not_taken_for_something_else(effect: Effect) -> None:
     assert run_mission(
@@ -93,6 +96,7 @@ def test_what_falls_or_is_put_down_is_not_taken_for_something_else(effect: Effec
     ).agrees
 
 
+@pytest.mark.slow
 def test_what_sticks_hangs_at_the_tool_to_the_end(watched: Watched) -> None:
     result = watched.run(during("*/Release", tool_sticks(), nth=(2, 3, 4)), holding)
     assert (result.status, result.reason) == ("FAILURE", "Release.stuck")
@@ -101,6 +105,7 @@ def test_what_sticks_hangs_at_the_tool_to_the_end(watched: Watched) -> None:
     assert result.agrees
 
 
+@pytest.mark.slow
 def test_what_is_taken_from_under_the_tool_is_gone_and_lost(watched: Watched) -> None:
     result = watched.run(during("*/Approach", object_removed(), nth=2), places)
     assert result.reasons("*/Approach") == ["no_contact"]
@@ -129,6 +134,7 @@ def test_what_is_moved_is_found_where_it_is_now(watched: Watched) -> None:
     assert (result.status, result.items["lost"], result.agrees) == ("SUCCESS", 0, True)
 
 
+@pytest.mark.slow
 def test_an_arm_that_runs_into_something_brakes(watched: Watched) -> None:
     result = watched.run(
         during("*/Approach", arm_runs_into("a hand"), nth=2), lambda cell, event: cell.cell.arm.at_rest
@@ -141,6 +147,7 @@ def test_an_arm_that_runs_into_something_brakes(watched: Watched) -> None:
     assert (result.status, result.items["rejected"], result.agrees) == ("SUCCESS", 0, True)
 
 
+@pytest.mark.slow
 def test_the_world_goes_on_without_what_was_removed_before_anybody_looked(watched: Watched) -> None:
     result = watched.run(after(0.0, object_removed(1)), places)
     assert (result.status, result.agrees) == ("SUCCESS", True)

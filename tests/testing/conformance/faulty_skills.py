@@ -1,0 +1,384 @@
+"""Skills that conform, and skills with one realistic mistake each, named after the mistake."""
+
+from __future__ import annotations
+
+import random
+import sys
+from collections.abc import Iterator
+from typing import Any, ClassVar
+
+from executive.arm import Goal
+from executive.cell import Cell, Steps
+from executive.messages import Item, Target
+from executive.moving import follow, heeding, planned
+from executive.skill import EMPTY, HOLDING, In, Metres, Out, Seconds, Skill, SkillFailed, param, port
+
+
+class Push(Skill):
+    """Push the target aside."""
+
+    target: In[Target] = port(doc="what to push")
+    height: Metres = param(0.05, ge=0.0, le=0.2, doc="above the target's middle")
+    reasons: ClassVar = ("unreachable", "blocked")
+    uses: ClassVar = ("arm",)
+    moves: ClassVar = True
+    tool_state: ClassVar = (EMPTY, EMPTY)
+
+    def run(self, cell: Cell) -> Steps:
+        x, y, z = (float(value) for value in self.target.position)
+        motion = yield from planned(self, cell.arm, lambda: (Goal((x, y, z + self.height)), heeding(cell)))
+        yield from follow(self, cell, motion)
+
+
+class Pause(Skill):
+    """Wait for two control steps."""
+
+    reasons: ClassVar = ("tired",)
+
+    def run(self, cell: Cell) -> Steps:
+        yield
+        yield
+
+
+class GraspTarget(Skill):
+    """Grasp the target."""
+
+    target: In[Target] = port(doc="what the tool touches")
+    reasons: ClassVar = ("missed",)
+    uses: ClassVar = ("tool",)
+    tool_state: ClassVar = (EMPTY, HOLDING)
+
+
+class Careful(Pause):
+    """Wait."""
+
+    def run(self, cell: Cell) -> Steps:
+        """Keep steps and a failure until they are wanted; `follow` is a local name here."""
+        steps, waiting, follow = cell.clock.sleep(0.01), self._rest(cell), list[int].append
+        failure = self.failed("tired", "after 1 step")
+        follow([], 1)
+        yield from steps
+        yield from waiting
+        try:
+            raise failure
+        except SkillFailed:
+            return
+
+    def _rest(self, cell: Cell) -> Steps:
+        return cell.clock.sleep(0.01)
+
+
+class Undocumented(Pause):
+    gap: Metres = param(0.1)
+    target: In[Target]
+
+
+class BadDefaults(Pause):
+    """Wait."""
+
+    near: Metres = param(0.1, ge=0.2, doc="how near")
+    far: Metres = param(0.3, le=0.2, doc="how far")
+    edge: Metres = param(0.2, ge=0.2, le=0.2, doc="both bounds are allowed")
+    order: str = param("rows", choices=("columns", "none"), doc="in which order")
+    gap: Metres = param("wide", doc="how far apart")
+    limit: float | None = param(None, ge=1, doc="at most [-]")
+
+
+class RaisesUndeclared(Pause):
+    """Wait."""
+
+    def run(self, cell: Cell) -> Steps:
+        yield
+        if not cell.bins:
+            raise self.failed("no_bins", "there are no bins")
+
+
+class TextForTuple(Pause):
+    """Wait."""
+
+    reasons: ClassVar = "tired"
+    uses: ClassVar = "arm"
+
+
+class BadResources(Pause):
+    """Wait."""
+
+    uses: ClassVar = ("gripper", "tool")
+    moves: ClassVar = True
+    tool_left: ClassVar = {"dropped": EMPTY, "halt": EMPTY, "tired": EMPTY}
+
+
+class StepsNotTaken(Push):
+    """Push the target aside."""
+
+    def run(self, cell: Cell) -> Steps:
+        motion = yield from planned(self, cell.arm, lambda: ("aside", heeding(cell)))
+        follow(self, cell, motion)
+        steps = follow(self, cell, motion)  # noqa: F841
+        cell.clock.sleep(1.0)
+        self._rest(cell)
+        _wait(cell)
+        self._tire()
+        self.failed("blocked", "after 1 step")
+        return follow(self, cell, motion)
+
+    def _rest(self, cell: Cell) -> Steps:
+        return cell.clock.sleep(1.0)
+
+    def _tire(self) -> SkillFailed:
+        return self.failed("blocked", "after 1 step")
+
+
+def _wait(cell: Cell) -> Steps:
+    cell.clock.sleep(1.0)
+    yield
+
+
+class AlwaysFails(Pause):
+    """Wait."""
+
+    def run(self, cell: Cell) -> Steps:
+        yield
+        raise self.failed("tired", "after 1 step")
+
+
+class NeedsUnknown(Pause):
+    """Wait."""
+
+    plan: In[dict[str, int]] = port(doc="what is to come")
+    words: In[str] = port(doc="what to say")
+
+
+class WaitsForEver(Pause):
+    """Wait."""
+
+    tool_state: ClassVar = (EMPTY, EMPTY)
+
+    def run(self, cell: Cell) -> Steps:
+        while not cell.tool.holding:
+            yield
+
+
+class LoopsWithoutYield(Pause):
+    """Wait."""
+
+    tool_state: ClassVar = (EMPTY, EMPTY)
+
+    def run(self, cell: Cell) -> Steps:
+        yield
+        while cell.ledger.epoch > 0:
+            try:
+                cell.camera.area("table")
+            except Exception:
+                return
+
+
+class LoopsWhenHalted(Pause):
+    """Wait."""
+
+    def run(self, cell: Cell) -> Steps:
+        is_done = False
+        try:
+            yield
+            is_done = True
+        finally:
+            while not is_done:
+                pass
+
+
+class TrustsTheDetector(Skill):
+    """Look, and take an answer for granted."""
+
+    uses: ClassVar = ("camera",)
+    senses: ClassVar = True
+
+    def run(self, cell: Cell) -> Steps:
+        request = next(iter(cell.detectors.values())).request(cell.camera.capture(), "table")
+        while not request.ready:
+            yield
+        _ = request.result().found[0]
+
+
+class ForgetsOutput(Pause):
+    """Wait."""
+
+    chosen: Out[Item] = port(refers="item", doc="what was chosen")
+
+
+class FailsUndeclared(Pause):
+    """Wait."""
+
+    def run(self, cell: Cell) -> None:  # type: ignore[override]
+        if cell.tool.holding:
+            raise SkillFailed("bored", "nothing happens")
+
+
+class FailsWithoutSentence(Pause):
+    """Wait."""
+
+    def run(self, cell: Cell) -> Steps:
+        yield
+        if cell.tool.holding:
+            raise self.failed("tired", " ")
+
+
+class YieldsValue(Pause):
+    """Wait."""
+
+    def run(self, cell: Cell) -> Iterator[Any]:  # type: ignore[override]
+        yield cell.clock.sleep(1.0)
+
+
+class WrongOutputs(Pause):
+    """Wait."""
+
+    chosen: Out[Item] = port(refers="item", doc="what was chosen")
+    targets: Out[list[Target]] = port(doc="what there is")
+    length: Out[float | None] = port(doc="how long")
+
+    def run(self, cell: Cell) -> Steps:
+        yield
+        self.chosen, self.targets, self.length = 3, ["cube-1"], 1  # type: ignore[assignment, list-item]
+
+
+class ChangesInput(Pause):
+    """Wait."""
+
+    targets: In[list[Target]] = port(doc="what there is")
+
+    def run(self, cell: Cell) -> Steps:
+        yield
+        self.targets.pop(0)
+
+
+class UsesUndeclared(Skill):
+    """Do as one likes."""
+
+    def run(self, cell: Cell) -> Steps:
+        yield
+        cell.camera.capture()
+        cell.operator.ask(())
+        cell.arm.stop()
+
+
+class MovesUndeclared(Push):
+    """Push the target aside."""
+
+    moves: ClassVar = False
+
+
+class LetsGo(Skill):
+    """Hold what the tool holds."""
+
+    uses: ClassVar = ("tool",)
+    tool_state: ClassVar = (HOLDING, HOLDING)
+
+    def run(self, cell: Cell) -> Steps:
+        yield
+        cell.tool.open()
+
+
+class GraspsInSecret(GraspTarget):
+    """Grasp the target."""
+
+    def run(self, cell: Cell) -> Steps:
+        yield
+        cell.tool.close()
+        if not cell.tool.holding:
+            cell.tool.open()
+            raise self.failed("missed", "no seal")
+
+
+class HoldsOnWhenHalted(GraspTarget):
+    """Grasp the target."""
+
+    def run(self, cell: Cell) -> Steps:
+        cell.tool.close()
+        yield
+        if not cell.tool.holding:
+            cell.tool.open()
+            raise self.failed("missed", "no seal")
+        cell.ledger.held(self.target.item)
+
+
+class EndsTooEarly(Push):
+    """Push the target aside."""
+
+    def run(self, cell: Cell) -> Steps:
+        motion = yield from planned(self, cell.arm, lambda: ("aside", heeding(cell)))
+        cell.arm.start(motion)
+
+
+class RunsOnWhenHalted(Push):
+    """Push the target aside."""
+
+    def run(self, cell: Cell) -> Steps:
+        motion = yield from planned(self, cell.arm, lambda: ("aside", heeding(cell)))
+        cell.arm.start(motion)
+        while not cell.arm.at_rest:
+            yield
+        if cell.arm.met:
+            raise self.failed("blocked", cell.arm.met)
+
+
+class WaitsInFinally(Pause):
+    """Wait."""
+
+    def run(self, cell: Cell) -> Steps:
+        try:
+            yield
+        finally:
+            yield from cell.clock.sleep(0.1)
+
+
+class RaisesInFinally(Pause):
+    """Wait."""
+
+    def run(self, cell: Cell) -> Steps:
+        is_done = False
+        try:
+            yield
+            is_done = True
+        finally:
+            if not is_done:
+                raise ValueError("not done")
+
+
+class DependsOnChance(Pause):
+    """Wait."""
+
+    chosen: Out[float] = port(doc="what was chosen")
+
+    def run(self, cell: Cell) -> Steps:
+        yield
+        self.chosen = random.random()
+
+
+class CallsByChance(Pause):
+    """Wait."""
+
+    def run(self, cell: Cell) -> Steps:
+        yield
+        cell.camera.area(str(random.random()))
+
+
+class WaitsByChance(Pause):
+    """Wait."""
+
+    runs: ClassVar[list[int]] = []
+
+    def run(self, cell: Cell) -> Steps:
+        self.runs.append(0)
+        if len(self.runs) % 2:
+            yield
+
+
+class ComputesTooLong(Skill):
+    """Hold on."""
+
+    tool_state: ClassVar = (HOLDING, HOLDING)
+    work: Seconds = param(0.06, doc="time that it blocks")
+
+    def run(self, cell: Cell) -> Steps:
+        yield
+        sys.modules["time"].sleep(self.work)

@@ -1,0 +1,282 @@
+"""Every check against the skills that make its mistake, told word for word; and every shipped skill."""
+
+from __future__ import annotations
+
+import re
+import signal
+import sys
+from collections.abc import Mapping
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from typing import Any
+
+import faulty_skills as faulty
+import pytest
+
+from executive.discovery import discover
+from executive.skill import Skill
+from executive.testing.conformance import Stage, conformance
+from executive.testing.conformance.check import RULES, Check, NotConforming
+
+ARRANGE = "as skills/README.md shows."
+FAULT = " That is a fault, which ends the run: fail with a declared reason where this can happen, or mend it."
+FINALLY = "What finally does must be done at once and cannot fail."
+REST = "Call cell.arm.stop() in finally, or use follow of executive.moving."
+CHANCE = "Nothing may depend on chance, on time, or on an earlier run; a seed may be a param."
+TOOL = "Leave the tool as declared, or declare how it is left."
+EMPTY = "with an empty tool"
+
+
+def unmade(text: str) -> str:
+    return (
+        f"faulty_skills.py:N calls {text}(...) and makes none of its steps, so it does nothing. "
+        f'Write "yield from {text}(...)".'
+    )
+
+
+def unraised(text: str) -> str:
+    return (
+        f"faulty_skills.py:N calls {text}(...) and does not raise it, so nothing fails. "
+        f'Write "raise {text}(...)".'
+    )
+
+
+FAULTY: list[tuple[str, type[Skill], list[str]]] = [
+    ("documented", faulty.Undocumented, [
+        'the docstring of Undocumented begins with "", which is no sentence. Say in its first line what is '
+        "true when the skill has succeeded.",
+        'Undocumented.gap has no doc. Write param(..., doc="what it is").',
+        'Undocumented.target has no doc. Write port(..., doc="what it is").',
+    ]),
+    ("defaults_allowed", faulty.BadDefaults, [
+        f"BadDefaults.{problem}. Mend the default, or its limits." for problem in (
+            "near has the default 0.1, which is less than 0.2",
+            "far has the default 0.3, which is more than 0.2",
+            "order has the default 'rows', which is not among 'columns', 'none'",
+            "gap has the default 'wide': must be a number, not the text \"wide\"",
+        )
+    ]),
+    ("reasons_declared", faulty.RaisesUndeclared, [
+        'faulty_skills.py:N fails with "no_bins", which RaisesUndeclared does not declare. '
+        "Add it to reasons; there are: tired.",
+    ]),
+    ("reasons_declared", faulty.TextForTuple, [
+        'TextForTuple.reasons is the text "tired". Write a tuple: ("tired",).',
+    ]),
+    ("resources_declared", faulty.TextForTuple, [
+        "TextForTuple uses 'arm'. Write a tuple of arm, tool, camera.",
+    ]),
+    ("resources_declared", faulty.BadResources, [
+        "BadResources uses gripper. Write a tuple of arm, tool, camera.",
+        'BadResources moves the arm but does not use it. Add "arm" to uses, or leave moves out.',
+        'BadResources.tool_left has "dropped", which is no ending of it. There are: tired, halt.',
+    ]),
+    ("calls_take_effect", faulty.StepsNotTaken, [
+        unmade("follow"), unmade("follow"), unmade("cell.clock.sleep"), unmade("self._rest"), unmade("_wait"),
+        unraised("self._tire"), unraised("self.failed"), unmade("follow"), unmade("cell.clock.sleep"),
+    ]),
+    ("arranged", faulty.AlwaysFails, [
+        f'AlwaysFails never succeeded; {EMPTY} it failed with "tired" (after 1 step). Arrange a stage on '
+        f"which it can: conformance(AlwaysFails, lambda stage: ...), {ARRANGE}",
+    ]),
+    ("arranged", faulty.NeedsUnknown, [
+        'NeedsUnknown cannot be tried: no value can be made up for "plan" (dict) and "words" (a text). Give '
+        f'it in a test: conformance(NeedsUnknown, lambda stage: {{"plan": ..., "words": ...}}), {ARRANGE}',
+    ]),
+    ("comes_to_an_end", faulty.WaitsForEver, [
+        f"{EMPTY} WaitsForEver was not over after 60 s. Whatever it waits for may never come: wait for so "
+        "long at most, then fail with a reason.",
+    ]),
+    ("ends_as_declared", faulty.TrustsTheDetector, [
+        f"{EMPTY} while everything on the table is gone at tick 12 IndexError: tuple index out of range "
+        f"(faulty_skills.py:N).{FAULT}",
+        f"{EMPTY} while no detector answers at tick 12 Unavailable: the detector is dead, as the test wants "
+        f"it (faulty_skills.py:N).{FAULT}",
+        f"{EMPTY} while the detectors see nothing at tick 12 IndexError: tuple index out of range "
+        f"(faulty_skills.py:N).{FAULT}",
+    ]),
+    ("ends_as_declared", faulty.ForgetsOutput, [
+        f"{EMPTY} at tick 2 it succeeded without setting its output chosen.{FAULT}",
+    ]),
+    ("ends_as_declared", faulty.FailsUndeclared, [
+        'with an item in the tool at tick 0 it failed with the undeclared reason "bored"; it declares: tired '
+        f"(faulty_skills.py:N).{FAULT}",
+    ]),
+    ("ends_as_declared", faulty.FailsWithoutSentence, [
+        'with an item in the tool at tick 1 it failed with "tired" and no sentence. '
+        "Say what happened, with the numbers: it is all that the operator will read.",
+    ]),
+    ("ends_as_declared", faulty.YieldsValue, [
+        f'{EMPTY} at tick 0 it yielded a generator; to run steps of others write "yield from".{FAULT}',
+    ]),
+    ("outputs_fit", faulty.WrongOutputs, [
+        f"{EMPTY} WrongOutputs.chosen is of the type int, not a text. "
+        "Set what it declares, or declare what it is.",
+        f"{EMPTY} WrongOutputs.targets is of the type list, not a list of Target. "
+        "Set what it declares, or declare what it is.",
+    ]),
+    ("inputs_unchanged", faulty.ChangesInput, [
+        f"{EMPTY} it changed what self.targets holds. Others read the same value after it: work on a copy.",
+    ]),
+    ("uses_only_what_it_declares", faulty.UsesUndeclared, [
+        'UsesUndeclared calls cell.camera.capture and does not use the camera. Add "camera" to uses.',
+        "UsesUndeclared calls cell.camera.capture and does not say that it senses. Add senses = True.",
+        "UsesUndeclared calls cell.operator.ask and does not say that it senses. Add senses = True.",
+        'UsesUndeclared calls cell.arm.stop and does not use the arm. Add "arm" to uses.',
+    ]),
+    ("uses_only_what_it_declares", faulty.MovesUndeclared, [
+        "MovesUndeclared calls cell.arm.start and does not say that it moves. Add moves = True.",
+    ]),
+    ("tool_left_as_declared", faulty.LetsGo, [
+        "with an item in the tool it succeeded, and the tool is empty. It should hold something: tool_state "
+        f"says so. {TOOL}",
+    ]),
+    ("tool_left_as_declared", faulty.GraspsInSecret, [
+        f"{EMPTY} it succeeded, and the tool holds an object that the ledger does not know of. "
+        "Tell it by cell.ledger.held, or open the tool in finally.",
+    ]),
+    ("tool_left_as_declared", faulty.HoldsOnWhenHalted, [
+        f"{EMPTY} it was halted at tick 1, and the tool holds something. It should be empty: as before, for "
+        f'tool_left says nothing of "halt". {TOOL}',
+    ]),
+    ("arm_left_at_rest", faulty.EndsTooEarly, [f"{EMPTY} it succeeded, and the arm still moves. {REST}"]),
+    ("arm_left_at_rest", faulty.RunsOnWhenHalted, [
+        f"{EMPTY} it was halted at tick 13, and the arm still moves. {REST}",
+    ]),
+    ("halts_at_once", faulty.WaitsInFinally, [
+        f"{EMPTY} at tick 1 it yielded while it was halted; nothing may wait in \"finally\". {FINALLY}",
+    ]),
+    ("halts_at_once", faulty.RaisesInFinally, [
+        f"{EMPTY} at tick 1 ValueError while it was halted: not done (faulty_skills.py:N). {FINALLY}",
+    ]),
+    ("repeats_itself", faulty.DependsOnChance, [
+        f"{EMPTY}, twice the same, it set its outputs to different values. {CHANCE}",
+    ]),
+    ("repeats_itself", faulty.CallsByChance, [
+        f"{EMPTY}, twice the same, it called camera.area at tick 1 with different arguments. {CHANCE}",
+    ]),
+    ("repeats_itself", faulty.WaitsByChance, [
+        f"{EMPTY}, twice the same, it ended as SUCCESS after 1 ticks and then as SUCCESS after 0. {CHANCE}",
+    ]),
+    ("ticks_are_quick", faulty.ComputesTooLong, [
+        "with an item in the tool it computed for N ms in tick 1, which holds up the arm. "
+        "Spread the work over ticks by yield, or let a detector do it.",
+    ]),
+]  # fmt: skip
+"""Check, skill, and the first problems that the check tells of it."""
+
+
+def check_of(skill: type[Skill], name: str) -> Check:
+    return next(check for check in conformance(skill) if check.name == name)
+
+
+def told(check: Check) -> list[str]:
+    """Return the problems without what depends on the machine, or on a line in a file."""
+    patterns = ((r"\.py:\d+", ".py:N"), (r"\d+ ms", "N ms"))
+    problems = list(check.verdict().problems)
+    for pattern, word in patterns:
+        problems = [re.sub(pattern, word, problem) for problem in problems]
+    return problems
+
+
+@pytest.mark.parametrize(("check", "skill", "problems"), FAULTY, ids=lambda one: getattr(one, "__name__", ""))
+def test_a_mistake_is_told(check: str, skill: type[Skill], problems: list[str]) -> None:
+    assert told(check_of(skill, check))[: len(problems)] == problems
+
+
+def test_every_check_has_a_skill_that_fails_it() -> None:
+    assert {check for check, _, _ in FAULTY} | {"imports_allowed"} == {rule.__name__ for rule in RULES}
+
+
+def test_the_guide_lists_every_check_with_its_rule() -> None:
+    guide = (Path(__file__).parents[3] / "skills" / "README.md").read_text(encoding="utf-8")
+    rows = [f"| `{check.name}` | {check.doc.rstrip('.')} |" for check in conformance(faulty.Pause)]
+    assert re.findall(r"^\| `[a-z_]+` \| .* \|$", guide.partition("## Conformance")[2], re.M) == rows
+
+
+@pytest.mark.parametrize("skill", [faulty.Push, faulty.Careful], ids=lambda skill: skill.__name__)
+def test_nothing_is_found_in_a_skill_that_conforms(skill: type[Skill]) -> None:
+    for check in conformance(skill):
+        check()
+
+
+@pytest.mark.parametrize("name", discover())
+def test_every_shipped_skill_conforms(name: str) -> None:
+    for check in conformance(discover()[name], name=name):
+        check()
+
+
+@pytest.mark.parametrize("statement", ["import time", "from threading import Lock", "import asyncio.events"])
+def test_a_file_that_imports_another_clock_or_threads_is_found(statement: str, tmp_path: Path) -> None:
+    path = tmp_path / "waving.py"
+    path.write_text(
+        f"from executive.skill import Skill\n{statement}\n\n"
+        "class Wave(Skill):\n    '''Wave once.'''\n\n    def run(self, cell):\n        yield\n"
+    )
+    spec = spec_from_file_location(path.stem, path)
+    assert spec is not None and spec.loader is not None
+    module = sys.modules[path.stem] = module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        del sys.modules[path.stem]
+    package = statement.split()[1].partition(".")[0]
+    assert check_of(module.Wave, "imports_allowed").verdict().problems == (
+        f"waving.py:2 imports {package}. A skill waits on cell.clock and acts through cell alone; "
+        "find there what it needs.",
+    )
+
+
+def test_a_problem_is_raised_with_the_rule_and_without_a_stage_nothing_succeeds() -> None:
+    with pytest.raises(NotConforming) as raised:
+        check_of(faulty.AlwaysFails, "arranged")()
+    assert str(raised.value).splitlines()[0] == (
+        "It can be tried, and it succeeds in one situation at least. Not so:"
+    )
+    check = check_of(faulty.NeedsUnknown, "arm_left_at_rest")
+    assert check.verdict().status == "not run"
+    with pytest.raises(NotConforming, match='no value can be made up for "plan"'):
+        check()
+
+
+def test_a_check_is_called_after_skill_and_rule() -> None:
+    assert str(conformance(faulty.Pause)[0]) == "Pause.documented"
+    assert str(conformance(faulty.Pause, name="Break")[0]) == "Break.documented"
+
+
+@pytest.mark.parametrize(
+    ("skill", "where"),
+    [
+        (faulty.LoopsWithoutYield, f"{EMPTY} while the table has changed since the look at tick 1"),
+        (faulty.LoopsWhenHalted, f"{EMPTY} at tick 1, halted there,"),
+    ],
+)
+def test_a_tick_that_does_not_come_back_is_broken_off_once(
+    skill: type[Skill], where: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("executive.testing.conformance.patience.STUCK_TIMEOUT", 0.3)
+    answered = signal.getsignal(signal.SIGALRM)
+    checks = {check.name: check for check in conformance(skill)}
+    problem = (
+        f"{where} {skill.__name__} did not come back for 0.3 s, at faulty_skills.py:N. "
+        "The arm waits for every tick: yield in each loop that waits, or leave work to a detector."
+    )
+    assert told(checks["comes_to_an_end"]) == [problem]
+    tries = checks["comes_to_an_end"].case.tries
+    assert (checks["halts_at_once"].verdict().status, told(checks["halts_at_once"])) == ("not run", [problem])
+    assert checks["halts_at_once"].case.tries == tries, "nobody waits twice"
+    assert checks["documented"].verdict().status == "ok"
+    assert signal.getitimer(signal.ITIMER_REAL)[0] == 0
+    assert signal.getsignal(signal.SIGALRM) is answered
+
+
+def test_an_arrangement_that_does_not_come_back_is_broken_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    def arrange(stage: Stage) -> Mapping[str, Any]:
+        while True:
+            pass
+
+    monkeypatch.setattr("executive.testing.conformance.patience.STUCK_TIMEOUT", 0.3)
+    check = next(check for check in conformance(faulty.Pause, arrange) if check.name == "arranged")
+    assert check.verdict().problems == (
+        "what Pause.arranged asks of it did not come back for 0.3 s. A skill answers every question at once.",
+    )
