@@ -1,11 +1,16 @@
-"""What a cell file means in space: bins with their drop slots, classes of objects, the height of travel."""
+"""Layout of a cell file: bins with their drop slots, classes of objects, height of travel, and the cell."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
+from executive.arm import Arm
+from executive.cell import Camera, Cell, Clock, Detector, Ledger, Localizer, Operator, Routes, Tool
 from executive.cell_config import BinConfig, CellConfig, ObjectConfig
-from executive.messages import Bin, ObjectClass
+from executive.events import Emit
+from executive.messages import Bin, ObjectClass, Target
 
 TOOL_RADIUS = 0.012
 """Radius of the tool's body [m]."""
@@ -39,3 +44,55 @@ def pile_height(config: CellConfig) -> float:
     """Return how high [m] things on the table may be: the tallest object, or two where some are stacked."""
     tallest = max(kind.height for kind in config.objects.values())
     return 2 * tallest if config.table.stacked else tallest
+
+
+def bins_of(config: CellConfig) -> dict[str, Bin]:
+    """Return the bins of a cell file by name."""
+    return {name: as_bin(name, bin) for name, bin in config.bins.items()}
+
+
+def classes_of(config: CellConfig) -> dict[str, ObjectClass]:
+    """Return the classes of a cell file by label, each of the default mass."""
+    return {label: as_class(label, kind) for label, kind in config.objects.items()}
+
+
+def make_cell(
+    config: CellConfig,
+    routes: Routes,
+    emit: Emit,
+    *,
+    clock: Clock,
+    arm: Arm,
+    tool: Tool,
+    camera: Camera,
+    detectors: Mapping[str, Detector],
+    ledger: Ledger,
+    operator: Operator,
+    classes: Mapping[str, ObjectClass],
+    localizer: Localizer,
+) -> Cell:
+    """Return a cell of these parts with the layout of its cell file.
+
+    Every decision for a target is emitted as a `decision`.
+    """
+
+    def decided(target: Target, bin: str) -> None:
+        emit("decision", item=target.item, label=target.label, frame=target.frame, bin=bin)
+
+    return Cell(
+        clock=clock,
+        arm=arm,
+        tool=tool,
+        camera=camera,
+        detectors=detectors,
+        ledger=ledger,
+        operator=operator,
+        bins=bins_of(config),
+        classes=classes,
+        routes=routes,
+        localizer=localizer,
+        safe_place=np.array(config.safe_place),
+        descent=config.motion.descent,
+        descent_speed=config.motion.descent_speed,
+        decided=decided,
+    )

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from executive.clock import STEP
 from executive.geometry import Array
 from executive.motion.limits import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.sim.arm import SimArm
-from executive.sim.world import STEP
 
 BEFORE = 5
 """Commands looked at from before the arm was told to stop, so that no edge is missed."""

@@ -12,11 +12,12 @@ import pybullet
 
 from executive.campaign.motion_rivals import Textbook
 from executive.cell_config import CellConfig
+from executive.clock import STEP
 from executive.geometry import Array
 from executive.motion.limits import JointLimits
 from executive.motion.state import JOINTS, State
 from executive.motion.trajectory import peaks
-from executive.sim.world import STEP, World
+from executive.sim.world import World
 
 MOVES = (300, 240, 240, 300, 240, 240)
 """Steps for which each target is held: above the object, on it, above it, above the bin, in it, above it."""

@@ -12,13 +12,14 @@ from executive.campaign.motion_gauge import Gauge
 from executive.campaign.motion_scenes import Scene, Scenes
 from executive.campaign.motion_trial import EVERY, Progress, opened, repeat, silent
 from executive.cell_config import CellConfig
+from executive.clock import STEP
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Pose
 from executive.motion.planner import Planner
 from executive.sim.arm import SimArm
 from executive.sim.clock import SimClock
 from executive.sim.tool import SuctionTool
-from executive.sim.world import STEP, World
+from executive.sim.world import World
 from executive.view.figures.motion import ExecutionFigures
 
 SETTLE = 24

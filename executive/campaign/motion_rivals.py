@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from executive.arm import Goal
+from executive.clock import STEP
 from executive.errors import InputError
 from executive.geometry import Array, tool_down
 from executive.motion.free import Connector
@@ -21,7 +22,7 @@ from executive.motion.limits import JointLimits
 from executive.motion.postures import LIMIT_MARGIN, find_postures, upright_line
 from executive.motion.state import State
 from executive.motion.timing import rest_to_rest
-from executive.motion.trajectory import STEP, Trajectory
+from executive.motion.trajectory import Trajectory
 
 AROUND = np.radians(np.arange(-5.0, 5.5, 0.5))
 """Swivels around the best one of the coarse search that the floor tries too [rad]."""

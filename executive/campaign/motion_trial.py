@@ -20,6 +20,7 @@ from executive.campaign.motion_gauge import Gauge
 from executive.campaign.motion_rivals import Textbook, floor, textbook, toppra
 from executive.campaign.motion_scenes import Scene, Scenes
 from executive.cell_config import CellConfig
+from executive.clock import STEP
 from executive.errors import Blocked, InputError, Unreachable
 from executive.geometry import Array
 from executive.layout import travel_height
@@ -27,7 +28,7 @@ from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
 from executive.motion.state import State
 from executive.motion.stop import brake
-from executive.motion.trajectory import STEP, Trajectory, peaks
+from executive.motion.trajectory import Trajectory, peaks
 from executive.sim.clearance import PathClearance
 from executive.sim.world import World
 from executive.view.figures.motion import MethodFigures, MotionFigures, PlanningFigures

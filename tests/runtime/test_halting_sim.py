@@ -14,6 +14,7 @@ import pytest
 from py_trees.common import Status
 from scipy.optimize import minimize_scalar
 
+from executive.clock import STEP
 from executive.discovery import discover
 from executive.geometry import Array
 from executive.mission.load import load_mission
@@ -22,7 +23,6 @@ from executive.motion.trajectory import Trajectory
 from executive.record.journal import Journal, read_journal
 from executive.runtime.run import Outcome, Run
 from executive.sim.cell import SimCell
-from executive.sim.world import STEP
 from executive.testing.oracle import oracle_cell
 
 TICKS = [int(tick) for tick in np.linspace(40, 1900, 12)]

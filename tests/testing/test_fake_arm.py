@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from executive.arm import Goal, Motion, Task
+from executive.clock import STEP
 from executive.errors import Fault, Unreachable
 from executive.geometry import Array
 from executive.messages import Obstacle
 from executive.testing.fake_arm import BEARS, SPEED
 from executive.testing.fake_cell import FakeCell, bare_table
-from executive.testing.fake_world import STEP
 
 LATENCY = bare_table().motion.planning
 BESIDE = Goal((0.5, 0.2, 0.03), guarded=0.02, speed=0.05)

@@ -8,6 +8,7 @@ from time import perf_counter
 from traceback import extract_tb
 from typing import Any
 
+from executive.clock import STEP
 from executive.messages import Item
 from executive.skill import Direction, Skill, SkillFailed
 from executive.testing.conformance.adversities import NOTHING, Adversity
@@ -17,7 +18,6 @@ from executive.testing.conformance.same import same
 from executive.testing.conformance.situations import Scene
 from executive.testing.conformance.source import place_in
 from executive.testing.conformance.watch import Call, Watch
-from executive.testing.fake_world import STEP
 
 LONGEST = 60.0
 """Time on the run's clock after which a skill must have ended [s]: nothing takes so long on a fake table."""

@@ -9,13 +9,12 @@ from pathlib import Path
 
 from executive.cell import Steps
 from executive.cell_config import CameraConfig, DetectorConfig
+from executive.clock import STEP
 from executive.errors import Unavailable
 from executive.messages import Detection, Frame
 from executive.vision.detectors.registry import build_detectors
 from executive.vision.detectors.setting import ClosableDetector
 
-STEP = 1 / 240
-"""Length of a control step of simulated cells [s]."""
 PAUSE = 1.0
 """Time on the clock between two looks [s]: about what lies between two in a run."""
 PATIENCE = 60.0
