@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import singledispatch
 from typing import Any
 
 from executive.arm import Goal
@@ -28,7 +27,7 @@ def written_down(cell: Cell, commands: list[str]) -> Cell:
     """
 
     def note(command: str, *arguments: Any) -> None:
-        commands.append(" ".join([command, *filter(None, map(said, arguments))]))
+        commands.append(" ".join([command, *filter(None, map(short_text, arguments))]))
 
     def ask(access: Access) -> Any:
         if access.name in _NOTED:
@@ -42,34 +41,17 @@ def written_down(cell: Cell, commands: list[str]) -> Cell:
     return replace(intercept(cell, ask, _ROLES), decided=decided)
 
 
-@singledispatch
-def said(argument: object) -> str:
-    """Return an argument of a command in a word, or "" for one that no word can tell."""
-    del argument
+def short_text(argument: object) -> str:
+    """Return the short text of an argument of a command, or "" for one that has none."""
+    if isinstance(argument, str):
+        return argument
+    if isinstance(argument, Goal):
+        # Adding 0.0 makes a negative zero a plain one.
+        return str(tuple(round(float(value), 4) + 0.0 for value in argument.position))
+    if isinstance(argument, Target):
+        return argument.item
+    if isinstance(argument, Frame):
+        return f"frame {argument.id}"
+    if isinstance(argument, Detections):
+        return f"{len(argument.found)} found in frame {argument.frame.id}"
     return ""
-
-
-@said.register
-def _(argument: str) -> str:
-    return argument
-
-
-@said.register
-def _(argument: Goal) -> str:
-    # Adding 0.0 makes a negative zero a plain one.
-    return str(tuple(round(float(value), 4) + 0.0 for value in argument.position))
-
-
-@said.register
-def _(argument: Target) -> str:
-    return argument.item
-
-
-@said.register
-def _(argument: Frame) -> str:
-    return f"frame {argument.id}"
-
-
-@said.register
-def _(argument: Detections) -> str:
-    return f"{len(argument.found)} found in frame {argument.frame.id}"
