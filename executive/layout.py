@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from executive.arm import Arm
-from executive.cell import Camera, Cell, Clock, Detector, Ledger, Localizer, Operator, Routes, Tool
+from executive.cell import Cell, Ledger, Routes
 from executive.cell_config import BinConfig, CellConfig, ObjectConfig
 from executive.events import Emit
 from executive.messages import Bin, ObjectClass, Target
@@ -56,41 +55,28 @@ def classes_of(config: CellConfig) -> dict[str, ObjectClass]:
     return {label: as_class(label, kind) for label, kind in config.objects.items()}
 
 
-def make_cell(
-    config: CellConfig,
-    routes: Routes,
-    emit: Emit,
-    *,
-    clock: Clock,
-    arm: Arm,
-    tool: Tool,
-    camera: Camera,
-    detectors: Mapping[str, Detector],
-    ledger: Ledger,
-    operator: Operator,
-    classes: Mapping[str, ObjectClass],
-    localizer: Localizer,
-) -> Cell:
-    """Return a cell of these parts with the layout of its cell file.
+def cell_without_parts(config: CellConfig, routes: Routes, ledger: Ledger, emit: Emit) -> Cell:
+    """Return the cell of a cell file with None for every part of hardware, for a cell kind to put in.
 
     Every decision for a target is emitted as a `decision`.
     """
+    missing: Any = None
 
     def decided(target: Target, bin: str) -> None:
         emit("decision", item=target.item, label=target.label, frame=target.frame, bin=bin)
 
     return Cell(
-        clock=clock,
-        arm=arm,
-        tool=tool,
-        camera=camera,
-        detectors=detectors,
+        clock=missing,
+        arm=missing,
+        tool=missing,
+        camera=missing,
+        detectors=dict.fromkeys(config.detectors, missing),
         ledger=ledger,
-        operator=operator,
+        operator=missing,
         bins=bins_of(config),
-        classes=classes,
+        classes=classes_of(config),
         routes=routes,
-        localizer=localizer,
+        localizer=missing,
         safe_place=np.array(config.safe_place),
         descent=config.motion.descent,
         descent_speed=config.motion.descent_speed,

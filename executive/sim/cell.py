@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from executive.cell_config import CellConfig
 from executive.clock import STEP
 from executive.errors import InputError
 from executive.events import Emit
-from executive.layout import bins_of, make_cell
+from executive.layout import bins_of, cell_without_parts
 from executive.ledger.ledger import ItemLedger
 from executive.motion.planner import Planner
 from executive.sim.arm import SimArm
@@ -97,16 +98,13 @@ class SimCell:
         self._detectors = detectors(
             config.detectors, camera=camera_config, clock=clock, base=options.base, seed=seeds.detectors
         )
-        self._cell = make_cell(
-            config,
-            self._routes,
-            emit,
+        self._cell = replace(
+            cell_without_parts(config, self._routes, self._ledger, emit),
             clock=clock,
             arm=self._arm,
             tool=self._tool,
             camera=self._camera,
             detectors=self._detectors,
-            ledger=self._ledger,
             operator=options.operator,
             classes=classes,
             localizer=localizer,

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from executive.cell import Cell, Routes
 from executive.cell_config import CellConfig
 from executive.events import Emit
-from executive.layout import bins_of, classes_of, make_cell
+from executive.layout import bins_of, cell_without_parts
 from executive.ledger.ledger import ItemLedger
 from executive.workcell import CellOptions
 
@@ -31,21 +30,7 @@ class PlayedCell:
         del seed, options
         self._steps = 0
         self._ledger = ItemLedger(config.ledger, config.table, bins_of(config), routes, emit)
-        absent: Any = None
-        self._cell = make_cell(
-            config,
-            dict(routes),
-            emit,
-            clock=absent,
-            arm=absent,
-            tool=absent,
-            camera=absent,
-            detectors=dict.fromkeys(config.detectors, absent),
-            ledger=self._ledger,
-            operator=absent,
-            classes=classes_of(config),
-            localizer=absent,
-        )
+        self._cell = cell_without_parts(config, routes, self._ledger, emit)
 
     @property
     def cell(self) -> Cell:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from executive.clock import StepClock
 from executive.errors import InputError
 from executive.events import Emit, ignore
 from executive.geometry import Pose
-from executive.layout import bins_of, classes_of, make_cell
+from executive.layout import bins_of, cell_without_parts, classes_of
 from executive.ledger.item import State
 from executive.ledger.ledger import ItemLedger
 from executive.messages import BIN_THICKNESS
@@ -111,18 +112,14 @@ class FakeCell:
             restore(read_state(options.past.log), self.world, self.arm)
             self.camera.skip(options.past.frames, options.past.turns)
             self.log_to(options.past.log)
-        self._cell = make_cell(
-            config,
-            self.routes,
-            emit,
+        self._cell = replace(
+            cell_without_parts(config, self.routes, self.ledger, emit),
             clock=clock,
             arm=self.arm,
             tool=self.tool,
             camera=self.camera,
             detectors=self.detectors,
-            ledger=self.ledger,
             operator=options.operator,
-            classes=classes,
             localizer=PlaneLocalizer(classes),
         )
 
