@@ -12,16 +12,12 @@ from scripted_leaf import Leaf
 
 from executive.control.backoff import Backoff
 from executive.control.fallback import Fallback
-from executive.control.for_each import ForEach
 from executive.control.halting import halt
 from executive.control.invert import Invert
 from executive.control.parallel import Parallel
-from executive.control.repeat import Repeat
 from executive.control.retry import Retry
-from executive.control.scope import Scope
 from executive.control.sequence import Sequence
 from executive.control.timeout import Timeout
-from executive.control.while_loop import While
 from executive.errors import Fault
 
 
@@ -67,14 +63,6 @@ def test_halting_does_not_reach_a_child_that_never_ran(leaf: Any, site: Any) -> 
     assert log == []
 
 
-def test_earlier_children_are_not_run_again_while_a_later_one_runs(
-    leaf: Any, site: Any, ticks: Any, log: Any
-) -> None:
-    assert ticks(Sequence(site(), [leaf("A"), leaf("B", "R R R S")])) == "RRRS"
-    assert ticks(Fallback(site(), [leaf("C", "lost"), leaf("D", "R R R S")])) == "RRRS"
-    assert log == ["A starts", "B starts", "C starts", "D starts"]
-
-
 def test_the_old_status_of_a_child_that_was_not_ticked_decides_nothing_and_is_told_to_nobody(
     leaf: Any, site: Any, ticks: Any, events: Any
 ) -> None:
@@ -88,14 +76,6 @@ def test_the_old_status_of_a_child_that_was_not_ticked_decides_nothing_and_is_to
     assert "ghost" not in {event["node"] for event in events}
     # Nor is it taken for a success later on, when the node does get there.
     assert ticks(node) == "F"
-
-
-def test_an_attempt_or_a_round_costs_no_tick_of_its_own(leaf: Any, site: Any, ticks: Any) -> None:
-    # Three bodies that hand back one tick each: three ticks, and the one in which the last ends.
-    assert ticks(Retry(site(), leaf("A", "R lost", "R lost", "R S"), 3)) == "RRRS"
-    assert ticks(Repeat(site(), leaf("A", "R S"), times=3)) == "RRRS"
-    assert ticks(ForEach(site(), leaf("A", "R S"), Scope(), "it", [1, 2, 3])) == "RRRS"
-    assert ticks(While(site(), leaf("more", "S", "S", "S", "no"), leaf("A", "R S"))) == "RRRS"
 
 
 def test_nothing_depends_on_the_clock_on_the_wall(
