@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 from executive.arm import Arm, Planning
@@ -55,7 +55,7 @@ class Access:
     arguments: tuple[Any, ...] = ()
     named: Mapping[str, Any] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def name(self) -> str:
         """Role and member: `arm.start`."""
         return f"{self.role}.{self.member}"
@@ -98,13 +98,17 @@ class _Proxy:
 
     def __init__(self, role: str, key: str, part: Any, interceptor: Interceptor) -> None:
         self._role, self._key, self._part, self._intercept = role, key, part, interceptor
+        self._reads: dict[str, Access] = {}
 
     def __getattr__(self, member: str) -> Any:
         if member.startswith("_") or member not in METHODS[self._role]:
+            # Underscores first: a copy that is being made has no role yet.
             raise AttributeError(f"{type(self).__name__} has no attribute {member!r}")
         if METHODS[self._role][member]:
             return partial(self._call, member)
-        return self._intercept(Access(self._role, self._key, member, partial(getattr, self._part, member)))
+        if member not in self._reads:
+            self._reads[member] = Access(self._role, self._key, member, partial(getattr, self._part, member))
+        return self._intercept(self._reads[member])
 
     def _call(self, member: str, /, *arguments: Any, **named: Any) -> Any:
         def proceed() -> Any:

@@ -72,6 +72,8 @@ def recorded(cell: Cell, tape: Tape, emit: Emit) -> Cell:
                 emit("intent", action=access.member)
             return tape.command(access.proceed)
         name, codec = QUESTIONS[access.name]
-        return tape.sense(name.format(*access.values, key=access.key), access.proceed, codec)
+        if "{" in name:
+            name = name.format(*access.values, key=access.key)
+        return tape.sense(name, access.proceed, codec)
 
     return replace(intercept(cell, ask, RECORDED_ROLES), clock=StepClock(tape.clock, tape.step))

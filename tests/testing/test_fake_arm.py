@@ -110,11 +110,3 @@ def test_it_follows_one_motion_at_a_time(fake: FakeCell) -> None:
     fake.arm.start(motion)
     with pytest.raises(Fault, match="the arm was started while it moves"):
         fake.arm.start(motion)
-
-
-def test_the_gauge_tells_the_strength_of_a_seal_and_nothing_without_one(fake: FakeCell) -> None:
-    assert fake.tool.bears == 0
-    fake.world.held = fake.world.put("cube", 0.5, 0.0)
-    assert fake.tool.bears == BEARS
-    fake.tool.strength = 2.5
-    assert fake.tool.bears == 2.5
