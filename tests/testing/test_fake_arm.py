@@ -12,7 +12,7 @@ from executive.clock import STEP
 from executive.errors import Fault, Unreachable
 from executive.geometry import Array
 from executive.messages import Obstacle
-from executive.testing.fake_arm import BEARS, SPEED
+from executive.testing.fake_arm import SPEED
 from executive.testing.fake_cell import FakeCell, bare_table
 
 LATENCY = bare_table().motion.planning
