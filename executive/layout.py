@@ -1,11 +1,15 @@
-"""What a cell file means in space: bins with their drop slots, classes of objects, the height of travel."""
+"""Layout of a cell file: bins with their drop slots, classes of objects, height of travel, and the cell."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from executive.cell import Cell, Ledger, Routes
 from executive.cell_config import BinConfig, CellConfig, ObjectConfig
-from executive.messages import Bin, ObjectClass
+from executive.events import Emit
+from executive.messages import Bin, ObjectClass, Target
 
 TOOL_RADIUS = 0.012
 """Radius of the tool's body [m]."""
@@ -39,3 +43,42 @@ def pile_height(config: CellConfig) -> float:
     """Return how high [m] things on the table may be: the tallest object, or two where some are stacked."""
     tallest = max(kind.height for kind in config.objects.values())
     return 2 * tallest if config.table.stacked else tallest
+
+
+def bins_of(config: CellConfig) -> dict[str, Bin]:
+    """Return the bins of a cell file by name."""
+    return {name: as_bin(name, bin) for name, bin in config.bins.items()}
+
+
+def classes_of(config: CellConfig) -> dict[str, ObjectClass]:
+    """Return the classes of a cell file by label, each of the default mass."""
+    return {label: as_class(label, kind) for label, kind in config.objects.items()}
+
+
+def cell_without_parts(config: CellConfig, routes: Routes, ledger: Ledger, emit: Emit) -> Cell:
+    """Return the cell of a cell file with None for every part of hardware, for a cell kind to put in.
+
+    Every decision for a target is emitted as a `decision`.
+    """
+    missing: Any = None
+
+    def decided(target: Target, bin: str) -> None:
+        emit("decision", item=target.item, label=target.label, frame=target.frame, bin=bin)
+
+    return Cell(
+        clock=missing,
+        arm=missing,
+        tool=missing,
+        camera=missing,
+        detectors=dict.fromkeys(config.detectors, missing),
+        ledger=ledger,
+        operator=missing,
+        bins=bins_of(config),
+        classes=classes_of(config),
+        routes=routes,
+        localizer=missing,
+        safe_place=np.array(config.safe_place),
+        descent=config.motion.descent,
+        descent_speed=config.motion.descent_speed,
+        decided=decided,
+    )

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
+from executive.clock import STEP
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
 from executive.layout import travel_height
@@ -28,7 +29,7 @@ from executive.motion.postures import find_postures
 from executive.motion.seal import Hold
 from executive.motion.search import Search
 from executive.motion.surroundings import BETWEEN
-from executive.motion.trajectory import STEP, Trajectory, thinned
+from executive.motion.trajectory import Trajectory, thinned
 
 Check = Callable[[Array, Task], None]
 """Takes joint positions along a path `(N, 7)` [rad] and what it has to heed; raises Blocked."""

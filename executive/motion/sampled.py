@@ -8,9 +8,10 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import BPoly
 
+from executive.clock import STEP
 from executive.geometry import Array
 from executive.motion.state import State
-from executive.motion.trajectory import STEP, Trajectory
+from executive.motion.trajectory import Trajectory
 
 
 class Sampled:

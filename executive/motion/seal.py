@@ -6,11 +6,12 @@ import math
 
 import numpy as np
 
+from executive.clock import STEP
 from executive.geometry import GRAVITY, Array
 from executive.messages import Load
 from executive.motion.kinematics import Kinematics
 from executive.motion.state import JOINTS
-from executive.motion.trajectory import STEP, Trajectory
+from executive.motion.trajectory import Trajectory
 from executive.motion.transcription import SAMPLES, Demand
 
 SAFETY = 2.0

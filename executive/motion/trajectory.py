@@ -11,6 +11,7 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 
+from executive.clock import STEP
 from executive.errors import Fault, Unreachable
 from executive.geometry import Array
 from executive.motion.free import NoProfile
@@ -19,8 +20,6 @@ from executive.motion.state import JOINTS, Piece, State
 
 _ROUNDING = 1e-6
 """Difference of joint states that is rounding [rad, rad/s, rad/s²]."""
-STEP = 1 / 240
-"""Time between the states that a motion is checked at [s]: no joint moves by 0.6 degrees in it."""
 
 
 class Trajectory:

@@ -8,8 +8,8 @@ from typing import Any
 from executive.cell import Cell
 from executive.events import Event, Observer
 from executive.tape.past import Past
+from executive.tape.recorded_cell import recorded
 from executive.tape.tape import Tape
-from executive.tape.taped_cell import taped
 from executive.workcell import Workcell
 
 LONGEST_BRAKING = 2.0
@@ -45,7 +45,7 @@ class Plant:
         self.workcell = workcell
         step = clock.step if past is None else past.step
         self.tape = Tape(self.emit, step, lambda: clock.now, past)
-        self.cell = taped(workcell.cell, self.tape, self.emit)
+        self.cell = recorded(workcell.cell, self.tape, self.emit)
         self._connected = True
 
     def observe(self, observer: Observer) -> None:

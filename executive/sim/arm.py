@@ -10,6 +10,7 @@ import numpy as np
 from executive.arm import Goal, Motion, Task, refuse_steps
 from executive.cell import Clock
 from executive.cell_config import CellConfig
+from executive.clock import STEP
 from executive.errors import Fault
 from executive.events import Emit, ignore
 from executive.geometry import Array, Pose
@@ -21,7 +22,7 @@ from executive.motion.trajectory import Trajectory
 from executive.sim import command_log
 from executive.sim.contacts import Contacts
 from executive.sim.rebuild import UnderWay
-from executive.sim.world import STEP, World
+from executive.sim.world import World
 
 MOMENT = 1e-4
 """Time over which a tool velocity is taken [s]: too short for the arm to bend the way."""

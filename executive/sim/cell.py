@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-
 from executive.cell import Cell, Routes
 from executive.cell_config import CellConfig
+from executive.clock import STEP
 from executive.errors import InputError
 from executive.events import Emit
-from executive.layout import as_bin
+from executive.layout import bins_of, cell_without_parts
 from executive.ledger.ledger import ItemLedger
-from executive.messages import Target
 from executive.motion.planner import Planner
 from executive.sim.arm import SimArm
 from executive.sim.audit import audit
@@ -32,7 +31,6 @@ from executive.sim.rebuild import UnderWay, rebuild
 from executive.sim.scenery import SimScenery
 from executive.sim.tool import SuctionTool
 from executive.sim.view import ArmShadow
-from executive.sim.world import STEP
 from executive.vision.detectors.registry import build_detectors, known_labels, wrong_detectors
 from executive.vision.detectors.setting import ClosableDetector
 from executive.vision.localization.build import build_localizer
@@ -73,7 +71,7 @@ class SimCell:
         self._routes = dict(routes)
         self._world = first_world(config, seed, gui=options.gui)
         self._initial = {body: self._world.object_pose(body).position for body in self._world.bodies}
-        self._bins = {name: as_bin(name, bin) for name, bin in config.bins.items()}
+        self._bins = bins_of(config)
         self._clock = clock = SimClock(self._world, STEP)
         self._clearance = PathClearance(config)
         planner = Planner(config, self._clearance.check)
@@ -95,30 +93,21 @@ class SimCell:
             self._camera.skip(options.past.frames, options.past.turns)
         classes = {label: weighed(label, kind) for label, kind in config.objects.items()}
 
-        def decided(target: Target, bin: str) -> None:
-            emit("decision", item=target.item, label=target.label, frame=target.frame, bin=bin)
-
         localizer = build_localizer(config.localization, classes, partial(cast, self._world))
         # Last of all: some of them start processes, which nobody would end if something after them failed.
         self._detectors = detectors(
             config.detectors, camera=camera_config, clock=clock, base=options.base, seed=seeds.detectors
         )
-        self._cell = Cell(
+        self._cell = replace(
+            cell_without_parts(config, self._routes, self._ledger, emit),
             clock=clock,
             arm=self._arm,
             tool=self._tool,
             camera=self._camera,
             detectors=self._detectors,
-            ledger=self._ledger,
             operator=options.operator,
-            bins=self._bins,
             classes=classes,
-            routes=self._routes,
             localizer=localizer,
-            safe_place=np.array(config.safe_place),
-            descent=config.motion.descent,
-            descent_speed=config.motion.descent_speed,
-            decided=decided,
         )
 
     @staticmethod

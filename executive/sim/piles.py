@@ -11,10 +11,11 @@ import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell_config import CellConfig
+from executive.clock import STEP
 from executive.geometry import Pose
 from executive.sim.bodies import add_body
 from executive.sim.models import upright
-from executive.sim.world import STEP, add_bin
+from executive.sim.world import add_bin
 
 SETTLING = 360
 """Physics steps after which a pile is taken as it is."""

@@ -9,13 +9,14 @@ import numpy as np
 import pybullet
 
 from executive.cell_config import CellConfig
+from executive.clock import STEP
 from executive.motion.planner import Planner
 from executive.sim.arm import SimArm
 from executive.sim.camera import camera_pose
 from executive.sim.clearance import PathClearance
 from executive.sim.clock import SimClock
 from executive.sim.view import ArmShadow
-from executive.sim.world import STEP, World
+from executive.sim.world import World
 from executive.vision.camera_model import calibrated
 from executive.workcell import KeyPath
 

@@ -15,6 +15,7 @@ import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell_config import BinConfig, CellConfig
+from executive.clock import STEP
 from executive.geometry import Array, Pose
 from executive.layout import NECK_LENGTH, TOOL_RADIUS
 from executive.messages import BIN_THICKNESS
@@ -25,8 +26,6 @@ from executive.sim.bodies import add_body
 from executive.sim.command_log import CommandLog
 from executive.sim.models import find_model, upright
 
-STEP = 1 / 240
-"""Length of a physics step [s]."""
 TABLE_HEIGHT = 0.625
 """Height of the top of pybullet_data's table over its feet [m]."""
 TABLE_CENTRE = (0.40, 0.0)

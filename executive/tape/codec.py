@@ -1,25 +1,42 @@
-"""Frames, answers and poses as plain values that lose nothing, and back."""
+"""Codecs between the answers of a cell and plain values; nothing is lost but images and paths."""
 
 from __future__ import annotations
 
 import base64
 import zlib
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from executive.arm import Motion
 from executive.geometry import Array, Pose
 from executive.messages import Answer, Detection, Frame, Reliability
 
 
-def write_array(array: Array) -> list[Any]:
-    """Return an array as lists of floats."""
-    return array.tolist()
+class Codec(NamedTuple):
+    """Functions between an answer of a cell and its plain form.
+
+    Attributes:
+        write: Returns an answer as plain values.
+        read: Returns an answer from plain values.
+    """
+
+    write: Callable[[Any], Any]
+    read: Callable[[Any], Any]
+
+
+@dataclass(frozen=True)
+class PlayedMotion:
+    """All that is known of a motion that was planned in a recorded run; implements `executive.arm.Motion`."""
+
+    duration: float
 
 
 def read_array(value: Any) -> Array:
-    """Return what `write_array` was given."""
+    """Return an array from lists of floats."""
     return np.array(value, dtype=np.float64)
 
 
@@ -39,7 +56,7 @@ def write_frame(frame: Frame) -> dict[str, Any]:
     return {
         "id": frame.id,
         "camera": frame.camera,
-        "matrix": write_array(frame.matrix),
+        "matrix": frame.matrix.tolist(),
         "X_WC": write_pose(frame.X_WC),
         "stamp": frame.stamp,
         "epoch": frame.epoch,
@@ -92,3 +109,26 @@ def _unpacked(text: str, size: tuple[int, int]) -> NDArray[np.bool_]:
         return np.ones(size, np.bool_)
     bits = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.uint8)
     return np.unpackbits(bits, count=size[0] * size[1]).reshape(size).astype(np.bool_)
+
+
+def _identity(value: Any) -> Any:
+    return value
+
+
+def _duration(motion: Motion) -> float:
+    return motion.duration
+
+
+def _nothing(value: Any) -> None:
+    del value
+
+
+PLAIN = Codec(_identity, _identity)
+NOTHING = Codec(_nothing, _nothing)
+TEXTS = Codec(list, _identity)
+BOX = Codec(list, tuple)
+ARRAY = Codec(np.ndarray.tolist, read_array)
+POSE = Codec(write_pose, read_pose)
+FRAME = Codec(write_frame, read_frame)
+ANSWER = Codec(write_answer, read_answer)
+MOTION = Codec(_duration, PlayedMotion)

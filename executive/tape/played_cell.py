@@ -1,27 +1,16 @@
-"""A cell that is not there: bins, classes and a ledger, while a tape answers for everything else."""
+"""Cell of a replay: bins, classes and a ledger, while a tape answers for every other part."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from executive.cell import Cell, Routes
 from executive.cell_config import CellConfig
 from executive.events import Emit
-from executive.layout import as_bin, as_class
+from executive.layout import bins_of, cell_without_parts
 from executive.ledger.ledger import ItemLedger
-from executive.messages import Target
 from executive.workcell import CellOptions
-
-
-class Absent:
-    """A part that nobody asks: the tape does not let a question through while it plays."""
-
-    def __getattr__(self, name: str) -> Any:
-        raise AssertionError(f"nothing asks the cell while a tape plays, and this asked for {name}")
 
 
 class PlayedCell:
@@ -40,30 +29,8 @@ class PlayedCell:
     ) -> None:
         del seed, options
         self._steps = 0
-        bins = {name: as_bin(name, bin) for name, bin in config.bins.items()}
-        self._ledger = ItemLedger(config.ledger, config.table, bins, routes, emit)
-
-        def decided(target: Target, bin: str) -> None:
-            emit("decision", item=target.item, label=target.label, frame=target.frame, bin=bin)
-
-        absent: Any = Absent()
-        self._cell = Cell(
-            clock=absent,
-            arm=absent,
-            tool=absent,
-            camera=absent,
-            detectors=dict.fromkeys(config.detectors, absent),
-            ledger=self._ledger,
-            operator=absent,
-            bins=bins,
-            classes={label: as_class(label, kind) for label, kind in config.objects.items()},
-            routes=dict(routes),
-            localizer=absent,
-            safe_place=np.array(config.safe_place),
-            descent=config.motion.descent,
-            descent_speed=config.motion.descent_speed,
-            decided=decided,
-        )
+        self._ledger = ItemLedger(config.ledger, config.table, bins_of(config), routes, emit)
+        self._cell = cell_without_parts(config, routes, self._ledger, emit)
 
     @property
     def cell(self) -> Cell:

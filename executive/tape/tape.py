@@ -9,23 +9,17 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 from executive import errors
 from executive.errors import Fault, Stopped
 from executive.events import Emit, Exact
+from executive.tape.codec import NOTHING, PLAIN, Codec
 from executive.tape.past import Past, Sense
-
-T = TypeVar("T")
 
 
 class Unrecorded(Fault):
     """Something was asked that the recorded run never asked: there is no answer to play."""
-
-
-def same(value: Any) -> Any:
-    """Return the value: what makes a plain answer plain, and back."""
-    return value
 
 
 class Tape:
@@ -68,50 +62,44 @@ class Tape:
 
     def clock(self) -> float:
         """Return the time on the run's clock [s], as an answer of the cell."""
-        return self._tick * self.step + self.sense("clock", self._ahead)
+        ahead: float = self.sense("clock", self._ahead)
+        return self._tick * self.step + ahead
 
-    def command(self, do: Callable[[], None]) -> None:
-        """Let the cell do something; nothing while playing.
+    def command(self, do: Callable[[], Any]) -> Any:
+        """Let the cell do something and return its answer; nothing is done while playing, and None returned.
 
         Raises:
-            Exception: What the cell raises, played as it was.
+            Exception: The exception that the cell raised, played as it was.
         """
-        self.sense("command", do)
+        return self.sense("command", do, NOTHING)
 
-    def sense(
-        self,
-        name: str,
-        ask: Callable[[], T],
-        write: Callable[[T], Any] = same,
-        read: Callable[[Any], T] = same,
-    ) -> T:
+    def sense(self, name: str, ask: Callable[[], Any], codec: Codec = PLAIN) -> Any:
         """Return the cell's answer to a question.
 
         Args:
-            name: What is asked; the same question has the same name.
+            name: Name of the question; the same question has the same name.
             ask: Asks the cell.
-            write: Returns an answer as plain values.
-            read: Returns an answer from plain values.
+            codec: Makes answers plain and reads them.
 
         Raises:
-            Unrecorded: It plays, and this was never asked before.
-            Exception: What the cell raised; while playing, of the same name with the same text.
+            Unrecorded: The tape plays, and this was never asked before.
+            Exception: The exception that the cell raised; while playing, one of the same name and text.
         """
         nth = self._asked[name] = self._asked.get(name, 0) + 1
         if self.playing:
-            return self._play(name, nth, read)
+            return self._play(name, nth, codec)
         try:
             answer = ask()
         except (Exception, Stopped) as error:
             self._emit("sense", name=name, nth=nth, value=str(error), raised=type(error).__name__)
             raise
-        value = write(answer)
+        value = codec.write(answer)
         if name not in self._last or value != self._last[name]:
             self._last[name] = value
             self._emit("sense", name=name, nth=nth, value=Exact(value))
         return answer
 
-    def _play(self, name: str, nth: int, read: Callable[[Any], T]) -> T:
+    def _play(self, name: str, nth: int, codec: Codec) -> Any:
         to_come = self._to_come.get(name, deque())
         while to_come and (to_come[0].tick, to_come[0].nth) <= (self._tick, nth):
             sense = to_come.popleft()
@@ -120,7 +108,7 @@ class Tape:
             self._last[name] = sense.value
         if name not in self._last:
             raise Unrecorded(f"the record holds no answer to what is asked here first: {name}")
-        return read(self._last[name])
+        return codec.read(self._last[name])
 
     def _ahead(self) -> float:
         return self._now() - self._tick * self.step

@@ -1,81 +1,57 @@
-"""What a skill commands of its cell, written down."""
+"""Commands of a skill to its cell, as a list of short texts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import replace
-from functools import partial, singledispatch
 from typing import Any
 
 from executive.arm import Goal
 from executive.cell import Cell
+from executive.cell_proxy import Access, intercept
 from executive.messages import Detections, Frame, Target
-from executive.testing.interception import Intercepted
+from executive.tape.recorded_cell import COMMANDS
 
-ARM = ("plan", "plan_ahead", "start", "stop")
-TOOL = ("close", "open")
-CAMERA = ("capture", "next_pose")
-LEDGER = (
-    "observe", "touched", "missed", "held", "dropped", "placed", "returned", "rejected", "bumped",
-)  # fmt: skip
+_ROLES = ("arm", "tool", "camera", "detector", "ledger", "operator")
+_NOTED = COMMANDS | {
+    "camera.capture", "camera.next_pose", "operator.ask", "ledger.observe", "ledger.touched", "ledger.missed",
+    "ledger.held", "ledger.dropped", "ledger.placed", "ledger.returned", "ledger.rejected", "ledger.bumped",
+}  # fmt: skip
 
 
 def written_down(cell: Cell, commands: list[str]) -> Cell:
     """Return the cell with every command to one of its parts noted in `commands`, in order.
 
-    A command is its part, its name and what can be said in a word of what it was given: `arm.plan home`,
+    A command is its part, its name and those of its arguments that have a short text: `arm.plan home`,
     `arm.plan (0.5, 0.0, 0.035)`, `tool.close`, `embedded.request table`, `ledger.held cube-1`. Questions are
     no commands.
     """
 
-    def note(command: str, call: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
-        words = map(said, (*arguments, *named.values()))
-        commands.append(" ".join([command, *filter(None, words)]))
-        return call(*arguments, **named)
+    def note(command: str, *arguments: Any) -> None:
+        commands.append(" ".join([command, *filter(None, map(short_text, arguments))]))
 
-    def noted(part: Any, name: str, methods: Iterable[str]) -> Any:
-        return Intercepted(part, {method: partial(note, f"{name}.{method}") for method in methods})
+    def ask(access: Access) -> Any:
+        if access.name in _NOTED:
+            note(f"{access.key or access.role}.{access.member}", *access.values)
+        return access.proceed()
 
-    return replace(
-        cell,
-        arm=noted(cell.arm, "arm", ARM),
-        tool=noted(cell.tool, "tool", TOOL),
-        camera=noted(cell.camera, "camera", CAMERA),
-        detectors={name: noted(one, name, ("request",)) for name, one in cell.detectors.items()},
-        ledger=noted(cell.ledger, "ledger", LEDGER),
-        operator=noted(cell.operator, "operator", ("ask",)),
-        decided=partial(note, "decided", cell.decided),
-    )
+    def decided(target: Target, bin: str) -> None:
+        note("decided", target, bin)
+        cell.decided(target, bin)
+
+    return replace(intercept(cell, ask, _ROLES), decided=decided)
 
 
-@singledispatch
-def said(argument: object) -> str:
-    """Return an argument of a command in a word, or "" for one that no word can tell."""
-    del argument
+def short_text(argument: object) -> str:
+    """Return the short text of an argument of a command, or "" for one that has none."""
+    if isinstance(argument, str):
+        return argument
+    if isinstance(argument, Goal):
+        # Adding 0.0 makes a negative zero a plain one.
+        return str(tuple(round(float(value), 4) + 0.0 for value in argument.position))
+    if isinstance(argument, Target):
+        return argument.item
+    if isinstance(argument, Frame):
+        return f"frame {argument.id}"
+    if isinstance(argument, Detections):
+        return f"{len(argument.found)} found in frame {argument.frame.id}"
     return ""
-
-
-@said.register
-def _(argument: str) -> str:
-    return argument
-
-
-@said.register
-def _(argument: Goal) -> str:
-    # Adding 0.0 makes a negative zero a plain one.
-    return str(tuple(round(float(value), 4) + 0.0 for value in argument.position))
-
-
-@said.register
-def _(argument: Target) -> str:
-    return argument.item
-
-
-@said.register
-def _(argument: Frame) -> str:
-    return f"frame {argument.id}"
-
-
-@said.register
-def _(argument: Detections) -> str:
-    return f"{len(argument.found)} found in frame {argument.frame.id}"

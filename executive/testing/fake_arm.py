@@ -12,13 +12,14 @@ import numpy as np
 from executive.arm import Goal, Motion, Task, refuse_steps
 from executive.cell import Clock
 from executive.cell_config import CellConfig
+from executive.clock import STEP
 from executive.errors import Fault, Unreachable
 from executive.events import Emit, ignore
 from executive.geometry import Array, Pose, tool_down
 from executive.layout import as_bin, travel_height
 from executive.motion.kinematics import Kinematics
 from executive.motion.plans import Plan, Plans
-from executive.testing.fake_world import STEP, FakeWorld
+from executive.testing.fake_world import FakeWorld
 from executive.workcell import KeyPath
 
 REACH = 0.85

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell import Request
+from executive.cell import Clock, Request
 from executive.cell_config import CameraConfig, DetectorConfig, TableConfig
 from executive.errors import Unavailable
 from executive.geometry import Pose
 from executive.messages import Answer, Box, Detection, Frame, Reliability
-from executive.testing.fake_world import FakeClock, FakeWorld
+from executive.testing.fake_world import FakeWorld
 from executive.vision.camera_model import calibrated
 
 CONFIDENCE = 0.9
@@ -112,7 +112,7 @@ class FakeRequest:
     """An answer that is due at a time."""
 
     due: float
-    clock: FakeClock
+    clock: Clock
     answer: Sequence[Detection] | str
     detector: str
     reliability: Reliability
@@ -141,7 +141,7 @@ class FakeDetector:
         name: str,
         config: DetectorConfig,
         world: FakeWorld,
-        clock: FakeClock,
+        clock: Clock,
         area: Callable[[str], Box],
     ) -> None:
         self._name = name

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from executive.cell import Cell, LeastTimes, Routes
 from executive.cell_config import CellConfig
+from executive.clock import StepClock
 from executive.errors import InputError
 from executive.events import Emit, ignore
 from executive.geometry import Pose
-from executive.layout import as_bin, as_class
+from executive.layout import bins_of, cell_without_parts, classes_of
 from executive.ledger.item import State
 from executive.ledger.ledger import ItemLedger
-from executive.messages import BIN_THICKNESS, Target
+from executive.messages import BIN_THICKNESS
 from executive.mission.parse.cell_file import load_cell
 from executive.mission.text.files import shipped_folder
 from executive.testing.fake_arm import FakeArm, FakeTool, out_of_reach
@@ -24,7 +26,7 @@ from executive.testing.fake_camera import FakeCamera, FakeDetector
 from executive.testing.fake_log import FakeLog, read_state, restore
 from executive.testing.fake_scenery import FakeScenery
 from executive.testing.fake_times import FakeTimes
-from executive.testing.fake_world import FakeClock, FakeObject, FakeWorld
+from executive.testing.fake_world import FakeObject, FakeWorld
 from executive.vision.localization.plane import PlaneLocalizer
 from executive.workcell import CellOptions, KeyPath
 
@@ -60,7 +62,6 @@ class FakeCell:
     Attributes:
         world, arm, tool, camera, detectors, ledger, routes: The parts, for a test to arrange and inspect.
         detector: The first detector.
-        decisions: Every target that was decided for, in order.
 
     Raises:
         InputError: The workspace has no room for the objects, or a window was asked for.
@@ -79,17 +80,16 @@ class FakeCell:
         options = options or CellOptions(SilentOperator(), base=Path())
         if options.gui:
             raise InputError(f'cell {config.cell} is of kind "fake" and has no window; run it without --gui')
-        self._emit = emit
         self._config = config
         self._gate = config.ledger.gate
         self.routes = dict(routes)
-        classes = {label: as_class(label, kind) for label, kind in config.objects.items()}
+        classes = classes_of(config)
         self.world = FakeWorld(classes)
         scatter(self.world, config, seed)
-        clock = FakeClock(self.world)
+        clock = StepClock(lambda: self.world.now)
         self.arm = FakeArm(self.world, config, clock, emit)
         self.tool = FakeTool(self.world, lambda: self.arm.tool_pose.position)
-        bins = {name: as_bin(name, bin) for name, bin in config.bins.items()}
+        bins = bins_of(config)
         self.world.bins = tuple(bins.values())
         self.ledger = ItemLedger(config.ledger, config.table, bins, self.routes, emit)
         name, camera = next(iter(config.cameras.items()))
@@ -107,28 +107,20 @@ class FakeCell:
             for name, detector in config.detectors.items()
         }
         self.detector = next(iter(self.detectors.values()))
-        self.decisions: list[Target] = []
         self._log: FakeLog | None = None
         if options.past is not None:
             restore(read_state(options.past.log), self.world, self.arm)
             self.camera.skip(options.past.frames, options.past.turns)
             self.log_to(options.past.log)
-        self._cell = Cell(
+        self._cell = replace(
+            cell_without_parts(config, self.routes, self.ledger, emit),
             clock=clock,
             arm=self.arm,
             tool=self.tool,
             camera=self.camera,
             detectors=self.detectors,
-            ledger=self.ledger,
             operator=options.operator,
-            bins=bins,
-            classes=classes,
-            routes=self.routes,
             localizer=PlaneLocalizer(classes),
-            safe_place=np.array(config.safe_place),
-            descent=config.motion.descent,
-            descent_speed=config.motion.descent_speed,
-            decided=self._decided,
         )
 
     @staticmethod
@@ -219,10 +211,6 @@ class FakeCell:
             if record.state is not State.PHANTOM
             for place in thing.stood
         )
-
-    def _decided(self, target: Target, bin: str) -> None:
-        self.decisions.append(target)
-        self._emit("decision", item=target.item, label=target.label, frame=target.frame, bin=bin)
 
 
 @functools.cache

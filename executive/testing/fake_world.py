@@ -7,14 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from executive.cell import Steps
+from executive.clock import STEP
 from executive.errors import InputError
 from executive.geometry import Array
 from executive.messages import BIN_THICKNESS, Bin, ObjectClass
 from executive.mission.findings import alternatives
-
-STEP = 1 / 240
-"""Length of one control step [s]."""
 
 CUP = 0.012
 """How far beside an object's centre the fake cup still seals [m]."""
@@ -122,26 +119,3 @@ class FakeWorld:
             if near and thing is not self.held:
                 return thing
         return None
-
-
-class FakeClock:
-    """A clock that only the test moves."""
-
-    def __init__(self, world: FakeWorld) -> None:
-        self._world = world
-
-    @property
-    def now(self) -> float:
-        """Time since the run began [s]."""
-        return self._world.now
-
-    @property
-    def step(self) -> float:
-        """Length of one control step [s]."""
-        return STEP
-
-    def sleep(self, duration: float) -> Steps:
-        """Yield until `duration` [s] has passed."""
-        end = self.now + duration
-        while self.now < end - STEP / 2:
-            yield

@@ -1,8 +1,8 @@
-"""A work cell inside another one that does something more."""
+"""Work cell around another one, with more to do at every control step."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from executive.cell import Cell
@@ -10,15 +10,31 @@ from executive.scenery import Scenery
 from executive.workcell import Accounts, Workcell
 
 
+def _do_nothing() -> None:
+    """Do nothing."""
+
+
 class WrappedCell:
     """A work cell that is another one, but for what a subclass changes; implements `Workcell`.
+
+    Args:
+        inner: The other one.
+        before: Called before every control step.
+        after: Called after every control step.
 
     Attributes:
         inner: The other one.
     """
 
-    def __init__(self, inner: Workcell) -> None:
+    def __init__(
+        self,
+        inner: Workcell,
+        *,
+        before: Callable[[], None] = _do_nothing,
+        after: Callable[[], None] = _do_nothing,
+    ) -> None:
         self.inner = inner
+        self._before, self._after = before, after
 
     @property
     def cell(self) -> Cell:
@@ -40,8 +56,10 @@ class WrappedCell:
         self.inner.log_to(path)
 
     def advance(self) -> None:
-        """Let one control step pass."""
+        """Let one control step pass, with the calls before and after it."""
+        self._before()
         self.inner.advance()
+        self._after()
 
     def scenery(self) -> Scenery | None:
         """Return what there is to be seen."""

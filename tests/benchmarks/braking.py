@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from executive.clock import STEP
 from executive.geometry import Array
 from executive.motion.limits import JointLimits
-from executive.motion.trajectory import STEP, Trajectory
+from executive.motion.trajectory import Trajectory
 
 
 def measure_braking(

@@ -17,13 +17,14 @@ import click
 import numpy as np
 
 from executive.cell_config import CellConfig
+from executive.clock import STEP
 from executive.errors import Blocked, InputError, Unreachable
 from executive.geometry import Array
 from executive.layout import travel_height
 from executive.motion.planner import Planner
 from executive.motion.state import State
 from executive.motion.stop import brake
-from executive.motion.trajectory import STEP, Trajectory, peaks
+from executive.motion.trajectory import Trajectory, peaks
 from executive.sim.world import World
 from tests.benchmarks import motion_rivals as rivals
 from tests.benchmarks.motion_execution import execute_pairs

@@ -9,13 +9,14 @@ import numpy as np
 
 from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
+from executive.clock import STEP
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Pose
 from executive.motion.planner import Planner
 from executive.sim.arm import SimArm
 from executive.sim.clock import SimClock
 from executive.sim.tool import SuctionTool
-from executive.sim.world import STEP, World
+from executive.sim.world import World
 from tests.benchmarks.motion_gauge import Gauge
 from tests.benchmarks.motion_scenes import Scene, Scenes, open_world
 from tests.benchmarks.report import Figures, show_progress

@@ -20,6 +20,7 @@ from toppra.constraint import JointAccelerationConstraint, JointVelocityConstrai
 
 from executive.arm import Goal
 from executive.cell_config import CellConfig
+from executive.clock import STEP
 from executive.geometry import Array, tool_down
 from executive.motion.free import Connector
 from executive.motion.kinematics import Kinematics
@@ -27,7 +28,7 @@ from executive.motion.limits import JointLimits
 from executive.motion.postures import LIMIT_MARGIN, Postures, find_postures, upright_line
 from executive.motion.state import JOINTS, State
 from executive.motion.timing import rest_to_rest
-from executive.motion.trajectory import STEP, Trajectory, peaks
+from executive.motion.trajectory import Trajectory, peaks
 from executive.sim.world import World
 
 SWIVELS_AROUND = np.radians(np.arange(-5.0, 5.5, 0.5))

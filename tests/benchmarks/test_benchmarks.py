@@ -16,11 +16,12 @@ import pytest
 from executive.campaign.subject import Subject
 from executive.cell_config import CellConfig
 from executive.cli.subject import load_subject
+from executive.clock import STEP
 from executive.motion.free import Connector
 from executive.motion.limits import JointLimits
 from executive.motion.state import State
 from executive.motion.stop import brake
-from executive.motion.trajectory import STEP, Trajectory
+from executive.motion.trajectory import Trajectory
 from executive.testing.fake_cell import FakeCell
 from tests.benchmarks import braking, halts, journal, kills, report, soak, suction_map, tick
 from tests.benchmarks.forks import Forks

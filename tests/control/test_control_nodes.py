@@ -9,93 +9,10 @@ import pytest
 from py_trees.common import Status
 
 from executive.control.attempt import Try
-from executive.control.fallback import Fallback
 from executive.control.halting import halt
-from executive.control.invert import Invert
 from executive.control.sequence import Sequence
-from executive.control.succeed import Succeed
 from executive.control.timeout import Timeout
 from executive.errors import Fault
-
-
-def test_a_sequence_has_no_idle_ticks(leaf: Any, site: Any, ticks: Any, log: Any) -> None:
-    assert ticks(Sequence(site(), [leaf("A", "R S"), leaf("B"), leaf("C", "R S")])) == "RRS"
-    assert log == ["A starts", "B starts", "C starts"]
-
-
-def test_a_sequence_fails_with_the_first_failure(leaf: Any, site: Any, ticks: Any, log: Any) -> None:
-    node = Sequence(site(), [leaf("A"), leaf("B", "lost"), leaf("C")])
-    assert ticks(node) == "F"
-    assert (str(node.failure), node.failure.path) == ("B.lost", "B")
-    assert log == ["A starts", "B starts"]
-
-
-def test_a_sequence_begins_again_when_it_is_ticked_again(leaf: Any, site: Any, ticks: Any, log: Any) -> None:
-    node = Sequence(site(), [leaf("A", "lost", "S")])
-    assert ticks(node) + ticks(node) == "FS"
-    assert node.failure is None
-
-
-def test_a_fallback_takes_the_next_best_and_tells_why(leaf: Any, site: Any, ticks: Any, events: Any) -> None:
-    node = Fallback(site(), [leaf("A", "R lost"), leaf("B"), leaf("C")])
-    assert ticks(node) == "RS"
-    (choice,) = [event for event in events if event["kind"] == "choice"]
-    assert (choice["choice"], choice["reason"]) == ("choice 2 of 3", "A.lost")
-
-
-def test_a_fallback_fails_with_the_last_failure(leaf: Any, site: Any, ticks: Any) -> None:
-    node = Fallback(site(), [leaf("A", "lost"), leaf("B", "stuck")])
-    assert ticks(node) == "F"
-    assert str(node.failure) == "B.stuck"
-
-
-def test_a_caught_failure_is_a_success(leaf: Any, site: Any, ticks: Any, log: Any) -> None:
-    handlers = [([("B", "lost")], leaf("other")), ([("A", "lost"), ("A", "stuck")], leaf("rescue", "R S"))]
-    assert ticks(Try(site(), leaf("A", "stuck"), handlers)) == "RS"
-    assert log == ["A starts", "rescue starts"]
-
-
-def test_an_uncaught_failure_passes_on(leaf: Any, site: Any, ticks: Any) -> None:
-    node = Try(site(), leaf("A", "lost"), [([("A", "stuck")], leaf("rescue"))])
-    assert ticks(node) == "F"
-    assert str(node.failure) == "A.lost"
-
-
-def test_a_failing_catch_fails_with_its_own_failure(leaf: Any, site: Any, ticks: Any, log: Any) -> None:
-    handlers = [([("A", "lost")], leaf("rescue", "stuck")), ([("rescue", "stuck")], leaf("never"))]
-    node = Try(site(), leaf("A", "lost"), handlers)
-    assert ticks(node) == "F"
-    assert str(node.failure) == "rescue.stuck"
-    assert "never starts" not in log
-
-
-@pytest.mark.parametrize(
-    ("body", "caught", "finish", "end", "reason"),
-    [
-        ("S", "S", "R S", "RS", None),
-        ("lost", "S", "S", "S", None),
-        ("other", "S", "S", "F", "A.other"),
-        ("lost", "stuck", "S", "F", "rescue.stuck"),
-        ("S", "S", "late", "F", "finish.late"),
-        ("other", "S", "late", "F", "A.other"),
-    ],
-)
-def test_finally_runs_after_success_and_failure(
-    body: str,
-    caught: str,
-    finish: str,
-    end: str,
-    reason: str | None,
-    leaf: Any,
-    site: Any,
-    ticks: Any,
-    log: Any,
-) -> None:
-    handlers = [([("A", "lost")], leaf("rescue", caught))]
-    node = Try(site(), leaf("A", body), handlers, leaf("finish", finish))
-    assert ticks(node) == end
-    assert (str(node.failure) if node.failure else None) == reason
-    assert log[-1] == "finish starts"
 
 
 def test_finally_does_not_run_after_a_halt(leaf: Any, site: Any, log: Any) -> None:
@@ -145,19 +62,6 @@ def test_a_body_that_cannot_be_halted_is_a_fault(leaf: Any, site: Any, clock: An
     with pytest.raises(Fault, match="A: cannot stop") as caught:
         node.tick_once()
     assert caught.value.node == "here"
-
-
-def test_invert_turns_the_result_round(leaf: Any, site: Any, ticks: Any) -> None:
-    assert ticks(Invert(site(), leaf("A", "R lost"))) == "RS"
-    node = Invert(site(), leaf("A", "R S"))
-    assert ticks(node) == "RF"
-    assert (str(node.failure), node.failure.message) == ("invert.inverted", "A succeeded")
-
-
-def test_succeed_succeeds_in_any_case(leaf: Any, site: Any, ticks: Any) -> None:
-    assert ticks(Succeed(site(), leaf("A", "R lost"))) == "RS"
-    assert ticks(Succeed(site(), leaf("A"))) == "S"
-    assert ticks(Succeed(site())) == "S"
 
 
 def test_labels_gather_on_the_way_up(leaf: Any, site: Any, ticks: Any) -> None:

@@ -68,20 +68,6 @@ def test_a_text_names_the_variable_that_holds_the_list(
     assert used == ["a", 2]
 
 
-@pytest.mark.parametrize("source", [[], "todo"])
-def test_an_empty_list_is_a_success_without_a_run(
-    source: Any, make: Any, scope: Scope, ticks: Any, used: Any
-) -> None:
-    scope.write({"todo": []})
-    assert ticks(make(source)) == "S"
-    assert used == []
-
-
-def test_none_is_an_element_like_any_other(make: Any, ticks: Any, used: Any) -> None:
-    assert ticks(make([1, None, 3])) == "RRRS"
-    assert used == [1, None, 3]
-
-
 def test_the_list_is_the_one_of_the_start(make: Any, scope: Scope, ticks: Any, used: Any) -> None:
     todo = ["a", "b"]
     scope.write({"todo": todo})
@@ -93,19 +79,6 @@ def test_the_list_is_the_one_of_the_start(make: Any, scope: Scope, ticks: Any, u
     assert used == ["a", "b"]
     assert ticks(node) == "RS"
     assert used == ["a", "b", "other"]
-
-
-def test_a_failure_of_the_body_ends_it(leaf: Any, site: Any, scope: Scope, ticks: Any, log: Any) -> None:
-    node = ForEach(site(), leaf("A", "R S", "R lost"), scope, "it", [1, 2, 3])
-    assert ticks(node) == "RRF"
-    assert str(node.failure) == "A.lost"
-    assert len(log) == 2
-
-
-def test_elements_that_take_no_time_wait_for_the_next_tick(
-    leaf: Any, site: Any, scope: Scope, ticks: Any
-) -> None:
-    assert ticks(ForEach(site(), leaf("A"), scope, "it", [1, 2, 3])) == "RRS"
 
 
 def test_the_element_at_hand_is_told(make: Any, ticks: Any, events: Any) -> None:

@@ -10,10 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import LIMITS, positions, states
 
+from executive.clock import STEP
 from executive.errors import Fault, Unreachable
 from executive.motion.free import Connector, NoProfile
 from executive.motion.state import State
-from executive.motion.trajectory import STEP, Trajectory, over, thinned
+from executive.motion.trajectory import Trajectory, over, thinned
 
 CONNECTOR = Connector(LIMITS)
 A, B, C = np.radians([[0, 20, 0, -90, 0, 70, 0], [40, 40, 20, -60, 10, 60, 90], [40, 45, 20, -60, 0, 60, 90]])

@@ -109,13 +109,6 @@ def test_the_terminal_asks_again_after_an_unknown_word(
     assert second.startswith("pick what?")
 
 
-def test_an_empty_line_asks_again(type_in: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    operator = TerminalOperator(Heard(), interrupted=lambda: False)
-    lines = iter(["\n", "cube\n"])
-    monkeypatch.setattr(operator, "_line", lambda: next(lines))
-    assert operator.ask(CHOICES) == "cube"
-
-
 def test_the_end_of_the_input_means_quit(type_in: Any) -> None:
     type_in("", closed=True)
     heard = Heard()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from executive.discovery import discover
 from executive.mission.load import load_mission
 from executive.record.trace import Trace
@@ -22,6 +24,7 @@ def trace_of(missions: Path, seed: int) -> str:
     return trace.hexdigest()
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_trace_and_another_one_does_not(missions: Path) -> None:
     first, other, again = (trace_of(missions, seed) for seed in (7, 8, 7))
     assert first == again != other

@@ -9,6 +9,7 @@ import numpy as np
 
 from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
+from executive.clock import STEP
 from executive.geometry import Array, Pose
 from executive.motion.free import Connector
 from executive.motion.planner import Planner
@@ -18,7 +19,7 @@ from executive.sim.arm import SimArm
 from executive.sim.clearance import PathClearance
 from executive.sim.clock import SimClock
 from executive.sim.tool import SuctionTool
-from executive.sim.world import STEP, World
+from executive.sim.world import World
 
 WHITE = (1.0, 1.0, 1.0)
 

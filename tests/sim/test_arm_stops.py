@@ -10,10 +10,10 @@ from rig import Rig, off_path
 
 from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
+from executive.clock import STEP
 from executive.layout import as_class
 from executive.messages import Load
 from executive.motion.trajectory import Trajectory
-from executive.sim.world import STEP
 
 PICK = Goal((0.6, -0.15, 0.04), guarded=0.016, speed=0.035)
 ON_A_CUBE = Goal((0.6, -0.15, 0.0505))

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from executive.clock import STEP
 from executive.discovery import discover
 from executive.events import ignore
 from executive.geometry import Array
@@ -23,7 +24,6 @@ from executive.sim.command_log import STEP as STEP_MADE
 from executive.sim.command_log import read_commands
 from executive.sim.rebuild import Rebuilding
 from executive.sim.tool import SuctionTool
-from executive.sim.world import STEP
 from executive.testing.disturbances.hand import hand_of
 from executive.testing.fake_cell import SilentOperator
 from executive.testing.meanwhile import meanwhile

@@ -7,7 +7,7 @@ import pytest
 from rig import Rig
 
 from executive.arm import Goal
-from executive.sim.world import STEP
+from executive.clock import STEP
 
 
 def test_it_is_how_far_the_tool_gets_in_a_control_step(rig: Rig) -> None:

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from executive.cell_config import CellConfig
+from executive.clock import STEP
 from executive.motion.planner import Planner
 from executive.sim.arm import SimArm
 from executive.sim.clock import SimClock
 from executive.sim.view import ArmShadow
-from executive.sim.world import STEP, World
+from executive.sim.world import World
 from executive.vision.camera_model import calibrated, project
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from executive.messages import Target
-from executive.skill import SkillFailed
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
@@ -108,12 +107,6 @@ def test_an_approach_that_runs_into_something_is_blocked(fake: FakeCell, target:
     assert fake.ledger.attempts("cube-1") == 0
 
 
-def test_a_halted_approach_stops_the_arm(fake: FakeCell, target: Target) -> None:
-    assert run_skill(Approach(target=target), fake, halt_at=30).status == "HALTED"
-    assert fake.arm.at_rest
-    assert fake.arm.commanded == ["start", "stop"]
-
-
 def test_what_fell_before_it_was_let_go_is_not_placed(fake: FakeCell, held: str) -> None:
     fake.tool.open()
     fake.ledger.dropped(held)
@@ -167,27 +160,6 @@ def test_a_seal_that_breaks_on_the_way_is_dropped_and_the_arm_stops(fake: FakeCe
             fake.advance()
     assert fake.arm.at_rest
     assert fake.ledger.is_open("cube-1"), "a dropped item is looked for again"
-
-
-def test_a_carry_that_runs_into_something_keeps_what_it_holds(fake: FakeCell, held: str) -> None:
-    fake.arm.runs_into = "the held cube ran into a hand"
-    result = run_skill(Transit(held=held, bin="red_bin"), fake)
-    assert (result.reason, result.message) == ("blocked", "the held cube ran into a hand")
-    assert fake.tool.holding
-    assert run_skill(PutDown(held=held), fake).status == "SUCCESS"
-
-
-def test_what_is_torn_off_by_running_into_something_is_dropped(fake: FakeCell, held: str) -> None:
-    fake.arm.runs_into = "the held cube ran into a hand"
-    skill = Transit(held=held, bin="red_bin")
-    steps = skill.run(fake.cell)
-    with pytest.raises(SkillFailed, match="the seal on cube-1 broke on the way") as failure:
-        while True:
-            next(steps)
-            fake.advance()
-            if fake.arm.met:
-                fake.tool.open()
-    assert failure.value.reason == "dropped"
 
 
 def test_release_places_the_item(fake: FakeCell, held: str) -> None:

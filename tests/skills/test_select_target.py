@@ -15,13 +15,13 @@ def test_the_nearest_target_comes_first_with_its_bin(fake: FakeCell, look) -> No
     fake.world.put("duck", 0.45, 0.2)
     result = select(fake, look())
     assert (result.outputs["item"], result.outputs["bin"]) == ("duck-1", "yellow_bin")
-    assert [decision.item for decision in fake.decisions] == ["duck-1"]
+    assert result.commanded == ["decided duck-1 yellow_bin"]
 
 
 def test_a_tentative_choice_is_no_decision(fake: FakeCell, look) -> None:
     fake.world.put("cube", 0.6, -0.2)
-    assert select(fake, look(), tentative=True).outputs["item"] == "cube-1"
-    assert fake.decisions == []
+    result = select(fake, look(), tentative=True)
+    assert (result.outputs["item"], result.commanded) == ("cube-1", [])
 
 
 def test_while_the_arm_moves_the_nearest_is_the_one_nearest_to_where_it_will_be(fake: FakeCell, look) -> None:

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from executive.arm import Goal, Motion, Task
+from executive.clock import STEP
 from executive.errors import Fault, Unreachable
 from executive.geometry import Array
 from executive.messages import Obstacle
-from executive.testing.fake_arm import BEARS, SPEED
+from executive.testing.fake_arm import SPEED
 from executive.testing.fake_cell import FakeCell, bare_table
-from executive.testing.fake_world import STEP
 
 LATENCY = bare_table().motion.planning
 BESIDE = Goal((0.5, 0.2, 0.03), guarded=0.02, speed=0.05)
@@ -110,11 +110,3 @@ def test_it_follows_one_motion_at_a_time(fake: FakeCell) -> None:
     fake.arm.start(motion)
     with pytest.raises(Fault, match="the arm was started while it moves"):
         fake.arm.start(motion)
-
-
-def test_the_gauge_tells_the_strength_of_a_seal_and_nothing_without_one(fake: FakeCell) -> None:
-    assert fake.tool.bears == 0
-    fake.world.held = fake.world.put("cube", 0.5, 0.0)
-    assert fake.tool.bears == BEARS
-    fake.tool.strength = 2.5
-    assert fake.tool.bears == 2.5

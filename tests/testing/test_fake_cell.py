@@ -43,10 +43,6 @@ def placements(fake: FakeCell) -> list[tuple[str, float, float]]:
     return [(thing.label, *thing.position[:2]) for thing in fake.world.objects]
 
 
-def test_without_a_cell_file_the_table_is_bare() -> None:
-    assert FakeCell().world.objects == []
-
-
 def test_bins_classes_and_places_are_those_of_the_file(load: Load) -> None:
     config = load(safe_place="[0.4, -0.2, 0.01]", bins__red_bin__slots="[1, 4]")
     cell = FakeCell(config).cell
@@ -101,12 +97,6 @@ def test_a_look_at_the_table_alone_shows_nothing_beside_it() -> None:
     assert [len(boxes) for boxes in seen] == [1, 2]
 
 
-def test_what_the_tool_holds_is_no_object_on_the_table() -> None:
-    fake = FakeCell()
-    fake.world.held = fake.world.put("cube", 0.5, 0.0)
-    assert run_skill(Detect(), fake).outputs["detections"].found == ()
-
-
 @pytest.mark.parametrize("pose", ["scan", "scan_left", "scan_right"])
 def test_a_camera_on_the_wrist_sees_the_table_from_its_scan_poses_and_locates_truly(
     load: Load, pose: str
@@ -142,10 +132,6 @@ def test_a_window_is_refused_with_what_to_do(load: Load) -> None:
     options = CellOptions(SilentOperator(), base=Path(), gui=True)
     with pytest.raises(InputError, match='overhead is of kind "fake" and has no window; run it without'):
         FakeCell(load(), options=options)
-
-
-def test_any_class_may_be_asked_of_any_detector(load: Load) -> None:
-    assert FakeCell.labels(load(), Path()) == {"embedded": None}
 
 
 def test_nothing_is_done_sooner_than_the_least_times_say(load: Load) -> None:

@@ -47,6 +47,7 @@ def test_it_is_registered_with_pytest() -> None:
     assert entry.value == "executive.testing.plugin"
 
 
+@pytest.mark.slow
 def test_its_fixtures_work_in_a_project_that_only_installs_the_executive(tmp_path: Path) -> None:
     (tmp_path / "test_mine.py").write_text(TESTS, encoding="utf-8")
     done = python("-m", "pytest", "-p", "executive.testing.plugin", "-q", folder=tmp_path)
@@ -58,6 +59,7 @@ def test_pytest_starts_without_anything_heavy(tmp_path: Path) -> None:
     assert python("-c", ask, folder=tmp_path).stdout.strip() == "[]"
 
 
+@pytest.mark.slow
 def test_the_kit_itself_needs_no_simulator(tmp_path: Path) -> None:
     ask = (
         "import sys, executive.testing.run_skill, executive.testing.run_mission; "

@@ -61,12 +61,6 @@ def test_it_fails_the_first_times_and_then_does_its_work(fake: FakeCell, target:
     assert fake.tool.holding
 
 
-def test_it_fails_always_unless_told_how_often(fake: FakeCell) -> None:
-    stuck = failing(Release, "stuck")
-    given = {"held": "cube-1", "bin": "red_bin"}
-    assert {run_skill(stuck, fake, inputs=given).reason for _ in range(5)} == {"stuck"}
-
-
 def test_a_reason_that_the_skill_cannot_fail_with_is_refused() -> None:
     with pytest.raises(InputError, match='Grasp cannot fail with "dropped"; it declares: missed'):
         failing(Grasp, "dropped")
@@ -125,12 +119,6 @@ def test_it_never_ends_but_can_be_taken_away(fake: FakeCell) -> None:
     waiting = endless(Wait)
     assert run_skill(waiting, fake, inputs={"seconds": 0.1}, ticks=500).status == "RUNNING"
     assert run_skill(waiting, fake, inputs={"seconds": 0.1}, halt_at=500).status == "HALTED"
-
-
-def test_a_mission_survives_a_skill_that_fails_now_and_then() -> None:
-    result = run_mission("sort_overhead", substitutes={"*/Grasp": failing(Grasp, "missed", times=2)})
-    assert (result.status, result.reasons("*/Grasp")) == ("SUCCESS", ["missed", "missed"])
-    assert result.agrees
 
 
 def test_a_mission_with_a_bug_ends_as_a_fault_at_that_node_with_the_arm_at_rest() -> None:

@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from executive.cell import Cell
+from executive.cell_proxy import Access, intercept
 from executive.errors import InputError
 from executive.events import Emit, Event, ignore
 from executive.testing.disturbances.hand import Hand, hand_of
 from executive.testing.disturbances.scene import Scene
 from executive.testing.disturbances.schedule import Schedule
 from executive.testing.disturbances.script import Disturbance, DuringNode
-from executive.testing.interception import Intercepted
 from executive.testing.wrapped_cell import WrappedCell
 from executive.workcell import Workcell
+
+_DISTURBED = frozenset(
+    {
+        "arm.plan", "tool.close", "tool.open", "camera.sees_table", "camera.capture", "detector.request",
+        "localizer.locate", "operator.ask",
+    }
+)  # fmt: skip
+"""Accesses that go through the schedule; the method of an effect has the name of the member."""
 
 
 class DisturbedCell(WrappedCell):
@@ -79,28 +86,18 @@ class DisturbedCell(WrappedCell):
 
     def _between_skills_and(self, cell: Cell) -> Cell:
         """Return the cell with everything that can be disturbed going through the schedule."""
-        through, scene = self._schedule.through, self._scene
 
-        def start(do: Callable[..., None], motion: Any) -> None:
-            do(motion)
-            scene.started(motion)
+        def ask(access: Access) -> Any:
+            if access.name in _DISTURBED:
+                return self._schedule.through(access.member, access.proceed)
+            answer = access.proceed()
+            if access.name == "arm.start":
+                self._scene.started(*access.values)
+            elif access.name == "arm.stop":
+                self._scene.stopped()
+            return answer
 
-        def stop(do: Callable[[], None]) -> None:
-            do()
-            scene.stopped()
-
-        def part(part: Any, *hooks: str, **others: Callable[..., Any]) -> Any:
-            return Intercepted(part, {**{hook: partial(through, hook) for hook in hooks}, **others})
-
-        return replace(
-            cell,
-            arm=part(cell.arm, "plan", start=start, stop=stop),
-            tool=part(cell.tool, "close", "open"),
-            camera=part(cell.camera, "sees_table", "capture"),
-            detectors={name: part(one, "request") for name, one in cell.detectors.items()},
-            localizer=part(cell.localizer, "locate"),
-            operator=part(cell.operator, "ask"),
-        )
+        return intercept(cell, ask, ("arm", "tool", "camera", "detector", "localizer", "operator"))
 
 
 def disturbed(

@@ -9,12 +9,11 @@ from pathlib import Path
 
 from executive.cell import Steps
 from executive.cell_config import CameraConfig, DetectorConfig
+from executive.clock import STEP
 from executive.errors import Unavailable
 from executive.messages import Answer, Frame
 from executive.vision.detectors.registry import build_detectors
 
-STEP = 1 / 240
-"""Length of a control step of simulated cells [s]."""
 PAUSE = 1.0
 """Time on the clock between two looks [s]: about what lies between two in a run."""
 TIMEOUT = 60.0
