@@ -17,10 +17,9 @@ from executive.errors import InputError
 from executive.geometry import Array, tool_down
 from executive.motion.free import Connector
 from executive.motion.kinematics import Kinematics
-from executive.motion.limits import JointLimits
+from executive.motion.limits import JointLimits, rest_to_rest
 from executive.motion.postures import LIMIT_MARGIN, find_postures, upright_line
 from executive.motion.state import State
-from executive.motion.timing import rest_to_rest
 from executive.motion.trajectory import STEP, Trajectory
 
 AROUND = np.radians(np.arange(-5.0, 5.5, 0.5))

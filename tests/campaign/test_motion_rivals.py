@@ -15,9 +15,9 @@ from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.geometry import Array
 from executive.layout import travel_height
+from executive.motion.limits import rest_to_rest
 from executive.motion.planner import Planner
 from executive.motion.postures import find_postures
-from executive.motion.timing import rest_to_rest
 from executive.motion.trajectory import peaks
 
 TOUCH, DROP = Goal((0.5, 0.1, 0.051)), Goal((0.24, -0.48, 0.065))

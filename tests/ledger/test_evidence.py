@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.ledger.binding import reach
 from executive.ledger.item import Record
+from executive.ledger.looks import reach
 from executive.messages import Reliability
 
 GOOD = Reliability(threshold=0.5, misses=0.02, confused=0.0025, invented=0.02, jitter=0.7)

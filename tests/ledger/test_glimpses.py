@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from ledger_bench import Bench
 
-from executive.ledger.ledger import GLIMPSES
+from executive.ledger.item import GLIMPSES
 
 THERE = ("cube", 0.5, 0.0)
 

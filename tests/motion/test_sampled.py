@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from executive.arm import Goal
-from executive.motion.sampled import sampled
 from executive.motion.stop import brake
 from executive.motion.trajectory import STEP
+from executive.sim.rebuild import sampled
 
 
 def test_it_passes_the_same_states_between_the_samples(planner, home, limits) -> None:

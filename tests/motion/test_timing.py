@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from joint_states import LIMITS, shares
 
 from executive.motion.free import Connector
+from executive.motion.limits import rest_to_rest
 from executive.motion.state import State
-from executive.motion.timing import rest_to_rest
 
 CONNECTOR = Connector(LIMITS)
 

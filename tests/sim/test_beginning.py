@@ -8,7 +8,7 @@ import numpy as np
 
 from executive.cell_config import CellConfig
 from executive.events import ignore
-from executive.sim.beginning import PartSeeds, first_world
+from executive.sim.spawn import PartSeeds, first_world
 from executive.testing.fake_cell import SilentOperator
 from executive.testing.oracle import oracle_cell
 from executive.workcell import CellOptions

@@ -9,8 +9,7 @@ import pytest
 
 from executive.cell_config import CellConfig, DepthConfig
 from executive.geometry import Pose
-from executive.sim.camera import CELL_LIGHT, camera_pose, render
-from executive.sim.depth import sense
+from executive.sim.camera import CELL_LIGHT, camera_pose, render, sense
 from executive.sim.world import World
 from executive.vision.camera_model import calibrated
 

@@ -14,9 +14,8 @@ from executive.layout import as_bin, as_class, travel_height
 from executive.messages import Load
 from executive.mission.parse.cell_file import load_cell
 from executive.motion.kinematics import Kinematics
-from executive.motion.limits import JointLimits
+from executive.motion.limits import JointLimits, rest_to_rest
 from executive.motion.planner import Planner
-from executive.motion.timing import rest_to_rest
 from executive.sim.cell import SimCell
 from executive.sim.clearance import PathClearance
 from executive.sim.least_times import SimLeastTimes

@@ -11,8 +11,8 @@ import pytest
 from executive.cell_config import CellConfig, ObjectConfig
 from executive.errors import InputError
 from executive.geometry import Pose, about_z
+from executive.sim.arrangements import settle
 from executive.sim.models import load_mesh, missing_models, read_obj, upright
-from executive.sim.piles import settle
 from executive.sim.scenes import SceneRenderer
 from executive.sim.world import World
 from tests.sim.conftest import shipped_cell

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from executive.cell_config import CellConfig
-from executive.sim.reach import out_of_reach
+from executive.sim.poses import out_of_reach
 
 
 def moved(config: CellConfig, bin: str, *position: float) -> CellConfig:

@@ -17,11 +17,11 @@ from executive.mission.load import load_mission
 from executive.motion.limits import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.runtime.run import Run
-from executive.sim.beginning import first_world
 from executive.sim.cell import SimCell
 from executive.sim.command_log import STEP as STEP_MADE
 from executive.sim.command_log import read_commands
 from executive.sim.rebuild import Rebuilding
+from executive.sim.spawn import first_world
 from executive.sim.tool import SuctionTool
 from executive.sim.world import STEP
 from executive.testing.disturbances.hands import hand_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from executive.cell_config import CellConfig, DepthConfig
-from executive.sim.run_frames import as_labelled_frame, run_frames
+from executive.sim.datasets import as_labelled_frame, run_frames
 from executive.sim.scenes import SceneRenderer
 
 
@@ -42,7 +42,7 @@ def test_a_frame_is_the_cameras_whole_image_labelled_where_a_run_searches_it(wit
 def test_frames_are_the_same_for_any_number_of_workers(
     overhead: CellConfig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("executive.sim.run_frames.BLOCK", 1)
+    monkeypatch.setattr("executive.sim.datasets.BLOCK", 1)
     told: list[tuple[int, int]] = []
     one, two = (
         run_frames(

@@ -9,10 +9,10 @@ import pytest
 from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.geometry import Pose
+from executive.sim.arrangements import settle
 from executive.sim.datasets import generate
 from executive.sim.models import load_mesh
-from executive.sim.piles import settle
-from executive.sim.scenes import SIZE, SceneRenderer, render_sample
+from executive.sim.scenes import SIZE, SceneRenderer
 from executive.sim.silhouette import outline_area
 
 
@@ -26,7 +26,9 @@ def test_a_sample_depends_on_its_seed_alone(cell: str, request: pytest.FixtureRe
         again = used.sample(11)
     finally:
         used.close()
-    fresh = render_sample(config, cell, 11)
+    new = SceneRenderer(config, cell)
+    fresh = new.sample(11)
+    new.close()
     assert (fresh.image == again.image).all()
     assert (fresh.boxes == again.boxes).all()
     assert fresh.labels == again.labels
