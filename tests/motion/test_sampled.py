@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from executive.arm import Goal
-from executive.motion.stop import brake
 from executive.motion.trajectory import STEP
 from executive.sim.rebuild import sampled
 
@@ -22,15 +21,6 @@ def test_it_passes_the_same_states_between_the_samples(planner, home, limits) ->
         assert np.abs(one.qdd - other.qdd).max() <= limits.jerk.max() * STEP
     assert (again.duration, again.guarded) == (motion.duration, motion.guarded)
     assert np.array_equal(again.at(motion.duration).qd, np.zeros(7))
-
-
-def test_a_stop_on_it_is_the_same_stop(planner, home, limits) -> None:
-    motion = planner.plan(home, Goal((0.5, -0.1, 0.08)))
-    again = sampled(motion.samples, motion.duration, motion.guarded)
-    for s in np.arange(0.0, motion.duration, 20 * STEP):
-        one, other = (brake(each, float(s), limits, STEP) for each in (motion, again))
-        assert len(one) == len(other)
-        assert np.abs(one - other).max() < 1e-9
 
 
 def test_a_motion_to_where_the_arm_is_stays_there(planner, home) -> None:

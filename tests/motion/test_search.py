@@ -14,7 +14,7 @@ from executive.motion.search import Search
 
 CUBE = ObjectClass("cube", 0.05, 0.0354, mass=0.1)
 BIN = Goal((0.24, -0.44, 0.08))
-PLACES = [(x, y) for x in (0.45, 0.55, 0.62) for y in (-0.2, 0.0, 0.2)]
+PLACES = [(0.45, -0.2), (0.55, 0.0), (0.62, 0.0), (0.62, 0.2)]
 
 
 @pytest.fixture(scope="module")

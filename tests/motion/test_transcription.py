@@ -81,27 +81,19 @@ def flown(start: State, course: Course, fine: int = FINE) -> State:
     return State(*map(np.array, zip(*states, strict=True)))
 
 
-@given(moves())
+@given(moves() | moves(passing=0.15))
 @settings(max_examples=20, deadline=None)
-def test_a_course_begins_and_ends_in_the_given_states_of_rest(move) -> None:
-    program, course = fitted(*move)
-    for found in (course, shortened(program, course, 3)):
-        states = flown(move[0], found)
-        for values, first, last in zip(states, *move, strict=True):
-            assert np.array_equal(values[0], first)
-            assert np.allclose(values[-1], last, atol=1e-6)
-
-
-@given(moves(passing=0.15))
-@settings(max_examples=20, deadline=None)
-def test_a_course_begins_and_ends_in_moving_states(move) -> None:
+def test_a_course_begins_and_ends_in_the_given_states(move) -> None:
     program, course = fitted(*move)
     last = program.shorten(course, NOTHING, WIDE)
     assert last is not None
     # The squares of the step are tangents: what they miss is its change squared.
     missed = (last.step - course.step) ** 2 * LIMITS.acceleration.max() / last.step
     for found, miss in ((course, 0.0), (last, missed)):
-        q, qd, qdd = (values[-1] for values in flown(move[0], found))
+        states = flown(move[0], found)
+        for values, first in zip(states, move[0], strict=True):
+            assert np.allclose(values[0], first, atol=1e-9)
+        q, qd, qdd = (values[-1] for values in states)
         assert np.allclose(q, move[1].q, atol=1e-6 + miss * found.duration)
         assert np.allclose(qd, move[1].qd, atol=1e-6 + miss)
         assert np.allclose(qdd, move[1].qdd, atol=1e-9)
@@ -134,15 +126,6 @@ def test_positions_and_half_steps_are_those_of_its_accelerations(move) -> None:
             assert np.allclose(one, other, atol=1e-6)
 
 
-@given(moves())
-@settings(max_examples=20, deadline=None)
-def test_a_fit_takes_the_time_and_follows_the_path_it_is_given(move) -> None:
-    duration, first = direct(*move)
-    _, course = fitted(*move, slower=1.3)
-    assert course.duration == pytest.approx(1.3 * duration)
-    assert np.max(np.abs(course.qs - first)) < 0.05
-
-
 def test_nothing_fits_into_too_short_a_time() -> None:
     start, end = State.rest(np.zeros(7)), State.rest(np.full(7, 0.5))
     duration, first = direct(start, end)
@@ -154,6 +137,8 @@ def test_nothing_fits_into_too_short_a_time() -> None:
 def test_with_nothing_in_the_way_it_becomes_nearly_as_fast_as_can_be(move) -> None:
     program, course = fitted(*move)
     duration, _ = direct(*move)
+    assert course.duration == pytest.approx(1.6 * duration)
+    assert np.max(np.abs(course.qs - direct(*move)[1])) < 0.15
     assert duration <= shortened(program, course).duration <= 1.2 * duration
 
 
@@ -187,15 +172,6 @@ def test_a_step_meets_what_is_demanded_of_three_positions_together_and_of_its_le
     assert np.all(demand.slack + moved + growth * (found.step - course.step) > 0)
 
 
-def test_a_demand_that_only_time_can_meet_takes_that_time() -> None:
-    program, course = fitted(State.rest(np.zeros(7)), State.rest(np.full(7, 0.5)))
-    rows = np.array([[40, 50, 60]])
-    demand = Demand(np.array([-0.1 * course.step]), rows, np.zeros((1, 3, 7)), np.ones(1))
-    found = program.shorten(course, [*NOTHING, demand], WIDE)
-    assert found is not None
-    assert 1.1 * course.step < found.step < 1.15 * course.step
-
-
 @given(moves())
 @settings(max_examples=20, deadline=None)
 def test_a_step_changes_no_more_than_it_is_trusted_to(move) -> None:
@@ -207,8 +183,3 @@ def test_a_step_changes_no_more_than_it_is_trusted_to(move) -> None:
     change = np.abs(after - before) / (LIMITS.acceleration[:, None] * course.step**2)
     assert change.max() <= trust + 1e-6
     assert SHORTEST - 1e-6 <= found.step / course.step <= LONGEST + 1e-6
-
-
-def test_a_wall_that_cannot_be_kept_away_from_costs_no_solution() -> None:
-    program, course = fitted(State.rest(np.zeros(7)), State.rest(np.full(7, 0.5)))
-    assert program.shorten(course, [clear_of(np.arange(40, 80), -1.0, np.zeros(7))], WIDE) is not None

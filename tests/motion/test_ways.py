@@ -1,14 +1,12 @@
 from __future__ import annotations
 
 import itertools
-import math
 
 import numpy as np
 import pytest
 from joint_states import tool_velocities
 
 from executive.arm import Goal
-from executive.errors import Unreachable
 from executive.motion.kinematics import wrapped
 from executive.motion.state import State
 from executive.motion.ways import UNLIKE, ways_down
@@ -64,8 +62,3 @@ def test_the_straight_part_begins_in_the_entry_and_ends_over_the_goal(ways, kine
         assert way.posture is not None
         assert way.posture[0] == kinematics.branch(way.entry.q)
         assert wrapped(way.posture[1] - kinematics.swivel(way.entry.q)) == pytest.approx(0, abs=1e-6)
-
-
-def test_without_a_posture_there_is_no_way(ways) -> None:
-    with pytest.raises(Unreachable, match="farther than the arm is long"):
-        ways(Goal((0.9, 0.0, 0.1), math.pi))
