@@ -14,9 +14,7 @@ from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
 from executive.layout import NECK_LENGTH, TOOL_RADIUS
 from executive.messages import Load, ObjectClass, Obstacle
-from executive.motion.free import Free
 from executive.motion.kinematics import fold
-from executive.motion.line import Line
 from executive.motion.planner import SPACING, Planner
 from executive.motion.seal import GRAVITY
 from executive.motion.trajectory import Trajectory
@@ -36,18 +34,14 @@ def tips_of(planner: Planner, motion: Trajectory) -> Array:
     return planner.kinematics.tips(passed(motion).q)[0]
 
 
-def with_motion(config: CellConfig, **changed: float) -> CellConfig:
-    """The cell file with another `motion` section."""
-    return config.model_copy(update={"motion": config.motion.model_copy(update=changed)})
-
-
 def question(name: str, planner: Planner, config: CellConfig, home: Array) -> Trajectory:
     """Answer a fixed question."""
     near = neighbours(0.5, -0.1, 0.3, count=3, top=0.05)
     wall = tuple(Obstacle(float(x), 0.0, 0.04, 0.16, "the wall") for x in np.arange(0.2, 0.9, 0.05))
     aside, beyond = np.radians(config.arm.poses_deg["aside"]), Goal((0.5, 0.15, 0.07))
     picked = planner.plan(home, pick(0.5, -0.1)).end
-    straight = Planner(with_motion(config, straight=0.05))
+    motion = config.motion.model_copy(update={"straight": 0.05})
+    straight = Planner(config.model_copy(update={"motion": motion}))
     return {
         "pick": lambda: planner.plan(home, pick(0.5, -0.1)),
         "pick of many": lambda: planner.plan(aside, pick(0.5, -0.1), Task(around=near)),
@@ -247,33 +241,6 @@ def test_the_wrist_folds_no_farther_than_links_5_and_7_keep_the_margin(planner, 
         planner.require_reachable(Goal((0.9, 0.0, 0.114)))
     with pytest.raises(Unreachable, match=r"leaves joint 6 \d\.\d° outside ±106°"):
         planner.plan(home, Goal((0.3, 0.0, 0.7)))
-
-
-def test_straight_ends_where_the_cell_asks_for_them(config, home) -> None:
-    straight = 0.05
-    planner = Planner(with_motion(config, straight=straight))
-    into = planner.plan(home, BIN)
-    out = planner.plan(into.end, Goal((0.5, 0.1, 0.056)))
-    away = planner.plan(out.end, home)
-    assert (kinds(into), kinds(out), kinds(away)) == (
-        [False, True], [True, False, True], [True, False]
-    )  # fmt: skip
-    for motion, place in ((into, BIN.position), (out, (0.5, 0.1, 0.056))):
-        tips = tips_of(planner, motion)
-        last = np.linalg.norm(tips - place, axis=1) < straight
-        assert np.max(np.linalg.norm(tips[last, :2] - place[:2], axis=1)) < 5e-5
-    for motion, place in ((out, BIN.position), (away, (0.5, 0.1, 0.056))):
-        tips = tips_of(planner, motion)
-        first = np.linalg.norm(tips - place, axis=1) < straight
-        assert first[0]
-        assert np.max(np.linalg.norm(tips[first, :2] - place[:2], axis=1)) < 5e-5
-
-
-def kinds(motion: Trajectory) -> list[bool]:
-    """Whether the tool goes straight, from stretch to stretch."""
-    straight = [isinstance(piece, Line) for piece in motion._pieces]
-    assert all(isinstance(piece, Line | Free) for piece in motion._pieces)
-    return [one for number, one in enumerate(straight) if number == 0 or straight[number - 1] != one]
 
 
 def test_joint_positions_out_of_range_are_refused(planner, home) -> None:

@@ -79,12 +79,6 @@ def test_what_goes_on_begins_after_the_last_whole_command(path: Path) -> None:
     assert [one.kind for one in read_commands(path)] == [log.STEP, log.OPEN]
 
 
-def test_nothing_is_kept_where_nobody_wants_it() -> None:
-    nowhere = CommandLog()
-    nowhere.note(log.STEP)
-    nowhere.close()
-
-
 def test_a_file_that_is_no_log_says_so(path: Path) -> None:
     with pytest.raises(InputError, match=r"cannot read the log of the world .*without it a simulated run"):
         list(read_commands(path))

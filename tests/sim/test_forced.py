@@ -39,11 +39,6 @@ def test_a_seal_gives_way_and_the_object_falls(rig: Rig, held: int) -> None:
     assert not rig.tool.holding, "the vacuum is on and nothing is near"
 
 
-def test_where_there_is_no_seal_none_gives_way(rig: Rig) -> None:
-    rig.tool.part()
-    assert not rig.tool.holding
-
-
 def test_a_leaking_tool_seals_nothing_and_a_sound_one_does(rig: Rig) -> None:
     body = rig.add("cube", *CUBE)
     rig.step(60)
@@ -56,12 +51,6 @@ def test_a_leaking_tool_seals_nothing_and_a_sound_one_does(rig: Rig) -> None:
     rig.tool.leaks = False
     rig.step()
     assert rig.tool.held_body == body, "the vacuum is on still"
-
-
-def test_a_leak_takes_nothing_that_is_held(rig: Rig, held: int) -> None:
-    rig.tool.leaks = True
-    rig.step(24)
-    assert rig.tool.held_body == held
 
 
 def test_what_sticks_comes_off_when_the_tool_is_opened_once_more(rig: Rig, held: int) -> None:

@@ -111,14 +111,6 @@ def test_the_bins_differ_and_no_bin_means_the_nearest(config, least) -> None:
     assert least.carry("grey_bin") == 0.0
 
 
-def test_a_bin_farther_away_takes_longer(config, least) -> None:
-    red = config.bins["red_bin"]
-    far = red.model_copy(update={"position": (-0.4, -0.48, 0.0)})
-    assert SimLeastTimes(config.model_copy(update={"bins": {"far": far}})).carry("far") > least.carry(
-        "red_bin"
-    )
-
-
 def test_nothing_is_known_of_a_carry_from_where_the_arm_does_not_reach(config) -> None:
     assert SimLeastTimes(changed(config, "table", x=(1.2, 1.4))).carry("red_bin") == 0.0
 

@@ -18,11 +18,6 @@ from executive.motion.limits import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.runtime.run import Run
 from executive.sim.cell import SimCell
-from executive.sim.command_log import STEP as STEP_MADE
-from executive.sim.command_log import read_commands
-from executive.sim.rebuild import Rebuilding
-from executive.sim.spawn import first_world
-from executive.sim.tool import SuctionTool
 from executive.sim.world import STEP
 from executive.testing.disturbances.hands import hand_of
 from executive.testing.fake_cell import SilentOperator
@@ -114,19 +109,6 @@ def test_it_is_the_same_to_the_last_bit(cells: list[tuple[Left, SimCell]]) -> No
     assert any(one.motion is not None for one, _ in cells)
     for one, cell in cells:
         assert state_of(cell) == one.state, one.tick
-
-
-def test_it_is_the_same_after_each_step_on_the_way(left: list[Left], mission) -> None:
-    world = first_world(mission.cell_config, SEED)
-    tool = SuctionTool(world, mission.cell_config.tool)
-    rebuilding, start, states = Rebuilding(world, tool), world.steps, {}
-    for command in read_commands(left[-1].log):
-        rebuilding.do(command)
-        steps = world.steps - start
-        if command.kind == STEP_MADE:
-            states[steps] = state_of(SimpleNamespace(_world=world, _tool=tool, steps=steps))
-    world.close()
-    assert [states[one.tick] for one in left] == [one.state for one in left]
 
 
 def test_the_arm_brakes_on_the_path_it_was_on(cells: list[tuple[Left, SimCell]], mission) -> None:

@@ -37,18 +37,6 @@ def test_the_arm_is_where_its_joints_put_it(world: World) -> None:
     assert not np.allclose(before["link 4"].position, after["link 4"].position, atol=0.01)
 
 
-def test_every_object_is_there_until_it_is_taken_away(world: World) -> None:
-    scenery = SimScenery(world)
-    names = {name for name in scenery.poses() if name.startswith("object")}
-    assert len(names) == len(world.bodies) > 0
-    assert {shape.body for shape in scenery.shapes} >= names
-    gone, kept = list(world.bodies)[:2]
-    world.remove_object(gone)
-    poses = scenery.poses()
-    assert f"object {gone}" not in poses
-    assert np.allclose(poses[f"object {kept}"].position[:2], world.object_pose(kept).position[:2], atol=1e-6)
-
-
 def test_shapes_have_the_sizes_of_the_cell(world: World, config: CellConfig) -> None:
     shapes = SimScenery(world).shapes
     walls = [shape for shape in shapes if shape.kind == "box"]

@@ -60,14 +60,6 @@ def test_each_picture_is_of_its_moment(shoot: Shoot) -> None:
     assert (alone == middle).all()
 
 
-def test_steps_of_nobodys_run_take_none_of_its_time(
-    shoot: Shoot, overhead: CellConfig, tmp_path: Path
-) -> None:
-    (last,) = pictures(shoot, [STEPS])
-    earlier, same = pictures(swing(overhead, tmp_path / "whole", idle=0), [STEPS - 8, STEPS])
-    assert changed(last, same) * 4 < changed(last, earlier)
-
-
 def test_the_floor_is_not_in_the_picture(shoot: Shoot) -> None:
     (image,) = pictures(shoot, [0])
     assert np.abs(image[0].astype(int) - SKY).max() <= 1

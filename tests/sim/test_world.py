@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 
 from executive.cell_config import CellConfig
-from executive.errors import InputError
 from executive.geometry import Pose, about_z, tool_down
 from executive.mission.parse.cell_file import load_cell
 from executive.sim.cell import SimCell
-from executive.sim.models import find_model, load_mesh, mass_of
-from executive.sim.spawn import spawn
+from executive.sim.models import load_mesh
 from executive.sim.world import World, held_part
 
 Build = Callable[[CellConfig], World]
@@ -37,16 +35,6 @@ def test_the_tool_ends_where_the_tool_centre_point_is(build: Build, wrist: CellC
     assert high[2] - low[2] == pytest.approx(wrist.tool.length, abs=5e-3)
 
 
-def test_the_tool_stays_on_the_flange_without_slip(build: Build, overhead: CellConfig) -> None:
-    world = build(overhead)
-    for _ in range(50):
-        world.step()
-    X_FT = world.flange_pose().inverse() @ world.tool_pose()
-    tool = world.client.getLinkState(world.arm, world.tool, computeForwardKinematics=True)[4]
-    assert X_FT.position == pytest.approx([0, 0, overhead.tool.length])
-    assert np.array(tool) == pytest.approx(world.flange_pose().position, abs=1e-6)
-
-
 @pytest.mark.parametrize("label", ["cube", "sphere", "duck"])
 def test_an_object_lies_as_high_and_wide_as_the_cell_file_says(
     build: Build, overhead: CellConfig, label: str
@@ -62,13 +50,6 @@ def test_an_object_lies_as_high_and_wide_as_the_cell_file_says(
     assert hit[0] == body
     assert hit[3][2] == pytest.approx(model.height, abs=1e-3)
     assert np.hypot(*(vertices - centre)[:, :2].T).max() == pytest.approx(model.radius, abs=1e-3)
-
-
-@pytest.mark.parametrize("label", ["cube", "sphere", "duck"])
-def test_an_object_weighs_what_a_planner_is_told(build: Build, overhead: CellConfig, label: str) -> None:
-    world = build(overhead)
-    body = world.add_object(label, Pose.of([0.5, 0, 0.1]), (1, 1, 1))
-    assert world.client.getDynamicsInfo(body, -1)[0] == pytest.approx(mass_of(overhead.objects[label]))
 
 
 def test_an_object_is_where_it_was_put_and_can_be_put_elsewhere(build: Build, overhead: CellConfig) -> None:
@@ -104,25 +85,6 @@ def test_every_part_of_the_arm_has_a_name_too(build: Build, overhead: CellConfig
         "the tool",
     ]
     assert held_part("duck") == "the held duck"
-
-
-def test_rebuilding_gives_the_same_bits(build: Build, overhead: CellConfig) -> None:
-    def outcome() -> list[tuple[float, ...]]:
-        world = build(overhead)
-        bodies = spawn(world, overhead, seed=5)
-        for _ in range(60):
-            world.step()
-        return [world.client.getBasePositionAndOrientation(body)[0] for body in bodies]
-
-    assert outcome() == outcome()
-
-
-def test_a_model_that_is_nowhere_is_named() -> None:
-    with pytest.raises(
-        InputError,
-        match=r"there is no model unicorn\.urdf, neither beside the cell file nor in pybullet_data",
-    ):
-        find_model("unicorn.urdf")
 
 
 def test_a_missing_model_is_found_before_anything_is_loaded(missions: Path) -> None:
