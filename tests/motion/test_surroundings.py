@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from executive.cell_config import CellConfig
@@ -70,17 +70,6 @@ def test_distances_from_a_cylinder_are_what_geometry_says(config: CellConfig, ti
         assert found == pytest.approx(min(nearest - (config.motion.margin + BETWEEN), without), abs=5e-4)
     else:
         assert found <= -(config.motion.margin + BETWEEN) + 1e-9
-
-
-@given(near_the_post, st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.booleans())
-@example(np.array([POST.x, POST.y, POST.top + 0.02]), 0.5, 0.0, False)
-@settings(max_examples=60, deadline=None)
-def test_a_tilted_disc_is_never_nearer_than_it_is_said_to_be(config, tip, tilt, turn, loaded: bool) -> None:
-    axis = np.array([math.sin(tilt), math.cos(tilt) * math.sin(turn), -math.cos(tilt) * math.cos(turn)])
-    discs = hanging(config, CUBE if loaded else None)
-    found = slack(Surroundings(config, (POST,), AWAY), tip, axis, discs)
-    nearest = float(to_cylinder(np.concatenate(discs_of(tip, axis, discs)), POST).min())
-    assert found + (config.motion.margin + BETWEEN) <= nearest + 1e-9
 
 
 @given(st.tuples(st.floats(0.08, 0.38), st.floats(-0.66, -0.32), st.floats(0.01, 0.2)).map(np.array))

@@ -26,17 +26,6 @@ def by_way_of(*passing: State) -> Trajectory:
     return Trajectory([CONNECTOR.connect(one, other) for one, other in pairwise(ends)])
 
 
-@given(states())
-@settings(max_examples=30, deadline=None)
-def test_position_velocity_and_acceleration_do_not_jump_where_pieces_meet(between: State) -> None:
-    trajectory = by_way_of(between)
-    first = CONNECTOR.connect(State.rest(A), between).duration
-    before, after = trajectory.at(first - 1e-9), trajectory.at(first + 1e-9)
-    for one, other, wanted in zip(before, after, between, strict=True):
-        assert np.allclose(one, other, atol=1e-5)
-        assert np.allclose(one, wanted, atol=1e-5)
-
-
 @pytest.mark.parametrize(
     ("field", "off"), [("q", "their q differ by 0.01"), ("qd", "qd differ"), ("qdd", "qdd differ")]
 )
@@ -53,20 +42,6 @@ def test_a_motion_that_does_not_begin_or_end_at_rest_is_a_fault() -> None:
         Trajectory([CONNECTOR.connect(MOVING, State.rest(B))])
     with pytest.raises(Fault, match="rest and how a trajectory ends do not fit together: their qd"):
         Trajectory([CONNECTOR.connect(State.rest(A), MOVING)])
-
-
-def test_it_rests_before_its_start_and_after_its_end() -> None:
-    trajectory = by_way_of(MOVING)
-    assert np.array_equal(trajectory.start, A)
-    assert np.allclose(trajectory.end, B, atol=1e-9)
-    for s, where in (
-        (-1.0, trajectory.start),
-        (0.0, trajectory.start),
-        (trajectory.duration + 1, trajectory.end),
-    ):
-        for value, wanted in zip(trajectory.at(s), State.rest(where), strict=True):
-            assert np.array_equal(value, wanted)
-        trajectory.at(s).q[:] = 9.0  # who changes an answer does not change the motion
 
 
 @pytest.mark.parametrize("s", [math.nan, math.inf, -math.inf])

@@ -126,12 +126,6 @@ def test_positions_and_half_steps_are_those_of_its_accelerations(move) -> None:
             assert np.allclose(one, other, atol=1e-6)
 
 
-def test_nothing_fits_into_too_short_a_time() -> None:
-    start, end = State.rest(np.zeros(7)), State.rest(np.full(7, 0.5))
-    duration, first = direct(start, end)
-    assert Transcription(start, end, LIMITS).fit(0.7 * duration / STEPS, first) is None
-
-
 @given(moves())
 @settings(max_examples=20, deadline=None)
 def test_with_nothing_in_the_way_it_becomes_nearly_as_fast_as_can_be(move) -> None:
@@ -140,18 +134,6 @@ def test_with_nothing_in_the_way_it_becomes_nearly_as_fast_as_can_be(move) -> No
     assert course.duration == pytest.approx(1.6 * duration)
     assert np.max(np.abs(course.qs - direct(*move)[1])) < 0.15
     assert duration <= shortened(program, course).duration <= 1.2 * duration
-
-
-@given(moves(), st.floats(0.02, 0.3))
-@settings(max_examples=20, deadline=None)
-def test_a_step_keeps_its_distance_to_first_order(move, lack: float) -> None:
-    """A wall across all joints, that the last course was too near to in its middle."""
-    program, course = fitted(*move, slower=2.0)
-    rows = np.arange(50, 78)
-    wall = clear_of(rows, -0.1 * lack, np.full(7, 0.1))
-    found = program.shorten(course, [wall], WIDE)
-    assert found is not None
-    assert np.all(wall.slack + 0.1 * np.sum(found.qs[rows] - course.qs[rows], axis=1) > 0)
 
 
 @given(moves(passing=0.15), shares, st.floats(0.6, 2.0))

@@ -34,20 +34,6 @@ def test_each_way_ends_over_the_goal_unlike_those_before_it(ways, kinematics) ->
         assert np.max(np.abs(one.entry.q - other.entry.q)) > UNLIKE
 
 
-def test_the_most_promising_way_comes_first_and_none_is_faster_than_its_estimate(
-    ways, connector, home
-) -> None:
-    found = ways(Goal(PLACE))
-    estimates = [way.estimate for way in found]
-    assert estimates == sorted(estimates)
-    for way in found:
-        assert connector.connect(State.rest(home), way.entry).duration == pytest.approx(
-            way.estimate, abs=1e-6
-        )
-        assert way.tail == 0.0
-        assert way.arrival is None
-
-
 def test_the_straight_part_begins_in_the_entry_and_ends_over_the_goal(ways, kinematics) -> None:
     for way in ways(Goal(PLACE, guarded=0.02, speed=0.04), 0.02)[:6]:
         assert way.arrival is not None

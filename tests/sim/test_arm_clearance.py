@@ -44,11 +44,8 @@ def at(config: CellConfig, kinematics: Kinematics):
     return lambda x, y, z: kinematics.nearest_solution(tool_down([x, y, z]), home)
 
 
-@pytest.fixture(scope="module")
-def red_bin(config: CellConfig) -> tuple[float, float, float]:
-    """Centre of a bin and the distance of its outer wall along y [m]."""
-    bin = config.bins["red_bin"]
-    return bin.position[0], bin.position[1], bin.size[1] / 2
+RED_BIN = 0.24, -0.48, 0.15
+"""Centre of a bin and the distance of its wall along y [m]."""
 
 
 def test_the_tool_must_not_touch_the_table(clearance: PathClearance, at) -> None:
@@ -56,9 +53,9 @@ def test_the_tool_must_not_touch_the_table(clearance: PathClearance, at) -> None
         clearance.check(np.array([at(0.5, 0.0, z) for z in (0.1, 0.003)]))
 
 
-def test_the_tool_must_not_hit_a_bins_wall(clearance: PathClearance, at, red_bin) -> None:
+def test_the_tool_must_not_hit_a_bins_wall(clearance: PathClearance, at) -> None:
     with pytest.raises(Blocked, match=r"the tool 0\.\d+ m into red_bin"):
-        x, y, half = red_bin
+        x, y, half = RED_BIN
         clearance.check(np.array([at(x, y - away, 0.04) for away in (0.0, half)]))
 
 
@@ -68,16 +65,16 @@ def test_a_held_object_may_lie_on_the_table_but_not_go_into_it(clearance: PathCl
         clearance.check(np.array([at(0.5, 0.0, z) for z in (0.1, 0.03)]), DUCK)
 
 
-def test_a_held_object_must_pass_over_a_bins_wall(clearance: PathClearance, at, red_bin) -> None:
-    x, y, half = red_bin
+def test_a_held_object_must_pass_over_a_bins_wall(clearance: PathClearance, at) -> None:
+    x, y, half = RED_BIN
     path = [at(x, y - away, 0.09) for away in (half + 0.08, half + 0.04, half)]
     clearance.check(np.array(path))
     with pytest.raises(Blocked, match=r"the held duck .* red_bin"):
         clearance.check(np.array(path), DUCK)
 
 
-def test_a_held_object_may_be_put_on_a_bins_floor(clearance: PathClearance, at, red_bin) -> None:
-    clearance.check(np.array([at(*red_bin[:2], z) for z in (0.15, 0.057)]), DUCK)
+def test_a_held_object_may_be_put_on_a_bins_floor(clearance: PathClearance, at) -> None:
+    clearance.check(np.array([at(*RED_BIN[:2], z) for z in (0.15, 0.057)]), DUCK)
 
 
 def test_a_motion_may_leave_a_place_too_near_but_not_come_nearer(clearance: PathClearance, at) -> None:

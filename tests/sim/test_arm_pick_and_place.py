@@ -13,7 +13,6 @@ from executive.messages import Load
 
 AIM = {"cube": 0.0, "sphere": 0.0, "duck": 0.01}
 """Where along x from what is to be touched the middle of an object stands [m]: a duck's head is in front."""
-PLACES = [(0.44, -0.2), (0.53, 0.0), (0.62, 0.2)]
 OVERTRAVEL, DROP = 0.015, 0.015
 
 
@@ -22,15 +21,15 @@ def in_tool(rig: Rig, body: int) -> Pose:
     return rig.world.tool_pose().inverse() @ rig.world.object_pose(body)
 
 
-@pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize(
-    ("label", "bin"), [("cube", "red_bin"), ("sphere", "blue_bin"), ("duck", "yellow_bin")]
+    ("label", "bin", "x", "y"),
+    [("cube", "red_bin", 0.44, -0.2), ("sphere", "blue_bin", 0.53, 0.0), ("duck", "yellow_bin", 0.62, 0.2)],
 )
 def test_an_object_is_picked_carried_without_slip_and_placed(
-    rig: Rig, label: str, bin: str, place: tuple[float, float]
+    rig: Rig, label: str, bin: str, x: float, y: float
 ) -> None:
     config, arm, tool = rig.config, rig.arm, rig.tool
-    (x, y), kind, box = place, as_class(label, config.objects[label]), as_bin(bin, config.bins[bin])
+    kind, box = as_class(label, config.objects[label]), as_bin(bin, config.bins[bin])
     body = rig.add(label, x + AIM[label], y)
     rig.step(120)
     over = Goal((*box.slots[0], float(box.position[2]) + kind.height + DROP))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -140,6 +141,8 @@ def test_a_frame_is_the_cameras_whole_image_labelled_where_a_run_searches_it(ove
     frame = as_labelled_frame(drawn, "overhead", "a")
     left, top, right, bottom = frame.area or ()
     assert frame.image.shape == (480, 640, 3)
+    twice = as_labelled_frame(replace(drawn, part=(10, 20, 522, 532)), "overhead", "a")
+    assert twice.boxes == pytest.approx(drawn.boxes * 2 + [10, 20, 10, 20])
     assert frame.depth is not None
     assert (left, top, right, bottom) == camera.table_view
     assert (frame.image[top:bottom, left:right] == drawn.image).all()

@@ -9,12 +9,10 @@ import pytest
 
 from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
-from executive.geometry import Array, tool_down
-from executive.layout import as_bin, as_class, travel_height
+from executive.geometry import Array
+from executive.layout import as_bin, as_class
 from executive.messages import Load
 from executive.mission.parse.cell_file import load_cell
-from executive.motion.kinematics import Kinematics
-from executive.motion.limits import JointLimits, rest_to_rest
 from executive.motion.planner import Planner
 from executive.sim.cell import SimCell
 from executive.sim.clearance import PathClearance
@@ -24,16 +22,6 @@ from executive.sim.least_times import SimLeastTimes
 @pytest.fixture(scope="module")
 def config(missions: Path) -> CellConfig:
     return load_cell(missions / "cells" / "overhead.yaml")
-
-
-@pytest.fixture(scope="module")
-def limits(config: CellConfig) -> JointLimits:
-    return JointLimits.of(config.arm.limits)
-
-
-@pytest.fixture(scope="module")
-def kinematics(config: CellConfig, limits: JointLimits) -> Kinematics:
-    return Kinematics(config.tool.length, limits.position)
 
 
 @pytest.fixture(scope="module")
@@ -52,6 +40,7 @@ def nearest(config: CellConfig, slots: Array) -> Array:
     return np.clip(slots, low, high)
 
 
+@pytest.mark.slow
 def test_no_planned_carry_is_faster_than_the_least(config: CellConfig, least: SimLeastTimes) -> None:
     """Half of them are the shortest there are: from the place nearest to a slot, and higher than it must."""
     clearance = PathClearance(config)
@@ -75,44 +64,14 @@ def test_no_planned_carry_is_faster_than_the_least(config: CellConfig, least: Si
     assert np.mean(shares) > 0.4, "else it is of little use"
 
 
-def test_no_joint_makes_its_part_of_any_carry_in_less(
-    config: CellConfig, limits: JointLimits, kinematics: Kinematics, least: SimLeastTimes
-) -> None:
-    """Whatever is planned, in whatever posture and at whatever height the carry begins and ends."""
-
-    def postures(x: float, y: float, z: float, swivels: Array) -> Array:
-        found = kinematics.grid(tool_down([x, y, z]), np.radians(swivels)).reshape(-1, 7)
-        found[:, 6] = 0.0
-        return found[np.all(np.abs(found) <= limits.position, axis=1)]
-
-    heights, shares = {kind.height for kind in config.objects.values()}, []
-    for name, section in config.bins.items():
-        slots = as_bin(name, section).slots
-        places = nearest(config, slots)
-        close = np.argsort(np.linalg.norm(places - slots, axis=1))[:2]
-        ends = np.concatenate(
-            [
-                postures(*slots[number], z, np.arange(-180, 180, 15.0))
-                for number in close
-                for z in (0.055, 0.1, travel_height(config))
-            ]
-        )
-        for place in places[close]:
-            for height in heights:
-                for start in postures(*place, height, np.arange(-180, 180, 10.0)):
-                    shares.append(least.carry(name) / rest_to_rest(ends - start, limits).min())
-    assert max(shares) < 1.0
-
-
 def test_the_bins_differ_and_no_bin_means_the_nearest(config, least) -> None:
     times = {bin: least.carry(bin) for bin in config.bins}
-    assert len(set(times.values())) == 3
-    assert least.carry(None) == min(times.values()) > 0.3
+    assert times == pytest.approx(
+        {"red_bin": 0.34913, "blue_bin": 0.379096, "yellow_bin": 0.328779}, rel=1e-5
+    )
+    assert least.carry(None) == min(times.values())
     assert least.carry("grey_bin") == 0.0
-
-
-def test_nothing_is_known_of_a_carry_from_where_the_arm_does_not_reach(config) -> None:
-    assert SimLeastTimes(changed(config, "table", x=(1.2, 1.4))).carry("red_bin") == 0.0
+    assert SimLeastTimes(changed(config, "table", x=(1.2, 1.4))).carry("red_bin") == 0.0, "out of reach"
 
 
 def test_a_descent_may_end_early_on_an_object_higher_than_expected(config: CellConfig) -> None:
@@ -120,10 +79,6 @@ def test_a_descent_may_end_early_on_an_object_higher_than_expected(config: CellC
     long = SimLeastTimes(changed(config, "motion", descent=0.02, descent_speed=0.03))
     assert long.descent == pytest.approx((0.020 - 0.010 - 0.001) / 0.03)
     assert SimLeastTimes(changed(config, "motion", descent=0.008)).descent == 0.0
-
-
-def test_a_descent_onto_objects_of_one_height_takes_the_guarded_part(config: CellConfig) -> None:
-    """Less the last millimetre, from which the lip feels a surface."""
     cubes = config.model_copy(update={"objects": {"cube": config.objects["cube"]}})
     motion = config.motion
     assert SimLeastTimes(cubes).descent == pytest.approx((motion.descent - 0.001) / motion.descent_speed)

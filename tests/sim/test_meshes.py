@@ -85,42 +85,29 @@ def test_a_bolt_lies_still_on_its_head_and_the_tip_of_its_shaft(build: Build, fa
     assert X_WO.position == pytest.approx([0.5, 0.0, 0.0135], abs=0.002)
 
 
-def test_an_object_stands_around_its_middle_wherever_its_mesh_has_the_origin(
+def test_a_mesh_stands_around_its_middle_and_weighs_about_the_middle_of_its_volume(
     build: Build, overhead: CellConfig, wedge: ObjectConfig
 ) -> None:
     mesh = load_mesh(wedge)
     assert mesh.vertices.min(axis=0) == pytest.approx([-0.01, -0.005, -0.015])
     assert mesh.vertices.max(axis=0) == pytest.approx([0.01, 0.005, 0.015])
-    world = build(with_objects(overhead, wedge=wedge))
-    X_WO = Pose(about_z(0.7), np.array([0.5, 0.1, 0.2]))
-    body = world.add_object("wedge", X_WO, (1, 1, 1))
-    assert world.object_pose(body).rounded() == pytest.approx(X_WO.rounded(), abs=1e-6)
-    low, high = world.client.getAABB(body)
-    assert (np.array(low) + high) / 2 == pytest.approx(X_WO.position, abs=1e-3)
-
-
-def test_a_mesh_weighs_what_it_should_about_the_middle_of_its_volume(
-    build: Build, overhead: CellConfig, wedge: ObjectConfig
-) -> None:
     # A third of the way from its upright edge, and from its underside.
-    assert load_mesh(wedge).centroid == pytest.approx([-0.01 + 0.02 / 3, 0.0, -0.015 + 0.03 / 3])
-    world = build(with_objects(overhead, wedge=wedge))
-    body = world.add_object("wedge", Pose.of([0.5, 0.0, 0.2]), (1, 1, 1))
-    mass, *_ = world.client.getDynamicsInfo(body, -1)
-    centre, _ = world.client.getBasePositionAndOrientation(body)
-    assert mass == 0.2
-    assert centre == pytest.approx([0.5 - 0.01 + 0.02 / 3, 0.0, 0.2 - 0.005])
-
-
-def test_scale_and_turn_apply_to_what_is_seen_and_what_is_felt(
-    build: Build, overhead: CellConfig, wedge: ObjectConfig
-) -> None:
+    assert mesh.centroid == pytest.approx([-0.01 + 0.02 / 3, 0.0, -0.005])
     laid = wedge.model_copy(update={"scale": 2.0, "upright_deg": (90.0, 0.0, 0.0)})
-    mesh = load_mesh(laid)
-    assert np.ptp(mesh.vertices, axis=0) == pytest.approx([0.04, 0.06, 0.02])
-    world = build(with_objects(overhead, wedge=laid))
-    low, high = world.client.getAABB(world.add_object("wedge", Pose.of([0.5, 0.0, 0.2]), (1, 1, 1)))
+    assert np.ptp(load_mesh(laid).vertices, axis=0) == pytest.approx([0.04, 0.06, 0.02])
+    world = build(with_objects(overhead, wedge=wedge, laid=laid))
+    X_WO = Pose(about_z(0.7), np.array([0.5, 0.1, 0.2]))
+    body, other = (
+        world.add_object("wedge", X_WO, (1, 1, 1)),
+        world.add_object("laid", Pose.of([0.3, 0, 0.3]), (1, 1, 1)),
+    )
+    assert world.object_pose(body).rounded() == pytest.approx(X_WO.rounded(), abs=1e-6)
+    assert world.client.getDynamicsInfo(body, -1)[0] == 0.2
+    centre, _ = world.client.getBasePositionAndOrientation(body)
+    assert centre == pytest.approx(X_WO.apply(mesh.centroid))
+    low, high = world.client.getAABB(other)
     assert np.subtract(high, low) == pytest.approx([0.04, 0.06, 0.02], abs=0.005)
+    assert (np.array(low) + high) / 2 == pytest.approx([0.3, 0, 0.3], abs=1e-3)
 
 
 def test_a_rendered_scene_has_the_box_of_every_fastener(fasteners: CellConfig) -> None:

@@ -5,8 +5,6 @@ from collections.abc import Iterator
 
 import pybullet
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell_config import ToolConfig
@@ -96,16 +94,8 @@ def test_a_surface_out_of_reach_bears_nothing() -> None:
     assert breakaway(Seal(1, REACH + 1e-6, 0.0, 0.0), TOOL) == 0
 
 
-@given(gap=st.floats(0, 0.01), wider=st.floats(0, 0.01), tilt=st.floats(0, 1.5), steeper=st.floats(0, 1.5))
-def test_the_force_falls_with_gap_and_tilt_and_stays_in_its_range(
-    gap: float, wider: float, tilt: float, steeper: float
-) -> None:
-    force = breakaway(Seal(1, 0.0, gap, tilt), TOOL)
-    assert 0 <= force <= TOOL.force
-    assert breakaway(Seal(1, 0.0, gap + wider, tilt), TOOL) <= force
-    assert breakaway(Seal(1, 0.0, gap, tilt + steeper), TOOL) <= force
-
-
 def test_half_the_gap_and_half_the_tilt_leave_a_quarter_of_the_force() -> None:
     seal = Seal(1, 0.0, TOOL.gap / 2, math.radians(TOOL.tilt_deg) / 2)
     assert breakaway(seal, TOOL) == pytest.approx(TOOL.force / 4)
+    for bad in (Seal(1, 0.0, 2 * TOOL.gap, 0.0), Seal(1, 0.0, 2 * TOOL.gap, 1.5), None):
+        assert breakaway(bad, TOOL) == 0.0
