@@ -11,7 +11,7 @@ from joint_states import LIMITS
 
 from executive.arm import Goal
 from executive.errors import Unreachable
-from executive.motion.kinematics import Kinematics, wrapped
+from executive.motion.kinematics import Kinematics
 from executive.motion.postures import find_postures, line_chain, upright_line
 
 ARM = Kinematics(0.12, LIMITS.position)
@@ -31,18 +31,6 @@ def test_every_posture_points_down_over_the_goal_inside_the_limits(place, yaw, l
         assert np.all(np.abs(qs) <= LIMITS.position + 1e-9)
         for q in qs[::17] if yaw is not None else ():
             assert np.allclose(ARM.forward(q).rotation[:, 1], [-math.sin(yaw), math.cos(yaw), 0], atol=1e-7)
-
-
-@given(places, yaws)
-@settings(max_examples=20, deadline=None)
-def test_the_way_down_keeps_branch_swivel_and_yaw(place, yaw) -> None:
-    found = find_postures(ARM, Goal(place, yaw), 0.1, START)
-    for number in range(0, len(found), 29):
-        low, high = found.low[number], found.high[number]
-        assert ARM.branch(low) == ARM.branch(high) == found.branch[number]
-        assert abs(wrapped(ARM.swivel(low) - found.swivel[number])) < 1e-6
-        assert abs(wrapped(ARM.swivel(high) - found.swivel[number])) < 1e-6
-        assert np.allclose(ARM.forward(low).rotation, ARM.forward(high).rotation, atol=1e-7)
 
 
 def test_a_free_yaw_turns_joint_7_no_more_than_the_way_down_asks_for() -> None:

@@ -63,14 +63,6 @@ def test_a_seal_affords_all_of_a_motion_or_nothing(sway, kinematics) -> None:
     assert Hold(Load(KIND, weight), kinematics).lift == 0.5
 
 
-def test_a_level_motion_may_use_what_the_seal_bears_beyond_the_weight(sway, kinematics) -> None:
-    """Level acceleration and gravity are square to each other: `(k a)² + g² = (bears / 2 m)²`."""
-    most = strongest(sway, kinematics)
-    wanted = 0.7
-    bears = SAFETY * KIND.mass * math.hypot(GRAVITY, wanted * most)
-    assert Hold(Load(KIND, bears), kinematics).share(sway) == pytest.approx(wanted, rel=0.01)
-
-
 @pytest.mark.parametrize("share", [0.25, 0.6, 0.9])
 def test_flown_at_the_root_of_the_share_a_motion_is_just_affordable(sway, kinematics, share: float) -> None:
     bears = SAFETY * KIND.mass * math.hypot(GRAVITY, share * strongest(sway, kinematics))

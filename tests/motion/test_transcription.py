@@ -9,7 +9,7 @@ from joint_states import LIMITS, positions, shares
 from executive.geometry import Array
 from executive.motion.free import Connector
 from executive.motion.state import State
-from executive.motion.transcription import LONGEST, SAMPLES, SHORTEST, STEPS, Course, Demand, Transcription
+from executive.motion.transcription import SAMPLES, STEPS, Course, Demand, Transcription
 
 CONNECTOR = Connector(LIMITS)
 PLACES = np.arange(1, STEPS * SAMPLES) / (STEPS * SAMPLES)
@@ -114,18 +114,6 @@ def test_a_course_keeps_the_limits(move) -> None:
         assert np.all(np.abs(states.qd) <= LIMITS.velocity + bulge)
 
 
-@given(moves(passing=0.15))
-@settings(max_examples=20, deadline=None)
-def test_positions_and_half_steps_are_those_of_its_accelerations(move) -> None:
-    program, course = fitted(*move)
-    states = flown(move[0], course, SAMPLES)
-    assert np.allclose(course.qs, states.q[1:-1], atol=1e-9)
-    halves = zip(*(values[:: SAMPLES // 2] for values in states), strict=True)
-    for state, wanted in zip(program.states(course), halves, strict=True):
-        for one, other in zip(state, wanted, strict=True):
-            assert np.allclose(one, other, atol=1e-6)
-
-
 @given(moves())
 @settings(max_examples=20, deadline=None)
 def test_with_nothing_in_the_way_it_becomes_nearly_as_fast_as_can_be(move) -> None:
@@ -152,16 +140,3 @@ def test_a_step_meets_what_is_demanded_of_three_positions_together_and_of_its_le
     assert found is not None
     moved = np.einsum("rkj,rkj->r", slopes, found.qs[rows] - course.qs[rows])
     assert np.all(demand.slack + moved + growth * (found.step - course.step) > 0)
-
-
-@given(moves())
-@settings(max_examples=20, deadline=None)
-def test_a_step_changes_no_more_than_it_is_trusted_to(move) -> None:
-    program, course = fitted(*move)
-    trust = 0.15
-    found = program.shorten(course, NOTHING, trust)
-    assert found is not None
-    before, after = (one.accelerations * one.step**2 for one in (course, found))
-    change = np.abs(after - before) / (LIMITS.acceleration[:, None] * course.step**2)
-    assert change.max() <= trust + 1e-6
-    assert SHORTEST - 1e-6 <= found.step / course.step <= LONGEST + 1e-6

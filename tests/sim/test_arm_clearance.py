@@ -14,10 +14,11 @@ from executive.messages import Load, ObjectClass, Obstacle
 from executive.mission.parse.cell_file import load_cell
 from executive.motion.kinematics import Kinematics, fold
 from executive.motion.planner import Planner
-from executive.sim.clearance import SELF_PAIRS, PathClearance
+from executive.sim.clearance import PathClearance
 
 DUCK = Task(Load(ObjectClass("duck", 0.05, 0.04)))
 TOWER = Obstacle(0.5, 0.1, 0.03, 0.2, "cube-3")
+COIN = Obstacle(0.5, 0.1, 0.03, 0.0005, "a coin")
 
 
 @pytest.fixture(scope="module")
@@ -48,39 +49,47 @@ RED_BIN = 0.24, -0.48, 0.15
 """Centre of a bin and the distance of its wall along y [m]."""
 
 
-def test_the_tool_must_not_touch_the_table(clearance: PathClearance, at) -> None:
-    with pytest.raises(Blocked, match=r"the tool 0\.00\d m from the table, with the tool at \(0\.500"):
-        clearance.check(np.array([at(0.5, 0.0, z) for z in (0.1, 0.003)]))
+def straight(*heights: float) -> list[tuple[float, float, float]]:
+    return [(0.5, 0.0, height) for height in heights]
 
 
-def test_the_tool_must_not_hit_a_bins_wall(clearance: PathClearance, at) -> None:
-    with pytest.raises(Blocked, match=r"the tool 0\.\d+ m into red_bin"):
-        x, y, half = RED_BIN
-        clearance.check(np.array([at(x, y - away, 0.04) for away in (0.0, half)]))
-
-
-def test_a_held_object_may_lie_on_the_table_but_not_go_into_it(clearance: PathClearance, at) -> None:
-    clearance.check(np.array([at(0.5, 0.0, z) for z in (0.05, 0.1, 0.05)]), DUCK)
-    with pytest.raises(Blocked, match=r"the held duck 0\.0\d\d m into the table"):
-        clearance.check(np.array([at(0.5, 0.0, z) for z in (0.1, 0.03)]), DUCK)
-
-
-def test_a_held_object_must_pass_over_a_bins_wall(clearance: PathClearance, at) -> None:
+def into_the_bin(height: float, *distances: float) -> list[tuple[float, float, float]]:
+    """Places at so many distances from the wall of the red bin [m]."""
     x, y, half = RED_BIN
-    path = [at(x, y - away, 0.09) for away in (half + 0.08, half + 0.04, half)]
-    clearance.check(np.array(path))
-    with pytest.raises(Blocked, match=r"the held duck .* red_bin"):
-        clearance.check(np.array(path), DUCK)
+    return [(x, y - half - distance, height) for distance in distances]
 
 
-def test_a_held_object_may_be_put_on_a_bins_floor(clearance: PathClearance, at) -> None:
-    clearance.check(np.array([at(*RED_BIN[:2], z) for z in (0.15, 0.057)]), DUCK)
-
-
-def test_a_motion_may_leave_a_place_too_near_but_not_come_nearer(clearance: PathClearance, at) -> None:
-    clearance.check(np.array([at(0.5, 0.0, z) for z in (0.003, 0.004, 0.1)]))
-    with pytest.raises(Blocked, match="the table"):
-        clearance.check(np.array([at(0.5, 0.0, z) for z in (0.003, 0.001)]))
+@pytest.mark.parametrize(
+    ("places", "task", "said"),
+    [
+        (straight(0.2, 0.1, 0.03), Task(), ""),
+        (straight(0.1, 0.003), Task(), r"the tool 0\.00\d m from the table, with the tool at \(0\.500"),
+        (into_the_bin(0.04, -0.15, 0.0), Task(), r"the tool 0\.\d+ m into red_bin"),
+        (straight(0.05, 0.1, 0.05), DUCK, ""),
+        (straight(0.1, 0.03), DUCK, r"the held duck 0\.0\d\d m into the table"),
+        (into_the_bin(0.09, 0.08, 0.04, 0.0), Task(), ""),
+        (into_the_bin(0.09, 0.08, 0.04, 0.0), DUCK, r"the held duck .* red_bin"),
+        ([(*RED_BIN[:2], z) for z in (0.15, 0.057)], DUCK, ""),
+        (straight(0.003, 0.004, 0.1), Task(), ""),
+        (straight(0.003, 0.001), Task(), "the table"),
+        ([(0.5, y, 0.23) for y in (-0.1, 0.1)], Task(around=(TOWER,)), ""),
+        ([(0.5, y, 0.23) for y in (-0.1, 0.1)], Task(DUCK.load, (TOWER,)), r"held duck 0\.020 m into cube-3"),
+        ([(0.5, 0.1, z) for z in (0.1, 0.0505)], DUCK, ""),
+        ([(0.5, 0.1, z) for z in (0.1, 0.0505)], Task(DUCK.load, (COIN,)), r"the held duck .* a coin"),
+        ([(0.5, 0.1, z) for z in (0.202, 0.203, 0.25)], Task(around=(TOWER,)), ""),
+        ([(0.5, 0.1, z) for z in (0.202, 0.201)], Task(around=(TOWER,)), r"the tool 0\.001 m from cube-3"),
+    ],
+)
+def test_a_path_keeps_the_margin_but_a_load_may_lie_on_table_and_floor(
+    clearance: PathClearance, at, places, task: Task, said: str
+) -> None:
+    """A motion may leave a place that is too near to something, but not come nearer."""
+    path = np.array([at(*place) for place in places])
+    if said:
+        with pytest.raises(Blocked, match=said):
+            clearance.check(path, task)
+    else:
+        clearance.check(path, task)
 
 
 def test_a_long_tool_may_meet_the_upper_arm(config: CellConfig) -> None:
@@ -124,14 +133,6 @@ def test_several_things_of_one_size_stand_around_at_once(clearance: PathClearanc
             clearance.check(np.array([at(0.5, 0.2, 0.25), at(0.5, tower.y, 0.15)]), Task(around=towers))
 
 
-def test_a_held_object_keeps_clear_of_what_stands_around(clearance: PathClearance, at) -> None:
-    path = np.array([at(0.5, y, 0.23) for y in (-0.1, 0.1)])
-    around = (TOWER,)
-    clearance.check(path, Task(around=around))
-    with pytest.raises(Blocked, match=r"the held duck 0\.020 m into cube-3"):
-        clearance.check(path, Task(DUCK.load, around))
-
-
 def test_a_held_object_keeps_clear_of_the_arm(clearance: PathClearance) -> None:
     path = np.radians([(0, -65, 60, -90, 0, 60, 0), (0, -100, 65, -110, 0, 105, 0)])
     clearance.check(path)
@@ -150,19 +151,6 @@ def test_a_planned_motion_goes_around_what_stands_there(clearance: PathClearance
     around = planner.plan(q, goal, task)
     clearance.check(around.samples.q, task)
     assert straight.duration < around.duration < 4 * straight.duration
-
-
-@pytest.mark.parametrize("cell", ["overhead", "wrist"])
-def test_home_is_three_centimetres_clear_of_everything(
-    missions: Path, cell: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # The usual distance of links 5 and 7 is 29 mm.
-    monkeypatch.setattr("executive.sim.clearance.SELF_PAIRS", [pair for pair in SELF_PAIRS if pair != (4, 6)])
-    config = load_cell(missions / "cells" / f"{cell}.yaml")
-    config = config.model_copy(update={"motion": config.motion.model_copy(update={"margin": 0.03})})
-    clearance = PathClearance(config)
-    assert clearance.too_near(np.radians(config.arm.poses_deg["home"])) is None
-    clearance.close()
 
 
 @pytest.mark.parametrize("distance", [-0.01, 0.0, 0.0035, 0.006, 0.012, 0.02])

@@ -70,22 +70,3 @@ def test_an_object_is_picked_carried_without_slip_and_placed(
     assert lies[:2] == pytest.approx(box.slots[0], abs=0.03)
     assert box.contains(lies)
     assert lies[2] < kind.height
-
-
-def test_the_weaker_a_seal_the_gentler_its_load_is_carried(rig: Rig) -> None:
-    """What hangs there pulls at the seal with no more than half of what it bears, as the planner promises."""
-    kind, durations = as_class("cube", rig.config.objects["cube"]), []
-    rig.add("cube", 0.5, 0.1)
-    rig.step(120)
-    rig.touch_down(Goal((0.5, 0.1, 0.04), guarded=0.015, speed=0.035))
-    rig.tool.close()
-    places = [Goal((0.24, -0.48, 0.07)), Goal((0.24, 0.48, 0.07))]
-    for number, bears in enumerate((7.0, 3.2, 2.6, 2.3)):
-        motion, pulls = rig.planned(places[number % 2], Task(Load(kind, bears))), []
-        rig.arm.start(motion)
-        while not rig.arm.at_rest:
-            rig.step()
-            pulls.append(rig.tool.pull)
-        assert max(pulls) < 1.02 * bears / 2
-        durations.append(motion.duration)
-    assert durations[1:] == sorted(durations[1:])

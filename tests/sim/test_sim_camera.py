@@ -76,24 +76,6 @@ def test_projected_meshes_agree_with_the_rendered_silhouettes(
         assert abs(np.mean(np.array(seen) - expected)) < 0.3, label
 
 
-@pytest.mark.parametrize("cell", ["overhead", "wrist"])
-def test_the_workspace_lies_inside_the_table_view_from_every_scan_pose(
-    build: Build, cell: str, request: pytest.FixtureRequest
-) -> None:
-    config: CellConfig = request.getfixturevalue(cell)
-    world, name = at_scan_pose(build, config)
-    camera = config.cameras[name]
-    corners = [(x, y, z) for x in config.table.x for y in config.table.y for z in (0.0, 0.06)]
-    left, top, right, bottom = camera.table_view
-    assert right - left == bottom - top
-    for pose in camera.scan_poses:
-        world.set_arm(np.radians(config.arm.poses_deg[pose]))
-        matrix, _ = calibrated(camera)
-        pixels = project(matrix, camera_pose(world, camera), corners)
-        assert (pixels > (left, top)).all()
-        assert (pixels < (right, bottom)).all()
-
-
 def test_two_frames_of_one_scene_differ_and_a_seed_repeats_them(build: Build, overhead: CellConfig) -> None:
     world, name = at_scan_pose(build, overhead)
     one, same, other = (

@@ -143,18 +143,6 @@ def test_the_gauge_tells_what_the_seal_bears_until_nothing_is_held(bench: Bench)
     assert (bench.tool.holding, bench.tool.bears) == (False, 0.0)
 
 
-def test_a_seal_near_the_edge_bears_less() -> None:
-    bears = []
-    for dx in (0.0, 0.012, 0.018):
-        bench = Bench("sphere")
-        drop = 0.03 - np.sqrt(0.03**2 - max(0.0, dx - bench.config.cup_radius) ** 2)
-        bench.put(0.0008 - drop, dx=dx)
-        bench.tool.close()
-        bears.append(bench.tool.bears)
-        bench.world.close()
-    assert bears[0] > bears[1] > bears[2] > bench.config.least_force
-
-
 def test_a_blow_of_a_single_step_does_not_break_the_seal(bench: Bench) -> None:
     bench.hang()
     bench.steps(1, pull=2 * bench.config.force)

@@ -1,16 +1,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from executive.cell_config import CellConfig
 from executive.geometry import Pose, about_z, tool_down
-from executive.mission.parse.cell_file import load_cell
-from executive.sim.cell import SimCell
-from executive.sim.models import load_mesh
 from executive.sim.world import World, held_part
 
 Build = Callable[[CellConfig], World]
@@ -35,23 +31,6 @@ def test_the_tool_ends_where_the_tool_centre_point_is(build: Build, wrist: CellC
     assert high[2] - low[2] == pytest.approx(wrist.tool.length, abs=5e-3)
 
 
-@pytest.mark.parametrize("label", ["cube", "sphere", "duck"])
-def test_an_object_lies_as_high_and_wide_as_the_cell_file_says(
-    build: Build, overhead: CellConfig, label: str
-) -> None:
-    world, model = build(overhead), overhead.objects[label]
-    mesh = load_mesh(model)
-    body = world.add_object(label, Pose.of([0.5, 0, 0.001 - mesh.bottom]), (1, 1, 1))
-    for _ in range(240):
-        world.step()
-    vertices = world.object_pose(body).apply(mesh.vertices)
-    centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-    (hit,) = world.client.rayTest([*centre[:2], 1], [*centre[:2], -1])
-    assert hit[0] == body
-    assert hit[3][2] == pytest.approx(model.height, abs=1e-3)
-    assert np.hypot(*(vertices - centre)[:, :2].T).max() == pytest.approx(model.radius, abs=1e-3)
-
-
 def test_an_object_is_where_it_was_put_and_can_be_put_elsewhere(build: Build, overhead: CellConfig) -> None:
     world = build(overhead)
     first, second = Pose(about_z(0.7), np.array([0.5, 0.1, 0.2])), Pose.of([0.4, 0, 0.3])
@@ -63,36 +42,12 @@ def test_an_object_is_where_it_was_put_and_can_be_put_elsewhere(build: Build, ov
     assert world.bodies == {}
 
 
-def test_every_body_has_a_name_for_the_text_of_an_error(build: Build, overhead: CellConfig) -> None:
+def test_every_body_and_part_has_a_name_for_the_text_of_an_error(build: Build, overhead: CellConfig) -> None:
     world = build(overhead)
     duck = world.add_object("duck", Pose.of([0.5, 0.1, 0.2]), (1, 1, 1))
     bodies = world.plane, world.table, *world.bins["blue_bin"], duck, world.arm
-    assert [world.name_of(body) for body in bodies] == [
-        "the floor",
-        "the table",
-        "blue_bin",
-        "a duck",
-        "the arm",
-    ]
-
-
-def test_every_part_of_the_arm_has_a_name_too(build: Build, overhead: CellConfig) -> None:
-    world = build(overhead)
-    assert [world.part_of(link) for link in (-1, 0, world.flange, world.tool)] == [
-        "link 0",
-        "link 1",
-        "link 7",
-        "the tool",
-    ]
+    names = ["the floor", "the table", "blue_bin", "a duck", "the arm"]
+    assert [world.name_of(body) for body in bodies] == names
+    parts = [world.part_of(link) for link in (-1, 0, world.flange, world.tool)]
+    assert parts == ["link 0", "link 1", "link 7", "the tool"]
     assert held_part("duck") == "the held duck"
-
-
-def test_a_missing_model_is_found_before_anything_is_loaded(missions: Path) -> None:
-    overrides = {"cell.objects.duck.urdf": "unicorn.urdf"}
-    config = load_cell(missions / "cells" / "overhead.yaml", overrides)
-    assert list(SimCell.check(config, missions / "cells")) == [
-        (
-            ("objects", "duck", "urdf"),
-            "there is no model unicorn.urdf, neither beside the cell file nor in pybullet_data",
-        )
-    ]
