@@ -12,7 +12,6 @@ from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
-from executive.layout import NECK_LENGTH, TOOL_RADIUS
 from executive.messages import Load, ObjectClass, Obstacle
 from executive.motion.kinematics import fold
 from executive.motion.planner import SPACING, Planner
@@ -50,7 +49,7 @@ def question(name: str, planner: Planner, config: CellConfig, home: Array) -> Tr
         "turn": lambda: planner.plan(home, Goal((0.6, 0.2, 0.1), 0.5)),
         "carry": lambda: planner.plan(picked, BIN, Task(Load(CUBE, 7.9), near)),
         "carry weakly": lambda: planner.plan(picked, BIN, Task(Load(CUBE, 2.4))),
-        "carry weakly far": lambda: planner.plan(far, BIN, Task(Load(CUBE, 2.4))),
+        "weak far": lambda: planner.plan(far, BIN, Task(Load(CUBE, 2.4))),
         "sweep past": lambda: planner.plan(beside, onto, Task(target=Obstacle(0.5, 0.0, 0.0354, 0.05, "it"))),
         "carry hardly": lambda: planner.plan(picked, BIN, Task(Load(CUBE, 1.0))),
         "over a wall": lambda: planner.plan(picked, beyond, Task(Load(CUBE), wall)),
@@ -66,7 +65,7 @@ ANSWERS = {
     "turn": (0.514799, math.inf, [0.49188, 0.75019, 0.0, -1.45755, 0.0, 0.93386, -0.08944]),
     "carry": (0.714043, math.inf, [-0.17468, 0.85035, -0.64559, -1.77685, 0.76684, 0.74278, 7e-05]),
     "carry weakly": (0.923196, math.inf, [-0.01424, 1.00784, -0.84934, -1.78093, 0.93341, 0.90919, 0.00222]),
-    "carry weakly far": (1.268907, math.inf, [-0.00353, 0.89756, -0.44081, -1.59216, 0.47962, 0.81615, -8e-05]),
+    "weak far": (1.268907, math.inf, [-0.00353, 0.89756, -0.44081, -1.59216, 0.47962, 0.81615, -8e-05]),
     "sweep past": (1.067468, 0.466969, [0.30829, 0.86884, -0.40493, -1.86888, 0.62204, 0.5418, 0.01258]),
     "carry hardly": (3.545365, math.inf, [-0.05676, 0.88929, -0.82623, -1.80773, 0.81148, 0.90025, 0.02551]),
     "over a wall": (0.724018, math.inf, [0.34382, 0.77983, -0.4167, -1.67431, 0.40105, 0.52455, 4e-05]),
@@ -111,23 +110,6 @@ def neighbours(x: float, y: float, turn: float, count: int, top: float) -> tuple
         Obstacle(x + apart * math.cos(a), y + apart * math.sin(a), CUBE.radius, top, "a neighbour")
         for a in angles
     )
-
-
-@given(st.floats(0.47, 0.59), st.floats(-0.17, 0.17), st.floats(0, math.pi), st.integers(1, 6))
-@settings(max_examples=5, deadline=None)
-def test_among_tightly_standing_neighbours_it_still_comes_down_and_leaves_again(
-    planner, config, home, x, y, turn, count
-) -> None:
-    near = neighbours(x, y, turn, count, CUBE.height)
-    down = planner.plan(home, pick(x, y, 0.04), Task(around=near))
-    assert np.allclose(planner.kinematics.tips(down.end[None])[0], (x, y, 0.04), atol=1e-7)
-    for tip in tips_of(planner, down):
-        for thing in near:
-            away = math.hypot(tip[0] - thing.x, tip[1] - thing.y) - thing.radius
-            assert tip[2] > thing.top or away > config.tool.cup_radius
-            assert tip[2] + NECK_LENGTH > thing.top or away > TOOL_RADIUS
-    picked = planner.plan(home, pick(x, y), Task(around=near)).end
-    assert planner.plan(picked, BIN, Task(Load(CUBE), near)).duration < 2.0
 
 
 def test_the_check_gets_the_whole_path_without_gaps_and_what_has_to_be_heeded(config, home) -> None:

@@ -114,12 +114,6 @@ def test_what_cannot_be_reached_is_said_by_the_result_in_its_time(rig: Rig) -> N
     assert rig.events[-1]["duration"] == 0.0
 
 
-def test_it_goes_to_the_named_poses_of_the_cell_file(rig: Rig) -> None:
-    for pose in ("aside", "home"):
-        rig.go(pose)
-        assert np.allclose(np.degrees(rig.arm.q), rig.config.arm.poses_deg[pose], atol=0.01)
-
-
 def test_an_unknown_pose_is_a_fault_that_lists_the_known_ones(rig: Rig) -> None:
     for ask in (rig.arm.plan, rig.arm.plan_ahead):
         with pytest.raises(Fault, match='the cell file has no arm pose "hime"; it has aside, home'):

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from executive.cell_config import CellConfig
 from executive.errors import Blocked
 from executive.geometry import tool_down
 from executive.messages import Load, ObjectClass, Obstacle
-from executive.mission.parse.cell_file import load_cell
 from executive.motion.kinematics import Kinematics, fold
 from executive.motion.planner import Planner
 from executive.sim.clearance import PathClearance
@@ -22,26 +20,21 @@ COIN = Obstacle(0.5, 0.1, 0.03, 0.0005, "a coin")
 
 
 @pytest.fixture(scope="module")
-def config(missions: Path) -> CellConfig:
-    return load_cell(missions / "cells" / "overhead.yaml")
-
-
-@pytest.fixture(scope="module")
-def clearance(config: CellConfig) -> Iterator[PathClearance]:
-    clearance = PathClearance(config)
+def clearance(overhead: CellConfig) -> Iterator[PathClearance]:
+    clearance = PathClearance(overhead)
     yield clearance
     clearance.close()
 
 
 @pytest.fixture(scope="module")
-def kinematics(config: CellConfig) -> Kinematics:
-    return Kinematics(config.tool.length, np.radians(config.arm.limits.position_deg))
+def kinematics(overhead: CellConfig) -> Kinematics:
+    return Kinematics(overhead.tool.length, np.radians(overhead.arm.limits.position_deg))
 
 
 @pytest.fixture
-def at(config: CellConfig, kinematics: Kinematics):
+def at(overhead: CellConfig, kinematics: Kinematics):
     """Joint positions with the tool centre point at a place."""
-    home = np.radians(config.arm.poses_deg["home"])
+    home = np.radians(overhead.arm.poses_deg["home"])
     return lambda x, y, z: kinematics.nearest_solution(tool_down([x, y, z]), home)
 
 
@@ -92,9 +85,9 @@ def test_a_path_keeps_the_margin_but_a_load_may_lie_on_table_and_floor(
         clearance.check(path, task)
 
 
-def test_a_long_tool_may_meet_the_upper_arm(config: CellConfig) -> None:
-    tool = config.tool.model_copy(update={"length": 0.3})
-    clearance = PathClearance(config.model_copy(update={"tool": tool}))
+def test_a_long_tool_may_meet_the_upper_arm(overhead: CellConfig) -> None:
+    tool = overhead.tool.model_copy(update={"length": 0.3})
+    clearance = PathClearance(overhead.model_copy(update={"tool": tool}))
     folded = np.radians([(0, -65, 60, -90, 0, 60, 0), (0, -65, 105, -120, 0, 100, 0)])
     with pytest.raises(Blocked, match=r"the tool 0\.009 m into link 2, with the tool at"):
         clearance.check(folded)
@@ -140,10 +133,10 @@ def test_a_held_object_keeps_clear_of_the_arm(clearance: PathClearance) -> None:
         clearance.check(path, Task(Load(ObjectClass("rod", 0.2, 0.03))))
 
 
-def test_a_planned_motion_goes_around_what_stands_there(clearance: PathClearance, config: CellConfig) -> None:
+def test_a_planned_motion_goes_around_what_stands(clearance: PathClearance, overhead: CellConfig) -> None:
     """The detour of the search holds in the planning world, and without the obstacle it goes straight."""
-    planner = Planner(config, clearance.check)
-    q = planner.plan(np.radians(config.arm.poses_deg["home"]), Goal((0.5, 0.3, 0.1))).end
+    planner = Planner(overhead, clearance.check)
+    q = planner.plan(np.radians(overhead.arm.poses_deg["home"]), Goal((0.5, 0.3, 0.1))).end
     goal, task = Goal((0.5, -0.25, 0.1)), Task(around=(Obstacle(0.5, 0.0, 0.04, 0.3, "cube-3"),))
     straight = planner.plan(q, goal)
     with pytest.raises(Blocked, match="cube-3"):

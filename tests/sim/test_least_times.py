@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -12,7 +10,6 @@ from executive.cell_config import CellConfig
 from executive.geometry import Array
 from executive.layout import as_bin, as_class
 from executive.messages import Load
-from executive.mission.parse.cell_file import load_cell
 from executive.motion.planner import Planner
 from executive.sim.cell import SimCell
 from executive.sim.clearance import PathClearance
@@ -20,13 +17,8 @@ from executive.sim.least_times import SimLeastTimes
 
 
 @pytest.fixture(scope="module")
-def config(missions: Path) -> CellConfig:
-    return load_cell(missions / "cells" / "overhead.yaml")
-
-
-@pytest.fixture(scope="module")
-def least(config: CellConfig) -> SimLeastTimes:
-    return SimLeastTimes(config)
+def least(overhead: CellConfig) -> SimLeastTimes:
+    return SimLeastTimes(overhead)
 
 
 def changed(config: CellConfig, section: str, **values: object) -> CellConfig:
@@ -41,21 +33,21 @@ def nearest(config: CellConfig, slots: Array) -> Array:
 
 
 @pytest.mark.slow
-def test_no_planned_carry_is_faster_than_the_least(config: CellConfig, least: SimLeastTimes) -> None:
+def test_no_planned_carry_is_faster_than_the_least(overhead: CellConfig, least: SimLeastTimes) -> None:
     """Half of them are the shortest there are: from the place nearest to a slot, and higher than it must."""
-    clearance = PathClearance(config)
-    planner = Planner(config, clearance.check)
-    rng, home = np.random.default_rng(3), np.radians(config.arm.poses_deg["home"])
+    clearance = PathClearance(overhead)
+    planner = Planner(overhead, clearance.check)
+    rng, home = np.random.default_rng(3), np.radians(overhead.arm.poses_deg["home"])
     shares = []
     for number in range(24):
-        bin = list(config.bins)[number % 3]
-        label = list(config.objects)[number // 3 % 3]
-        kind = as_class(label, config.objects[label])
-        slot = rng.permutation(as_bin(bin, config.bins[bin]).slots)[0]
-        x, y = rng.uniform(*np.transpose([config.table.x, config.table.y]))
+        bin = list(overhead.bins)[number % 3]
+        label = list(overhead.objects)[number // 3 % 3]
+        kind = as_class(label, overhead.objects[label])
+        slot = rng.permutation(as_bin(bin, overhead.bins[bin]).slots)[0]
+        x, y = rng.uniform(*np.transpose([overhead.table.x, overhead.table.y]))
         drop = 0.015
         if number % 2:
-            (x, y), drop = nearest(config, slot), 0.1
+            (x, y), drop = nearest(overhead, slot), 0.1
         over = Goal((*slot, kind.height + drop))
         start = planner.plan(home, Goal((x, y, kind.height))).end
         shares.append(least.carry(bin) / planner.plan(start, over, Task(Load(kind))).duration)
@@ -64,27 +56,29 @@ def test_no_planned_carry_is_faster_than_the_least(config: CellConfig, least: Si
     assert np.mean(shares) > 0.4, "else it is of little use"
 
 
-def test_the_bins_differ_and_no_bin_means_the_nearest(config, least) -> None:
-    times = {bin: least.carry(bin) for bin in config.bins}
+def test_the_bins_differ_and_no_bin_means_the_nearest(overhead, least) -> None:
+    times = {bin: least.carry(bin) for bin in overhead.bins}
     assert times == pytest.approx(
         {"red_bin": 0.34913, "blue_bin": 0.379096, "yellow_bin": 0.328779}, rel=1e-5
     )
     assert least.carry(None) == min(times.values())
     assert least.carry("grey_bin") == 0.0
-    assert SimLeastTimes(changed(config, "table", x=(1.2, 1.4))).carry("red_bin") == 0.0, "out of reach"
+    assert SimLeastTimes(changed(overhead, "table", x=(1.2, 1.4))).carry("red_bin") == 0.0, "out of reach"
 
 
-def test_a_descent_may_end_early_on_an_object_higher_than_expected(config: CellConfig) -> None:
+def test_a_descent_may_end_early_on_an_object_higher_than_expected(overhead: CellConfig) -> None:
     """The objects differ by 10 mm in height, and the lip feels a surface 1 mm away."""
-    long = SimLeastTimes(changed(config, "motion", descent=0.02, descent_speed=0.03))
+    long = SimLeastTimes(changed(overhead, "motion", descent=0.02, descent_speed=0.03))
     assert long.descent == pytest.approx((0.020 - 0.010 - 0.001) / 0.03)
-    assert SimLeastTimes(changed(config, "motion", descent=0.008)).descent == 0.0
-    cubes = config.model_copy(update={"objects": {"cube": config.objects["cube"]}})
-    motion = config.motion
+    assert SimLeastTimes(changed(overhead, "motion", descent=0.008)).descent == 0.0
+    cubes = overhead.model_copy(update={"objects": {"cube": overhead.objects["cube"]}})
+    motion = overhead.motion
     assert SimLeastTimes(cubes).descent == pytest.approx((motion.descent - 0.001) / motion.descent_speed)
 
 
-def test_a_detector_answers_after_its_latency(config) -> None:
-    slow = config.detectors["embedded"].model_copy(update={"latency": 0.7})
-    least = SimCell.least_times(config.model_copy(update={"detectors": {**config.detectors, "slow": slow}}))
+def test_a_detector_answers_after_its_latency(overhead) -> None:
+    slow = overhead.detectors["embedded"].model_copy(update={"latency": 0.7})
+    least = SimCell.least_times(
+        overhead.model_copy(update={"detectors": {**overhead.detectors, "slow": slow}})
+    )
     assert [least.answer(name) for name in ("", "embedded", "slow", "none")] == [0.05, 0.05, 0.7, 0.0]

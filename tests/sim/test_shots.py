@@ -45,13 +45,10 @@ def changed(one: Image, other: Image) -> int:
     return np.count_nonzero((one != other).any(axis=2))
 
 
-def test_the_steps_of_the_run_are_counted_and_no_others(shoot: Shoot, tmp_path: Path) -> None:
+def test_each_picture_is_of_its_moment(shoot: Shoot, tmp_path: Path) -> None:
     assert steps_in(shoot.log) == STEPS
     with pytest.raises(InputError, match="can neither be taken up again nor filmed"):
         steps_in(tmp_path / "none")
-
-
-def test_each_picture_is_of_its_moment(shoot: Shoot) -> None:
     first, same, middle, last = pictures(shoot, [0, 0, 18, STEPS])
     assert first.shape == (SIZE[1], SIZE[0], 3)
     assert (first == same).all()
