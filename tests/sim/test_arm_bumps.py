@@ -9,7 +9,7 @@ import pytest
 from rig import Rig, off_path
 
 from executive.arm import Goal, Task
-from executive.geometry import Array, tool_down
+from executive.geometry import Array
 from executive.layout import NECK_LENGTH, TOOL_RADIUS, as_class
 from executive.messages import Load
 from executive.motion.trajectory import Trajectory
@@ -78,15 +78,6 @@ def test_it_counts_on_the_guarded_part_of_a_motion_as_well(rig: Rig) -> None:
     float_at(rig, "cube", under_the_flange, mass=1.0)
     said = bump(rig, motion, earliest=motion.guarded)
     assert re.match(r"link 7 ran into a cube, with the tool at", said)
-
-
-def test_without_a_guarded_part_a_touch_of_the_tool_counts(rig: Rig) -> None:
-    rig.add("cube", 0.5, 0.1)
-    rig.go(Goal((0.5, 0.1, 0.06)))
-    down = rig.planner.kinematics.nearest_solution(tool_down([0.5, 0.1, 0.0495]), rig.arm.q)
-    assert bump(rig, rig.straight_to(down)).startswith(
-        "the tool ran into a cube, with the tool at (0.500, 0.1"
-    )
 
 
 def test_what_it_touches_before_it_sets_out_is_no_bump(rig: Rig) -> None:
