@@ -81,10 +81,3 @@ def test_a_pose_that_cannot_be_reached_says_why(place: tuple[float, float, float
     narrow = np.where(np.arange(7) == 5, math.radians(20), LIMIT) if place[0] == 0.5 else LIMIT
     with pytest.raises(Unreachable, match=text):
         Kinematics(0.12, narrow).nearest_solution(tool_down(place), np.zeros(7))
-
-
-def test_the_nearest_solution_is_the_one_whose_largest_joint_difference_is_smallest() -> None:
-    goal, start = tool_down([0.5, 0.1, 0.1], 0.4), np.radians([38, 33, 0, -88, 0, 59, 20])
-    found = ARM.nearest_solution(goal, start)
-    assert_same(ARM.forward(found), goal)
-    assert np.abs(found - start).max() == np.abs(ARM.solutions(goal) - start).max(axis=1).min()

@@ -12,7 +12,7 @@ from joint_states import LIMITS
 from executive.arm import Goal
 from executive.errors import Unreachable
 from executive.motion.kinematics import Kinematics
-from executive.motion.postures import find_postures, line_chain, upright_line
+from executive.motion.postures import find_postures, upright_line
 
 ARM = Kinematics(0.12, LIMITS.position)
 START = np.radians([38, 33, 0, -88, 0, 59, 20])
@@ -41,17 +41,6 @@ def test_a_free_yaw_turns_joint_7_no_more_than_the_way_down_asks_for() -> None:
     last = LIMITS.position[6] - math.radians(1)
     assert np.allclose(np.maximum(found.low[:, 6], found.high[:, 6]), last, atol=1e-9)
     assert np.ptp(drift) > 0.01
-
-
-def test_a_chain_runs_on_where_a_joint_goes_past_half_a_turn() -> None:
-    found = find_postures(ARM, Goal((0.5, 0.15, 0.05)), 0.15, START)
-    drift = found.high[:, 6] - found.low[:, 6]
-    number = int(np.argmax(drift))
-    assert drift[number] > 0.02
-    q = found.low[number].copy()
-    q[6] = math.pi - 0.01
-    chain = line_chain(ARM, q, 0.15, 5, int(found.branch[number]), float(found.swivel[number]))
-    assert chain[-1, 6] == pytest.approx(q[6] + drift[number])
 
 
 def test_there_is_no_line_up_where_the_tool_does_not_point_down_or_a_joint_leaves_its_range() -> None:

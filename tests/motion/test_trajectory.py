@@ -14,6 +14,7 @@ from executive.errors import Fault, Unreachable
 from executive.motion.free import Connector, NoProfile
 from executive.motion.state import State
 from executive.motion.trajectory import STEP, Trajectory, peaks, thinned
+from executive.sim.rebuild import sampled
 
 CONNECTOR = Connector(LIMITS)
 A, B, C = np.radians([[0, 20, 0, -90, 0, 70, 0], [40, 40, 20, -60, 10, 60, 90], [40, 45, 20, -60, 0, 60, 90]])
@@ -78,6 +79,7 @@ def test_slowed_it_takes_the_same_path_in_more_time(between: State, rate: float)
 def test_a_motion_to_where_the_arm_is_takes_no_time() -> None:
     trajectory = Trajectory([CONNECTOR.connect(State.rest(A), State.rest(A))])
     assert trajectory.duration == 0
+    assert np.array_equal(sampled(trajectory.samples, 0.0).at(1.0).q, A)
     assert np.array_equal(trajectory.at(0.5).q, A)
     assert np.array_equal(trajectory.check(LIMITS).q, [A])
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from executive.sim.datasets import as_labelled_frame, generate, run_frames
 from executive.sim.models import load_mesh
 from executive.sim.scenes import SIZE, Sample, SceneRenderer
 from executive.sim.silhouette import outline_area
+from executive.workers import Workers
 
 
 def samples(config: CellConfig, seeds: range, *, randomized: bool = True) -> list[Sample]:
@@ -45,8 +47,12 @@ def test_a_sample_depends_on_its_seed_alone(
 
 
 def test_samples_are_labelled_inside_the_image_and_localize_near_the_object(overhead: CellConfig) -> None:
-    labels: set[str] = set()
-    for sample in samples(overhead, range(10)):
+    made, labels = samples(overhead, range(16)), set[str]()
+    assert [len(sample.labels) for sample in made] == [5, 3, 1, 1, 6, 0, 2, 2, 1, 2, 7, 0, 6, 2, 3, 4]
+    names = ("boxes", "visible_fraction", "positions", "image")
+    sums = [sum(float(getattr(one, name).sum()) for one in made) for name in names]
+    assert sums == pytest.approx([23167.342, 44.03, 24.76, 524974036.0], rel=1e-4)
+    for sample in made:
         assert sample.image.shape == (SIZE, SIZE, 3)
         assert (sample.boxes >= 0).all()
         assert (sample.boxes <= SIZE).all()
@@ -92,11 +98,21 @@ def make(out: Path, workers: int = 1, images: int = 1, **cells: CellConfig) -> l
     return told
 
 
-@pytest.mark.slow
+class Here(ThreadPoolExecutor):
+    """Does at once, in this process, what `Workers` does in others."""
+
+    def submit(self, call, /, *arguments):  # type: ignore[no-untyped-def]
+        done: Future[object] = Future()
+        done.set_result(call(*arguments))
+        return done
+
+
+@pytest.mark.parametrize("pool", [Here, pytest.param(Workers, marks=pytest.mark.slow)])
 def test_data_sets_and_frames_are_the_same_for_any_number_of_workers(
-    overhead: CellConfig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    pool: type, overhead: CellConfig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("executive.sim.datasets.BLOCK", 2)
+    monkeypatch.setattr("executive.sim.datasets.Workers", pool)
     one, two = tmp_path / "one", tmp_path / "two"
     assert make(one, 1, 4, overhead=overhead) == make(two, 2, 4, overhead=overhead) == [(2, 4), (4, 4)]
     files = sorted(path.relative_to(one) for path in one.rglob("*") if path.is_file())

@@ -75,15 +75,6 @@ def test_a_hole_is_a_hole_and_the_ring_around_it_is_not(
     assert {hit(world, 0.5 + ring * x, 0.1 + ring * y) for x, y in around} == {body}
 
 
-def test_a_bolt_lies_still_on_its_head_and_the_tip_of_its_shaft(build: Build, fasteners: CellConfig) -> None:
-    world = build(fasteners)
-    body = put(world, "bolt", 0.5, 0.0, yaw=0.4)
-    assert np.linalg.norm(world.client.getBaseVelocity(body)[0]) < 0.002
-    X_WO = world.object_pose(body)
-    assert X_WO.rotation == pytest.approx(about_z(0.4), abs=0.02)
-    assert X_WO.position == pytest.approx([0.5, 0.0, 0.0135], abs=0.002)
-
-
 def test_a_mesh_stands_around_its_middle_and_weighs_about_the_middle_of_its_volume(
     build: Build, overhead: CellConfig, wedge: ObjectConfig
 ) -> None:

@@ -25,6 +25,10 @@ def test_the_arm_is_where_its_joints_put_it(world: World) -> None:
     scenery = SimScenery(world)
     before = scenery.poses()
     assert np.allclose(before["link 8"].position, world.flange_pose().position, atol=1e-6)
+    for body in world.bodies:
+        assert before[f"object {body}"].position[:2] == pytest.approx(
+            world.object_pose(body).position[:2], abs=1e-6
+        )
     world.set_arm(np.radians([20, 40, 10, -70, 5, 60, 15]))
     after = scenery.poses()
     assert np.allclose(after["link 8"].position, world.flange_pose().position, atol=1e-6)

@@ -55,6 +55,9 @@ def placed(world: World) -> list[tuple[str, float, float, float]]:
 def test_a_seed_decides_everything(build: Build, overhead: CellConfig) -> None:
     plain, stacked = build(overhead), build(with_stacks(overhead, 1.0))
     assert spawn(plain, overhead, 1) == tuple(plain.bodies)
+    for body, label in plain.bodies.items():
+        colour = plain.client.getVisualShapeData(body)[0][7][:3]
+        assert tuple(round(value, 3) for value in colour) in overhead.objects[label].colours
     spawn(stacked, stacked.config, 2, count=4)
     assert placed(plain) == [
         ("sphere", 0.6287, -0.0828, 0.03), ("duck", 0.5131, 0.1442, -0.0023), ("duck", 0.51, 0.0218, -0.0023),

@@ -42,6 +42,17 @@ def test_an_object_is_where_it_was_put_and_can_be_put_elsewhere(build: Build, ov
     assert world.bodies == {}
 
 
+def test_a_ray_ends_at_the_first_thing_but_the_arm(build: Build, overhead: CellConfig) -> None:
+    world, down = build(overhead), np.array([0.0, 0.0, -2.0])
+    world.add_object("cube", Pose.of([0.5, 0.1, 0.025]), (1, 0, 0))
+    world.set_arm(np.radians([0, 33, 0, -88, 0, 59, 0]))
+    elbow = world.client.getLinkState(world.arm, 3)[0]
+    for (x, y), height in (((0.5, 0.1), 0.05), ((0.6, 0.1), 0.0), (elbow[:2], 0.0), ((0.001, 0.0), 0.0)):
+        assert world.cast_ray(np.array([x, y, 1.5]), down) == pytest.approx([x, y, height], abs=1e-3)
+    assert world.cast_ray(np.array([0.5, 0.1, 1.2]), -down) is None
+    assert world.cast_ray(np.array([0.5, 0.1, 5.1]), down) is None, "5 m is as far as it goes"
+
+
 def test_every_body_and_part_has_a_name_for_the_text_of_an_error(build: Build, overhead: CellConfig) -> None:
     world = build(overhead)
     duck = world.add_object("duck", Pose.of([0.5, 0.1, 0.2]), (1, 1, 1))
