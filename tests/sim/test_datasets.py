@@ -13,7 +13,7 @@ import pytest
 from executive.cell_config import CellConfig, DepthConfig, ObjectConfig
 from executive.errors import InputError
 from executive.geometry import Pose
-from executive.sim.arrangements import settle
+from executive.sim.arrangements import arrange, hanging, settle
 from executive.sim.datasets import as_labelled_frame, generate, run_frames
 from executive.sim.models import load_mesh
 from executive.sim.scenes import SIZE, Sample, SceneRenderer
@@ -63,6 +63,17 @@ def test_samples_are_labelled_inside_the_image_and_localize_near_the_object(over
         assert np.abs(sample.positions - sample.centres).max(initial=0) < 0.015
         labels |= set(sample.labels)
     assert labels == set(overhead.objects)
+
+
+def test_an_arrangement_follows_from_its_generator(overhead: CellConfig) -> None:
+    meshes = {label: load_mesh(model) for label, model in overhead.objects.items()}
+    footprint, items = np.array([[0.3, -0.4], [0.8, 0.4]]), []
+    for seed in range(30):
+        items += arrange(overhead, meshes, footprint, seed % 2 == 0, np.random.default_rng(seed))
+    total = sum(X_WO.position for _, X_WO, _ in items)
+    assert (len(items), total) == (107, pytest.approx([55.574, -3.9756, 2.0005], rel=1e-4))
+    label, X_WO, _ = hanging(Pose.of([0.5, 0.1, 0.3]), meshes, overhead, np.random.default_rng(1))
+    assert X_WO.position == pytest.approx([0.5, 0.1, 0.3 - meshes[label].top])
 
 
 def test_a_silhouette_has_the_area_of_its_shape(overhead: CellConfig) -> None:
