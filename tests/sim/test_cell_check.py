@@ -57,10 +57,8 @@ def test_all_that_is_wrong_is_said_at_once(overhead: CellConfig, tmp_path: Path)
         ("bins", "red_bin", "position"),
         ("arm", "poses_deg", "down"),
     ]
-    said = (
-        'localization "depth" needs a camera with depth, and overhead has none; give it a section "depth: {}"'
-    )
-    assert found["localization",].startswith(said)
+    said = found["localization",]
+    assert said.startswith('localization "depth" needs a camera with depth, and overhead has none; give')
 
 
 def test_a_missing_model_is_found_before_anything_is_loaded(missions: Path) -> None:
