@@ -14,8 +14,7 @@ from executive.cell_config import CellConfig, DetectorConfig
 from executive.errors import InputError
 from executive.layout import as_class
 from executive.mission.findings import alternatives
-from executive.sim.datasets import generate
-from executive.sim.run_frames import run_frames
+from executive.sim.datasets import generate, run_frames
 from executive.vision.detectors.registry import wrong_detectors
 from executive.vision.evaluation.asking import CellDetector
 from executive.vision.evaluation.cores import only_cores

@@ -1,4 +1,4 @@
-"""What the books say: to skills while they are open, to people, and in the end."""
+"""The accounts of a run that is over: the final state of each item, and their balance."""
 
 from __future__ import annotations
 
@@ -6,34 +6,6 @@ from collections import Counter
 from collections.abc import Iterable
 
 from executive.ledger.item import NOTHING, ON_TABLE, UNSURE, Record, State
-from executive.messages import Target
-
-
-def target_of(record: Record) -> Target:
-    """Return what skills are told of an item on the table."""
-    return Target(
-        record.item,
-        record.label,
-        record.position,
-        record.confidence,
-        record.frame,
-        record.epoch,
-        record.stamp,
-    )
-
-
-def row_of(record: Record) -> dict[str, object]:
-    """Return what is told of an item, as plain values."""
-    return {
-        "item": record.item,
-        "label": record.label,
-        "state": record.state.value,
-        "position": [round(float(value), 4) for value in record.position],
-        "looks": record.looks,
-        "attempts": record.attempts,
-        "bin": record.bin,
-        "why": record.why,
-    }
 
 
 def fate_of(record: Record, *, gone: bool, routed: bool) -> tuple[State, str] | None:

@@ -11,8 +11,8 @@ import numpy as np
 from executive.cell import Routes
 from executive.cell_config import LedgerConfig
 from executive.geometry import Array
-from executive.ledger.binding import SURE
 from executive.ledger.item import Record, State
+from executive.ledger.looks import SURE
 from executive.messages import BIN_THICKNESS, Bin, Detections, Item
 
 WALL = 0.035

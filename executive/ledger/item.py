@@ -9,8 +9,9 @@ from enum import Enum
 
 import numpy as np
 
+from executive.cell_config import LedgerConfig
 from executive.geometry import Array
-from executive.messages import Detection, Frame, Reliability
+from executive.messages import Detection, Frame, Reliability, Target
 
 LIKELY = 0.9
 """Probability of its existence from which an item is worth a grasp, and may be one missed elsewhere."""
@@ -28,6 +29,16 @@ CERTAIN = 100.0
 """Log odds beyond which more makes no difference."""
 CONFIRMED = math.log(1e4)
 """Log odds of existence from which an item is known to exist: two looks of a good detector agree."""
+CREDIBLE, CONTRADICTED = 0.01, 0.001
+"""Chance of as much disagreement about its class, above which an item is sorted, and under which given up."""
+SHARPER = 2 / 3
+"""Factor on the standard error of its position that is allowed for another attempt at an item."""
+PRESENT = 0.1
+"""Chance of having been overlooked by the looks that missed it, down to which it is taken to be there."""
+ENOUGH = 40
+"""Looks after which an item whose class they contradict each other about is given up."""
+GLIMPSES = 20
+"""Looks with a detector unsure of it, since one was sure, after which an item not known well is given up."""
 
 
 class State(Enum):
@@ -151,6 +162,40 @@ class Record:
         """Chance that it is an object at all, 0 to 1."""
         return 1.0 if self.exists else 1.0 / (1.0 + math.exp(-max(self.existence, -CERTAIN)))
 
+    @property
+    def target(self) -> Target:
+        """The item on the table as skills see it."""
+        return Target(
+            self.item, self.label, self.position, self.confidence, self.frame, self.epoch, self.stamp
+        )
+
+    @property
+    def row(self) -> dict[str, object]:
+        """The item for the record, as plain values."""
+        return {
+            "item": self.item,
+            "label": self.label,
+            "state": self.state.value,
+            "position": [round(float(value), 4) for value in self.position],
+            "looks": self.looks,
+            "attempts": self.attempts,
+            "bin": self.bin,
+            "why": self.why,
+        }
+
+    def is_sure(self, config: LedgerConfig) -> bool:
+        """Return True if enough looks agree that it exists, of which class it is, and where.
+
+        After a failed grasp they must agree better on where.
+        """
+        return (
+            self.probability >= LIKELY
+            and self.overlooked >= PRESENT
+            and self.misjudged <= config.misjudged
+            and self.consistency >= CREDIBLE
+            and self.spread <= config.aim * (SHARPER if self.attempts else 1.0)
+        )
+
     def vote(self, label: str, by: Reliability, *, alone: bool = True) -> None:
         """Count one detection as `label`: that much likelier than any other class, by a detector's errors.
 
@@ -190,10 +235,19 @@ class Record:
         self.epoch, self.frame, self.stamp = frame.epoch, frame.id, frame.stamp
         self.confidence = detection.confidence
 
-    def give_up_as_unsure(self) -> None:
-        """Reject it: looks agree that something is there, and none is sure that it is an object."""
-        self.state, self.why = State.REJECTED, UNSURE
-        self.existence = max(self.existence, 0.0)
+    def review(self, *, known: bool) -> None:
+        """Give it up if looks contradict each other about its class, or are unsure of it time and again.
+
+        `known`: it is sure, and nothing has disturbed it.
+        """
+        if self.state is State.SEEN and self.looks >= ENOUGH and self.consistency < CONTRADICTED:
+            votes = ", ".join(f"{count} {label}" for label, count in self.tally.most_common())
+            self.state, self.why = State.REJECTED, f"its class is in doubt: {votes}"
+        if known:
+            self.glimpses = 0
+        elif self.state is State.SEEN and self.glimpses >= GLIMPSES:
+            self.state, self.why = State.REJECTED, UNSURE
+            self.existence = max(self.existence, 0.0)
 
     def miss(self, by: Reliability) -> None:
         """Count one look that searched its place without seeing it."""

@@ -13,24 +13,13 @@ from executive.cell_config import LedgerConfig, TableConfig
 from executive.errors import Fault
 from executive.events import Emit
 from executive.geometry import Array
-from executive.ledger.accounts import balance, fate_of, row_of, target_of
+from executive.ledger.accounts import balance, fate_of
 from executive.ledger.bins import Bins
 from executive.ledger.coverage import Coverage
 from executive.ledger.freshness import Freshness
-from executive.ledger.item import LIKELY, OPEN, Record, State
+from executive.ledger.item import LYING, OPEN, Record, State
 from executive.ledger.looks import Looks, spread_of
 from executive.messages import Bin, Detection, Detections, Frame, Glimpse, Item, Target
-
-CREDIBLE, CONTRADICTED = 0.01, 0.001
-"""Chance of as much disagreement about its class, above which an item is sorted, and under which given up."""
-ENOUGH = 40
-"""Looks after which an item whose class they contradict each other about is given up."""
-GLIMPSES = 20
-"""Looks with a detector unsure of it, since one was sure, after which an item not known well is given up."""
-SHARPER = 2 / 3
-"""How much smaller the standard error of its position must be for another attempt at an item."""
-PRESENT = 0.1
-"""Chance of having been overlooked by the looks that missed it, down to which it is taken to be there."""
 
 
 class ItemLedger:
@@ -86,7 +75,7 @@ class ItemLedger:
             self._take(detections, positions, glimpses)
         self._emit_look(detections, positions, glimpses)
         return [
-            target_of(record)
+            record.target
             for record in self._records.values()
             if record.state is State.SEEN and self._looks.settled(record)
         ]
@@ -105,14 +94,7 @@ class ItemLedger:
 
         After a failed grasp they must agree better on where.
         """
-        record = self._record(item)
-        return (
-            record.probability >= LIKELY
-            and record.overlooked >= PRESENT
-            and record.misjudged <= self._config.misjudged
-            and record.consistency >= CREDIBLE
-            and record.spread <= self._config.aim * (SHARPER if record.attempts else 1.0)
-        )
+        return self._record(item).is_sure(self._config)
 
     def in_doubt(self) -> Sequence[Item]:
         """Return the open items in the workspace that a further look may make sure, or show to be gone."""
@@ -209,11 +191,9 @@ class ItemLedger:
     def standing(self) -> Sequence[Target]:
         """Return where everything is that is believed to stand on the table, to be sorted or not."""
         return [
-            target_of(record)
+            record.target
             for record in self._records.values()
-            if record.state in (State.SEEN, State.REJECTED)
-            and record.probability >= 0.5
-            and not self._is_gone(record)
+            if record.state in LYING and record.probability >= 0.5 and not self._is_gone(record)
         ]
 
     def bumped(self) -> None:
@@ -241,27 +221,21 @@ class ItemLedger:
 
     def rows(self) -> list[dict[str, object]]:
         """Return a plain row per item, in the order of first sight."""
-        return [row_of(record) for record in self._records.values()]
+        return [record.row for record in self._records.values()]
 
     def _take(self, detections: Detections, positions: Sequence[Array], glimpses: Sequence[Glimpse]) -> None:
         frame, jitter = detections.frame, detections.reliability.jitter
-        inside = [self._in_bins.at(position, spread_of(frame, position, jitter)) for position in positions]
+
+        def bin_at(position: Array) -> str | None:
+            return self._in_bins.at(position, spread_of(frame, position, jitter))
+
+        inside = [bin_at(position) for position in positions]
         outside = [number for number, bin in enumerate(inside) if bin is None]
-        found = tuple(detections.found[number] for number in outside)
+        look = replace(detections, found=tuple(detections.found[number] for number in outside))
         places = [positions[number] for number in outside]
-        unsure = [
-            glimpse
-            for glimpse in glimpses
-            if self._in_bins.at(glimpse.position, spread_of(frame, glimpse.position, jitter)) is None
-        ]
-        for record in self._looks.take(self._records, replace(detections, found=found), places, unsure):
-            if record.state is State.SEEN and record.looks >= ENOUGH and record.consistency < CONTRADICTED:
-                told = ", ".join(f"{count} {label}" for label, count in record.tally.most_common())
-                record.state, record.why = State.REJECTED, f"its class is in doubt: {told}"
-            if self._is_known(record):
-                record.glimpses = 0
-            elif record.state is State.SEEN and record.glimpses >= GLIMPSES:
-                record.give_up_as_unsure()
+        unsure = [glimpse for glimpse in glimpses if bin_at(glimpse.position) is None]
+        for record in self._looks.take(self._records, look, places, unsure):
+            record.review(known=self._is_known(record))
             self._report(record)
         if detections.view == "full":
             for record, bin in self._in_bins.fallen(detections, positions, inside):
@@ -274,7 +248,7 @@ class ItemLedger:
         return record.state is State.SEEN and likely and not self._is_gone(record)
 
     def _is_known(self, record: Record) -> bool:
-        return self.is_sure(record.item) and self._looks.settled(record)
+        return record.is_sure(self._config) and self._looks.settled(record)
 
     def _is_gone(self, record: Record) -> bool:
         return record.overlooked <= self._config.overlooked
@@ -312,7 +286,7 @@ class ItemLedger:
         )
 
     def _report(self, record: Record) -> None:
-        self._emit("item", **row_of(record))
+        self._emit("item", **record.row)
 
 
 def _told(detection: Detection, position: Array) -> dict[str, object]:

@@ -10,11 +10,10 @@ import numpy as np
 from executive.arm import Goal
 from executive.geometry import Array
 from executive.motion.kinematics import Kinematics
-from executive.motion.limits import JointLimits
+from executive.motion.limits import JointLimits, rest_to_rest
 from executive.motion.line import SAMPLES, Line
 from executive.motion.postures import find_postures, line_chain
 from executive.motion.state import State
-from executive.motion.timing import rest_to_rest
 
 UNLIKE = 0.2
 """Joint difference from which two ends of a way are worth trying both [rad]."""

@@ -7,19 +7,20 @@ from __future__ import annotations
 
 import colorsys
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+import pybullet
+from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell_config import BinConfig, CameraConfig, CellConfig, Colour
+from executive.clock import STEP
 from executive.geometry import Array, Pose, about_z, rotation_from_quaternion, tool_down
 from executive.messages import BIN_THICKNESS
 from executive.motion.kinematics import FLANGE_OFFSET
 from executive.sim.camera import CELL_LIGHT, Light
-from executive.sim.models import Mesh
-from executive.sim.piles import settle
-from executive.sim.world import World
+from executive.sim.models import Mesh, add_body, upright
+from executive.sim.world import World, add_bin
 
 COUNTS = (0.08, 0.14, 0.17, 0.17, 0.15, 0.13, 0.10, 0.06)
 """Probability of 0, 1, … 7 objects."""
@@ -27,24 +28,11 @@ TABLE_X, TABLE_Y = (-0.05, 0.86), (-0.71, 0.71)
 """Part of the table top where objects may lie [m]."""
 FOOT = 0.16
 """Radius around the arm's foot kept free [m]."""
+SETTLING = 360
+"""Physics steps after which a pile is taken as it is."""
 
 Item = tuple[str, Pose, Colour]
-
-
-@dataclass(frozen=True, eq=False)
-class Arrangement:
-    """Objects of a scene: label, `X_WO` and colour of each."""
-
-    items: tuple[Item, ...]
-
-    def holding(
-        self, X_WT: Pose, meshes: Mapping[str, Mesh], config: CellConfig, rng: np.random.Generator
-    ) -> Arrangement:
-        """Return this arrangement with one more object, hanging upright at the tool's tip."""
-        label = str(rng.choice(list(meshes)))
-        hanging = X_WT.position - [0, 0, meshes[label].top]
-        pose = Pose(about_z(rng.uniform(0, math.tau)), hanging)
-        return Arrangement((*self.items, (label, pose, random_colour(config, label, rng))))
+"""Label, `X_WO` and colour of an object."""
 
 
 def reach(world: World, camera: CameraConfig, rng: np.random.Generator) -> bool:
@@ -127,7 +115,7 @@ def arrange(
     footprint: Array,
     plain_view: bool,
     rng: np.random.Generator,
-) -> Arrangement:
+) -> list[Item]:
     """Return a random arrangement of 0 to 7 objects.
 
     Args:
@@ -141,7 +129,7 @@ def arrange(
     low = np.maximum(footprint.min(axis=0), (TABLE_X[0], TABLE_Y[0]))
     high = np.minimum(footprint.max(axis=0), (TABLE_X[1], TABLE_Y[1]))
     if (high - low < 0.05).any():
-        return Arrangement(())
+        return []
     if plain_view and rng.random() < 0.75:
         margin = rng.uniform(0.0, 0.06)
         low = np.array([config.table.x[0], config.table.y[0]]) - margin
@@ -157,7 +145,41 @@ def arrange(
             tumbling = [Pose(_any_rotation(rng), pose.position + np.array([0, 0, 0.04])) for pose in poses]
             poses = settle(config, list(zip(labels, tumbling, strict=True)))
     items = zip(labels, poses, strict=True)
-    return Arrangement(tuple((label, pose, random_colour(config, label, rng)) for label, pose in items))
+    return [(label, pose, random_colour(config, label, rng)) for label, pose in items]
+
+
+def hanging(X_WT: Pose, meshes: Mapping[str, Mesh], config: CellConfig, rng: np.random.Generator) -> Item:
+    """Return a random object that hangs upright at the tool's tip."""
+    label = str(rng.choice(list(meshes)))
+    place = X_WT.position - [0, 0, meshes[label].top]
+    pose = Pose(about_z(rng.uniform(0, math.tau)), place)
+    return label, pose, random_colour(config, label, rng)
+
+
+def settle(config: CellConfig, objects: Sequence[tuple[str, Pose]]) -> list[Pose]:
+    """Return where objects (label, `X_WO`) come to lie 1.5 s after they are let go.
+
+    A fresh world every time makes the outcome a function of the starting poses alone.
+    """
+    client = BulletClient(pybullet.DIRECT)
+    try:
+        client.setGravity(0, 0, -9.81)
+        client.setTimeStep(STEP)
+        client.setPhysicsEngineParameter(deterministicOverlappingPairs=1)
+        table = client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[2, 2, 0.5])
+        client.createMultiBody(0, table, basePosition=[0, 0, -0.5])
+        for bin in config.bins.values():
+            add_bin(client, bin)
+        poses = []
+        for label, X_WO in objects:
+            body = add_body(client, config.objects[label], X_WO)
+            X_LI = Pose.of(*client.getDynamicsInfo(body, -1)[3:5])
+            poses.append((body, (upright(config.objects[label]) @ X_LI).inverse()))
+        for _ in range(SETTLING):
+            client.stepSimulation()
+        return [Pose.of(*client.getBasePositionAndOrientation(body)) @ X_IO for body, X_IO in poses]
+    finally:
+        client.disconnect()
 
 
 def _solve(world: World, X_WT: Pose) -> None:

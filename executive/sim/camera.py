@@ -1,22 +1,22 @@
-"""Rendering the simulated world, and the camera that a simulated cell offers."""
+"""Rendered images of the simulated world, depth, noise, and the camera that a simulated cell offers."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
+import cv2
 import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
 from executive.cell import Clock
-from executive.cell_config import CameraConfig, NoiseConfig
+from executive.cell_config import CameraConfig, DepthConfig, NoiseConfig
 from executive.geometry import Array, Pose
 from executive.messages import Box, Frame
-from executive.sim.depth import distances, sense
+from executive.sim.view import ArmShadow
 from executive.sim.world import World
-from executive.vision.camera_model import calibrated, projection_matrix, view_matrix
+from executive.vision.camera_model import FAR, NEAR, calibrated, projection_matrix, view_matrix
 
 Image = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
@@ -64,7 +64,9 @@ class Render:
     @property
     def depth(self) -> Array:
         """Distances along the optical axis `(h, w)` [m], inf where there is no body."""
-        return distances(self.buffer)
+        with np.errstate(divide="ignore"):
+            distances = FAR * NEAR / (FAR - (FAR - NEAR) * self.buffer.astype(np.float64))
+        return np.where(self.buffer < 1.0, distances, np.inf)
 
 
 def camera_pose(world: World, config: CameraConfig) -> Pose:
@@ -108,14 +110,32 @@ def add_noise(image: Image, noise: NoiseConfig, rng: np.random.Generator) -> Ima
     return np.asarray(np.clip(image * np.float32(gain) + read + 0.5, 0, 255).astype(np.uint8))
 
 
-class Shadow(Protocol):
-    """Knows what the arm hides from a camera; `size` is the image's width and height [pixel]."""
+def sense(true: Array, config: DepthConfig, rng: np.random.Generator) -> Array:
+    """Return what the sensor measures of distances `(H, W)` [m]: NaN where it measures nothing.
 
-    def visible(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> Mask:
-        """Return `(H, W)` bool, False where the arm may hide the scene."""
+    Neighbours err alike, for stereo matches windows and not pixels. Beside an edge one of its two cameras
+    sees what the other does not, so there it often has nothing to match.
+    """
+    noise = rng.standard_normal(true.shape)
+    if config.grain:
+        # Averaging weakens noise; it shall have the deviation that the figures say.
+        noise = np.asarray(cv2.GaussianBlur(noise, (0, 0), config.grain), dtype=np.float64)
+        noise /= noise.std()
+    seen = np.where(np.isfinite(true), true, np.nan)
+    measured = seen + noise * (config.floor + config.growth * seen**2)
+    if config.step:
+        measured = np.round(measured / config.step) * config.step
+    lost = rng.random(true.shape) < np.where(_edges(true, config), config.edge_dropout, config.dropout)
+    return np.where(lost, np.nan, measured)
 
-    def sees_table(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> bool:
-        """Tell whether the whole workspace is in view, the arm not in front of it."""
+
+def _edges(true: Array, config: DepthConfig) -> Mask:
+    """Return where `(H, W)` a jump of the distance is near."""
+    finite = np.where(np.isfinite(true), true, FAR).astype(np.float32)
+    around = np.ones((3, 3), np.uint8)
+    jumps = (cv2.dilate(finite, around) - cv2.erode(finite, around) > config.edge).astype(np.uint8)
+    width = 2 * config.edge_width + 1
+    return cv2.dilate(jumps, np.ones((width, width), np.uint8)).astype(bool)
 
 
 class SimCamera:
@@ -138,7 +158,7 @@ class SimCamera:
         clock: Clock,
         seed: int,
         *,
-        shadow: Shadow | None = None,
+        shadow: ArmShadow | None = None,
         epoch: Callable[[], int] = lambda: 0,
         light: Light = CELL_LIGHT,
     ) -> None:

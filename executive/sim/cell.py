@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 from executive.cell import Cell, Routes
@@ -17,18 +16,16 @@ from executive.ledger.ledger import ItemLedger
 from executive.motion.planner import Planner
 from executive.sim.arm import SimArm
 from executive.sim.audit import audit
-from executive.sim.beginning import PartSeeds, first_world
 from executive.sim.camera import SimCamera
 from executive.sim.clearance import PathClearance
 from executive.sim.clock import SimClock
 from executive.sim.command_log import CommandLog, read_commands
 from executive.sim.least_times import SimLeastTimes
 from executive.sim.models import missing_models, weighed
-from executive.sim.poses import unfit_poses
-from executive.sim.ray import cast
-from executive.sim.reach import out_of_reach
+from executive.sim.poses import out_of_reach, unfit_poses
 from executive.sim.rebuild import UnderWay, rebuild
 from executive.sim.scenery import SimScenery
+from executive.sim.spawn import PartSeeds, first_world
 from executive.sim.tool import SuctionTool
 from executive.sim.view import ArmShadow
 from executive.vision.detectors.registry import build_detectors, known_labels, wrong_detectors
@@ -93,7 +90,7 @@ class SimCell:
             self._camera.skip(options.past.frames, options.past.turns)
         classes = {label: weighed(label, kind) for label, kind in config.objects.items()}
 
-        localizer = build_localizer(config.localization, classes, partial(cast, self._world))
+        localizer = build_localizer(config.localization, classes, self._world.cast_ray)
         # Last of all: some of them start processes, which nobody would end if something after them failed.
         self._detectors = detectors(
             config.detectors, camera=camera_config, clock=clock, base=options.base, seed=seeds.detectors

@@ -9,8 +9,7 @@ from executive.errors import Unreachable
 from executive.geometry import Array, tool_down
 from executive.layout import as_bin, pile_height
 from executive.motion.kinematics import Kinematics
-from executive.motion.limits import JointLimits
-from executive.motion.timing import rest_to_rest
+from executive.motion.limits import JointLimits, rest_to_rest
 from executive.sim.tool import TOUCH
 
 SWIVELS = np.radians(np.arange(-180.0, 180.0, 20.0))

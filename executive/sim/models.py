@@ -1,4 +1,4 @@
-"""The visible shape of a model: its mesh, read from the file that the simulator loads too."""
+"""Models of objects: the mesh that a camera sees, read from a file, and the body that collides."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
+import pybullet
 import pybullet_data
 from numpy.typing import NDArray
+from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell_config import CellConfig, ObjectConfig
 from executive.errors import InputError
@@ -23,6 +25,8 @@ from executive.workcell import KeyPath
 
 TOLERANCE = 0.003
 """Difference between a cell file's figure and the model's own from which it counts as wrong [m]."""
+FRICTION = 0.0005
+"""Rolling and spinning friction: without it a ball at rest creeps, and a released one never stops."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +87,39 @@ def find_model(name: str) -> Path:
     if path.is_file():
         return path.resolve()
     raise InputError(f"there is no model {name}, neither beside the cell file nor in pybullet_data")
+
+
+def add_body(client: BulletClient, config: ObjectConfig, X_WO: Pose) -> int:
+    """Put an object at `X_WO` (z up as it stands) and return its body.
+
+    Raises:
+        InputError: Its model is not there, or is no mesh.
+    """
+    X_WL = X_WO @ upright(config)
+    body = _add_mesh(client, config, X_WL) if config.mesh else _add_urdf(client, config, X_WL)
+    client.changeDynamics(body, -1, rollingFriction=FRICTION, spinningFriction=FRICTION)
+    return body
+
+
+def _add_urdf(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
+    path = str(find_model(config.urdf))
+    return int(client.loadURDF(path, X_WL.position, X_WL.quaternion, globalScaling=config.scale))
+
+
+def _add_mesh(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
+    """Add a mesh of uniform density; to collide, its groups become convex and grow by Bullet's 1 mm."""
+    shape = {"fileName": str(find_model(config.mesh)), "meshScale": [config.scale] * 3}
+    centre = upright(config).inverse().apply(load_mesh(config).centroid)
+    return int(
+        client.createMultiBody(
+            baseMass=config.mass,
+            baseCollisionShapeIndex=client.createCollisionShape(pybullet.GEOM_MESH, **shape),
+            baseVisualShapeIndex=client.createVisualShape(pybullet.GEOM_MESH, **shape),
+            basePosition=X_WL.position,
+            baseOrientation=X_WL.quaternion,
+            baseInertialFramePosition=centre,
+        )
+    )
 
 
 def mass_of(config: ObjectConfig) -> float:

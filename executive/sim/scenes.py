@@ -6,6 +6,7 @@ of an object's whole silhouette, computed from its mesh, also where something hi
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -15,9 +16,8 @@ from numpy.typing import NDArray
 from executive.cell_config import CellConfig
 from executive.geometry import Array, Pose
 from executive.messages import Box
-from executive.sim.arrangements import Arrangement, arrange, random_light, random_part, random_tint, reach
-from executive.sim.camera import CELL_LIGHT, Image, add_noise, camera_pose, render
-from executive.sim.depth import sense
+from executive.sim.arrangements import Item, arrange, hanging, random_light, random_part, random_tint, reach
+from executive.sim.camera import CELL_LIGHT, Image, add_noise, camera_pose, render, sense
 from executive.sim.models import load_mesh
 from executive.sim.silhouette import outline_box, visible_share
 from executive.sim.spawn import spawn
@@ -105,10 +105,10 @@ class SceneRenderer:
         corners = [(x, y) for x in part[::2] for y in part[1::2]]
         footprint = np.array([on_plane(self._matrix, X_WC, corner, 0.0)[:2] for corner in corners])
         plain_view = part == self._camera.table_view
-        arrangement = arrange(self._config, self._meshes, footprint, plain_view, rng)
+        items = arrange(self._config, self._meshes, footprint, plain_view, rng)
         if holds:
-            arrangement = arrangement.holding(world.tool_pose(), self._meshes, self._config, rng)
-        bodies = [world.add_object(*item) for item in arrangement.items]
+            items.append(hanging(world.tool_pose(), self._meshes, self._config, rng))
+        bodies = [world.add_object(*item) for item in items]
         try:
             world.client.changeVisualShape(world.table, -1, rgbaColor=[*random_tint(rng), 1])
             shot = render(world, self._matrix, X_WC, part, random_light(rng))
@@ -116,7 +116,7 @@ class SceneRenderer:
             for body in bodies:
                 world.remove_object(body)
         image = add_noise(shot.image, self._camera.noise, rng)
-        return self._label(image, shot.bodies, bodies, arrangement, X_WC, part)
+        return self._label(image, shot.bodies, bodies, items, X_WC, part)
 
     def _draw_as_run(self, rng: np.random.Generator) -> Sample | None:
         world, camera = self._world, self._camera
@@ -135,22 +135,22 @@ class SceneRenderer:
         depth = None if camera.depth is None else sense(shot.depth, camera.depth, rng)
         left, top, right, bottom = part = camera.table_view
         image, seen = frame[top:bottom, left:right], shot.bodies[top:bottom, left:right]
-        sample = self._label(image, seen, list(bodies), Arrangement(tuple(items)), X_WC, part)
+        sample = self._label(image, seen, bodies, items, X_WC, part)
         return None if sample is None else replace(sample, frame=frame, depth=depth)
 
     def _label(
         self,
         image: Image,
         seen: NDArray[np.int32],
-        bodies: list[int],
-        arrangement: Arrangement,
+        bodies: Sequence[int],
+        items: Sequence[Item],
         X_WC: Pose,
         part: tuple[int, int, int, int],
     ) -> Sample | None:
         """Label a render, or return None where too many objects are half hidden."""
         labels, boxes, shares, positions, centres, ignored = [], [], [], [], [], []
         corner, scale = np.array(part[:2], dtype=float), SIZE / (part[2] - part[0])
-        for body, (label, X_WO, _) in zip(bodies, arrangement.items, strict=True):
+        for body, (label, X_WO, _) in zip(bodies, items, strict=True):
             mine = seen == body
             if not mine.any():
                 continue
@@ -186,15 +186,6 @@ class SceneRenderer:
             matrix=self._matrix,
             X_WC=X_WC,
         )
-
-
-def render_sample(config: CellConfig, camera_name: str, seed: int) -> Sample:
-    """Return the sample of `seed` as seen by a camera of a cell."""
-    renderer = SceneRenderer(config, camera_name)
-    try:
-        return renderer.sample(seed)
-    finally:
-        renderer.close()
 
 
 def _clipped(box: Box, corner: Array, scale: float) -> list[float]:

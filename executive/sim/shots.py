@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from collections import deque
 from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import Future
@@ -13,13 +12,12 @@ import cv2
 import numpy as np
 
 from executive.cell_config import CellConfig
-from executive.sim.beginning import first_world
 from executive.sim.camera import Image, Light, Render, render
 from executive.sim.command_log import STEP, read_commands
 from executive.sim.rebuild import Rebuilding
+from executive.sim.spawn import first_world
 from executive.sim.tool import SuctionTool
 from executive.sim.viewpoint import Viewpoint
-from executive.sim.world import World
 from executive.workers import Workers
 
 LIGHT = Light(direction=(0.5, -0.6, 1.2), ambient=0.6, diffuse=0.4, shadow=True)
@@ -66,32 +64,26 @@ def shots(shoot: Shoot, steps: Sequence[int], workers: int) -> Generator[Image, 
         steps: After how many steps, ascending.
         workers: Processes that take them.
     """
-    width, height = shoot.viewpoint.size
     blocks = [steps[first : first + BLOCK] for first in range(0, len(steps), BLOCK)]
     with Workers(workers) as pool:
-        under_way: deque[Future[list[bytes]]] = deque()
+        under_way: deque[Future[list[Image]]] = deque()
         # No more at a time than keeps everybody busy: pictures that nobody fetches yet fill the memory.
         for block in blocks:
             under_way.append(pool.submit(_take, shoot, block))
             if len(under_way) > workers:
-                yield from _unpacked(under_way.popleft(), width, height)
+                yield from under_way.popleft().result()
         while under_way:
-            yield from _unpacked(under_way.popleft(), width, height)
+            yield from under_way.popleft().result()
 
 
-def _unpacked(block: Future[list[bytes]], width: int, height: int) -> Iterator[Image]:
-    for data in block.result():
-        yield np.frombuffer(zlib.decompress(data), np.uint8).reshape(height, width, 3)
-
-
-def _take(shoot: Shoot, steps: Sequence[int]) -> list[bytes]:
-    """Take the pictures after these steps, packed; runs in a process of its own."""
-    return [zlib.compress(image.tobytes(), 1) for image in pictures(shoot, steps)]
+def _take(shoot: Shoot, steps: Sequence[int]) -> list[Image]:
+    """Take the pictures after these steps; runs in a process of its own."""
+    return list(pictures(shoot, steps))
 
 
 def pictures(shoot: Shoot, steps: Sequence[int]) -> Iterator[Image]:
     """Yield the pictures of `shots`, taken in one world in this process."""
-    world = first_world(shoot.config, shoot.seed)
+    world, viewpoint = first_world(shoot.config, shoot.seed), shoot.viewpoint
     try:
         # The floor's pattern would draw the eye; what is transparent is not drawn.
         world.client.changeVisualShape(world.plane, -1, rgbaColor=[1, 1, 1, 0])
@@ -103,14 +95,9 @@ def pictures(shoot: Shoot, steps: Sequence[int]) -> Iterator[Image]:
                 command = next(commands)
                 rebuilding.do(command)
                 done += command.kind == STEP
-            yield _picture(_rendered(world, shoot.viewpoint))
+            yield _picture(render(world, viewpoint.matrix, viewpoint.X_WC, (0, 0, *viewpoint.size), LIGHT))
     finally:
         world.close()
-
-
-def _rendered(world: World, viewpoint: Viewpoint) -> Render:
-    width, height = viewpoint.size
-    return render(world, viewpoint.matrix, viewpoint.X_WC, (0, 0, width, height), LIGHT)
 
 
 def _picture(rendered: Render) -> Image:

@@ -1,21 +1,66 @@
-"""The objects a run begins with: random classes, places, turns and colours, lying still."""
+"""The world that a run begins with: its seeds, and random objects at rest, some on top of others."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.geometry import Array, Pose, about_z
-from executive.sim.models import load_mesh
-from executive.sim.settling import DROP, come_to_rest
-from executive.sim.stacking import stack
+from executive.sim.models import Mesh, load_mesh
 from executive.sim.world import World
 
 TRIES = 2000
 """Places tried for one set of objects before the workspace counts as too small for it."""
+DROP = 0.002
+"""Height over what carries it at which an object is let go [m]."""
+STILL = 0.002
+"""Speed under which an object counts as still [m/s]."""
+LEAST, MOST = 60, 480
+"""Physics steps given to settle: at least, for nothing moves in the first ones, and at most."""
+OFFSET = 0.004
+"""Largest distance of an object's axis from that of the one it is put on, along x and y [m]."""
+NUDGE = 0.1
+"""Speed at which it is pushed aside to see whether it stays [m/s]; friction stops that within 1 mm."""
+MOVED = 0.005
+"""What moves further than this did not stay [m]."""
+
+
+@dataclass(frozen=True)
+class PartSeeds:
+    """What each part of a simulated cell draws its chance from.
+
+    Attributes:
+        objects: Decides which objects lie where.
+        camera: Decides the camera's noise.
+        detectors: Decides what detectors leave to chance.
+    """
+
+    objects: int
+    camera: int
+    detectors: int
+
+    @staticmethod
+    def of(seed: int) -> PartSeeds:
+        """Return the seeds that follow from a run's."""
+        parts = np.random.SeedSequence(seed).spawn(3)
+        return PartSeeds(*(int(part.generate_state(1)[0]) for part in parts))
+
+
+def first_world(config: CellConfig, seed: int, *, gui: bool = False) -> World:
+    """Return the world as a run of this seed finds it: arm at `home`, its objects at rest on the table.
+
+    Raises:
+        InputError: The workspace has no room for the objects.
+    """
+    world = World(config, gui=gui)
+    spawn(world, config, PartSeeds.of(seed).objects)
+    world.stood.clear()
+    return world
 
 
 def spawn(world: World, config: CellConfig, seed: int, count: int | None = None) -> tuple[int, ...]:
@@ -43,9 +88,9 @@ def spawn(world: World, config: CellConfig, seed: int, count: int | None = None)
         X_WO = Pose(about_z(rng.uniform(0, math.tau)), np.array([*place, height]))
         colour = model.colours[int(rng.integers(len(model.colours)))]
         bodies.append(world.add_object(label, X_WO, colour))
-    come_to_rest(world, bodies)
+    _come_to_rest(world, bodies)
     if table.stacked:
-        stack(world, bodies, meshes, table.stacked, rng)
+        _stack(world, bodies, meshes, table.stacked, rng)
     return tuple(bodies)
 
 
@@ -68,3 +113,67 @@ def _places(config: CellConfig, labels: list[str], rng: np.random.Generator) -> 
         f"{high[0] - low[0]:.2f} m by {high[1] - low[1]:.2f} m, {config.table.gap * 1000:.0f} mm apart; "
         "ask for fewer or widen table.x and table.y"
     )
+
+
+def _stack(
+    world: World, bodies: Sequence[int], meshes: Mapping[str, Mesh], share: float, rng: np.random.Generator
+) -> None:
+    """Put each object on another one with probability `share`, if there is one that carries it.
+
+    Which others do is found out by trying: what falls, also when nudged, is put back where it lay, and all
+    else too. So a ball is carried by nothing and carries nothing. No object gets on one that lies on
+    another, and none has two on top.
+
+    Args:
+        world: Where they lie, at rest.
+        bodies: The objects.
+        meshes: Shape of each class.
+        share: 0 to 1.
+        rng: Decides which, where, and how they are turned.
+    """
+    free = set(bodies)
+    for upper in bodies:
+        if rng.random() >= share or upper not in free:
+            continue
+        for lower in map(int, rng.permutation(sorted(free - {upper}))):
+            if _put_on(world, upper, lower, meshes, rng):
+                free -= {upper, lower}
+                break
+
+
+def _put_on(
+    world: World, upper: int, lower: int, meshes: Mapping[str, Mesh], rng: np.random.Generator
+) -> bool:
+    """Put one object on another, and tell whether it stayed; if not, all is again as it was."""
+    before = {body: world.object_pose(body) for body in world.bodies}
+    base = before[lower].position
+    height = base[2] + meshes[world.bodies[lower]].top - meshes[world.bodies[upper]].bottom + DROP
+    place = np.array([*(base[:2] + rng.uniform(-OFFSET, OFFSET, 2)), height])
+    goal = {**before, upper: Pose(about_z(rng.uniform(0, math.tau)), place)}
+    world.place_object(upper, goal[upper])
+    _come_to_rest(world, list(goal), lambda: _moved(world, goal))
+    heading = rng.uniform(0, math.tau)
+    world.client.resetBaseVelocity(upper, [NUDGE * math.cos(heading), NUDGE * math.sin(heading), 0.0])
+    _come_to_rest(world, list(goal), lambda: _moved(world, goal))
+    if not _moved(world, goal):
+        return True
+    for body, X_WO in before.items():
+        world.place_object(body, X_WO)
+    return False
+
+
+def _moved(world: World, goal: Mapping[int, Pose]) -> bool:
+    """Tell whether any body is far from where it should be."""
+    return any(
+        float(np.linalg.norm(world.object_pose(body).position - X_WO.position)) > MOVED
+        for body, X_WO in goal.items()
+    )
+
+
+def _come_to_rest(world: World, bodies: Sequence[int], enough: Callable[[], bool] = lambda: False) -> None:
+    """Step until every body has come to rest, or for two seconds, or until `enough` holds."""
+    for step in range(MOST):
+        world.step()
+        speeds = [np.linalg.norm(world.client.getBaseVelocity(body)[0]) for body in bodies]
+        if (step >= LEAST and max(speeds, default=0.0) < STILL) or enough():
+            return

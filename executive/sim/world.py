@@ -22,9 +22,8 @@ from executive.messages import BIN_THICKNESS
 from executive.motion.kinematics import FLANGE_OFFSET
 from executive.motion.state import JOINTS
 from executive.sim import command_log
-from executive.sim.bodies import add_body
 from executive.sim.command_log import CommandLog
-from executive.sim.models import find_model, upright
+from executive.sim.models import add_body, find_model, upright
 
 TABLE_HEIGHT = 0.625
 """Height of the top of pybullet_data's table over its feet [m]."""
@@ -36,6 +35,8 @@ TOOL_MASS = 0.1
 """Mass of the tool [kg]."""
 TORQUES = (320.0, 320.0, 176.0, 176.0, 110.0, 40.0, 40.0)
 """Largest joint torques of the iiwa 14 [Nm], data sheet as in RobotLocomotion/models iiwa_description."""
+RAY_LENGTH, RAY_STEP = 5.0, 1e-4
+"""Length of a ray, and the distance behind the arm's surface at which it goes on [m]."""
 
 
 class World:
@@ -153,6 +154,16 @@ class World:
     def tool_pose(self) -> Pose:
         """Return `X_WT`, the pose of the tool centre point: the middle of the cup's lip."""
         return self.flange_pose() @ Pose.of([0, 0, self.config.tool.length])
+
+    def cast_ray(self, origin: Array, direction: Array) -> Array | None:
+        """Return the first point `(3,)` [m] that a ray hits, the arm and its tool being air, or None."""
+        end = origin + RAY_LENGTH * direction / np.linalg.norm(direction)
+        start = origin
+        while True:
+            body, _, share, point, _ = self.client.rayTest(start, end)[0]
+            if body != self.arm:
+                return np.array(point) if body >= 0 else None
+            start = start + share * (end - start) + RAY_STEP * (end - start) / np.linalg.norm(end - start)
 
     def step(self) -> None:
         """Advance the physics by 1/240 s."""

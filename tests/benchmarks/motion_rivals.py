@@ -24,10 +24,9 @@ from executive.clock import STEP
 from executive.geometry import Array, tool_down
 from executive.motion.free import Connector
 from executive.motion.kinematics import Kinematics
-from executive.motion.limits import JointLimits
+from executive.motion.limits import JointLimits, rest_to_rest
 from executive.motion.postures import LIMIT_MARGIN, Postures, find_postures, upright_line
 from executive.motion.state import JOINTS, State
-from executive.motion.timing import rest_to_rest
 from executive.motion.trajectory import Trajectory, peaks
 from executive.sim.world import World
 

@@ -67,3 +67,22 @@ class Bench:
             [np.array([x, y, 0.025]) for _, x, y in things],
             [Glimpse(Detection(label, 0.4, (0, 0, 1, 1)), np.array([x, y, 0.025])) for label, x, y in unsure],
         )
+
+    def drop(self, item: str, landing: np.ndarray | None = None) -> None:
+        """Have the tool pick an item and lose it on the way."""
+        self.ledger.held(item)
+        self.ledger.dropped(item, landing)
+
+    def place(self, item: str, bin: str = "red_bin") -> None:
+        """Have the tool pick an item and let it go in a bin."""
+        self.ledger.held(item)
+        self.ledger.placed(item, bin)
+
+    def states(self) -> dict[str, tuple[str, str]]:
+        """State of each item, and where it was placed or why it is in that state."""
+        return {record.item: (record.state.value, record.bin or record.why) for record in self.ledger.records}
+
+    def end(self) -> dict[str, tuple[str, str]]:
+        """End the run and return the final states."""
+        self.ledger.close()
+        return self.states()

@@ -1,120 +1,161 @@
-"""What falls on its way is sought in the bins, and believed there where it came down."""
+"""Dropped items: sought on the table and in the bins, and believed where they came down."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from ledger_bench import Bench
+from ledger_bench import Bench, Thing
 
 OVER = np.array([0.2, -0.44, 0.025])
-"""The middle of the red bin, which no part of the image below shows."""
-
-
-def dropped(bench: Bench, landing: np.ndarray | None) -> dict[str, object]:
-    bench.look(("cube", 0.5, 0.0))
-    bench.ledger.held("cube-1")
-    bench.ledger.dropped("cube-1", landing)
-    for _ in range(3):
-        bench.look()
-    bench.ledger.close()
-    (row,) = bench.ledger.rows()
-    return row
-
-
-def test_what_came_down_in_its_bin_is_there_though_no_look_shows_it(bench: Bench) -> None:
-    row = dropped(bench, OVER)
-    assert (row["state"], row["bin"], row["why"]) == ("placed", "red_bin", "it fell there")
+"""The middle of the red bin, which the image of the view `table` does not show."""
+CUBE: Thing = ("cube", 0.5, 0.0)
+IN_RED: Thing = ("cube", 0.2, -0.44)
+LOST = ("lost", "known to exist, not found again")
 
 
 @pytest.mark.parametrize(
-    "landing",
-    [None, np.array([0.5, 0.0, 0.025]), np.array([0.3, -0.44, 0.025]), np.array([-0.2, 0.44, 0.025])],
-    ids=["nobody knows where", "on the table", "on the wall of its bin", "in a bin of another class"],
+    ("landing", "final"),
+    [
+        (OVER, ("placed", "red_bin")),
+        (None, LOST),
+        (np.array([0.5, 0.0, 0.025]), LOST),
+        (np.array([0.3, -0.44, 0.025]), LOST),
+        (np.array([0.276, -0.44, 0.025]), LOST),
+        (np.array([0.274, -0.44, 0.025]), ("placed", "red_bin")),
+        (np.array([-0.2, 0.44, 0.025]), LOST),
+    ],
+    ids=["bin", "unknown", "table", "wall", "near the wall", "not so near", "bin of another class"],
 )
-def test_what_may_have_come_down_elsewhere_and_is_not_found_is_lost(
-    bench: Bench, landing: np.ndarray | None
+def test_what_came_down_in_its_bin_is_there_though_no_look_shows_it(
+    bench: Bench, landing: np.ndarray | None, final: tuple[str, str]
 ) -> None:
-    row = dropped(bench, landing)
-    assert (row["state"], row["bin"]) == ("lost", "")
-
-
-def test_a_look_into_the_bin_that_does_not_show_it_takes_that_back(bench: Bench) -> None:
-    bench.look(("cube", 0.5, 0.0))
-    bench.ledger.held("cube-1")
-    bench.ledger.dropped("cube-1", OVER)
-    bench.look(view="full")
-    bench.ledger.close()
-    assert bench.ledger.rows()[0]["state"] == "lost"
-
-
-def test_a_look_that_shows_it_there_settles_it(bench: Bench) -> None:
-    bench.look(("cube", 0.5, 0.0))
-    bench.ledger.held("cube-1")
-    bench.ledger.dropped("cube-1", OVER)
-    bench.look(("cube", 0.2, -0.44), view="full")
-    (row,) = bench.ledger.rows()
-    assert (row["state"], row["bin"], row["why"]) == ("placed", "red_bin", "")
+    bench.look(CUBE)
+    bench.drop("cube-1", landing)
+    for _ in range(3):
+        bench.look()
+    assert bench.end() == {"cube-1": final}
+    assert bench.ledger.rows()[0]["why"] == ("it fell there" if final[0] == "placed" else final[1])
+    assert bench.ledger.attempts("cube-1") == 1
 
 
 def test_dropped_again_elsewhere_it_is_not_sought_where_it_fell_first(bench: Bench) -> None:
-    bench.look(("cube", 0.5, 0.0))
-    bench.ledger.held("cube-1")
-    bench.ledger.dropped("cube-1", OVER)
+    bench.look(CUBE)
+    bench.drop("cube-1", OVER)
     bench.look(("cube", 0.55, 0.1))
-    bench.ledger.held("cube-1")
-    bench.ledger.dropped("cube-1", np.array([0.5, 0.2, 0.025]))
+    bench.drop("cube-1", np.array([0.5, 0.2, 0.025]))
     for _ in range(3):
         bench.look()
-    bench.ledger.close()
-    assert bench.ledger.rows()[0]["state"] == "lost"
+    assert bench.end() == {"cube-1": LOST}
 
 
-def test_what_leans_on_the_wall_of_its_bin_is_in_it(bench: Bench) -> None:
-    bench.look(("cube", 0.5, 0.0), ("cube", 0.6, 0.1))
-    bench.ledger.held("cube-1")
-    bench.ledger.placed("cube-1", "red_bin")
-    bench.ledger.held("cube-2")
-    bench.ledger.dropped("cube-2", OVER)
-    bench.look(("cube", 0.2, -0.44), ("cube", 0.2, -0.44 + 0.12 + 0.003), view="full")
-    assert bench.ledger.balance()["placed"] == 2
-
-
-def test_what_must_have_fallen_into_a_bin_takes_a_place_there(bench: Bench) -> None:
-    bench.look(("cube", 0.5, 0.0))
-    bench.ledger.held("cube-1")
-    bench.ledger.dropped("cube-1", OVER)
+def test_what_must_have_fallen_into_a_bin_takes_a_place_there_until_a_look_shows_otherwise(
+    bench: Bench,
+) -> None:
+    bench.look(CUBE)
+    bench.drop("cube-1", OVER)
     assert bench.ledger.objects_in("red_bin") == 1
     bench.look(view="full")
-    assert bench.ledger.objects_in("red_bin") == 0, "a look shows that it is not there"
-    bench.look(("cube", 0.2, -0.44), view="full")
+    assert bench.ledger.objects_in("red_bin") == 0
+    bench.look(IN_RED, view="full")
     assert bench.ledger.objects_in("red_bin") == 1
-
-
-def test_what_was_given_up_where_nobody_knows_is_found_in_its_bin_all_the_same(bench: Bench) -> None:
-    bench.look(("cube", 0.5, 0.0))
-    bench.ledger.held("cube-1")
-    bench.ledger.dropped("cube-1")
-    bench.ledger.rejected("cube-1", "12 attempts failed")
-    assert not bench.ledger.is_open("cube-1")
-    bench.look(("cube", 0.2, -0.44), view="full")
     (row,) = bench.ledger.rows()
     assert (row["state"], row["bin"], row["why"]) == ("placed", "red_bin", "")
 
 
-def test_found_on_the_table_it_stays_given_up(bench: Bench) -> None:
-    bench.look(("cube", 0.5, 0.0))
-    bench.ledger.held("cube-1")
-    bench.ledger.dropped("cube-1")
+def test_a_look_into_the_bin_that_does_not_show_it_takes_the_belief_back(bench: Bench) -> None:
+    bench.look(CUBE)
+    bench.drop("cube-1", OVER)
+    bench.look(view="full")
+    assert bench.end() == {"cube-1": LOST}
+
+
+@pytest.mark.parametrize(
+    ("y", "placed"), [(-0.44 + 0.12 + 0.003, 2), (-0.44 + 0.12 + 0.007, 1)], ids=["on the wall", "beside it"]
+)
+def test_what_leans_on_the_wall_of_its_bin_is_in_it_and_what_lies_beside_it_is_no_target(
+    bench: Bench, y: float, placed: int
+) -> None:
+    bench.look(CUBE, ("cube", 0.6, 0.1))
+    bench.place("cube-1")
+    bench.drop("cube-2")
+    assert bench.look(("cube", 0.2, y), IN_RED, view="full") == []
+    assert bench.ledger.balance()["placed"] == placed
+
+
+def test_what_was_given_up_is_found_in_its_bin_all_the_same(bench: Bench) -> None:
+    bench.look(CUBE)
+    bench.drop("cube-1")
+    assert bench.ledger.is_open("cube-1")
     bench.ledger.rejected("cube-1", "12 attempts failed")
+    assert not bench.ledger.is_open("cube-1")
+    bench.look(IN_RED, view="full")
+    assert bench.states() == {"cube-1": ("placed", "red_bin")}
+
+
+def test_given_up_and_found_on_the_table_it_stays_given_up_and_never_found_it_is_lost(bench: Bench) -> None:
+    other = Bench()
+    for one in (bench, other):
+        one.look(CUBE)
+        one.drop("cube-1")
+        one.ledger.rejected("cube-1", "12 attempts failed")
     assert bench.look(("cube", 0.55, 0.1)) == []
-    (row,) = bench.ledger.rows()
-    assert (row["state"], row["position"][:2], row["why"]) == ("rejected", [0.55, 0.1], "12 attempts failed")
+    assert bench.states() == {"cube-1": ("rejected", "12 attempts failed")}
+    assert bench.ledger.rows()[0]["position"] == [0.55, 0.1, 0.025]
+    for _ in range(2):
+        other.look(view="full")
+    assert other.end() == {"cube-1": LOST}
 
 
-def test_given_up_and_never_found_it_is_lost(bench: Bench) -> None:
-    bench.look(("cube", 0.5, 0.0))
-    bench.ledger.held("cube-1")
-    bench.ledger.dropped("cube-1")
-    bench.ledger.rejected("cube-1", "12 attempts failed")
-    bench.ledger.close()
-    assert bench.ledger.rows()[0]["state"] == "lost"
+def test_a_dropped_item_is_recognized_where_it_lies(bench: Bench) -> None:
+    bench.look(CUBE, ("cube", 0.6, 0.1))
+    bench.drop("cube-1")
+    found = bench.look(("cube", 0.6, 0.1), ("cube", 0.30, -0.3), view="full")
+    assert [(t.item, t.position[0]) for t in found] == [("cube-1", 0.30), ("cube-2", pytest.approx(0.6))]
+
+
+def test_an_item_dropped_is_recognized_after_further_changes(bench: Bench) -> None:
+    bench.look(CUBE, ("cube", 0.60, 0.1))
+    bench.drop("cube-1")
+    bench.look(("cube", 0.60, 0.1), ("duck", 0.45, 0.15))
+    bench.ledger.missed("cube-2")
+    found = bench.look(("cube", 0.60, 0.1), ("cube", 0.45, -0.15), ("duck", 0.45, 0.15))
+    assert {t.item for t in found} == {"cube-1", "cube-2", "duck-1"}
+
+
+def test_no_name_is_given_out_twice(bench: Bench) -> None:
+    bench.look(CUBE)
+    bench.drop("cube-1")
+    bench.look(("cube", 0.45, 0.1), ("cube", 0.60, 0.1))
+    bench.look(("cube", 0.45, 0.1), ("cube", 0.60, 0.1), ("cube", 0.55, -0.2))
+    rows = bench.ledger.rows()
+    assert len({row["item"] for row in rows}) == len(rows) == 3
+    assert sorted(row["position"][0] for row in rows) == [0.45, 0.55, 0.60]  # type: ignore[index]
+
+
+def test_one_object_more_in_a_bin_of_its_class_than_was_let_go_there_is_the_dropped_one(
+    bench: Bench,
+) -> None:
+    bench.look(("cube", 0.45, 0.0))
+    bench.place("cube-1")
+    bench.look(("cube", 0.60, 0.0))
+    bench.drop("cube-2")
+    bench.look(IN_RED, view="full")
+    assert bench.ledger.balance()["placed"] == 1, "the cube in the red bin is the one that was let go there"
+    bench.look(IN_RED, ("cube", 0.2, 0.44), view="full")
+    assert bench.states()["cube-2"] == ("placed", "pink_bin")
+
+
+@pytest.mark.parametrize(
+    ("shown", "placed"),
+    [([IN_RED], ["red_bin"]), ([("cube", 0.2, 0.44), IN_RED], ["red_bin"]), ([("cube", -0.2, 0.44)], [])],
+    ids=["its bin", "two of its bins", "a bin of another class"],
+)
+def test_a_dropped_item_is_placed_once_in_a_bin_of_its_class(
+    bench: Bench, shown: list[Thing], placed: list[str]
+) -> None:
+    bench.look(CUBE)
+    bench.drop("cube-1")
+    assert bench.look(*shown, view="full") == []
+    told = [data["bin"] for kind, data in bench.events if kind == "item" and data["state"] == "placed"]
+    assert told == placed
+    assert len(bench.ledger.records) == 1, "what lies in a bin is no item"

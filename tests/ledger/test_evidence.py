@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.ledger.binding import reach
 from executive.ledger.item import Record
+from executive.ledger.looks import reach
 from executive.messages import Reliability
 
 GOOD = Reliability(threshold=0.5, misses=0.02, confused=0.0025, invented=0.02, jitter=0.7)
@@ -36,10 +36,35 @@ def test_one_vote_of_a_good_detector_is_enough_for_a_class_and_three_of_a_bad_on
 
 def test_votes_against_each_other_leave_nothing_certain() -> None:
     mixed = record()
-    mixed.vote("cube", BAD)
-    mixed.vote("duck", BAD)
+    for label in ("cube", "duck"):
+        mixed.vote(label, BAD)
     assert mixed.label == "cube", "the first in the alphabet"
-    assert mixed.misjudged > 0.5
+    assert mixed.misjudged == pytest.approx((1 + 1 / 9) / (2 + 1 / 9))
+    assert mixed.consistency == pytest.approx(0.19), "1 of 2 wrong at 10 %"
+
+
+def test_what_looks_say_of_existence_adds_up() -> None:
+    seen = record(-1.0)
+    seen.vote("cube", GOOD)
+    assert seen.existence == -1.0, "the first look is in the prior"
+    seen.vote("cube", GOOD)
+    assert seen.existence == pytest.approx(-1.0 + math.log(0.98 / (0.02 * 0.02)))
+    assert (seen.exists, seen.looks) == (False, 2)
+    seen.vote("cube", GOOD)
+    assert (seen.exists, seen.probability) == (True, 1.0)
+    beside = record(3.0)
+    beside.vote("cube", GOOD, alone=False)
+    beside.vote("cube", GOOD, alone=False)
+    assert beside.existence == pytest.approx(math.log(0.1)), "it may as well be a known item"
+    assert beside.probability == pytest.approx(0.1 / 1.1)
+
+
+def test_looks_into_a_bin_add_up_from_nothing() -> None:
+    fallen = record()
+    fallen.fell("red_bin", False, GOOD)
+    assert fallen.fallen == {"red_bin": 0.0}
+    fallen.fell("red_bin", True, GOOD)
+    assert fallen.fallen == {"red_bin": pytest.approx(math.log(0.98 / (0.02 * 0.04)))}
 
 
 @given(st.lists(st.sampled_from(["cube", "duck", "sphere"]), min_size=1, max_size=12))

@@ -1,13 +1,31 @@
+"""Limits of the joints, and the least time of a move within them."""
+
 from __future__ import annotations
 
 import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from joint_states import LIMITS, shares
 
-from executive.motion.limits import JointLimits
+from executive.motion.free import Connector
+from executive.motion.limits import JointLimits, rest_to_rest
+from executive.motion.state import State
+
+CONNECTOR = Connector(LIMITS)
 
 
 def test_limits_are_the_cell_files_in_radians(config, limits: JointLimits) -> None:
     assert np.allclose(np.degrees(limits.position), [170, 120, 170, 120, 170, 120, 175])
     assert np.allclose(np.degrees(limits.velocity), [85, 85, 100, 75, 130, 135, 135])
-    assert np.allclose(limits.acceleration, config.arm.limits.acceleration)
-    assert np.all(limits.stop_acceleration > limits.acceleration)
-    assert np.all(limits.stop_jerk > limits.jerk)
+    for name in ("acceleration", "jerk", "stop_acceleration", "stop_jerk"):
+        assert np.array_equal(getattr(limits, name), getattr(config.arm.limits, name)), name
+
+
+@given(shares, st.floats(-4, 0.5))
+@settings(max_examples=150, deadline=None)
+def test_the_closed_form_is_ruckigs_duration(share, power: float) -> None:
+    change = share * 10**power
+    found = CONNECTOR.connect(State.rest(np.zeros(7)), State.rest(change)).duration
+    # Ruckig takes moves of less than a billionth of a radian for none.
+    assert rest_to_rest(change, LIMITS) == pytest.approx(found, rel=1e-6, abs=5e-3 if found < 5e-3 else 1e-8)

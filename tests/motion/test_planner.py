@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import math
-import re
 
 import numpy as np
 import pytest
@@ -13,13 +12,10 @@ from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
-from executive.layout import NECK_LENGTH, TOOL_RADIUS
 from executive.messages import Load, ObjectClass, Obstacle
-from executive.motion.free import Free
 from executive.motion.kinematics import fold
-from executive.motion.line import Line
 from executive.motion.planner import SPACING, Planner
-from executive.motion.seal import GENTLEST, GRAVITY
+from executive.motion.seal import GRAVITY
 from executive.motion.trajectory import Trajectory
 
 CUBE = ObjectClass("cube", 0.05, 0.0354)
@@ -37,30 +33,59 @@ def tips_of(planner: Planner, motion: Trajectory) -> Array:
     return planner.kinematics.tips(passed(motion).q)[0]
 
 
-def with_motion(config: CellConfig, **changed: float) -> CellConfig:
-    """The cell file with another `motion` section."""
-    return config.model_copy(update={"motion": config.motion.model_copy(update=changed)})
+def question(name: str, planner: Planner, config: CellConfig, home: Array) -> Trajectory:
+    """Answer a fixed question."""
+    near = neighbours(0.5, -0.1, 0.3, count=3, top=0.05)
+    wall = tuple(Obstacle(float(x), 0.0, 0.04, 0.16, "the wall") for x in np.arange(0.2, 0.9, 0.05))
+    aside, beyond = np.radians(config.arm.poses_deg["aside"]), Goal((0.5, 0.15, 0.07))
+    picked = planner.plan(home, pick(0.5, -0.1)).end
+    motion = config.motion.model_copy(update={"straight": 0.05})
+    beside, onto = planner.plan(home, Goal((0.42, 0.0, 0.01))).end, Goal((0.5, 0.0, 0.035), None, 0.02, 0.035)
+    far = planner.plan(home, pick(0.62, 0.2)).end
+    straight = Planner(config.model_copy(update={"motion": motion}))
+    return {
+        "pick": lambda: planner.plan(home, pick(0.5, -0.1)),
+        "pick of many": lambda: planner.plan(aside, pick(0.5, -0.1), Task(around=near)),
+        "turn": lambda: planner.plan(home, Goal((0.6, 0.2, 0.1), 0.5)),
+        "carry": lambda: planner.plan(picked, BIN, Task(Load(CUBE, 7.9), near)),
+        "carry weakly": lambda: planner.plan(picked, BIN, Task(Load(CUBE, 2.4))),
+        "weak far": lambda: planner.plan(far, BIN, Task(Load(CUBE, 2.4))),
+        "sweep past": lambda: planner.plan(beside, onto, Task(target=Obstacle(0.5, 0.0, 0.0354, 0.05, "it"))),
+        "carry hardly": lambda: planner.plan(picked, BIN, Task(Load(CUBE, 1.0))),
+        "over a wall": lambda: planner.plan(picked, beyond, Task(Load(CUBE), wall)),
+        "empty over a wall": lambda: planner.plan(picked, beyond, Task(around=wall)),
+        "home": lambda: planner.plan(planner.plan(picked, BIN).end, home),
+        "straight": lambda: straight.plan(picked, BIN, Task(Load(CUBE, 3.0))),
+    }[name]()
 
 
-@given(on_the_table, st.floats(-math.pi, math.pi))
-@settings(max_examples=15, deadline=None)
-def test_the_tool_arrives_at_the_goal_pointing_down_with_the_yaw_asked_for(planner, home, place, yaw) -> None:
-    motion = planner.plan(home, Goal(place, yaw, guarded=0.01, speed=0.05))
-    assert np.array_equal(motion.start, home)
-    X_WT = planner.kinematics.forward(motion.end)
-    assert np.allclose(X_WT.position, place, atol=1e-7)
-    assert np.allclose(X_WT.rotation[:, 2], [0, 0, -1], atol=1e-7)
-    assert np.allclose(X_WT.rotation[:, 1], [-math.sin(yaw), math.cos(yaw), 0], atol=1e-7)
+ANSWERS = {
+    "pick": (1.017523, 0.611915, [0.30651, 0.77648, -0.32558, -1.71549, 0.42773, 0.75296, 0.00811]),
+    "pick of many": (0.880489, 0.474181, [-0.45612, 0.75291, 0.17469, -1.72332, -0.23836, 0.69373, -0.00516]),
+    "turn": (0.514799, math.inf, [0.49188, 0.75019, 0.0, -1.45755, 0.0, 0.93386, -0.08944]),
+    "carry": (0.714043, math.inf, [-0.17468, 0.85035, -0.64559, -1.77685, 0.76684, 0.74278, 7e-05]),
+    "carry weakly": (0.923196, math.inf, [-0.01424, 1.00784, -0.84934, -1.78093, 0.93341, 0.90919, 0.00222]),
+    "weak far": (1.268907, math.inf, [-0.00353, 0.89756, -0.44081, -1.59216, 0.47962, 0.81615, -8e-05]),
+    "sweep past": (1.067468, 0.466969, [0.30829, 0.86884, -0.40493, -1.86888, 0.62204, 0.5418, 0.01258]),
+    "carry hardly": (3.545365, math.inf, [-0.05676, 0.88929, -0.82623, -1.80773, 0.81148, 0.90025, 0.02551]),
+    "over a wall": (0.724018, math.inf, [0.34382, 0.77983, -0.4167, -1.67431, 0.40105, 0.52455, 4e-05]),
+    "empty over a wall": (0.618551, math.inf, [0.39062, 0.82881, -0.4995, -1.7098, 0.60504, 0.60066, 9e-05]),
+    "home": (0.954888, math.inf, [0.15931, 0.83832, -0.51236, -1.67924, 0.58407, 1.00385, 0.0]),
+    "straight": (1.139490, math.inf, [-0.06943, 0.87187, -0.79608, -1.81132, 0.77825, 0.84499, 0.07135]),
+}  # fmt: skip
+"""Duration [s], beginning of the guarded part [s] and mean joint positions [rad] of each fixed question."""
 
 
-@given(on_the_table)
-@settings(max_examples=10, deadline=None)
-def test_a_free_yaw_leaves_joint_7_alone(planner, home, place) -> None:
-    assert planner.plan(home, Goal(place)).end[6] == pytest.approx(home[6], abs=1e-9)
+@pytest.mark.parametrize("name", ANSWERS)
+def test_a_fixed_question_gets_a_fixed_answer(planner, config, home, name: str) -> None:
+    """Whoever changes what the planner decides changes this table and says why."""
+    motion, (duration, guarded, mean) = question(name, planner, config, home), ANSWERS[name]
+    assert (motion.duration, motion.guarded) == pytest.approx((duration, guarded), rel=1e-5)
+    assert motion.samples.q.mean(axis=0) == pytest.approx(mean, abs=2e-5)
 
 
 @given(on_the_table, st.floats(0.008, 0.03), st.floats(0.02, 0.08))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=10, deadline=None)
 def test_the_guarded_part_is_straight_even_and_no_faster_than_asked(
     planner, home, place, guarded, speed
 ) -> None:
@@ -77,29 +102,6 @@ def test_the_guarded_part_is_straight_even_and_no_faster_than_asked(
     assert (low[1:] >= low[:-1]).all()  # it does not leave that part again
 
 
-def test_a_load_changes_the_way(planner, home) -> None:
-    picked = planner.plan(home, pick(0.5, -0.1)).end
-    empty, loaded = planner.plan(picked, BIN), planner.plan(picked, BIN, CARRYING)
-    assert loaded.duration > empty.duration
-    over_the_wall = []
-    for motion in (empty, loaded):
-        tips = tips_of(planner, motion)
-        over_the_wall.append(tips[np.argmin(np.abs(tips[:, 1] + 0.33)), 2])
-    assert over_the_wall[1] > 0.06 + CUBE.height
-    assert over_the_wall[1] > over_the_wall[0] + 0.02
-
-
-@pytest.mark.parametrize("load", [None, Load(CUBE)])
-def test_what_stands_between_is_passed_above(planner, home, load) -> None:
-    wall = tuple(Obstacle(x, 0.0, 0.04, 0.16, "the wall") for x in np.arange(0.2, 0.9, 0.05).tolist())
-    picked = planner.plan(home, pick(0.5, 0.15)).end
-    tips = tips_of(planner, planner.plan(picked, Goal((0.5, -0.15, 0.07)), Task(load, wall)))
-    lowest = tips[np.abs(tips[:, 1]) < 0.03, 2].min()
-    assert lowest > 0.16 + (load.kind.height if load else 0.0)
-    direct = tips_of(planner, planner.plan(picked, Goal((0.5, -0.15, 0.07)), Task(load)))
-    assert direct[np.abs(direct[:, 1]) < 0.03, 2].min() < 0.16
-
-
 def neighbours(x: float, y: float, turn: float, count: int, top: float) -> tuple[Obstacle, ...]:
     """Cubes around a cube, 12 mm away from it."""
     apart = 2 * CUBE.radius + 0.012
@@ -108,54 +110,6 @@ def neighbours(x: float, y: float, turn: float, count: int, top: float) -> tuple
         Obstacle(x + apart * math.cos(a), y + apart * math.sin(a), CUBE.radius, top, "a neighbour")
         for a in angles
     )
-
-
-@given(st.floats(0.47, 0.59), st.floats(-0.17, 0.17), st.floats(0, math.pi), st.integers(1, 6))
-@settings(max_examples=12, deadline=None)
-def test_among_tightly_standing_neighbours_it_still_comes_down_and_leaves_again(
-    planner, config, home, x, y, turn, count
-) -> None:
-    near = neighbours(x, y, turn, count, CUBE.height)
-    down = planner.plan(home, pick(x, y, 0.04), Task(around=near))
-    assert np.allclose(planner.kinematics.tips(down.end[None])[0], (x, y, 0.04), atol=1e-7)
-    for tip in tips_of(planner, down):
-        for thing in near:
-            away = math.hypot(tip[0] - thing.x, tip[1] - thing.y) - thing.radius
-            assert tip[2] > thing.top or away > config.tool.cup_radius
-            assert tip[2] + NECK_LENGTH > thing.top or away > TOOL_RADIUS
-    picked = planner.plan(home, pick(x, y), Task(around=near)).end
-    assert planner.plan(picked, BIN, Task(Load(CUBE), near)).duration < 2.0
-
-
-@pytest.mark.parametrize("turn", [0.0, 0.5])
-@pytest.mark.parametrize(("x", "y"), [(0.5, 0.0), (0.57, 0.15), (0.48, -0.1)])
-def test_a_load_is_lifted_out_of_a_ring_of_taller_neighbours(planner, home, x, y, turn) -> None:
-    near = neighbours(x, y, turn, count=6, top=0.06)
-    picked = planner.plan(home, pick(x, y), Task(around=near)).end
-    for tip in tips_of(planner, planner.plan(picked, BIN, Task(Load(CUBE), near))):
-        for thing in near:
-            away = math.hypot(tip[0] - thing.x, tip[1] - thing.y) - thing.radius - CUBE.radius
-            assert tip[2] - CUBE.height > thing.top or away > 0.006
-
-
-def test_an_approach_does_not_sweep_past_its_target_on_the_way_there(planner, config, home) -> None:
-    """From the table beside it the fastest way would be through its edge."""
-    x, y = 0.5, 0.0
-    low = planner.plan(home, Goal((0.42, 0.0, 0.01))).end
-    goal, target = Goal((x, y, 0.035), guarded=0.02, speed=0.035), Obstacle(x, y, CUBE.radius, 0.05, "it")
-    through, over = (planner.plan(low, goal, task) for task in (Task(), Task(target=target)))
-
-    def nearest(motion: Trajectory) -> float:
-        """How near the cup comes to the target before it is above it, in its last part [m]."""
-        tips = tips_of(planner, motion)
-        away = np.hypot(*(tips[:, :2] - (x, y)).T)
-        coming = tips[: np.argmax(away < 1e-4)]
-        beside = away[: len(coming)] - target.radius - config.tool.cup_radius
-        return float(np.min(np.maximum(coming[:, 2] - target.top, beside)))
-
-    assert nearest(through) < -0.005
-    assert nearest(over) > 0.004
-    assert planner.kinematics.tips(over.end[None])[0][0, 2] < target.top, "it may be touched in the end"
 
 
 def test_the_check_gets_the_whole_path_without_gaps_and_what_has_to_be_heeded(config, home) -> None:
@@ -214,33 +168,6 @@ def test_when_all_ways_are_blocked_the_error_is_the_first_ones_and_counts(config
     assert str(caught.value) == f"way 1 is too near; of {len(asked)} ways tried none is free"
 
 
-def test_a_goal_inside_something_is_blocked_by_that(planner, home) -> None:
-    crate = Obstacle(0.5, 0.0, 0.05, 0.3, "the crate")
-    around = Task(around=(crate, Obstacle(0.5, 0.0, 0.12, 0.2, "the heap")))
-    with pytest.raises(
-        Blocked, match=r"too near to the (heap|crate), with the tool at .*; of \d+ ways tried none is free"
-    ):
-        planner.plan(home, pick(0.5, 0.0), around)
-
-
-def test_an_unreachable_goal_says_how_far_off_it_is(planner, home) -> None:
-    far = Goal((0.9, 0.0, 0.114))
-    text = "(0.900, 0.000, 0.114) m: its wrist would be 0.900 m from the shoulder, 0.080 m farther"
-    with pytest.raises(Unreachable, match=re.escape(text)):
-        planner.plan(home, far)
-    with pytest.raises(Unreachable, match="farther than the arm is long"):
-        planner.require_reachable(far)
-    with pytest.raises(Unreachable, match=re.escape("0.110 m nearer than joint 4 can fold")):
-        planner.plan(home, Goal((0.3, 0.0, 0.114)))
-
-
-def test_every_bin_and_the_whole_workspace_can_be_reached(planner, config) -> None:
-    spots = [bin.position[:2] for bin in config.bins.values()]
-    spots += [(x, y) for x in config.table.x for y in config.table.y]
-    for x, y in spots:
-        planner.require_reachable(Goal((x, y, 0.04)))
-
-
 def pull(planner: Planner, motion: Trajectory, kind: ObjectClass) -> float:
     """Largest `m |a + g|` of a load on the way [N]."""
     tips, axes = planner.kinematics.tips(passed(motion).q)
@@ -250,9 +177,8 @@ def pull(planner: Planner, motion: Trajectory, kind: ObjectClass) -> float:
 
 
 @pytest.mark.parametrize(
-    ("mass", "bears"), [(0.1, 7.9), (0.1, 3.0), (0.1, 2.4), (0.1, 2.25), (0.3, 8.0), (0.05, 1.2)]
+    ("mass", "bears", "x", "y"), [(0.1, 3.0, 0.55, 0.1), (0.1, 2.25, 0.45, -0.2), (0.3, 8.0, 0.55, 0.1)]
 )
-@pytest.mark.parametrize(("x", "y"), [(0.55, 0.1), (0.45, -0.2)])
 def test_a_seal_bears_twice_what_is_asked_of_it(planner, home, mass, bears, x, y) -> None:
     """As long as it bears more than twice the weight, with some room."""
     kind = ObjectClass("cube", 0.05, 0.0354, mass=mass)
@@ -265,75 +191,15 @@ def test_a_seal_bears_twice_what_is_asked_of_it(planner, home, mass, bears, x, y
         assert pull(planner, motion, kind) > bears / 2 * 0.85
 
 
-def test_a_seal_that_hardly_bears_the_weight_is_carried_at_the_gentlest(planner, limits, home) -> None:
-    picked = planner.plan(home, pick(0.55, 0.1)).end
-    weak = planner.plan(picked, BIN, Task(Load(CUBE, 1.0)))
-    _, acceleration, jerk = peaks(passed(weak), limits)
-    assert 0.5 * GENTLEST <= acceleration <= GENTLEST + 1e-6
-    assert jerk <= GENTLEST**1.5 + 1e-6
-    assert np.allclose(planner.kinematics.tips(weak.end[None])[0], BIN.position, atol=1e-7)
-
-
 def test_the_wrist_folds_no_farther_than_links_5_and_7_keep_the_margin(planner, config, limits, home) -> None:
     """The data sheet would let joint 6 bend by 120 degrees."""
     most = fold(config.motion.margin)
     motion = planner.plan(home, Goal((0.3, 0.0, 0.6)))
     assert math.radians(95) < np.abs(motion.samples.q[:, 5]).max() <= most < limits.position[5]
+    with pytest.raises(Unreachable, match=r"0\.900, 0\.000, 0\.160\) m: .* 0\.081 m farther than the arm"):
+        planner.require_reachable(Goal((0.9, 0.0, 0.114)))
     with pytest.raises(Unreachable, match=r"leaves joint 6 \d\.\d° outside ±106°"):
         planner.plan(home, Goal((0.3, 0.0, 0.7)))
-
-
-@pytest.mark.parametrize(("bears", "straight"), [(2.5, True), (7.9, False)])
-def test_a_load_of_a_weak_seal_leaves_what_it_lies_on_straight_up(planner, home, bears, straight) -> None:
-    """Dragged over the table or pressed on it by microns only, it would tear off."""
-    picked = planner.plan(home, pick(0.55, 0.1)).end
-    motion = planner.plan(picked, BIN, Task(Load(CUBE, bears)))
-    qs = passed(motion, SOONER / 4).q
-    tips = planner.kinematics.tips(qs)[0] - planner.kinematics.tips(picked[None])[0]
-    leaving = tips[:, 2] < 4.5e-4
-    aside = np.linalg.norm(tips[leaving, :2], axis=1).max()
-    if straight:
-        assert np.all(np.diff(tips[leaving, 2]) >= 0)
-        assert aside < 1e-5
-    else:
-        assert aside > 1e-4
-
-
-def test_straight_ends_where_the_cell_asks_for_them(config, home) -> None:
-    straight = 0.05
-    planner = Planner(with_motion(config, straight=straight))
-    into = planner.plan(home, BIN)
-    out = planner.plan(into.end, Goal((0.5, 0.1, 0.056)))
-    away = planner.plan(out.end, home)
-    assert (kinds(into), kinds(out), kinds(away)) == (
-        [False, True], [True, False, True], [True, False]
-    )  # fmt: skip
-    for motion, place in ((into, BIN.position), (out, (0.5, 0.1, 0.056))):
-        tips = tips_of(planner, motion)
-        last = np.linalg.norm(tips - place, axis=1) < straight
-        assert np.max(np.linalg.norm(tips[last, :2] - place[:2], axis=1)) < 5e-5
-    for motion, place in ((out, BIN.position), (away, (0.5, 0.1, 0.056))):
-        tips = tips_of(planner, motion)
-        first = np.linalg.norm(tips - place, axis=1) < straight
-        assert first[0]
-        assert np.max(np.linalg.norm(tips[first, :2] - place[:2], axis=1)) < 5e-5
-
-
-def kinds(motion: Trajectory) -> list[bool]:
-    """Whether the tool goes straight, from stretch to stretch."""
-    straight = [isinstance(piece, Line) for piece in motion._pieces]
-    assert all(isinstance(piece, Line | Free) for piece in motion._pieces)
-    return [one for number, one in enumerate(straight) if number == 0 or straight[number - 1] != one]
-
-
-def test_joint_positions_are_a_goal_too(planner, config, home) -> None:
-    aside = np.radians(config.arm.poses_deg["aside"])
-    picked = planner.plan(home, pick(0.6, 0.1)).end
-    for start in (home, picked):
-        motion = planner.plan(start, aside)
-        assert np.array_equal(motion.start, start)
-        assert np.allclose(motion.end, aside, atol=1e-9)
-    assert tips_of(planner, motion)[:, 2].min() > 0.05
 
 
 def test_joint_positions_out_of_range_are_refused(planner, home) -> None:
@@ -341,19 +207,11 @@ def test_joint_positions_out_of_range_are_refused(planner, home) -> None:
         planner.plan(home, np.radians([0, 20, 0, -125, 0, 70, 0]))
 
 
-def test_the_same_question_gets_the_same_answer(config, planner, home) -> None:
-    picked = planner.plan(home, pick(0.5, 0.1)).end
-    fresh = Planner(config)
-    one, other = (asked.plan(picked, BIN, CARRYING).samples for asked in (planner, fresh))
-    for values, same in zip(one, other, strict=True):
-        assert np.array_equal(values, same)
-
-
 def test_random_motions_keep_every_limit(planner, limits, config, home) -> None:
     """To and fro between the table and the bins, empty and loaded, some among other things."""
     rng = np.random.default_rng(11)
     q = home
-    for number in range(40):
+    for number in range(10):
         x, y = rng.uniform((0.42, -0.22), (0.64, 0.22))
         around = tuple(
             Obstacle(float(a), float(b), 0.0354, 0.05, f"thing {n}")

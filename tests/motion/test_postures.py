@@ -11,9 +11,8 @@ from joint_states import LIMITS
 
 from executive.arm import Goal
 from executive.errors import Unreachable
-from executive.geometry import tool_down
-from executive.motion.kinematics import Kinematics, wrapped
-from executive.motion.postures import find_postures, line_chain, upright_line
+from executive.motion.kinematics import Kinematics
+from executive.motion.postures import find_postures, upright_line
 
 ARM = Kinematics(0.12, LIMITS.position)
 START = np.radians([38, 33, 0, -88, 0, 59, 20])
@@ -34,25 +33,6 @@ def test_every_posture_points_down_over_the_goal_inside_the_limits(place, yaw, l
             assert np.allclose(ARM.forward(q).rotation[:, 1], [-math.sin(yaw), math.cos(yaw), 0], atol=1e-7)
 
 
-@given(places, yaws)
-@settings(max_examples=20, deadline=None)
-def test_the_way_down_keeps_branch_swivel_and_yaw(place, yaw) -> None:
-    found = find_postures(ARM, Goal(place, yaw), 0.1, START)
-    for number in range(0, len(found), 29):
-        low, high = found.low[number], found.high[number]
-        assert ARM.branch(low) == ARM.branch(high) == found.branch[number]
-        assert abs(wrapped(ARM.swivel(low) - found.swivel[number])) < 1e-6
-        assert abs(wrapped(ARM.swivel(high) - found.swivel[number])) < 1e-6
-        assert np.allclose(ARM.forward(low).rotation, ARM.forward(high).rotation, atol=1e-7)
-
-
-@given(places)
-@settings(max_examples=20, deadline=None)
-def test_a_free_yaw_leaves_joint_7_where_it_is_if_it_can(place) -> None:
-    found = find_postures(ARM, Goal(place), 0.0, START)
-    assert np.array_equal(found.low[:, 6], np.full(len(found), START[6]))
-
-
 def test_a_free_yaw_turns_joint_7_no_more_than_the_way_down_asks_for() -> None:
     start = START.copy()
     start[6] = LIMITS.position[6]
@@ -61,50 +41,6 @@ def test_a_free_yaw_turns_joint_7_no_more_than_the_way_down_asks_for() -> None:
     last = LIMITS.position[6] - math.radians(1)
     assert np.allclose(np.maximum(found.low[:, 6], found.high[:, 6]), last, atol=1e-9)
     assert np.ptp(drift) > 0.01
-
-
-def test_of_all_postures_none_is_missed() -> None:
-    """As many as inverse kinematics finds at the same swivels."""
-    goal = Goal((0.55, 0.0, 0.1), 0.3)
-    found = find_postures(ARM, goal, 0.0, START)
-    swivels = ARM.swivel(START) + np.radians(np.arange(0, 360, 5))
-    every = ARM.grid(tool_down(goal.position, goal.yaw), swivels).reshape(-1, 7)
-    assert len(found) == np.sum(np.all(np.abs(every) <= LIMITS.position - math.radians(1), axis=1))
-
-
-@given(places, st.floats(0.01, 0.2), st.integers(0, 10**6))
-@settings(max_examples=30, deadline=None)
-def test_a_chain_goes_straight_up_from_where_it_is_asked_to(place, length: float, pick: int) -> None:
-    found = find_postures(ARM, Goal(place), length, START)
-    number = pick % len(found)
-    posture = int(found.branch[number]), float(found.swivel[number])
-    chain = line_chain(ARM, found.low[number], length, 5, *posture)
-    tips, axes = ARM.tips(chain)
-    assert np.allclose(chain[0], found.low[number], atol=1e-9)
-    assert np.allclose(chain[-1], found.high[number], atol=1e-7)
-    assert np.allclose(tips, np.array(place) + np.outer(np.linspace(0, length, 5), [0, 0, 1]), atol=1e-7)
-    assert np.allclose(axes, [0, 0, -1], atol=1e-7)
-
-
-def test_a_chain_runs_on_where_a_joint_goes_past_half_a_turn() -> None:
-    found = find_postures(ARM, Goal((0.5, 0.15, 0.05)), 0.15, START)
-    drift = found.high[:, 6] - found.low[:, 6]
-    number = int(np.argmax(drift))
-    assert drift[number] > 0.02
-    q = found.low[number].copy()
-    q[6] = math.pi - 0.01
-    chain = line_chain(ARM, q, 0.15, 5, int(found.branch[number]), float(found.swivel[number]))
-    assert chain[-1, 6] == pytest.approx(q[6] + drift[number])
-
-
-@given(places, st.integers(0, 10**6))
-@settings(max_examples=20, deadline=None)
-def test_the_line_up_from_a_posture_is_its_own(place, pick: int) -> None:
-    found = find_postures(ARM, Goal(place), 0.1, START)
-    number = pick % len(found)
-    line = upright_line(ARM, found.low[number], 0.1, 5)
-    assert line is not None
-    assert np.allclose(line[[0, -1]], [found.low[number], found.high[number]], atol=1e-6)
 
 
 def test_there_is_no_line_up_where_the_tool_does_not_point_down_or_a_joint_leaves_its_range() -> None:

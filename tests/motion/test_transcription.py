@@ -9,7 +9,7 @@ from joint_states import LIMITS, positions, shares
 from executive.geometry import Array
 from executive.motion.free import Connector
 from executive.motion.state import State
-from executive.motion.transcription import LONGEST, SAMPLES, SHORTEST, STEPS, Course, Demand, Transcription
+from executive.motion.transcription import SAMPLES, STEPS, Course, Demand, Transcription
 
 CONNECTOR = Connector(LIMITS)
 PLACES = np.arange(1, STEPS * SAMPLES) / (STEPS * SAMPLES)
@@ -81,27 +81,19 @@ def flown(start: State, course: Course, fine: int = FINE) -> State:
     return State(*map(np.array, zip(*states, strict=True)))
 
 
-@given(moves())
+@given(moves() | moves(passing=0.15))
 @settings(max_examples=20, deadline=None)
-def test_a_course_begins_and_ends_in_the_given_states_of_rest(move) -> None:
-    program, course = fitted(*move)
-    for found in (course, shortened(program, course, 3)):
-        states = flown(move[0], found)
-        for values, first, last in zip(states, *move, strict=True):
-            assert np.array_equal(values[0], first)
-            assert np.allclose(values[-1], last, atol=1e-6)
-
-
-@given(moves(passing=0.15))
-@settings(max_examples=20, deadline=None)
-def test_a_course_begins_and_ends_in_moving_states(move) -> None:
+def test_a_course_begins_and_ends_in_the_given_states(move) -> None:
     program, course = fitted(*move)
     last = program.shorten(course, NOTHING, WIDE)
     assert last is not None
     # The squares of the step are tangents: what they miss is its change squared.
     missed = (last.step - course.step) ** 2 * LIMITS.acceleration.max() / last.step
     for found, miss in ((course, 0.0), (last, missed)):
-        q, qd, qdd = (values[-1] for values in flown(move[0], found))
+        states = flown(move[0], found)
+        for values, first in zip(states, move[0], strict=True):
+            assert np.allclose(values[0], first, atol=1e-9)
+        q, qd, qdd = (values[-1] for values in states)
         assert np.allclose(q, move[1].q, atol=1e-6 + miss * found.duration)
         assert np.allclose(qd, move[1].qd, atol=1e-6 + miss)
         assert np.allclose(qdd, move[1].qdd, atol=1e-9)
@@ -122,51 +114,14 @@ def test_a_course_keeps_the_limits(move) -> None:
         assert np.all(np.abs(states.qd) <= LIMITS.velocity + bulge)
 
 
-@given(moves(passing=0.15))
-@settings(max_examples=20, deadline=None)
-def test_positions_and_half_steps_are_those_of_its_accelerations(move) -> None:
-    program, course = fitted(*move)
-    states = flown(move[0], course, SAMPLES)
-    assert np.allclose(course.qs, states.q[1:-1], atol=1e-9)
-    halves = zip(*(values[:: SAMPLES // 2] for values in states), strict=True)
-    for state, wanted in zip(program.states(course), halves, strict=True):
-        for one, other in zip(state, wanted, strict=True):
-            assert np.allclose(one, other, atol=1e-6)
-
-
-@given(moves())
-@settings(max_examples=20, deadline=None)
-def test_a_fit_takes_the_time_and_follows_the_path_it_is_given(move) -> None:
-    duration, first = direct(*move)
-    _, course = fitted(*move, slower=1.3)
-    assert course.duration == pytest.approx(1.3 * duration)
-    assert np.max(np.abs(course.qs - first)) < 0.05
-
-
-def test_nothing_fits_into_too_short_a_time() -> None:
-    start, end = State.rest(np.zeros(7)), State.rest(np.full(7, 0.5))
-    duration, first = direct(start, end)
-    assert Transcription(start, end, LIMITS).fit(0.7 * duration / STEPS, first) is None
-
-
 @given(moves())
 @settings(max_examples=20, deadline=None)
 def test_with_nothing_in_the_way_it_becomes_nearly_as_fast_as_can_be(move) -> None:
     program, course = fitted(*move)
     duration, _ = direct(*move)
+    assert course.duration == pytest.approx(1.6 * duration)
+    assert np.max(np.abs(course.qs - direct(*move)[1])) < 0.15
     assert duration <= shortened(program, course).duration <= 1.2 * duration
-
-
-@given(moves(), st.floats(0.02, 0.3))
-@settings(max_examples=20, deadline=None)
-def test_a_step_keeps_its_distance_to_first_order(move, lack: float) -> None:
-    """A wall across all joints, that the last course was too near to in its middle."""
-    program, course = fitted(*move, slower=2.0)
-    rows = np.arange(50, 78)
-    wall = clear_of(rows, -0.1 * lack, np.full(7, 0.1))
-    found = program.shorten(course, [wall], WIDE)
-    assert found is not None
-    assert np.all(wall.slack + 0.1 * np.sum(found.qs[rows] - course.qs[rows], axis=1) > 0)
 
 
 @given(moves(passing=0.15), shares, st.floats(0.6, 2.0))
@@ -185,30 +140,3 @@ def test_a_step_meets_what_is_demanded_of_three_positions_together_and_of_its_le
     assert found is not None
     moved = np.einsum("rkj,rkj->r", slopes, found.qs[rows] - course.qs[rows])
     assert np.all(demand.slack + moved + growth * (found.step - course.step) > 0)
-
-
-def test_a_demand_that_only_time_can_meet_takes_that_time() -> None:
-    program, course = fitted(State.rest(np.zeros(7)), State.rest(np.full(7, 0.5)))
-    rows = np.array([[40, 50, 60]])
-    demand = Demand(np.array([-0.1 * course.step]), rows, np.zeros((1, 3, 7)), np.ones(1))
-    found = program.shorten(course, [*NOTHING, demand], WIDE)
-    assert found is not None
-    assert 1.1 * course.step < found.step < 1.15 * course.step
-
-
-@given(moves())
-@settings(max_examples=20, deadline=None)
-def test_a_step_changes_no_more_than_it_is_trusted_to(move) -> None:
-    program, course = fitted(*move)
-    trust = 0.15
-    found = program.shorten(course, NOTHING, trust)
-    assert found is not None
-    before, after = (one.accelerations * one.step**2 for one in (course, found))
-    change = np.abs(after - before) / (LIMITS.acceleration[:, None] * course.step**2)
-    assert change.max() <= trust + 1e-6
-    assert SHORTEST - 1e-6 <= found.step / course.step <= LONGEST + 1e-6
-
-
-def test_a_wall_that_cannot_be_kept_away_from_costs_no_solution() -> None:
-    program, course = fitted(State.rest(np.zeros(7)), State.rest(np.full(7, 0.5)))
-    assert program.shorten(course, [clear_of(np.arange(40, 80), -1.0, np.zeros(7))], WIDE) is not None

@@ -11,9 +11,7 @@ from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
 from executive.clock import STEP
 from executive.geometry import Array, Pose
-from executive.motion.free import Connector
 from executive.motion.planner import Planner
-from executive.motion.state import State
 from executive.motion.trajectory import Trajectory
 from executive.sim.arm import SimArm
 from executive.sim.clearance import PathClearance
@@ -68,11 +66,6 @@ class Rig:
         while not planning.ready:
             self.step()
         return planning.result()
-
-    def straight_to(self, q: Array) -> Trajectory:
-        """Return the fastest motion to joint positions `(7,)` [rad], whatever is in the way."""
-        connector = Connector(self.planner.limits)
-        return Trajectory([connector.connect(State.rest(self.arm._command), State.rest(q))])
 
     def run(self, most: int = 2000) -> int:
         """Step until the arm rests and return how many steps that took."""

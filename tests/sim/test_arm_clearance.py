@@ -1,10 +1,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
-import pybullet
 import pytest
 
 from executive.arm import Goal, Task
@@ -12,96 +10,84 @@ from executive.cell_config import CellConfig
 from executive.errors import Blocked
 from executive.geometry import tool_down
 from executive.messages import Load, ObjectClass, Obstacle
-from executive.mission.parse.cell_file import load_cell
 from executive.motion.kinematics import Kinematics, fold
 from executive.motion.planner import Planner
-from executive.sim.clearance import SELF_PAIRS, PathClearance
-from executive.sim.world import World
+from executive.sim.clearance import PathClearance
 
 DUCK = Task(Load(ObjectClass("duck", 0.05, 0.04)))
 TOWER = Obstacle(0.5, 0.1, 0.03, 0.2, "cube-3")
+COIN = Obstacle(0.5, 0.1, 0.03, 0.0005, "a coin")
 
 
 @pytest.fixture(scope="module")
-def config(missions: Path) -> CellConfig:
-    return load_cell(missions / "cells" / "overhead.yaml")
-
-
-@pytest.fixture(scope="module")
-def clearance(config: CellConfig) -> Iterator[PathClearance]:
-    clearance = PathClearance(config)
+def clearance(overhead: CellConfig) -> Iterator[PathClearance]:
+    clearance = PathClearance(overhead)
     yield clearance
     clearance.close()
 
 
 @pytest.fixture(scope="module")
-def kinematics(config: CellConfig) -> Kinematics:
-    return Kinematics(config.tool.length, np.radians(config.arm.limits.position_deg))
+def kinematics(overhead: CellConfig) -> Kinematics:
+    return Kinematics(overhead.tool.length, np.radians(overhead.arm.limits.position_deg))
 
 
 @pytest.fixture
-def at(config: CellConfig, kinematics: Kinematics):
+def at(overhead: CellConfig, kinematics: Kinematics):
     """Joint positions with the tool centre point at a place."""
-    home = np.radians(config.arm.poses_deg["home"])
+    home = np.radians(overhead.arm.poses_deg["home"])
     return lambda x, y, z: kinematics.nearest_solution(tool_down([x, y, z]), home)
 
 
-@pytest.fixture(scope="module")
-def red_bin(config: CellConfig) -> tuple[float, float, float]:
-    """Centre of a bin and the distance of its outer wall along y [m]."""
-    bin = config.bins["red_bin"]
-    return bin.position[0], bin.position[1], bin.size[1] / 2
+RED_BIN = 0.24, -0.48, 0.15
+"""Centre of a bin and the distance of its wall along y [m]."""
 
 
-def test_a_free_path_passes(clearance: PathClearance, at) -> None:
-    clearance.check(np.array([at(0.5, 0.0, z) for z in (0.2, 0.1, 0.03)]))
+def straight(*heights: float) -> list[tuple[float, float, float]]:
+    return [(0.5, 0.0, height) for height in heights]
 
 
-def test_the_tool_must_not_touch_the_table(clearance: PathClearance, at) -> None:
-    with pytest.raises(Blocked, match=r"the tool 0\.00\d m from the table, with the tool at \(0\.500"):
-        clearance.check(np.array([at(0.5, 0.0, z) for z in (0.1, 0.003)]))
+def into_the_bin(height: float, *distances: float) -> list[tuple[float, float, float]]:
+    """Places at so many distances from the wall of the red bin [m]."""
+    x, y, half = RED_BIN
+    return [(x, y - half - distance, height) for distance in distances]
 
 
-def test_the_tool_must_not_hit_a_bins_wall(clearance: PathClearance, at, red_bin) -> None:
-    with pytest.raises(Blocked, match=r"the tool 0\.\d+ m into red_bin"):
-        x, y, half = red_bin
-        clearance.check(np.array([at(x, y - away, 0.04) for away in (0.0, half)]))
+@pytest.mark.parametrize(
+    ("places", "task", "said"),
+    [
+        (straight(0.2, 0.1, 0.03), Task(), ""),
+        (straight(0.1, 0.003), Task(), r"the tool 0\.00\d m from the table, with the tool at \(0\.500"),
+        (into_the_bin(0.04, -0.15, 0.0), Task(), r"the tool 0\.\d+ m into red_bin"),
+        (straight(0.05, 0.1, 0.05), DUCK, ""),
+        (straight(0.1, 0.03), DUCK, r"the held duck 0\.0\d\d m into the table"),
+        (into_the_bin(0.09, 0.08, 0.04, 0.0), Task(), ""),
+        (into_the_bin(0.09, 0.08, 0.04, 0.0), DUCK, r"the held duck .* red_bin"),
+        ([(*RED_BIN[:2], z) for z in (0.15, 0.057)], DUCK, ""),
+        (straight(0.003, 0.004, 0.1), Task(), ""),
+        (straight(0.003, 0.001), Task(), "the table"),
+        ([(0.5, y, 0.23) for y in (-0.1, 0.1)], Task(around=(TOWER,)), ""),
+        ([(0.5, y, 0.23) for y in (-0.1, 0.1)], Task(DUCK.load, (TOWER,)), r"held duck 0\.020 m into cube-3"),
+        ([(0.5, 0.1, z) for z in (0.1, 0.0505)], DUCK, ""),
+        ([(0.5, 0.1, z) for z in (0.1, 0.0505)], Task(DUCK.load, (COIN,)), r"the held duck .* a coin"),
+        ([(0.5, 0.1, z) for z in (0.202, 0.203, 0.25)], Task(around=(TOWER,)), ""),
+        ([(0.5, 0.1, z) for z in (0.202, 0.201)], Task(around=(TOWER,)), r"the tool 0\.001 m from cube-3"),
+    ],
+)
+def test_a_path_keeps_the_margin_but_a_load_may_lie_on_table_and_floor(
+    clearance: PathClearance, at, places, task: Task, said: str
+) -> None:
+    """A motion may leave a place that is too near to something, but not come nearer."""
+    path = np.array([at(*place) for place in places])
+    if said:
+        with pytest.raises(Blocked, match=said):
+            clearance.check(path, task)
+    else:
+        clearance.check(path, task)
 
 
-def test_a_held_object_may_lie_on_the_table_but_not_go_into_it(clearance: PathClearance, at) -> None:
-    clearance.check(np.array([at(0.5, 0.0, z) for z in (0.05, 0.1, 0.05)]), DUCK)
-    with pytest.raises(Blocked, match=r"the held duck 0\.0\d\d m into the table"):
-        clearance.check(np.array([at(0.5, 0.0, z) for z in (0.1, 0.03)]), DUCK)
-
-
-def test_a_held_object_must_pass_over_a_bins_wall(clearance: PathClearance, at, red_bin) -> None:
-    x, y, half = red_bin
-    path = [at(x, y - away, 0.09) for away in (half + 0.08, half + 0.04, half)]
-    clearance.check(np.array(path))
-    with pytest.raises(Blocked, match=r"the held duck .* red_bin"):
-        clearance.check(np.array(path), DUCK)
-
-
-def test_a_held_object_may_be_put_on_a_bins_floor(clearance: PathClearance, at, red_bin) -> None:
-    clearance.check(np.array([at(*red_bin[:2], z) for z in (0.15, 0.057)]), DUCK)
-
-
-def test_a_motion_may_leave_a_place_too_near_but_not_come_nearer(clearance: PathClearance, at) -> None:
-    clearance.check(np.array([at(0.5, 0.0, z) for z in (0.003, 0.004, 0.1)]))
-    with pytest.raises(Blocked, match="the table"):
-        clearance.check(np.array([at(0.5, 0.0, z) for z in (0.003, 0.001)]))
-
-
-def test_folding_the_arm_onto_itself_is_blocked(clearance: PathClearance, config: CellConfig) -> None:
-    home = np.radians(config.arm.poses_deg["home"])
-    folded = np.radians([0, -40, 0, -120, 0, -120, 0])
-    with pytest.raises(Blocked, match=r"link 5 .* link 7"):
-        clearance.check(np.array([home, folded]))
-
-
-def test_a_long_tool_may_meet_the_upper_arm(config: CellConfig) -> None:
-    tool = config.tool.model_copy(update={"length": 0.3})
-    clearance = PathClearance(config.model_copy(update={"tool": tool}))
+def test_a_long_tool_may_meet_the_upper_arm(overhead: CellConfig) -> None:
+    tool = overhead.tool.model_copy(update={"length": 0.3})
+    clearance = PathClearance(overhead.model_copy(update={"tool": tool}))
     folded = np.radians([(0, -65, 60, -90, 0, 60, 0), (0, -65, 105, -120, 0, 100, 0)])
     with pytest.raises(Blocked, match=r"the tool 0\.009 m into link 2, with the tool at"):
         clearance.check(folded)
@@ -140,36 +126,6 @@ def test_several_things_of_one_size_stand_around_at_once(clearance: PathClearanc
             clearance.check(np.array([at(0.5, 0.2, 0.25), at(0.5, tower.y, 0.15)]), Task(around=towers))
 
 
-def test_what_stood_around_is_put_away_afterwards(clearance: PathClearance, at) -> None:
-    path = np.array([at(0.5, y, 0.15) for y in (0.0, 0.1)])
-    for _ in range(2):
-        with pytest.raises(Blocked, match="cube-3"):
-            clearance.check(path, Task(around=(TOWER,)))
-        clearance.check(path)
-        clearance.check(path, Task(around=(Obstacle(0.5, 0.3, 0.03, 0.2, "cube-3"),)))
-    count = clearance.world.client.getNumBodies()
-    for _ in range(20):
-        clearance.check(path[:1], Task(around=(TOWER,)))
-    assert clearance.world.client.getNumBodies() == count
-
-
-def test_a_held_object_keeps_clear_of_what_stands_around(clearance: PathClearance, at) -> None:
-    path = np.array([at(0.5, y, 0.23) for y in (-0.1, 0.1)])
-    around = (TOWER,)
-    clearance.check(path, Task(around=around))
-    with pytest.raises(Blocked, match=r"the held duck 0\.020 m into cube-3"):
-        clearance.check(path, Task(DUCK.load, around))
-
-
-def test_a_held_object_may_not_stand_on_what_stands_around(clearance: PathClearance, at) -> None:
-    """Only the table and the floor of a bin are there to put things on."""
-    low = Obstacle(0.5, 0.1, 0.03, 0.0005, "a coin")
-    path = np.array([at(0.5, 0.1, z) for z in (0.1, 0.0505)])
-    clearance.check(path, DUCK)
-    with pytest.raises(Blocked, match=r"the held duck .* a coin"):
-        clearance.check(path, Task(DUCK.load, (low,)))
-
-
 def test_a_held_object_keeps_clear_of_the_arm(clearance: PathClearance) -> None:
     path = np.radians([(0, -65, 60, -90, 0, 60, 0), (0, -100, 65, -110, 0, 105, 0)])
     clearance.check(path)
@@ -177,29 +133,10 @@ def test_a_held_object_keeps_clear_of_the_arm(clearance: PathClearance) -> None:
         clearance.check(path, Task(Load(ObjectClass("rod", 0.2, 0.03))))
 
 
-def test_a_motion_may_leave_what_stands_too_near_but_not_come_nearer(clearance: PathClearance, at) -> None:
-    around = (TOWER,)
-    clearance.check(np.array([at(0.5, 0.1, z) for z in (0.202, 0.203, 0.25)]), Task(around=around))
-    with pytest.raises(Blocked, match=r"the tool 0\.001 m from cube-3"):
-        clearance.check(np.array([at(0.5, 0.1, z) for z in (0.202, 0.201)]), Task(around=around))
-
-
-def test_no_sorting_motion_is_blocked(clearance: PathClearance, config: CellConfig) -> None:
-    planner = Planner(config, clearance.check)
-    rng = np.random.default_rng(5)
-    q = np.radians(config.arm.poses_deg["home"])
-    for number, bin in enumerate([*config.bins.values()] * 3):
-        x, y = rng.uniform(*config.table.x), rng.uniform(*config.table.y)
-        q = planner.plan(q, Goal((x, y, 0.0505), guarded=0.01, speed=0.035)).end
-        q = planner.plan(q, Goal((*bin.position[:2], 0.07)), DUCK).end
-        if number % 3 == 2:
-            q = planner.plan(q, np.radians(config.arm.poses_deg["home"])).end
-
-
-def test_a_planned_motion_goes_around_what_stands_there(clearance: PathClearance, config: CellConfig) -> None:
+def test_a_planned_motion_goes_around_what_stands(clearance: PathClearance, overhead: CellConfig) -> None:
     """The detour of the search holds in the planning world, and without the obstacle it goes straight."""
-    planner = Planner(config, clearance.check)
-    q = planner.plan(np.radians(config.arm.poses_deg["home"]), Goal((0.5, 0.3, 0.1))).end
+    planner = Planner(overhead, clearance.check)
+    q = planner.plan(np.radians(overhead.arm.poses_deg["home"]), Goal((0.5, 0.3, 0.1))).end
     goal, task = Goal((0.5, -0.25, 0.1)), Task(around=(Obstacle(0.5, 0.0, 0.04, 0.3, "cube-3"),))
     straight = planner.plan(q, goal)
     with pytest.raises(Blocked, match="cube-3"):
@@ -207,39 +144,6 @@ def test_a_planned_motion_goes_around_what_stands_there(clearance: PathClearance
     around = planner.plan(q, goal, task)
     clearance.check(around.samples.q, task)
     assert straight.duration < around.duration < 4 * straight.duration
-
-
-def test_the_arm_at_home_hides_nothing_of_the_workspace_from_the_fixed_camera(config) -> None:
-    world = World(config)
-    camera = config.cameras["overhead"]
-    assert camera.position is not None
-    assert camera.fov_deg is not None
-    width, height = camera.width // 4, camera.height // 4
-    view = world.client.computeViewMatrix(camera.position, camera.look_at, camera.up)
-    projection = world.client.computeProjectionMatrixFOV(camera.fov_deg, width / height, 0.05, 3)
-    picture = world.client.getCameraImage(width, height, view, projection, renderer=pybullet.ER_TINY_RENDERER)
-    bodies = np.array(picture[4]).reshape(height, width)
-    focal = height / 2 / np.tan(np.radians(camera.fov_deg) / 2) / camera.position[2]
-    margin = 0.08
-    rows = [height / 2 - (x - camera.position[0]) * focal for x in np.add(config.table.x, (-margin, margin))]
-    columns = [width / 2 - y * focal for y in np.add(config.table.y, (-margin, margin))]
-    workspace = bodies[int(rows[1]) : int(rows[0]) + 1, int(columns[1]) : int(columns[0]) + 1]
-    assert np.any(bodies == world.arm)
-    assert not np.any(workspace == world.arm)
-    world.close()
-
-
-@pytest.mark.parametrize("cell", ["overhead", "wrist"])
-def test_home_is_three_centimetres_clear_of_everything(
-    missions: Path, cell: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # The usual distance of links 5 and 7 is 29 mm.
-    monkeypatch.setattr("executive.sim.clearance.SELF_PAIRS", [pair for pair in SELF_PAIRS if pair != (4, 6)])
-    config = load_cell(missions / "cells" / f"{cell}.yaml")
-    config = config.model_copy(update={"motion": config.motion.model_copy(update={"margin": 0.03})})
-    clearance = PathClearance(config)
-    assert clearance.too_near(np.radians(config.arm.poses_deg["home"])) is None
-    clearance.close()
 
 
 @pytest.mark.parametrize("distance", [-0.01, 0.0, 0.0035, 0.006, 0.012, 0.02])

@@ -2,44 +2,23 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
-from executive.geometry import Array, tool_down
-from executive.layout import as_bin, as_class, travel_height
+from executive.geometry import Array
+from executive.layout import as_bin, as_class
 from executive.messages import Load
-from executive.mission.parse.cell_file import load_cell
-from executive.motion.kinematics import Kinematics
-from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
-from executive.motion.timing import rest_to_rest
 from executive.sim.cell import SimCell
 from executive.sim.clearance import PathClearance
 from executive.sim.least_times import SimLeastTimes
 
 
 @pytest.fixture(scope="module")
-def config(missions: Path) -> CellConfig:
-    return load_cell(missions / "cells" / "overhead.yaml")
-
-
-@pytest.fixture(scope="module")
-def limits(config: CellConfig) -> JointLimits:
-    return JointLimits.of(config.arm.limits)
-
-
-@pytest.fixture(scope="module")
-def kinematics(config: CellConfig, limits: JointLimits) -> Kinematics:
-    return Kinematics(config.tool.length, limits.position)
-
-
-@pytest.fixture(scope="module")
-def least(config: CellConfig) -> SimLeastTimes:
-    return SimLeastTimes(config)
+def least(overhead: CellConfig) -> SimLeastTimes:
+    return SimLeastTimes(overhead)
 
 
 def changed(config: CellConfig, section: str, **values: object) -> CellConfig:
@@ -53,21 +32,22 @@ def nearest(config: CellConfig, slots: Array) -> Array:
     return np.clip(slots, low, high)
 
 
-def test_no_planned_carry_is_faster_than_the_least(config: CellConfig, least: SimLeastTimes) -> None:
+@pytest.mark.slow
+def test_no_planned_carry_is_faster_than_the_least(overhead: CellConfig, least: SimLeastTimes) -> None:
     """Half of them are the shortest there are: from the place nearest to a slot, and higher than it must."""
-    clearance = PathClearance(config)
-    planner = Planner(config, clearance.check)
-    rng, home = np.random.default_rng(3), np.radians(config.arm.poses_deg["home"])
+    clearance = PathClearance(overhead)
+    planner = Planner(overhead, clearance.check)
+    rng, home = np.random.default_rng(3), np.radians(overhead.arm.poses_deg["home"])
     shares = []
     for number in range(24):
-        bin = list(config.bins)[number % 3]
-        label = list(config.objects)[number // 3 % 3]
-        kind = as_class(label, config.objects[label])
-        slot = rng.permutation(as_bin(bin, config.bins[bin]).slots)[0]
-        x, y = rng.uniform(*np.transpose([config.table.x, config.table.y]))
+        bin = list(overhead.bins)[number % 3]
+        label = list(overhead.objects)[number // 3 % 3]
+        kind = as_class(label, overhead.objects[label])
+        slot = rng.permutation(as_bin(bin, overhead.bins[bin]).slots)[0]
+        x, y = rng.uniform(*np.transpose([overhead.table.x, overhead.table.y]))
         drop = 0.015
         if number % 2:
-            (x, y), drop = nearest(config, slot), 0.1
+            (x, y), drop = nearest(overhead, slot), 0.1
         over = Goal((*slot, kind.height + drop))
         start = planner.plan(home, Goal((x, y, kind.height))).end
         shares.append(least.carry(bin) / planner.plan(start, over, Task(Load(kind))).duration)
@@ -76,69 +56,29 @@ def test_no_planned_carry_is_faster_than_the_least(config: CellConfig, least: Si
     assert np.mean(shares) > 0.4, "else it is of little use"
 
 
-def test_no_joint_makes_its_part_of_any_carry_in_less(
-    config: CellConfig, limits: JointLimits, kinematics: Kinematics, least: SimLeastTimes
-) -> None:
-    """Whatever is planned, in whatever posture and at whatever height the carry begins and ends."""
-
-    def postures(x: float, y: float, z: float, swivels: Array) -> Array:
-        found = kinematics.grid(tool_down([x, y, z]), np.radians(swivels)).reshape(-1, 7)
-        found[:, 6] = 0.0
-        return found[np.all(np.abs(found) <= limits.position, axis=1)]
-
-    heights, shares = {kind.height for kind in config.objects.values()}, []
-    for name, section in config.bins.items():
-        slots = as_bin(name, section).slots
-        places = nearest(config, slots)
-        close = np.argsort(np.linalg.norm(places - slots, axis=1))[:2]
-        ends = np.concatenate(
-            [
-                postures(*slots[number], z, np.arange(-180, 180, 15.0))
-                for number in close
-                for z in (0.055, 0.1, travel_height(config))
-            ]
-        )
-        for place in places[close]:
-            for height in heights:
-                for start in postures(*place, height, np.arange(-180, 180, 10.0)):
-                    shares.append(least.carry(name) / rest_to_rest(ends - start, limits).min())
-    assert max(shares) < 1.0
-
-
-def test_the_bins_differ_and_no_bin_means_the_nearest(config, least) -> None:
-    times = {bin: least.carry(bin) for bin in config.bins}
-    assert len(set(times.values())) == 3
-    assert least.carry(None) == min(times.values()) > 0.3
-    assert least.carry("grey_bin") == 0.0
-
-
-def test_a_bin_farther_away_takes_longer(config, least) -> None:
-    red = config.bins["red_bin"]
-    far = red.model_copy(update={"position": (-0.4, -0.48, 0.0)})
-    assert SimLeastTimes(config.model_copy(update={"bins": {"far": far}})).carry("far") > least.carry(
-        "red_bin"
+def test_the_bins_differ_and_no_bin_means_the_nearest(overhead, least) -> None:
+    times = {bin: least.carry(bin) for bin in overhead.bins}
+    assert times == pytest.approx(
+        {"red_bin": 0.34913, "blue_bin": 0.379096, "yellow_bin": 0.328779}, rel=1e-5
     )
+    assert least.carry(None) == min(times.values())
+    assert least.carry("grey_bin") == 0.0
+    assert SimLeastTimes(changed(overhead, "table", x=(1.2, 1.4))).carry("red_bin") == 0.0, "out of reach"
 
 
-def test_nothing_is_known_of_a_carry_from_where_the_arm_does_not_reach(config) -> None:
-    assert SimLeastTimes(changed(config, "table", x=(1.2, 1.4))).carry("red_bin") == 0.0
-
-
-def test_a_descent_may_end_early_on_an_object_higher_than_expected(config: CellConfig) -> None:
+def test_a_descent_may_end_early_on_an_object_higher_than_expected(overhead: CellConfig) -> None:
     """The objects differ by 10 mm in height, and the lip feels a surface 1 mm away."""
-    long = SimLeastTimes(changed(config, "motion", descent=0.02, descent_speed=0.03))
+    long = SimLeastTimes(changed(overhead, "motion", descent=0.02, descent_speed=0.03))
     assert long.descent == pytest.approx((0.020 - 0.010 - 0.001) / 0.03)
-    assert SimLeastTimes(changed(config, "motion", descent=0.008)).descent == 0.0
-
-
-def test_a_descent_onto_objects_of_one_height_takes_the_guarded_part(config: CellConfig) -> None:
-    """Less the last millimetre, from which the lip feels a surface."""
-    cubes = config.model_copy(update={"objects": {"cube": config.objects["cube"]}})
-    motion = config.motion
+    assert SimLeastTimes(changed(overhead, "motion", descent=0.008)).descent == 0.0
+    cubes = overhead.model_copy(update={"objects": {"cube": overhead.objects["cube"]}})
+    motion = overhead.motion
     assert SimLeastTimes(cubes).descent == pytest.approx((motion.descent - 0.001) / motion.descent_speed)
 
 
-def test_a_detector_answers_after_its_latency(config) -> None:
-    slow = config.detectors["embedded"].model_copy(update={"latency": 0.7})
-    least = SimCell.least_times(config.model_copy(update={"detectors": {**config.detectors, "slow": slow}}))
+def test_a_detector_answers_after_its_latency(overhead) -> None:
+    slow = overhead.detectors["embedded"].model_copy(update={"latency": 0.7})
+    least = SimCell.least_times(
+        overhead.model_copy(update={"detectors": {**overhead.detectors, "slow": slow}})
+    )
     assert [least.answer(name) for name in ("", "embedded", "slow", "none")] == [0.05, 0.05, 0.7, 0.0]

@@ -11,9 +11,7 @@ import pytest
 from executive.cell_config import CellConfig, ObjectConfig
 from executive.errors import InputError
 from executive.geometry import Pose, about_z
-from executive.sim.models import load_mesh, missing_models, read_obj, upright
-from executive.sim.piles import settle
-from executive.sim.scenes import SceneRenderer
+from executive.sim.models import load_mesh, missing_models, read_obj
 from executive.sim.world import World
 from tests.sim.conftest import shipped_cell
 
@@ -77,82 +75,29 @@ def test_a_hole_is_a_hole_and_the_ring_around_it_is_not(
     assert {hit(world, 0.5 + ring * x, 0.1 + ring * y) for x, y in around} == {body}
 
 
-def test_every_fastener_is_as_large_as_its_cell_says(fasteners: CellConfig) -> None:
-    assert list(missing_models(fasteners)) == []
-
-
-def test_a_bolt_lies_still_on_its_head_and_the_tip_of_its_shaft(build: Build, fasteners: CellConfig) -> None:
-    world = build(fasteners)
-    body = put(world, "bolt", 0.5, 0.0, yaw=0.4)
-    assert np.linalg.norm(world.client.getBaseVelocity(body)[0]) < 0.002
-    X_WO = world.object_pose(body)
-    assert X_WO.rotation == pytest.approx(about_z(0.4), abs=0.02)
-    assert X_WO.position == pytest.approx([0.5, 0.0, 0.0135], abs=0.002)
-
-
-def test_an_object_stands_around_its_middle_wherever_its_mesh_has_the_origin(
+def test_a_mesh_stands_around_its_middle_and_weighs_about_the_middle_of_its_volume(
     build: Build, overhead: CellConfig, wedge: ObjectConfig
 ) -> None:
     mesh = load_mesh(wedge)
     assert mesh.vertices.min(axis=0) == pytest.approx([-0.01, -0.005, -0.015])
     assert mesh.vertices.max(axis=0) == pytest.approx([0.01, 0.005, 0.015])
-    world = build(with_objects(overhead, wedge=wedge))
-    X_WO = Pose(about_z(0.7), np.array([0.5, 0.1, 0.2]))
-    body = world.add_object("wedge", X_WO, (1, 1, 1))
-    assert world.object_pose(body).rounded() == pytest.approx(X_WO.rounded(), abs=1e-6)
-    low, high = world.client.getAABB(body)
-    assert (np.array(low) + high) / 2 == pytest.approx(X_WO.position, abs=1e-3)
-
-
-def test_a_mesh_weighs_what_it_should_about_the_middle_of_its_volume(
-    build: Build, overhead: CellConfig, wedge: ObjectConfig
-) -> None:
     # A third of the way from its upright edge, and from its underside.
-    assert load_mesh(wedge).centroid == pytest.approx([-0.01 + 0.02 / 3, 0.0, -0.015 + 0.03 / 3])
-    world = build(with_objects(overhead, wedge=wedge))
-    body = world.add_object("wedge", Pose.of([0.5, 0.0, 0.2]), (1, 1, 1))
-    mass, *_ = world.client.getDynamicsInfo(body, -1)
-    centre, _ = world.client.getBasePositionAndOrientation(body)
-    assert mass == 0.2
-    assert centre == pytest.approx([0.5 - 0.01 + 0.02 / 3, 0.0, 0.2 - 0.005])
-
-
-def test_scale_and_turn_apply_to_what_is_seen_and_what_is_felt(
-    build: Build, overhead: CellConfig, wedge: ObjectConfig
-) -> None:
+    assert mesh.centroid == pytest.approx([-0.01 + 0.02 / 3, 0.0, -0.005])
     laid = wedge.model_copy(update={"scale": 2.0, "upright_deg": (90.0, 0.0, 0.0)})
-    mesh = load_mesh(laid)
-    assert np.ptp(mesh.vertices, axis=0) == pytest.approx([0.04, 0.06, 0.02])
-    world = build(with_objects(overhead, wedge=laid))
-    low, high = world.client.getAABB(world.add_object("wedge", Pose.of([0.5, 0.0, 0.2]), (1, 1, 1)))
-    assert np.subtract(high, low) == pytest.approx([0.04, 0.06, 0.02], abs=0.005)
-
-
-def test_a_pile_of_meshes_comes_to_lie_on_the_table(fasteners: CellConfig) -> None:
-    washer, nut = settle(
-        fasteners, [("washer", Pose.of([0.5, 0.0, 0.05])), ("nut", Pose.of([0.5, 0.03, 0.09]))]
+    assert np.ptp(load_mesh(laid).vertices, axis=0) == pytest.approx([0.04, 0.06, 0.02])
+    world = build(with_objects(overhead, wedge=wedge, laid=laid))
+    X_WO = Pose(about_z(0.7), np.array([0.5, 0.1, 0.2]))
+    body, other = (
+        world.add_object("wedge", X_WO, (1, 1, 1)),
+        world.add_object("laid", Pose.of([0.3, 0, 0.3]), (1, 1, 1)),
     )
-    assert washer.position[2] == pytest.approx(0.004, abs=0.002)
-    assert 0.005 < nut.position[2] < 0.03
-
-
-def test_a_rendered_scene_has_the_box_of_every_fastener(fasteners: CellConfig) -> None:
-    renderer, labels = SceneRenderer(fasteners, "overhead", randomized=False), set()
-    try:
-        samples = [renderer.sample(seed) for seed in range(6)]
-    finally:
-        renderer.close()
-    scale = 594 / 1.19  # pixels to a metre of the table: focal length over distance
-    for sample in samples:
-        labels |= set(sample.labels)
-        assert np.abs(sample.positions[:, :2] - sample.centres[:, :2]).max() < 0.006
-        for label, box in zip(sample.labels, sample.boxes, strict=True):
-            width, height = box[2:] - box[:2]
-            across = 2 * fasteners.objects[label].radius * scale
-            assert max(width, height) < across + 3
-            if label == "washer":
-                assert (width, height) == pytest.approx((across, across), abs=2)
-    assert labels == {"bolt", "nut", "washer"}
+    assert world.object_pose(body).rounded() == pytest.approx(X_WO.rounded(), abs=1e-6)
+    assert world.client.getDynamicsInfo(body, -1)[0] == 0.2
+    centre, _ = world.client.getBasePositionAndOrientation(body)
+    assert centre == pytest.approx(X_WO.apply(mesh.centroid))
+    low, high = world.client.getAABB(other)
+    assert np.subtract(high, low) == pytest.approx([0.04, 0.06, 0.02], abs=0.005)
+    assert (np.array(low) + high) / 2 == pytest.approx([0.3, 0, 0.3], abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -173,12 +118,6 @@ def test_what_is_no_mesh_is_refused_with_the_reason(text: str, complaint: str, t
         read_obj(path)
 
 
-def test_bytes_that_are_no_text_are_no_mesh(tmp_path: Path) -> None:
-    (tmp_path / "thing.obj").write_bytes(b"\x00\xff\xfe")
-    with pytest.raises(InputError, match=r"the model thing\.obj is no Wavefront mesh: .*utf-8"):
-        read_obj(tmp_path / "thing.obj")
-
-
 def test_missing_and_broken_meshes_and_wrong_sizes_are_named_with_their_keys(
     overhead: CellConfig, wedge: ObjectConfig, tmp_path: Path
 ) -> None:
@@ -190,33 +129,12 @@ def test_missing_and_broken_meshes_and_wrong_sizes_are_named_with_their_keys(
         flat=wedge.model_copy(update={"height": 0.02, "radius": 0.03}),
         cube=overhead.objects["cube"].model_copy(update={"scale": 0.5}),
     )
-    assert list(missing_models(config)) == [
-        (
-            ("objects", "gone", "mesh"),
-            "there is no model gone.obj, neither beside the cell file nor in pybullet_data",
-        ),
-        (
-            ("objects", "empty", "mesh"),
-            "the model empty.obj is no Wavefront mesh: it has no faces (lines beginning with f)",
-        ),
-        (
-            ("objects", "flat", "height"),
-            f"the model of flat has a height of 0.0300 m, not 0.02 m; {ADVICE}",
-        ),
-        (
-            ("objects", "flat", "radius"),
-            f"the model of flat has a radius of 0.0112 m, not 0.03 m; {ADVICE}",
-        ),
-        (
-            ("objects", "cube", "height"),
-            f"the model of cube has a height of 0.0250 m, not 0.05 m; {ADVICE}",
-        ),
-        (
-            ("objects", "cube", "radius"),
-            f"the model of cube has a radius of 0.0177 m, not 0.0354 m; {ADVICE}",
-        ),
-    ]
-
-
-def test_a_urdf_keeps_its_origin(overhead: CellConfig) -> None:
-    assert upright(overhead.objects["duck"]).position == pytest.approx([0, 0, 0])
+    found = {".".join(map(str, key[1:])): sentence for key, sentence in missing_models(config)}
+    assert found == {
+        "gone.mesh": "there is no model gone.obj, neither beside the cell file nor in pybullet_data",
+        "empty.mesh": "the model empty.obj is no Wavefront mesh: it has no faces (lines beginning with f)",
+        "flat.height": f"the model of flat has a height of 0.0300 m, not 0.02 m; {ADVICE}",
+        "flat.radius": f"the model of flat has a radius of 0.0112 m, not 0.03 m; {ADVICE}",
+        "cube.height": f"the model of cube has a height of 0.0250 m, not 0.05 m; {ADVICE}",
+        "cube.radius": f"the model of cube has a radius of 0.0177 m, not 0.0354 m; {ADVICE}",
+    }

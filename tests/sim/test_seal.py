@@ -3,11 +3,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-import numpy as np
 import pybullet
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell_config import ToolConfig
@@ -58,12 +55,6 @@ def test_a_cup_reaching_over_the_edge_of_a_cube_has_no_seal(client: BulletClient
     assert breakaway(outside, TOOL) == 0
 
 
-def test_nothing_under_the_cup_is_no_seal(client: BulletClient) -> None:
-    body = box(client, (0, 0, -0.025), 0.025)
-    assert measure(client, tool_down([0.1, 0, 0.001]), {body}, 0.006, REACH) is None
-    assert breakaway(None, TOOL) == 0
-
-
 @pytest.mark.parametrize("cup", [0.004, 0.006, 0.012])
 def test_the_gap_on_a_sphere_is_the_height_of_the_cap_under_the_cup(client: BulletClient, cup: float) -> None:
     radius = 0.03
@@ -71,15 +62,6 @@ def test_the_gap_on_a_sphere_is_the_height_of_the_cap_under_the_cup(client: Bull
     assert seal is not None
     assert seal.gap == pytest.approx(radius - math.sqrt(radius**2 - cup**2), abs=5e-5)
     assert seal.tilt == pytest.approx(0, abs=0.01)
-
-
-def test_a_cup_beside_the_top_of_a_sphere_leans_by_the_angle_of_its_surface(client: BulletClient) -> None:
-    body = ball(client, 0.03)
-    top = math.sqrt(0.03**2 - 0.009**2) - 0.03
-    seal = measure(client, tool_down([0.009, 0, top + 0.002]), {body}, 0.004, REACH)
-    assert seal is not None
-    assert seal.tilt == pytest.approx(math.asin(0.009 / 0.03), abs=0.02)
-    assert seal.gap == pytest.approx(0.03 - math.sqrt(0.03**2 - 0.004**2), abs=5e-5)
 
 
 @pytest.mark.parametrize("angle", [0.1, 0.4])
@@ -112,35 +94,8 @@ def test_a_surface_out_of_reach_bears_nothing() -> None:
     assert breakaway(Seal(1, REACH + 1e-6, 0.0, 0.0), TOOL) == 0
 
 
-@given(gap=st.floats(0, 0.01), wider=st.floats(0, 0.01), tilt=st.floats(0, 1.5), steeper=st.floats(0, 1.5))
-def test_the_force_falls_with_gap_and_tilt_and_stays_in_its_range(
-    gap: float, wider: float, tilt: float, steeper: float
-) -> None:
-    force = breakaway(Seal(1, 0.0, gap, tilt), TOOL)
-    assert 0 <= force <= TOOL.force
-    assert breakaway(Seal(1, 0.0, gap + wider, tilt), TOOL) <= force
-    assert breakaway(Seal(1, 0.0, gap, tilt + steeper), TOOL) <= force
-
-
-@given(gap=st.floats(0, 0.006), tilt=st.floats(0, 1.2))
-def test_the_force_has_no_jumps(gap: float, tilt: float) -> None:
-    force = breakaway(Seal(1, 0.0, gap, tilt), TOOL)
-    beside = breakaway(Seal(1, 0.0, gap + 1e-7, tilt + 1e-7), TOOL)
-    assert abs(force - beside) < 1e-3
-
-
 def test_half_the_gap_and_half_the_tilt_leave_a_quarter_of_the_force() -> None:
     seal = Seal(1, 0.0, TOOL.gap / 2, math.radians(TOOL.tilt_deg) / 2)
     assert breakaway(seal, TOOL) == pytest.approx(TOOL.force / 4)
-
-
-def test_measuring_is_independent_of_the_tool_yaw(client: BulletClient) -> None:
-    body = box(client, (0, 0, 0), 0.025, roll=0.3)
-    height = 0.025 / math.cos(0.3) + 0.006 * math.tan(0.3)
-    tilts = [
-        seal.tilt
-        for yaw in np.linspace(0, 2, 5)
-        if (seal := measure(client, tool_down([0, 0, height], yaw), {body}, 0.006, REACH)) is not None
-    ]
-    assert len(tilts) == 5
-    assert np.ptp(tilts) < 1e-3
+    for bad in (Seal(1, 0.0, 2 * TOOL.gap, 0.0), Seal(1, 0.0, 2 * TOOL.gap, 1.5), None):
+        assert breakaway(bad, TOOL) == 0.0

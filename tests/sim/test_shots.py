@@ -45,35 +45,22 @@ def changed(one: Image, other: Image) -> int:
     return np.count_nonzero((one != other).any(axis=2))
 
 
-def test_the_steps_of_the_run_are_counted_and_no_others(shoot: Shoot, tmp_path: Path) -> None:
+def test_each_picture_is_of_its_moment(shoot: Shoot, tmp_path: Path) -> None:
     assert steps_in(shoot.log) == STEPS
     with pytest.raises(InputError, match="can neither be taken up again nor filmed"):
         steps_in(tmp_path / "none")
-
-
-def test_each_picture_is_of_its_moment(shoot: Shoot) -> None:
     first, same, middle, last = pictures(shoot, [0, 0, 18, STEPS])
     assert first.shape == (SIZE[1], SIZE[0], 3)
     assert (first == same).all()
     assert 0 < changed(first, middle) < changed(first, last)
     (alone,) = pictures(shoot, [18])
     assert (alone == middle).all()
+    image = first.astype(int)  # without the floor
+    assert np.abs(image[0] - SKY).max() <= 1
+    assert np.abs(image[-1, -1] - GROUND).max() <= 1
 
 
-def test_steps_of_nobodys_run_take_none_of_its_time(
-    shoot: Shoot, overhead: CellConfig, tmp_path: Path
-) -> None:
-    (last,) = pictures(shoot, [STEPS])
-    earlier, same = pictures(swing(overhead, tmp_path / "whole", idle=0), [STEPS - 8, STEPS])
-    assert changed(last, same) * 4 < changed(last, earlier)
-
-
-def test_the_floor_is_not_in_the_picture(shoot: Shoot) -> None:
-    (image,) = pictures(shoot, [0])
-    assert np.abs(image[0].astype(int) - SKY).max() <= 1
-    assert np.abs(image[-1, -1].astype(int) - GROUND).max() <= 1
-
-
+@pytest.mark.slow
 def test_several_processes_take_the_same_pictures_in_the_same_order(
     shoot: Shoot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -83,3 +70,10 @@ def test_several_processes_take_the_same_pictures_in_the_same_order(
         together = list(taken)
     for here, there in zip(pictures(shoot, steps), together, strict=True):
         assert (here == there).all()
+
+
+def test_a_viewpoint_has_arm_workspace_and_bins_in_the_given_part_of_the_image(overhead: CellConfig) -> None:
+    view = overview(overhead, (800, 720), (20, 60, 780, 640))
+    assert view.matrix == pytest.approx(np.array([[1215.34, 0, 400], [0, 1215.34, 360], [0, 0, 1]]), rel=1e-5)
+    pose = [1.8486, -1.1888, 1.3928, -0.7711, -0.3845, 0.2265, 0.4542]
+    assert (view.X_WC.rounded(4), view.size) == (pytest.approx(pose, abs=2e-4), (800, 720))

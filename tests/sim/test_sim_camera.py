@@ -8,7 +8,7 @@ import pytest
 
 from executive.cell_config import CalibrationConfig, CameraConfig, CellConfig, DepthConfig, NoiseConfig
 from executive.geometry import Pose, about_z
-from executive.sim.camera import CELL_LIGHT, SimCamera, camera_pose, render
+from executive.sim.camera import CELL_LIGHT, SimCamera, camera_pose, render, sense
 from executive.sim.models import load_mesh
 from executive.sim.world import World
 from executive.vision.camera_model import calibrated, project
@@ -76,49 +76,7 @@ def test_projected_meshes_agree_with_the_rendered_silhouettes(
         assert abs(np.mean(np.array(seen) - expected)) < 0.3, label
 
 
-@pytest.mark.parametrize("cell", ["overhead", "wrist"])
-def test_the_workspace_lies_inside_the_table_view_from_every_scan_pose(
-    build: Build, cell: str, request: pytest.FixtureRequest
-) -> None:
-    config: CellConfig = request.getfixturevalue(cell)
-    world, name = at_scan_pose(build, config)
-    camera = config.cameras[name]
-    corners = [(x, y, z) for x in config.table.x for y in config.table.y for z in (0.0, 0.06)]
-    left, top, right, bottom = camera.table_view
-    assert right - left == bottom - top
-    for pose in camera.scan_poses:
-        world.set_arm(np.radians(config.arm.poses_deg[pose]))
-        matrix, _ = calibrated(camera)
-        pixels = project(matrix, camera_pose(world, camera), corners)
-        assert (pixels > (left, top)).all()
-        assert (pixels < (right, bottom)).all()
-
-
-def test_the_wrist_camera_shows_the_side_away_from_the_robot_at_the_top(
-    build: Build, wrist: CellConfig
-) -> None:
-    world, name = at_scan_pose(build, wrist)
-    X_WC = camera_pose(world, wrist.cameras[name])
-    assert X_WC.position == pytest.approx([0.53, 0.0, 0.55], abs=1e-3)
-    assert X_WC.rotation[:, 1] == pytest.approx([-1, 0, 0], abs=1e-4)
-    matrix, _ = calibrated(wrist.cameras[name])
-    bodies = render(world, matrix, X_WC, (0, 0, 640, 480), CELL_LIGHT).bodies
-    assert not (bodies == world.arm).any(), "the camera sees its own tool"
-
-
-def test_two_frames_of_one_scene_differ_and_a_seed_repeats_them(build: Build, overhead: CellConfig) -> None:
-    world, name = at_scan_pose(build, overhead)
-    one, same, other = (
-        SimCamera(world, name, overhead.cameras[name], StoppedClock(), seed) for seed in (7, 7, 8)
-    )
-    first, second = one.capture(), one.capture()
-    assert (first.id, second.id) == (1, 2)
-    assert np.abs(first.image.astype(int) - second.image).mean() > 0.5
-    assert (same.capture().image == first.image).all()
-    assert (other.capture().image != first.image).any()
-
-
-def test_a_depth_sensor_measures_what_the_camera_sees_and_changes_no_image(
+def test_a_seed_repeats_the_noise_of_images_and_depth_and_a_depth_sensor_changes_no_image(
     build: Build, overhead: CellConfig
 ) -> None:
     world, name = at_scan_pose(build, overhead)
@@ -131,15 +89,19 @@ def test_a_depth_sensor_measures_what_the_camera_sees_and_changes_no_image(
     )
     frame = one.capture()
     assert frame.depth is not None
-    assert frame.depth.shape == (480, 640)
     assert (frame.image == without.capture().image).all()
-    bodies = render(world, frame.matrix, frame.X_WC, (0, 0, 640, 480), CELL_LIGHT).bodies
-    assert np.nanmedian(frame.depth[bodies == cube]) == pytest.approx(1.15, abs=0.003)
-    assert np.nanmedian(frame.depth[bodies == world.table]) == pytest.approx(1.2, abs=0.001)
-    again, second, others = same.capture().depth, one.capture().depth, other.capture().depth
-    assert np.array_equal(frame.depth, again, equal_nan=True)
-    assert not np.array_equal(frame.depth, second, equal_nan=True)
-    assert not np.array_equal(frame.depth, others, equal_nan=True)
+    shot = render(world, frame.matrix, frame.X_WC, (0, 0, 640, 480), CELL_LIGHT)
+    for body, distance in ((cube, 1.15), (world.table, 1.2)):
+        assert shot.depth[shot.bodies == body] == pytest.approx(distance, abs=1e-4)
+        assert np.nanmedian(frame.depth[shot.bodies == body]) == pytest.approx(distance, abs=0.003)
+    sky = render(world, frame.matrix, Pose(np.eye(3), np.array([0, 0, 1.2])), (0, 0, 64, 64), CELL_LIGHT)
+    assert np.isinf(sky.depth).all()
+    again, second, others = same.capture(), one.capture(), other.capture()
+    assert (frame.id, second.id) == (1, 2)
+    assert np.abs(frame.image.astype(int) - second.image).mean() > 0.5
+    assert [(one.image == frame.image).all() for one in (again, second, others)] == [True, False, False]
+    same_depth = [np.array_equal(frame.depth, one.depth, equal_nan=True) for one in (again, second, others)]
+    assert same_depth == [True, False, False]
 
 
 def test_a_frame_carries_what_is_needed_to_use_it_later(build: Build, overhead: CellConfig) -> None:
@@ -162,3 +124,58 @@ def test_a_frame_carries_what_is_needed_to_use_it_later(build: Build, overhead: 
     assert frame.X_WC.position == pytest.approx(config.position)
     assert not camera.sees_table()
     assert SimCamera(world, name, config, StoppedClock(), 1).sees_table()
+
+
+PERFECT = DepthConfig(floor=0, growth=0, grain=0, step=0, edge_dropout=0, dropout=0)
+
+
+def changed(**figures: float) -> DepthConfig:
+    return PERFECT.model_copy(update=figures)
+
+
+def flat(distance: float) -> np.ndarray:
+    return np.full((200, 300), distance)
+
+
+def test_a_perfect_sensor_measures_the_truth_and_nothing_of_the_sky() -> None:
+    true = flat(1.2)
+    true[:, 200:] = np.inf
+    measured = sense(true, PERFECT, np.random.default_rng(1))
+    assert (measured[:, :200] == 1.2).all()
+    assert np.isnan(measured[:, 200:]).all()
+
+
+@pytest.mark.parametrize("grain", [0.0, 1.0, 2.0])
+@pytest.mark.parametrize("distance", [0.5, 1.0, 2.0])
+def test_noise_is_a_floor_and_grows_with_the_square_of_the_distance(grain: float, distance: float) -> None:
+    config = changed(floor=0.001, growth=0.004, grain=grain)
+    error = sense(flat(distance), config, np.random.default_rng(1)) - distance
+    assert error.std() == pytest.approx(0.001 + 0.004 * distance**2, rel=0.02)
+    assert abs(error.mean()) < error.std() / 10
+
+
+def test_neighbours_err_alike_where_there_is_grain() -> None:
+    def alike(grain: float) -> float:
+        error = sense(flat(1.0), changed(floor=0.005, grain=grain), np.random.default_rng(1)) - 1.0
+        return float(np.corrcoef(error[:, 1:].ravel(), error[:, :-1].ravel())[0, 1])
+
+    assert abs(alike(0.0)) < 0.02
+    # The autocorrelation of noise blurred by s pixels is exp(-d² / 4 s²).
+    assert alike(1.0) == pytest.approx(np.exp(-1 / 4), abs=0.05)
+
+
+def test_distances_are_whole_multiples_of_the_step() -> None:
+    measured = sense(flat(1.0), changed(floor=0.005, step=0.002), np.random.default_rng(1))
+    assert np.unique(np.round(measured / 0.002, 6) % 1).tolist() == [0.0]
+
+
+def test_pixels_drop_out_beside_edges_and_a_few_anywhere() -> None:
+    true = flat(1.2)
+    true[:, 150:] = 1.15
+    config = changed(edge=0.02, edge_width=2, edge_dropout=0.7, dropout=0.01)
+    lost = np.isnan(sense(true, config, np.random.default_rng(1)))
+    assert lost[:, 147:153].mean() == pytest.approx(0.7, abs=0.05)
+    assert lost[:, :147].mean() == pytest.approx(0.01, abs=0.005)
+    assert lost[:, 153:].mean() == pytest.approx(0.01, abs=0.005)
+    smaller = np.where(true < 1.2, 1.19, true)
+    assert np.isnan(sense(smaller, config, np.random.default_rng(1))).mean() == pytest.approx(0.01, abs=0.005)

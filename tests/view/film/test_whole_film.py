@@ -12,10 +12,10 @@ import pytest
 
 from executive.errors import InputError
 from executive.record.run_directory import RunDirectory
-from executive.sim.beginning import first_world
 from executive.sim.command_log import STEP, read_commands
 from executive.sim.rebuild import Rebuilding
 from executive.sim.shots import steps_in
+from executive.sim.spawn import first_world
 from executive.sim.tool import SuctionTool
 from executive.view.film.course import Course
 from executive.view.film.film import film
