@@ -104,10 +104,7 @@ def test_ports_and_reasons_are_told_on_demand(every_node):
 def test_json_tells_what_a_skill_reads_writes_and_fails_with(every_node):
     nodes = json.loads(shown(every_node, "--json").stdout)
     (grasp,) = [node for node in nodes if node["skill"] == "Grasp"]
-    assert grasp["reads"] == [
-        {"port": "target", "variable": "target", "required": True},
-        {"port": "bin", "variable": "bin", "required": False},
-    ]
+    assert grasp["reads"] == [{"port": "target", "variable": "target", "required": True}]
     assert grasp["writes"] == [{"port": "held", "variable": "held", "required": True}]
     assert grasp["reasons"] == ["missed"]
     (select,) = [node for node in nodes if "wanted: $kind" in node["detail"]]

@@ -18,12 +18,6 @@ def test_the_nearest_target_comes_first_with_its_bin(fake: FakeCell, look) -> No
     assert [decision.item for decision in fake.decisions] == ["duck-1"]
 
 
-def test_a_tentative_choice_is_no_decision(fake: FakeCell, look) -> None:
-    fake.world.put("cube", 0.6, -0.2)
-    assert select(fake, look(), tentative=True).outputs["item"] == "cube-1"
-    assert fake.decisions == []
-
-
 def test_while_the_arm_moves_the_nearest_is_the_one_nearest_to_where_it_will_be(fake: FakeCell, look) -> None:
     fake.world.put("cube", 0.45, 0.0)
     fake.world.put("duck", 0.6, -0.2)

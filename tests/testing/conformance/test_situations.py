@@ -99,7 +99,7 @@ def test_every_other_choice_is_tried() -> None:
         "with an empty tool and pose: next",
         "with an empty tool and pose: aside",
     ]
-    assert "with an empty tool and tentative: True" in names(discover()["SelectTarget"])
+    assert "with an empty tool and prefer: surest" in names(discover()["SelectTarget"])
 
 
 @pytest.mark.parametrize(
