@@ -1,4 +1,4 @@
-"""Motions that are planned ahead: into the bin once the tool holds, and to the next target while the arm carries."""
+"""Motions planned ahead: into the bin once the tool holds, and to the next target during the carry."""
 
 from __future__ import annotations
 
