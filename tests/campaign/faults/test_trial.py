@@ -165,7 +165,9 @@ def test_a_skill_goes_wrong_in_the_activations_named() -> None:
 
 def test_a_skill_that_says_that_it_dropped_something_has_let_it_fall() -> None:
     skills = discover()
-    path = "tree/2:repeat/do/carry_and_watch/try/retry/do/deliver_and_watch/parallel/deliver/1:retry/do/Transit"
+    path = (
+        "tree/2:repeat/do/carry_and_watch/try/retry/do/deliver_and_watch/parallel/deliver/1:retry/do/Transit"
+    )
     breakages = [Breakage(path, "fails", "dropped", (1,))]
     result = run_mission("sort_overhead", substitutes=broken_skills(breakages, {path: skills["Transit"]}))
     states: list[Mapping[str, Any]] = [event.data for event in result.events if event.kind == "item"]
