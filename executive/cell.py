@@ -140,11 +140,14 @@ class Ledger(Protocol):
     def observe(
         self, detections: Detections, positions: Sequence[Array], glimpses: Sequence[Glimpse] = ()
     ) -> Sequence[Target]:
-        """Record a look and return one target per open item on the table whose place is known now.
+        """Record a look and return the `targets` that are known now.
 
         `positions` `(3,)` [m] belong to `detections.found` one to one, `glimpses` to `detections.doubtful`.
         What earlier looks have shown, and nothing has disturbed since, is known too.
         """
+
+    def targets(self) -> Sequence[Target]:
+        """Return one target per open item on the table whose place is known now."""
 
     def is_fresh(self, target: Target) -> bool:
         """Tell whether nothing the robot did since has put the target's position in doubt."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -84,6 +85,24 @@ def onto(
     surface = middle + kind.height / 2
     lowest = max(surface - overtravel, middle)
     return Goal((x + dx, y + dy, lowest), guarded=surface + descent - lowest, speed=descent_speed)
+
+
+def nearest_first(cell: Cell, targets: Sequence[Target]) -> list[Target]:
+    """Return the targets that can be picked, in the order of their distance from where the arm will be.
+
+    A target can be picked if its item is open, sure and of a class with a route, and nothing has put its
+    position in doubt.
+    """
+    ledger, here = cell.ledger, cell.arm.destination[:2]
+    possible = [
+        target
+        for target in targets
+        if ledger.is_open(target.item)
+        and ledger.is_fresh(target)
+        and ledger.is_sure(target.item)
+        and ledger.label(target.item) in cell.routes
+    ]
+    return sorted(possible, key=lambda t: (float(np.linalg.norm(t.position[:2] - here)), t.item))
 
 
 def into(cell: Cell, bin: str, item: Item, drop: float = DROP) -> Goal:

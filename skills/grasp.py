@@ -6,23 +6,19 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from executive.cell import Cell, LeastTimes, Steps
-from executive.goals import into
 from executive.messages import Item, Target
-from executive.moving import carrying
 from executive.skill import EMPTY, HOLDING, In, Out, Seconds, Skill, param, port
 
 
 class Grasp(Skill):
     """Close the tool on the target and prove that it holds.
 
-    Succeeds when the tool's sensor still reports a seal after `settle`. Where it is known into which bin the
-    target goes, the way there is planned meanwhile.
+    Succeeds when the tool's sensor still reports a seal after `settle`.
     """
 
     target: In[Target] = port(doc="what the tool touches")
-    bin: In[str | None] = port(default=None, refers="bin", doc="where it will be carried")
     held: Out[Item] = port(refers="item", doc="the item in the tool")
-    settle: Seconds = param(0.10, ge=0, le=2, doc="time given to the seal")
+    settle: Seconds = param(0.10, ge=0, le=2, doc="time allowed for the grip to settle")
     reasons: ClassVar = ("missed",)
     uses: ClassVar = ("tool",)
     tool_state: ClassVar = (EMPTY, HOLDING)
@@ -38,7 +34,7 @@ class Grasp(Skill):
         cell.tool.close()
         sealed = False
         try:
-            yield from self._settle(cell)
+            yield from cell.clock.sleep(self.settle)
             sealed = cell.tool.holding
         finally:
             # Whoever takes the skill away would otherwise leave in the tool what nobody knows of.
@@ -49,12 +45,3 @@ class Grasp(Skill):
             raise self.failed("missed", f"no seal on {self.target.item} {self.settle:.2f} s after contact")
         cell.ledger.held(self.target.item)
         self.held = self.target.item
-
-    def _settle(self, cell: Cell) -> Steps:
-        """Give the seal its time; once it holds, have the way on planned if it is known where to."""
-        bin, item = self.bin, self.target.item
-        for _ in cell.clock.sleep(self.settle):
-            if bin is not None and cell.tool.holding:
-                cell.arm.plan_ahead(into(cell, bin, item), carrying(cell, item))
-                bin = None
-            yield

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-import numpy as np
-
 from executive.cell import Cell, Steps
+from executive.goals import nearest_first
 from executive.messages import Item, Target
 from executive.skill import In, Out, Skill, SkillFailed, param, port
 from executive.surroundings import slots_taken
@@ -29,33 +28,23 @@ class SelectTarget(Skill):
     prefer: str = param(
         "nearest", choices=("nearest", "surest"), doc="`nearest` to the tool, or the `surest` detection"
     )
-    tentative: bool = param(False, doc="only think ahead: the record does not take it for a decision")
     reasons: ClassVar = ("no_candidate", "unseen", "doubtful")
 
     def run(self, cell: Cell) -> Steps:
         """Filter, order, take the first."""
         yield from ()
-        candidates = [target for target in self.targets if self._eligible(cell, target)]
+        candidates = [
+            target for target in nearest_first(cell, self.targets) if self._is_sought(cell, target.item)
+        ]
         if not candidates:
             raise self._none(cell)
-        here = cell.arm.destination[:2]
-        if self.prefer == "nearest":
-            best = min(candidates, key=lambda t: (float(np.linalg.norm(t.position[:2] - here)), t.item))
-        else:
+        best = candidates[0]
+        if self.prefer == "surest":
             best = min(candidates, key=lambda t: (-t.confidence, t.item))
         self.target, self.item = best, best.item
         bins = cell.routes[cell.ledger.label(best.item)]
         self.bin = min(bins, key=lambda bin: slots_taken(cell, bin))
-        if not self.tentative:
-            cell.decided(best, self.bin)
-
-    def _eligible(self, cell: Cell, target: Target) -> bool:
-        return (
-            cell.ledger.is_open(target.item)
-            and cell.ledger.is_fresh(target)
-            and cell.ledger.is_sure(target.item)
-            and self._is_sought(cell, target.item)
-        )
+        cell.decided(best, self.bin)
 
     def _is_sought(self, cell: Cell, item: Item) -> bool:
         label = cell.ledger.label(item)

@@ -17,7 +17,7 @@ def look(fake: FakeCell, view: str = "table") -> list[Target]:
     return run_skill(Localize(detections=detections), fake).outputs["targets"]
 
 
-def pick(fake: FakeCell, target: Target, bin: str | None = None) -> str:
+def pick(fake: FakeCell, target: Target) -> str:
     """Grasp an object that was localized; return its item."""
     run_skill(Approach(target=target), fake)
-    return run_skill(Grasp(target=target, bin=bin), fake).outputs["held"]
+    return run_skill(Grasp(target=target), fake).outputs["held"]

@@ -27,7 +27,7 @@ def held(fake: FakeCell) -> str:
 def picked(fake: FakeCell, label: str) -> str:
     """Pick the first object of that class that a look shows in the workspace; return its item."""
     target = next(one for one in look(fake, "full") if one.label == label and one.position[1] > -0.2)
-    return pick(fake, target, "red_bin")
+    return pick(fake, target)
 
 
 def test_it_is_the_safe_place_if_that_is_free(fake: FakeCell, held: str) -> None:

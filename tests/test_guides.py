@@ -115,7 +115,7 @@ def test_every_library_and_cell_of_the_authors_guide_is_used_by_a_mission_of_it(
 
 
 def test_the_authors_guide_tells_every_code_of_a_finding_and_no_other() -> None:
-    told = [code for cell in rows("## 10. What `executive check` finds") for code in in_code(cell)]
+    told = [code for cell in rows("## 11. What `executive check` finds") for code in in_code(cell)]
     assert len(told) == len(set(told))
     assert set(told) == CODES
 

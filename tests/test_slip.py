@@ -42,7 +42,7 @@ def held(fake: FakeCell) -> str:
     """A cube in the tool."""
     fake.world.put("cube", 0.5, 0.0)
     (target,) = look(fake)
-    return pick(fake, target, "red_bin")
+    return pick(fake, target)
 
 
 def test_the_ledger_is_told_once(fake: FakeCell, held: str) -> None:

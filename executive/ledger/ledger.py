@@ -63,7 +63,7 @@ class ItemLedger:
     def observe(
         self, detections: Detections, positions: Sequence[Array], glimpses: Sequence[Glimpse] = ()
     ) -> Sequence[Target]:
-        """Record a look and return one target per item that is open and whose place is known now.
+        """Record a look and return the `targets` that are known now.
 
         What lies in a bin is no target. A detection where the robot has changed the table since the frame
         was taken shows what is no longer there, and counts for nothing. The same frame a second time is no
@@ -74,6 +74,10 @@ class ItemLedger:
             self._frame = frame.id
             self._take(detections, positions, glimpses)
         self._emit_look(detections, positions, glimpses)
+        return self.targets()
+
+    def targets(self) -> Sequence[Target]:
+        """Return one target per item that is open and whose place is known now."""
         return [
             record.target
             for record in self._records.values()

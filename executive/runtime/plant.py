@@ -7,6 +7,7 @@ from typing import Any
 
 from executive.cell import Cell
 from executive.events import Event, Observer
+from executive.runtime.planning_ahead import PlanningAhead
 from executive.tape.past import Past
 from executive.tape.recorded_cell import recorded
 from executive.tape.tape import Tape
@@ -46,6 +47,8 @@ class Plant:
         step = clock.step if past is None else past.step
         self.tape = Tape(self.emit, step, lambda: clock.now, past)
         self.cell = recorded(workcell.cell, self.tape, self.emit)
+        self._planning_ahead = PlanningAhead(workcell.cell)
+        self.observe(self._planning_ahead.take)
         self._connected = True
 
     def observe(self, observer: Observer) -> None:
@@ -84,6 +87,11 @@ class Plant:
         if not self.tape.playing:
             self.workcell.advance()
         self.tick += 1
+
+    def plan_ahead(self) -> None:
+        """Have the arm plan what it will probably be asked next; in the past nobody plans."""
+        if not self.tape.playing:
+            self._planning_ahead.step()
 
     def come_to_rest(self) -> str:
         """Let the arm brake until it is at rest; return what went wrong, or ""."""

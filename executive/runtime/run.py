@@ -207,6 +207,7 @@ class Run:
                     break
                 if self.root.status is not Status.RUNNING:
                     return self._verdict()
+                self._plant.plan_ahead()
                 self._plant.advance()
                 if self._realtime:
                     time.sleep(max(0.0, began + self._plant.tape.now - time.monotonic()))

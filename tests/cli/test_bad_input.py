@@ -69,7 +69,7 @@ CASES = {
         m.yaml:10:5: error[unknown-skill]: there is no skill "Localise"
           10 |   - Localise
              |     ^^^^^^^^
-          Did you mean "Localize"? Installed skills: Approach, AwaitRequest, Detect, Grasp, IsHolding, Localize, MoveToScan, PlanAhead, PutDown, RejectTarget, Release, SelectTarget, Transit, Wait.
+          Did you mean "Localize"? Installed skills: Approach, AwaitRequest, Detect, Grasp, IsHolding, Localize, MoveToScan, PutDown, RejectTarget, Release, SelectTarget, Transit, Wait.
         """,
         mission=("- Localize", "- Localise"),
     ),

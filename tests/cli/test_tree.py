@@ -104,10 +104,7 @@ def test_ports_and_reasons_are_told_on_demand(every_node):
 def test_json_tells_what_a_skill_reads_writes_and_fails_with(every_node):
     nodes = json.loads(shown(every_node, "--json").stdout)
     (grasp,) = [node for node in nodes if node["skill"] == "Grasp"]
-    assert grasp["reads"] == [
-        {"port": "target", "variable": "target", "required": True},
-        {"port": "bin", "variable": "bin", "required": False},
-    ]
+    assert grasp["reads"] == [{"port": "target", "variable": "target", "required": True}]
     assert grasp["writes"] == [{"port": "held", "variable": "held", "required": True}]
     assert grasp["reasons"] == ["missed"]
     (select,) = [node for node in nodes if "wanted: $kind" in node["detail"]]
@@ -146,7 +143,7 @@ def test_a_folded_tree_shows_every_subtree_once():
     assert text.count("view: table, doubtful: pass") == 1, "the only one of its kind is in look"
     assert [line.strip("│├└─ ") for line in text.splitlines() if "as above" in line] == [
         "recover look: try  (as above)",
-        "1:look: try  (as above, other params)", "2:look: try  (as above, other params)",
+        "look: try  (as above, other params)", "look: try  (as above, other params)",
         "look: try  (as above)",
     ]  # fmt: skip
     picture = ElementTree.fromstring(shown("sort_overhead", "--fold", "--svg").stdout)

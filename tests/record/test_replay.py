@@ -68,8 +68,8 @@ def edited(path: Path, missions: Path, old: str, new: str) -> Path:
 
 
 def test_the_first_decision_of_an_edited_mission_that_differs_is_told(missions: Path, tmp_path: Path) -> None:
-    path = recorded(missions, tmp_path, "sort_overhead")
-    done = again(path, edited(path, missions, "do: SelectTarget}", "do: {SelectTarget: {prefer: surest}}}"))
+    path = recorded(missions, tmp_path, "inspect_then_sort")
+    done = again(path, edited(path, missions, "try: {SelectTarget: {prefer: surest}}", "try: SelectTarget"))
     assert done.edited
     assert done.recorded is not None
     assert done.replayed is not None

@@ -209,7 +209,11 @@ def test_a_run_that_was_halted_goes_on(missions: Path, tmp_path: Path) -> None:
     result = resumed(path)
     assert (result["status"], result["items"]["placed"]) == ("SUCCESS", 6)
     assert set(placed(path).values()) == {1}
-    assert replay(path, read_journal(path / "journal.jsonl"), discover()).difference == ""
+    entries = read_journal(path / "journal.jsonl")
+    assert replay(path, entries, discover()).difference == ""
+    since = [entry["kind"] for entry in entries].index("resume")
+    ahead = [entry["ahead"] for entry in entries[since:] if entry["kind"] == "plan"]
+    assert sum(ahead) == 6 + 5, "on the cell itself the ways into bins and to next targets are planned ahead"
 
 
 @pytest.mark.slow
@@ -246,9 +250,9 @@ def test_there_must_be_something_to_take_up(missions: Path, tmp_path: Path) -> N
 
 
 def test_a_mission_that_is_decided_otherwise_now_is_not_gone_on_with(missions: Path, tmp_path: Path) -> None:
-    path = cut_off(load(missions, "sort_overhead"), tmp_path, views=[Cutter(900)])
+    path = cut_off(load(missions, "inspect_then_sort"), tmp_path, views=[Cutter(900)])
     file = path / "mission.yaml"
-    old, new = "do: SelectTarget}", "do: {SelectTarget: {prefer: surest}}}"
+    old, new = "try: {SelectTarget: {prefer: surest}}", "try: SelectTarget"
     assert old in file.read_text()
     file.write_text(file.read_text().replace(old, new))
     with pytest.raises(InputError, match=r"cannot be taken up again: the record says at .* and now it is"):

@@ -17,11 +17,11 @@ from py_trees.common import Status
 from executive.control.scope import Scope
 from executive.control.skill_node import SkillNode
 from executive.discovery import discover
-from executive.events import Event
 from executive.mission.build import build
 from executive.mission.load import LoadedMission, load_mission
 from executive.record.plain import plain
 from executive.record.trace import Trace
+from executive.runtime.plant import Plant
 from executive.runtime.run import Run
 from executive.skill import Skill
 from executive.testing.fake_cell import FakeCell
@@ -38,32 +38,31 @@ class Interleaved:
     """A mission on a cell of its own, ticked from outside."""
 
     def __init__(self, loaded: LoadedMission, seed: int) -> None:
-        self._trace, self._ticks = Trace(), 0
-        self._fake: FakeCell | None = None
-        self._fake = FakeCell(loaded.cell_config, seed=seed, routes=loaded.routes, emit=self._emit)
-        self._root = build(loaded, skills(), self._fake.cell, Scope(), self._emit)
+        self._trace = Trace()
+        self._plant = Plant([self._trace])
+        emit = self._plant.emit
+        self._fake = FakeCell(loaded.cell_config, seed=seed, routes=loaded.routes, emit=emit)
+        self._plant.connect(self._fake)
+        self._root = build(loaded, skills(), self._plant.cell, Scope(), emit)
 
     def tick(self) -> bool:
         """Go on by one tick; return whether there is more to do."""
+        self._plant.begin_tick()
         self._root.tick_once()
         if self._root.status is not Status.RUNNING:
             return False
-        self._fake.advance()
-        self._ticks += 1
-        assert self._ticks < 5000, "the mission goes on for ever"
+        self._plant.plan_ahead()
+        self._plant.advance()
+        assert self._plant.tick < 5000, "the mission goes on for ever"
         return True
 
     def story(self) -> Story:
         self._fake.accounts.close()
         items = {**self._fake.accounts.balance(), "rows": self._fake.accounts.rows()}
         return (
-            self._root.status.value, self._ticks, self._trace.hexdigest(), variables(self._root), items,
+            self._root.status.value, self._plant.tick, self._trace.hexdigest(), variables(self._root), items,
             self._fake.audit(),
         )  # fmt: skip
-
-    def _emit(self, kind: str, **data: Any) -> None:
-        clock = 0.0 if self._fake is None else self._fake.cell.clock.now
-        self._trace(Event(kind, self._ticks, round(clock, 6), data))
 
 
 @cache

@@ -18,12 +18,6 @@ def test_the_nearest_target_comes_first_with_its_bin(fake: FakeCell, look) -> No
     assert result.commanded == ["decided duck-1 yellow_bin"]
 
 
-def test_a_tentative_choice_is_no_decision(fake: FakeCell, look) -> None:
-    fake.world.put("cube", 0.6, -0.2)
-    result = select(fake, look(), tentative=True)
-    assert (result.outputs["item"], result.commanded) == ("cube-1", [])
-
-
 def test_while_the_arm_moves_the_nearest_is_the_one_nearest_to_where_it_will_be(fake: FakeCell, look) -> None:
     fake.world.put("cube", 0.45, 0.0)
     fake.world.put("duck", 0.6, -0.2)

@@ -146,7 +146,9 @@ def test_a_fault_repeated_is_recorded(campaign: Campaign, tmp_path: Path) -> Non
 
 def test_a_skill_that_says_in_its_second_start_that_it_dropped_something_has_let_it_fall() -> None:
     skills = discover()
-    path = "tree/2:repeat/do/carry/try/retry/do/2:parallel/1:sequence/1:retry/do/Transit"
+    path = (
+        "tree/2:repeat/do/carry_and_watch/try/retry/do/deliver_and_watch/parallel/deliver/1:retry/do/Transit"
+    )
     breakages = [Breakage(path, "fails", "dropped", (2,))]
     result = run_mission("sort_overhead", substitutes=broken_skills(breakages, {path: skills["Transit"]}))
     states: list[Mapping[str, Any]] = [event.data for event in result.events if event.kind == "item"]

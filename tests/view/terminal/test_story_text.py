@@ -34,7 +34,7 @@ def text(run: FailedRun, *, numbered: bool = True) -> str:
     assert story is not None
     told = "\n".join(story_lines(story, "runs/latest", "executive run trial")) + "\n"
     told = re.sub(r"py:\d+", "py:N", told)
-    return told if numbered else re.sub(r"\bline \d+", "line N", told)
+    return told if numbered else re.sub(r"(\bline |\.yaml:)\d+", r"\1N", told)
 
 
 def gone(look: int, true: object) -> str:
@@ -52,7 +52,7 @@ FAILURE after 1.77 s: Transit of cube-1 failed (dropped) on the last of 3 attemp
 why nothing in trial.yaml stopped it, from the root down:
   retry              all 3 attempts failed: 1 x Grasp.missed, 2 x Transit.dropped (line 11)
   Transit of cube-1  tree/5:retry/do/Transit (line 15)
-the cell    tool.holding = False (1.77 s), tool.touching = True (1.60 s), tool.bears = 7.9 (1.09 s)
+the cell    tool.holding = False (1.77 s), tool.touching = True (1.60 s), tool.bears = 7.9 (1.19 s)
 last look   cube-1 as cube 0.90 at (0.498, 0.102, 0.025) m: frame 3, camera overhead, by embedded, at 1.31 s;
             3 looks, 3 failed attempts in all
 now         the arm is at rest, the tool is empty
@@ -114,17 +114,18 @@ def test_a_detector_that_gives_no_answer(at_home) -> None:
 FAILURE after 7.40 s: Detect failed (unavailable) on the last of 8 attempts: detector embedded: the server is
   gone
 why nothing in missions/sort_overhead.yaml stopped it, from the root down:
-  look: try    catches only Detect.unsure (line N)
+  look: try    catches only Detect.unsure (missions/library/sorting.yaml:N)
   look: retry  tries again only after Detect.unsure, Detect.hidden, Localize.stale, Localize.no_depth,
-               MoveToScan.unreachable, MoveToScan.blocked (line N)
-  look: retry  all 8 attempts failed: 8 x Detect.unavailable (line N)
-  Detect       tree/look/try/retry/do/2:retry/do/Detect (line N)
+               MoveToScan.unreachable, MoveToScan.blocked (missions/library/sorting.yaml:N)
+  look: retry  all 8 attempts failed: 8 x Detect.unavailable (missions/library/sorting.yaml:N)
+  Detect       tree/look/try/retry/do/2:retry/do/Detect (missions/library/sorting.yaml:N)
 the cell    detector.embedded raised Unavailable (7.40 s)
 last look   none so far
 now         the arm is at rest, the tool is empty
 next        see to it that detector.embedded answers again
-next        to let the mission go on after Detect.unavailable: catch it in the try at line N, or allow more
-            than 8 attempts at line N
+next        to let the mission go on after Detect.unavailable: catch it in the try at
+            missions/library/sorting.yaml:N, or allow more than 8 attempts at
+            missions/library/sorting.yaml:N
 record      runs/latest
 repeat      executive run trial
 """
@@ -173,18 +174,21 @@ def test_an_arm_whose_way_is_barred_whenever_it_carries(at_home) -> None:
     expected = """\
 FAILURE after 1.91 s: PutDown of cube-1 failed (blocked): link 5 met a wrench
 why nothing in missions/sort_overhead.yaml stopped it, from the root down:
-  repeat             ends well only with choice.no_candidate (line N)
-  carry: try         caught Transit.blocked (link 5 met a wrench), but what it did instead failed (line N)
-  carry: try         catches only PutDown.dropped (line N)
-  PutDown of cube-1  tree/2:repeat/do/carry/try/catch/4/try/do/PutDown (line N)
-the cell    arm.met = link 5 met a wrench (1.15 s), tool.bears = 7.9 (0.57 s), tool.holding = True (0.57 s)
+  repeat                ends well only with choice.no_candidate (line N)
+  carry_and_watch: try  caught Transit.blocked (link 5 met a wrench), but what it did instead failed
+                        (missions/library/sorting.yaml:N)
+  put_aside: try        catches only PutDown.dropped (missions/library/sorting.yaml:N)
+  PutDown of cube-1     tree/2:repeat/do/carry_and_watch/try/catch/4/put_aside/try/do/PutDown
+                        (missions/library/sorting.yaml:N)
+the cell    arm.met = link 5 met a wrench (1.15 s), tool.bears = 7.9 (0.68 s), tool.holding = True (0.68 s)
 last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera overhead, by embedded, at 0.05 s;
             1 look, 0 failed attempts in all
 now         the arm is at rest, the tool holds cube-1
 left to do  1: cube-1
 next        take cube-1 out of the tool before another run
 next        see what is in the arm's way: link 5 met a wrench
-next        to let the mission go on after PutDown.blocked: catch it in the try at line N
+next        to let the mission go on after PutDown.blocked: catch it in the try at
+            missions/library/sorting.yaml:N
 record      runs/latest
 repeat      executive run trial
 """
