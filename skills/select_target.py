@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from executive.cell import Cell, Steps
+from executive.cell import Cell
 from executive.goals import nearest_first
 from executive.messages import Item, Target
 from executive.skill import In, Out, Skill, SkillFailed, param, port
@@ -30,9 +30,8 @@ class SelectTarget(Skill):
     )
     reasons: ClassVar = ("no_candidate", "unseen", "doubtful")
 
-    def run(self, cell: Cell) -> Steps:
+    def run(self, cell: Cell) -> None:
         """Filter, order, take the first."""
-        yield from ()
         candidates = [
             target for target in nearest_first(cell, self.targets) if self._is_sought(cell, target.item)
         ]

@@ -119,7 +119,7 @@ def test_everything_registered_is_counted_and_loaded(tmp_path: Path, monkeypatch
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", list(sys.path))
     assert shown(doctor.check_registered()) == [
-        "ok registered: 14 skills, 2 kinds of cells, 4 kinds of detectors"
+        "ok registered: 13 skills, 2 kinds of cells, 4 kinds of detectors"
     ]
     Path("pyproject.toml").write_text("[project]\n")
     assert shown(doctor.check_registered())[0].endswith(f"detectors; {tmp_path}/pyproject.toml counts")

@@ -10,6 +10,7 @@ import at_hand
 import pytest
 
 from executive.arm import Goal
+from executive.events import Event
 from executive.goals import nearest_first
 from executive.messages import Target
 from executive.runtime.plant import Plant
@@ -31,19 +32,27 @@ class Bench:
 
     Attributes:
         plans: Data of every `plan` event.
+        decisions: Items of all `decision` events.
     """
 
     def __init__(self) -> None:
         self.plans: list[dict[str, Any]] = []
-        self.plant = Plant([lambda event: self.plans.append(event.data) if event.kind == "plan" else None])
+        self.decisions: list[str] = []
+        self.plant = Plant([self.note])
         self.fake = FakeCell(emit=self.plant.emit)
         self.plant.connect(self.fake)
         self.look = partial(at_hand.look, self.fake)
         self.fake.world.put("cube", 0.5, 0.0)
 
+    def note(self, event: Event) -> None:
+        if event.kind == "plan":
+            self.plans.append(event.data)
+        elif event.kind == "decision":
+            self.decisions.append(event.data["item"])
+
     def run(self, skill: Skill, meanwhile: Callable[[], object] = lambda: None) -> Skill:
         """Run a skill to its end; call `meanwhile` once, 30 control steps after its beginning."""
-        for tick, _ in enumerate(skill.run(self.plant.cell)):
+        for tick, _ in enumerate(skill.run(self.plant.cell) or ()):
             if tick == 30:
                 meanwhile()
             self.plant.plan_ahead()
@@ -93,7 +102,7 @@ def test_the_next_target_is_the_one_that_is_selected_when_the_arm_is_free(bench:
     bench.fake.world.put("cube", 0.6, 0.1)
     targets = bench.look()
     bench.carry(targets[:1])
-    assert [one.item for one in bench.fake.decisions] == ["cube-1"], "planning ahead decides nothing"
+    assert bench.decisions == ["cube-1"], "planning ahead decides nothing"
     selected = bench.run(SelectTarget(targets=targets))
     assert (selected.item, selected.bin) == ("cube-2", "blue_bin")
     bench.run(Approach(target=selected.target))

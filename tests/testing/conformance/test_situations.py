@@ -74,7 +74,7 @@ def test_a_skill_is_tried_in_every_situation_that_it_may_begin_in() -> None:
         "with an empty tool and pose: next",
         "with an empty tool and pose: aside",
     ]
-    assert names(discover()["Grasp"]) == ["with an empty tool", "with an empty tool and every input given"]
+    assert "with an empty tool and every input given" in names(discover()["SelectTarget"])
     given = names(discover()["MoveToScan"], lambda stage: {"pose": "home"})
     assert given == ["with an empty tool", "with an item in the tool"], "a param that is given is not varied"
 
