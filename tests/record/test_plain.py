@@ -20,25 +20,15 @@ from executive.messages import Detection, Frame, Reliability
 from executive.record.plain import LONGEST, plain
 
 
-class Colour(Enum):
-    RED = "red"
-
-
-class Shade(str, Enum):
-    DARK = "dark"
-
-
-class Level(IntEnum):
-    HIGH = 3
-
-
-class Share(float, Enum):
-    THIRD = 1 / 3
-
-
 class Corner(NamedTuple):
     x: float
     y: float
+
+
+Colour = Enum("Colour", {"RED": "red"})
+Shade = Enum("Shade", {"DARK": "dark"}, type=str)
+Level = IntEnum("Level", {"HIGH": 3})
+Share = Enum("Share", {"THIRD": 1 / 3}, type=float)
 
 
 @dataclass

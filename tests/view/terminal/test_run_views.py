@@ -58,14 +58,14 @@ def test_what_rests_is_folded():
     assert [node.name for node in opened(nodes, {"tree/sort/repeat"})] == ["sort"]
 
 
-MISSED = {"reason": "missed", "message": "no seal 0.1 s after contact"}
+MISSED = {"item": "cube-1", "reason": "missed", "message": "no seal 0.1 s after contact"}
 AGAIN = {"node": "tree/sort/repeat", "choice": "attempt 2 of 3", "reason": "Grasp.missed"}
 
 
 @pytest.mark.parametrize(
     ("events", "shown"),
     [
-        ([status(GRASP, "RUNNING", 1.0, item="cube-1"), status(GRASP, "FAILURE", 1.1, item="cube-1", **MISSED)],
+        ([status(GRASP, "RUNNING", 1.0, item="cube-1"), status(GRASP, "FAILURE", 1.1, **MISSED)],
          ["     1.00 s  Grasp [cube-1] ...",
           "     1.10 s  Grasp [cube-1] failed: missed: no seal 0.1 s after contact"]),
         ([status("tree/sort/repeat", "RUNNING"), Event("choice", 1, 2.0, AGAIN),

@@ -117,8 +117,8 @@ def test_a_detector_that_gives_no_answer(at_home) -> None:
     assert chain[0::2] == ["catches only Detect.unsure", "all 8 attempts failed: 8 x Detect.unavailable"]
     assert [unnumbered(each) for each in story["next"]] == [
         "see to it that detector.embedded answers again",
-        "to let the mission go on after Detect.unavailable: catch it in the try at missions/library/sorting.yaml:N"
-        ", or allow more than 8 attempts at missions/library/sorting.yaml:N",
+        "to let the mission go on after Detect.unavailable: catch it in the try at "
+        "missions/library/sorting.yaml:N, or allow more than 8 attempts at missions/library/sorting.yaml:N",
     ]
 
 
