@@ -153,6 +153,18 @@ def read_journal(path: Path) -> list[Entry]:
     return entries
 
 
+def start_of(entries: Sequence[Entry], path: Path, otherwise: str) -> Entry:
+    """Return the entry for how the run in the directory `path` began.
+
+    Raises:
+        InputError: It had not begun; `otherwise` says what follows from that.
+    """
+    for entry in entries:
+        if entry["kind"] == "run":
+            return entry
+    raise InputError(f'the run in "{path}" had not begun when it was cut off; {otherwise}')
+
+
 def ending_of(entries: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
     """Return the `end` of a run by its journal, or None: it was cut off, or goes on.
 
