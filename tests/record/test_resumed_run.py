@@ -10,8 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, Phase, example, given, settings
-from hypothesis import strategies as st
 
 from executive.discovery import discover
 from executive.errors import InputError
@@ -63,10 +61,8 @@ def load(missions: Path, name: str) -> LoadedMission:
 
 def run_of(loaded: LoadedMission, runs: Path, **options: Any) -> dict[str, Any]:
     """Run a mission on the fake cell, asking for every class four times."""
-    requests = [*loaded.routes] * 4
-    return recorded_run(
-        loaded, discover(), seed=SEED, runs=runs, kind=FakeCell, requests=requests, frames=False, **options
-    )
+    options = {"skills": discover(), "requests": [*loaded.routes] * 4, **options}
+    return recorded_run(loaded, seed=SEED, runs=runs, kind=FakeCell, frames=False, **options)
 
 
 def cut_off(loaded: LoadedMission, runs: Path, tick: int, nth: int = 1) -> Path:
@@ -77,7 +73,7 @@ def cut_off(loaded: LoadedMission, runs: Path, tick: int, nth: int = 1) -> Path:
 
 
 def resumed(path: Path, **options: Any) -> dict[str, Any]:
-    return resumed_run(path, discover(), frames=False, kind=FakeCell, **options)
+    return resumed_run(path, **{"skills": discover(), **options}, frames=False, kind=FakeCell)
 
 
 def redecided(path: Path) -> str:
@@ -98,44 +94,27 @@ def placed(path: Path) -> Counter[str]:
 
 
 MISSIONS = ("sort_overhead", "sort_wrist", "kit_fasteners", "pick_on_request")
-CASES = [(name, after) for name in MISSIONS for after in (1, 333, 700, 1100)]
+WITHIN_A_STEP = [(444, 7), (1203, 3), (2100, 11)]
+CASES = [(name, after, 1) for name in MISSIONS for after in (1, 333, 700, 1100)] + [
+    ("sort_overhead", *cut) for cut in WITHIN_A_STEP
+]
+QUICK = ("sort_overhead", 700, 1)
 
 
 @pytest.mark.parametrize(
-    ("name", "after"),
-    [pytest.param(*case, marks=[] if case == ("sort_overhead", 700) else pytest.mark.slow) for case in CASES],
+    ("name", "after", "nth"),
+    [pytest.param(*case, marks=[] if case == QUICK else pytest.mark.slow) for case in CASES],
 )
-def test_it_ends_as_if_nothing_had_happened(missions: Path, tmp_path: Path, name: str, after: int) -> None:
+def test_it_ends_as_if_nothing_had_happened(missions: Path, tmp_path: Path, name, after, nth) -> None:
     loaded = load(missions, name)
     whole = run_of(loaded, tmp_path)
-    path = cut_off(loaded, tmp_path, after)
+    path = cut_off(loaded, tmp_path, after, nth)
     result = resumed(path)
     assert (result["status"], result["items"]) == (whole["status"], whole["items"])
     assert ledger_agrees(result)
     assert set(placed(path).values()) <= {1}
     assert redecided(path) == ""
     assert json.loads((path / "result.json").read_text()) == result
-
-
-@pytest.mark.slow
-@settings(
-    max_examples=4,
-    deadline=None,
-    # Each run takes a second: shrinking would take long.
-    phases=[Phase.explicit, Phase.reuse, Phase.generate],
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
-@given(st.integers(0, 2700), st.integers(1, 12))
-@example(444, 7)
-def test_in_the_middle_of_a_control_step_it_may_be_cut_off_too(
-    missions: Path, tmp_path_factory: pytest.TempPathFactory, tick: int, nth: int
-) -> None:
-    path = cut_off(load(missions, "sort_overhead"), tmp_path_factory.mktemp("runs"), tick, nth)
-    result = resumed(path)
-    assert result["status"] == "SUCCESS"
-    assert result["items"]["placed"] == result["items"]["seen"] == result["audit"]["right"]
-    assert set(placed(path).values()) == {1}
-    assert redecided(path) == ""
 
 
 @pytest.mark.slow
@@ -199,11 +178,10 @@ def test_a_run_that_was_halted_goes_on(missions: Path, tmp_path: Path) -> None:
 def test_a_run_that_a_bug_has_ended_goes_on_once_it_is_mended(missions: Path, tmp_path: Path, name) -> None:
     skills = discover()
     buggy = {**skills, name: raising(skills[name], ZeroDivisionError("a bug"), after=3)}
-    loaded = load_mission(missions / "sort_overhead.yaml", buggy)
-    first = recorded_run(loaded, buggy, seed=SEED, runs=tmp_path, kind=FakeCell, frames=False)
+    first = run_of(load(missions, "sort_overhead"), tmp_path, skills=buggy)
     assert (first["status"], "a bug" in first["message"]) == ("FAULT", True)
     run = Path(first["run"])
-    again = resumed_run(run, buggy, frames=False, kind=FakeCell)
+    again = resumed(run, skills=buggy)
     assert again["message"] == first["message"], "it is not mended yet"
     result = resumed(run)
     assert (result["status"], result["audit"]["right"]) == ("SUCCESS", result["items"]["seen"])

@@ -30,12 +30,11 @@ def full(*args, **kwargs):
 
 
 def test_latest_points_to_the_last_run_and_survives_moving_the_folder(tmp_path):
-    create(tmp_path / "runs").save_inputs(mission="", params={}, cell={})
-    last = create(tmp_path / "runs")
-    last.save_inputs(mission="", params={}, cell={})
-    (last.path / "mark").touch()
+    for number in range(2):
+        directory = create(tmp_path / "runs")
+        directory.save_inputs(mission=f"mission: {number}", params={}, cell={})
     (tmp_path / "runs").rename(tmp_path / "moved")
-    assert (tmp_path / "moved" / "latest" / "mark").exists()
+    assert (tmp_path / "moved" / "latest" / "mission.yaml").read_text() == "mission: 1"
 
 
 def test_what_repeats_a_run_is_on_the_disk_and_libraries_lie_where_the_mission_looks(tmp_path, monkeypatch):

@@ -154,20 +154,14 @@ def test_what_was_let_go_as_the_run_ended_is_to_be_looked_for() -> None:
 
     run.at_every_step(let_go_and_stop)
     story = run.tell()
-    assert (story["holds"], story["left"]) == ("", ["cube-1"])
-    assert story["next"] == ["see where cube-1 lies: it was let go as the run ended"]
+    said = ["see where cube-1 lies: it was let go as the run ended"]
+    assert (story["holds"], story["left"], story["next"]) == ("", ["cube-1"], said)
 
 
 def test_a_halt_at_a_question_says_so() -> None:
     run = FailedRun("pick_on_request", requests=None)
-
-    def stop(event: Event) -> None:
-        if event.kind == "asking":
-            run.run.control.stop()
-
-    run.run.observe(stop)
-    story = run.tell()
-    assert story["verdict"] == "halted by the user while the operator was asked"
+    run.run.observe(lambda event: run.run.control.stop() if event.kind == "asking" else None)
+    assert run.tell()["verdict"] == "halted by the user while the operator was asked"
 
 
 @pytest.mark.slow

@@ -11,9 +11,6 @@ from tests.record.failed_runs import PICK, FailedRun
 
 CUBE = [("cube", 0.5, 0.1)]
 DUCK = [("duck", 0.4, -0.1)]
-TIMED = "  timeout:\n    seconds: $patience\n    do:\n" + "".join(
-    f"    {line}\n" for line in PICK.splitlines()
-)
 
 
 @pytest.fixture
@@ -69,21 +66,16 @@ next        to let the mission go on after Transit.dropped: put a try with a cat
 
 
 def test_a_time_that_is_over(abroad) -> None:
-    run = FailedRun(TIMED, objects=CUBE, overrides={"patience": "1.0"})
-    assert (
-        text(run)
-        == """\
-FAILURE after 1.00 s: timeout: not done after 1 s during Transit of cube-1
-where       tree/timeout (trial.yaml:7)
-last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera overhead, by embedded, at 0.05 s;
-            1 look, 0 failed attempts in all
-now         the arm is at rest, the tool holds cube-1
-left to do  1: cube-1
-next        take cube-1 out of the tool before another run
-next        to let the mission go on after timeout.timeout: put a try with a catch for it around line 7, or
-            allow more than 1 s with --set patience=...
-"""
-    )
+    body = "".join(f"    {line}\n" for line in PICK.splitlines())
+    tree = "  timeout:\n    seconds: $patience\n    do:\n" + body
+    story = FailedRun(tree, objects=CUBE, overrides={"patience": "1.0"}).tell()
+    assert story["verdict"] == "timeout: not done after 1 s during Transit of cube-1"
+    assert (story["node"]["path"], story["node"]["place"]) == ("tree/timeout", "trial.yaml:7")
+    assert story["next"] == [
+        "take cube-1 out of the tool before another run",
+        "to let the mission go on after timeout.timeout: put a try with a catch for it around line 7, or "
+        "allow more than 1 s with --set patience=...",
+    ]
 
 
 def test_an_exception_in_a_part(abroad) -> None:
