@@ -146,14 +146,11 @@ def test_what_the_last_decision_rests_on_is_kept(tmp_path, drawn):
     assert list(drawn) == ["000012_cube-1.jpg", "000090_cube-1_missed.jpg"]
 
 
-def test_a_long_run_keeps_its_first_pictures_and_says_so(tmp_path, drawn, monkeypatch):
+def test_a_long_run_keeps_its_first_pictures_and_says_what_it_left_out(tmp_path, drawn, monkeypatch):
     monkeypatch.setattr(module, "MOST", 3)
     frames = shown(tmp_path, look(1, CUBE), *(decision(tick=tick) for tick in range(5)))
     assert list(drawn) == ["000000_cube-1.jpg", "000001_cube-1.jpg", "000002_cube-1.jpg"]
     assert frames.problem == "pictures left out: 2 beyond the 3 that a run keeps"
-
-
-def test_pictures_that_come_too_fast_are_told(tmp_path, monkeypatch):
     monkeypatch.setattr(Drawer, "draw", lambda self, name, scene: False)
     frames = shown(tmp_path, look(1, CUBE), decision())
     assert frames.problem == "pictures left out: 1 that came faster than they can be drawn"

@@ -115,13 +115,9 @@ def test_serves_the_page_to_the_page_and_nothing_else() -> None:
         assert site.wishes == []
 
     serve(look)
-
-
-def test_the_policy_and_the_headers_keep_the_page_to_itself() -> None:
     assert POLICY.startswith("default-src 'none'; script-src 'self'; ")
     assert "frame-ancestors 'none'" in POLICY
-    assert HEADERS["Referrer-Policy"] == "no-referrer"
-    assert HEADERS["Cache-Control"] == "no-store"
+    assert (HEADERS["Referrer-Policy"], HEADERS["Cache-Control"]) == ("no-referrer", "no-store")
 
 
 def test_a_watcher_is_told_everything_then_news_and_is_heard() -> None:

@@ -75,23 +75,18 @@ def test_however_long_the_run_its_timeline_has_a_bound():
 
 
 @pytest.mark.parametrize(
-    ("end", "length"), [(0.0, SHORTEST), (1.0, SHORTEST), (100.0, 4500.0), (1e6, LONGEST)]
+    ("end", "length"), [(0.0, SHORTEST), (1.0, SHORTEST), (100.0, 4500.0), (4e6, LONGEST)]
 )
-def test_the_time_axis_is_neither_too_short_nor_too_long(end, length):
+def test_the_time_axis_is_neither_too_short_nor_too_long_and_its_times_stand_clear(end, length):
     picture = ElementTree.fromstring(timeline([ran("Wait", 0.0, end)], TREE, end))
     (bar,) = picture.iter(f"{SVG}rect")
     assert float(bar.attrib["width"]) == pytest.approx(length if end else THINNEST)
-    assert float(picture.attrib["width"]) > length
-
-
-@pytest.mark.parametrize("end", [0.0, 26.0, 500.0, 4e6])
-def test_the_times_above_the_lanes_stand_clear_of_each_other(end):
-    picture = ElementTree.fromstring(timeline([ran("Wait", 0.0, end)], TREE, end))
+    width = float(picture.attrib["width"])
+    assert width > length
     clocks = [text for text in picture.iter(f"{SVG}text") if text.attrib["class"] == "clock"]
     places = [float(text.attrib["x"]) for text in clocks]
-    assert clocks[0].text == "0 s"
+    assert (clocks[0].text, places[-1] <= width) == ("0 s", True)
     assert all(after - before >= 55 - 0.2 for before, after in pairwise(places))
-    assert places[-1] <= float(picture.attrib["width"])
 
 
 def test_text_from_a_mission_cannot_leave_its_place():

@@ -123,30 +123,25 @@ RESULT = {
 }  # fmt: skip
 
 
-def test_the_summary_says_how_it_ended_how_long_it_took_and_how_to_repeat_it():
+def test_the_summary_says_how_it_ended_how_long_it_took_and_how_to_repeat_it_in_a_shell():
     items = ItemTable()
-    items(item("placed", bin="red_bin"))
-    items(item("placed", item="cube-2", bin="red_bin"))
-    items(item("rejected", item="duck-1", why="three misses"))
-    repeat = repeat_command("sort", seed=7, overrides={"attempts": "5"}, requests=["cube"])
-    assert summary(RESULT, items, repeat).splitlines() == [
+    for event in (
+        item("placed", bin="red_bin"), item("placed", item="cube-2", bin="red_bin"),
+        item("rejected", item="duck-1", why="three misses"),
+    ):  # fmt: skip
+        items(event)
+    repeat = repeat_command("my mission.yaml", seed=7, overrides={"attempts": "a b"}, requests=["cube"])
+    lines = [
         "FAILURE Transit.dropped at sort/0/3: lost at 1.2 m/s",
         "34.2 s on the robot's clock, 6.8 s by the wall clock",
-        "runs/latest  (repeat: executive run sort --seed 7 --set attempts=5 --request cube)",
+        "runs/latest  (repeat: executive run 'my mission.yaml' --seed 7 --set 'attempts=a b' --request cube)",
         "  red_bin: cube-1, cube-2",
         "  rejected: duck-1 (three misses)",
     ]
-
-
-def test_the_summary_of_a_success_names_the_report_and_its_command_survives_a_shell():
+    assert summary(RESULT, items, repeat).splitlines() == lines
     result = {**RESULT, "status": "SUCCESS", "reason": "", "node": "", "message": ""}
-    repeat = repeat_command("my mission.yaml", seed=0, overrides={"a": "x y"})
-    assert summary(result, ItemTable(), repeat, "runs/x/report.html").splitlines() == [
-        "SUCCESS",
-        "34.2 s on the robot's clock, 6.8 s by the wall clock",
-        "runs/latest  (repeat: executive run 'my mission.yaml' --seed 0 --set 'a=x y')",
-        "report: runs/x/report.html",
-    ]
+    shown = summary(result, ItemTable(), repeat, "runs/x/report.html").splitlines()
+    assert shown == ["SUCCESS", *lines[1:3], "report: runs/x/report.html"]
 
 
 def test_the_keys_are_named_beside_the_clock_where_there_is_a_keyboard(monkeypatch):
