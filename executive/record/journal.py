@@ -68,7 +68,7 @@ class Journal:
         line = self._encode(entry)
         try:
             self._write(self._file, line)
-            if _must_last(entry):
+            if entry["kind"] in ("intent", "end") or entry.get("state") == "placed":
                 self._sync(self._file)
         except OSError as error:
             self._broken = True
@@ -186,11 +186,6 @@ def _entry_in(line: bytes) -> Entry:
     if not isinstance(entry, dict):
         raise ValueError("it is no object")
     return entry
-
-
-def _must_last(entry: Entry) -> bool:
-    kind = entry["kind"]
-    return kind in ("intent", "end") or (kind == "item" and entry.get("state") == "placed")
 
 
 def _whole(content: bytes) -> int:
