@@ -68,7 +68,7 @@ class Journal:
         line = self._encode(entry)
         try:
             self._write(self._file, line)
-            if _must_last(entry):
+            if entry["kind"] in ("intent", "end") or entry.get("state") == "placed":
                 self._sync(self._file)
         except OSError as error:
             self._broken = True
@@ -153,6 +153,18 @@ def read_journal(path: Path) -> list[Entry]:
     return entries
 
 
+def start_of(entries: Sequence[Entry], path: Path, otherwise: str) -> Entry:
+    """Return the entry for how the run in the directory `path` began.
+
+    Raises:
+        InputError: It had not begun; `otherwise` says what follows from that.
+    """
+    for entry in entries:
+        if entry["kind"] == "run":
+            return entry
+    raise InputError(f'the run in "{path}" had not begun when it was cut off; {otherwise}')
+
+
 def ending_of(entries: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
     """Return the `end` of a run by its journal, or None: it was cut off, or goes on.
 
@@ -174,11 +186,6 @@ def _entry_in(line: bytes) -> Entry:
     if not isinstance(entry, dict):
         raise ValueError("it is no object")
     return entry
-
-
-def _must_last(entry: Entry) -> bool:
-    kind = entry["kind"]
-    return kind in ("intent", "end") or (kind == "item" and entry.get("state") == "placed")
 
 
 def _whole(content: bytes) -> int:

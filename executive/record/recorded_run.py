@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -113,10 +114,11 @@ def new_directory(run: Run, loaded: LoadedMission, seed: int, runs: Path) -> Run
     return directory
 
 
+@dataclass
 class Recording:
     """A run, and all who follow it.
 
-    Args:
+    Attributes:
         run: The run.
         loaded: Its mission.
         skills: Installed skills by name.
@@ -126,20 +128,17 @@ class Recording:
         past: Events before it begins.
     """
 
-    def __init__(
-        self,
-        run: Run,
-        loaded: LoadedMission,
-        skills: Mapping[str, type[Skill]],
-        directory: RunDirectory,
-        recorder: Recorder,
-        views: Sequence[View] | None = None,
-        past: Iterable[Event] = (),
-    ) -> None:
-        self._run, self._loaded, self._directory = run, loaded, directory
-        self._recorder, self._views, self._past = recorder, views or (), past
+    run: Run
+    loaded: LoadedMission
+    skills: Mapping[str, type[Skill]]
+    directory: RunDirectory
+    recorder: Recorder
+    views: Sequence[View]
+    past: Iterable[Event] = ()
+
+    def __post_init__(self) -> None:
         self._noted: list[dict[str, Any]] = []
-        self._story = Story(loaded, skills)
+        self._story = Story(self.loaded, self.skills)
 
     def execute(self, seed: int, began: float) -> dict[str, Any]:
         """Execute the run and return its result object, which is in the run directory then.
@@ -150,22 +149,22 @@ class Recording:
             ExecutiveError: The result cannot be written.
         """
         outcome, items, audit = self._watched()
-        run, path = self._run, self._directory.path
+        run, path = self.run, self.directory.path
         result = result_of(
-            mission=self._loaded.mission.name, seed=seed, outcome=outcome, items=items, audit=audit,
+            mission=self.loaded.mission.name, seed=seed, outcome=outcome, items=items, audit=audit,
             noted=self._noted, story=self._story.tell(outcome, path, lambda: run.workcell.cell.arm.at_rest),
-            wall_time=time.perf_counter() - began, trace=self._recorder.trace, run=path,
+            wall_time=time.perf_counter() - began, trace=self.recorder.trace, run=path,
         )  # fmt: skip
-        problems = [self._recorder.problem]
+        problems = [self.recorder.problem]
         try:
-            write_result(self._directory.result, result)
+            write_result(self.directory.result, result)
         except ExecutiveError as error:
             problems.append(str(error))
             if result["status"] != "FAULT":
                 # What `--json` prints is then all that there is of it.
                 result |= {"status": "FAULT", "reason": "fault", "message": str(error), "node": ""}
         if any(problems):
-            for view in self._views:
+            for view in self.views:
                 view.note("; ".join(filter(None, problems)))
         return result
 
@@ -176,22 +175,22 @@ class Recording:
 
     def _watched(self) -> tuple[Outcome, dict[str, Any], Mapping[str, int] | None]:
         """Execute the run with all observers attached, and close them at every end."""
-        run, completed = self._run, False
-        watchers: list[Observer] = [self._note, self._story, *self._views]
+        run, completed = self.run, False
+        watchers: list[Observer] = [self._note, self._story, *self.views]
         try:
-            for view in self._views:
+            for view in self.views:
                 view.open(run)
             for watcher in watchers:
                 run.observe(watcher)
-            for event in self._past:
+            for event in self.past:
                 for watcher in watchers:
                     watcher(event)
-            run.record(self._recorder)
+            run.record(self.recorder)
             ended = run.execute(), run.items(), run.audit()
             completed = True
         finally:
-            for view in reversed(self._views):
+            for view in reversed(self.views):
                 view.close()
             # Whoever ends a run by force does not want to wait for its pictures.
-            self._recorder.close(wait=completed)
+            self.recorder.close(wait=completed)
         return ended

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 from executive.errors import InputError
 from executive.events import Event
-from executive.record.journal import ending_of, read_journal
+from executive.record.journal import ending_of, read_journal, start_of
 from executive.record.recorded_mission import recorded_mission
 from executive.record.recorded_run import Recording, View
 from executive.record.recorder import Recorder
 from executive.record.replay import compare
 from executive.record.result import ENDED
 from executive.record.run_directory import RunDirectory
-from executive.tape.past import Past
+from executive.tape.past import Entry, Past
 
 if TYPE_CHECKING:
     from executive.skill import Skill
@@ -69,9 +69,9 @@ def resumed_run(
     # First of all: from here on no other process writes to the directory.
     recorder = Recorder(directory, frames=frames, again=True)
     try:
-        past, seed = _past(directory)
-        assert past.start is not None, "a past to take up has begun"
-        loaded = recorded_mission(path, past.start, skills)
+        past, start = _past(directory)
+        seed = int(start["seed"])
+        loaded = recorded_mission(path, start, skills)
         # Not the step in which it was halted or in which a skill broke: a mended skill may go on there.
         taken_up = past if past.halt is None else past.before(int(past.halt["tick"]))
         replay = compare(loaded, skills, taken_up, seed)
@@ -81,7 +81,7 @@ def resumed_run(
                 "skill has been changed since; go back to what it was run with, or run the mission anew"
             )
         run = Run(
-            loaded, skills, seed=seed, gui=gui, realtime=realtime, requests=past.start["requests"],
+            loaded, skills, seed=seed, gui=gui, realtime=realtime, requests=start["requests"],
             keyboard=keyboard, kind=kind, past=past, takes_up=directory.world,
         )  # fmt: skip
     except BaseException:
@@ -96,8 +96,8 @@ def resumed_run(
         return Recording(run, loaded, skills, directory, recorder, views, told).execute(seed, began)
 
 
-def _past(directory: RunDirectory) -> tuple[Past, int]:
-    """Return what a run to take up again has had, and its seed.
+def _past(directory: RunDirectory) -> tuple[Past, Entry]:
+    """Return what a run to take up again has had, and how it began.
 
     Raises:
         InputError: There is nothing to take up.
@@ -109,12 +109,7 @@ def _past(directory: RunDirectory) -> tuple[Past, int]:
             f'the run in "{directory.path}" came to its end: {ending["status"]}; '
             "there is nothing to take up again"
         )
-    past = Past.of(entries)
-    if past.start is None:
-        raise InputError(
-            f'the run in "{directory.path}" had not begun when it was cut off; run the mission anew'
-        )
-    return past, int(past.start["seed"])
+    return Past.of(entries), start_of(entries, directory.path, "run the mission anew")
 
 
 def _events(past: Past) -> Iterator[Event]:

@@ -26,7 +26,10 @@ _BOLD = 1.12
 
 def extent(text: str, size: float, *, bold: bool = False) -> float:
     """Return about how long a text is in a sans-serif font of this size; never too short in usual fonts."""
-    advances = sum(_advance(character) for character in text)
+    advances = sum(
+        1.05 if unicodedata.east_asian_width(character) in "WF" else _ADVANCE.get(character, _USUAL)
+        for character in text
+    )
     return advances * size * (_BOLD if bold else 1.0)
 
 
@@ -62,9 +65,3 @@ def render(template: str, **values: Any) -> str:
         lstrip_blocks=True,
     )
     return writable(environment.get_template(template).render(values))
-
-
-def _advance(character: str) -> float:
-    if unicodedata.east_asian_width(character) in "WF":
-        return 1.05
-    return _ADVANCE.get(character, _USUAL)

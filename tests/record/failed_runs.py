@@ -36,13 +36,9 @@ PICK = """\
 
 
 class FailedRun:
-    """A run of a mission, its parts to be broken before it is executed; writes a file where it is.
+    """A run of a shipped mission or of a tree, written to a file here; its parts can be broken first.
 
-    Args:
-        mission: Name of a shipped mission, or the tree of one.
-        objects: What lies on the table: label and place [m]; by default what the seed says.
-        overrides: As with `--set`.
-        requests: As with `--request`.
+    `objects` are label and place [m] of what lies on the table; by default it is what the seed says.
     """
 
     def __init__(

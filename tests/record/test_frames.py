@@ -41,6 +41,14 @@ def skill(name: str, status: str, item: str = "", reason: str = "", tick: int = 
     return Event("status", tick, 2.0, data)
 
 
+def shown(folder, *events: Event) -> Frames:
+    """Return an observer that has seen events."""
+    frames = Frames(folder)
+    for event in events:
+        frames(event)
+    return frames
+
+
 @pytest.fixture
 def drawn(monkeypatch):
     """The scenes that would be drawn, by file, without a process."""
@@ -55,9 +63,7 @@ def drawn(monkeypatch):
 
 
 def test_a_decision_is_drawn_on_the_frame_it_rests_on(tmp_path):
-    frames = Frames(tmp_path / "frames")
-    frames(look(1, CUBE, DUCK))
-    frames(decision(position=(0.5, 0.1, 0.02)))
+    frames = shown(tmp_path / "frames", look(1, CUBE, DUCK), decision(position=(0.5, 0.1, 0.02)))
     frames.close()
     assert frames.problem == ""
     image = cv2.imread(str(tmp_path / "frames" / "000012_cube-1.jpg"))
@@ -68,14 +74,11 @@ def test_a_decision_is_drawn_on_the_frame_it_rests_on(tmp_path):
 
 
 def test_a_picture_says_what_the_run_is_about(tmp_path, drawn):
-    frames = Frames(tmp_path)
-    for event in (
-        Event("run", 0, 0.0, {"mission": "sort"}), look(1, DUCK, CUBE), skill("SelectTarget", "RUNNING"),
-        item("duck-1", "placed", bin="yellow_bin"),
-        item("cube-1", "seen", position=(0.5, 0.1, 0.02), attempts=1),
-        decision(),
-    ):  # fmt: skip
-        frames(event)
+    shown(
+        tmp_path, Event("run", 0, 0.0, {"mission": "sort"}), look(1, DUCK, CUBE),
+        skill("SelectTarget", "RUNNING"), item("duck-1", "placed", bin="yellow_bin"),
+        item("cube-1", "seen", position=(0.5, 0.1, 0.02), attempts=1), decision(),
+    )  # fmt: skip
     scene = drawn["000012_cube-1.jpg"]
     assert (scene.mission, scene.clock, scene.age) == ("sort", 0.75, 0.25)
     assert (scene.camera, scene.detector) == ("overhead", "embedded")
@@ -95,23 +98,17 @@ def test_a_picture_says_what_the_run_is_about(tmp_path, drawn):
         ((DUCK,), {}, None),
     ],
 )
-def test_the_chosen_box_is_the_nearest_else_the_only_one_of_its_class(
-    tmp_path, drawn, found, chosen, expected
-):
-    frames = Frames(tmp_path)
-    frames(look(1, *found))
-    frames(decision(**chosen))
+def test_the_chosen_box_is_the_nearest_else_the_only_of_its_class(tmp_path, drawn, found, chosen, expected):
+    shown(tmp_path, look(1, *found), decision(**chosen))
     assert drawn["000012_cube-1.jpg"].chosen == expected
 
 
 def test_a_failed_attempt_is_drawn_on_what_was_decided_from(tmp_path, drawn):
-    frames = Frames(tmp_path)
-    for event in (
-        look(1, CUBE), decision(), look(2), skill("Grasp", "RUNNING", "cube-1"),
+    shown(
+        tmp_path, look(1, CUBE), decision(), look(2), skill("Grasp", "RUNNING", "cube-1"),
         item("cube-1", "seen", position=(0.5, 0.1, 0.02), attempts=1),
         skill("Grasp", "FAILURE", "cube-1", "missed"),
-    ):  # fmt: skip
-        frames(event)
+    )  # fmt: skip
     scene = drawn["000090_cube-1_missed.jpg"]
     assert (scene.failure, scene.message) == ("Grasp.missed", "it was missed")
     assert (scene.phase, scene.attempts, scene.age) == ("Grasp", 1, 1.5)
@@ -120,73 +117,51 @@ def test_a_failed_attempt_is_drawn_on_what_was_decided_from(tmp_path, drawn):
 
 
 def test_a_look_that_leads_to_nothing_is_drawn_once(tmp_path, drawn):
-    frames = Frames(tmp_path)
-    for event in (
-        look(1, DUCK), skill("SelectTarget", "FAILURE", reason="unseen", tick=20),
+    shown(
+        tmp_path, look(1, DUCK), skill("SelectTarget", "FAILURE", reason="unseen", tick=20),
         skill("MoveToScan", "FAILURE", reason="blocked", tick=30),
-    ):  # fmt: skip
-        frames(event)
-    assert list(drawn) == ["000020_unseen.jpg"]
-    scene = drawn["000020_unseen.jpg"]
+    )  # fmt: skip
+    ((name, scene),) = drawn.items()
+    assert name == "000020_unseen.jpg"
     assert (scene.failure, scene.item, scene.chosen) == ("SelectTarget.unseen", "", None)
 
 
 def test_what_fails_because_a_skill_failed_is_not_drawn_again(tmp_path, drawn):
-    frames = Frames(tmp_path)
-    frames(look(1, CUBE))
-    frames(Event("status", 90, 2.0, {"node": "tree/do", "status": "FAILURE", "reason": "Grasp.missed"}))
+    failed = {"node": "tree/do", "status": "FAILURE", "reason": "Grasp.missed"}
+    shown(tmp_path, look(1, CUBE), Event("status", 90, 2.0, failed))
     assert not drawn
 
 
 def test_an_earlier_look_is_found_again_and_old_ones_are_forgotten(tmp_path, drawn):
-    frames = Frames(tmp_path)
-    for number in range(KEPT + 1):
-        frames(look(number, CUBE))
-    frames(decision(frame=1))
-    assert len(drawn) == 1
-    frames(decision(frame=0))
-    assert len(drawn) == 1
+    looks = [look(number, CUBE) for number in range(KEPT + 1)]
+    frames = shown(tmp_path, *looks, decision(frame=1), decision(frame=0, tick=13))
+    assert list(drawn) == ["000012_cube-1.jpg"]
     assert frames.problem == f"pictures left out: 1 of a look before the last {KEPT}"
 
 
 def test_what_the_last_decision_rests_on_is_kept(tmp_path, drawn):
-    frames = Frames(tmp_path)
-    frames(look(0, CUBE))
-    frames(decision(frame=0))
-    for number in range(1, 2 * KEPT):
-        frames(look(number))
-    frames(skill("Grasp", "FAILURE", "cube-1", "missed"))
-    frames(decision(frame=KEPT))
+    looks = [look(number) for number in range(1, 2 * KEPT)]
+    missed = skill("Grasp", "FAILURE", "cube-1", "missed")
+    shown(tmp_path, look(0, CUBE), decision(frame=0), *looks, missed, decision(frame=KEPT, tick=91))
     assert list(drawn) == ["000012_cube-1.jpg", "000090_cube-1_missed.jpg"]
 
 
-def test_a_long_run_keeps_its_first_pictures_and_says_so(tmp_path, drawn, monkeypatch):
+def test_a_long_run_keeps_its_first_pictures_and_says_what_it_left_out(tmp_path, drawn, monkeypatch):
     monkeypatch.setattr(module, "MOST", 3)
-    frames = Frames(tmp_path)
-    frames(look(1, CUBE))
-    for tick in range(5):
-        frames(decision(tick=tick))
+    frames = shown(tmp_path, look(1, CUBE), *(decision(tick=tick) for tick in range(5)))
     assert list(drawn) == ["000000_cube-1.jpg", "000001_cube-1.jpg", "000002_cube-1.jpg"]
     assert frames.problem == "pictures left out: 2 beyond the 3 that a run keeps"
-
-
-def test_pictures_that_come_too_fast_are_told(tmp_path, monkeypatch):
     monkeypatch.setattr(Drawer, "draw", lambda self, name, scene: False)
-    frames = Frames(tmp_path)
-    frames(look(1, CUBE))
-    frames(decision())
+    frames = shown(tmp_path, look(1, CUBE), decision())
     assert frames.problem == "pictures left out: 1 that came faster than they can be drawn"
 
 
 def test_pictures_that_cannot_be_written_are_told_and_break_nothing(tmp_path):
     (tmp_path / "frames").write_text("a file, no folder")
-    frames = Frames(tmp_path / "frames")
-    frames(look(1, CUBE))
-    frames(decision())
+    frames = shown(tmp_path / "frames", look(1, CUBE), decision())
     frames.close()
-    assert frames.problem == (
-        f'not every picture was drawn: cannot make the folder "{tmp_path}/frames": File exists'
-    )
+    problem = f'not every picture was drawn: cannot make the folder "{tmp_path}/frames": File exists'
+    assert frames.problem == problem
 
 
 @pytest.mark.parametrize(

@@ -95,9 +95,7 @@ def test_wherever_the_disk_fills_up_the_run_ends_at_rest_and_says_so(run, monkey
         assert not (left / "result.json").exists() or json.loads((left / "result.json").read_text()) == result
     # Where the run has not begun it is bad input: a place that cannot be written to.
     assert codes == sorted(codes, key=(2, 3, 0).index)
-    assert 0 in codes
-    assert codes.count(2) > 5
-    assert codes.count(3) > len(kinds)
+    assert (0 in codes, codes.count(2) > 5, codes.count(3) > len(kinds)) == (True, True, True)
 
 
 @pytest.mark.parametrize("room", [0, 1, 300])
@@ -124,8 +122,7 @@ def test_a_run_whose_directory_is_deleted_ends_at_rest_and_says_so(run, monkeypa
 
     monkeypatch.setattr(Recorder, "__call__", steal)
     shown, left = run()
-    assert shown.exit_code == 3
-    assert left is None
+    assert (shown.exit_code, left) == (3, None)
     assert "it was deleted while the run went on; the run stops" in json.loads(shown.stdout)["message"]
     assert "note: cannot write the result" in shown.stderr
     assert "no such file or directory; the journal beside it" in shown.stderr

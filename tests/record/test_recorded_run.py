@@ -1,62 +1,27 @@
-"""A run with its record, on a runtime that only pretends."""
+"""A run with its record, on the fake cell."""
 
 from __future__ import annotations
 
 import json
-import sys
-from types import ModuleType, SimpleNamespace
 
 import py_trees
 import pytest
 
+from executive.discovery import discover
 from executive.errors import InputError
-from executive.events import Event
-from executive.record.journal import read_journal
+from executive.mission.load import load_mission
+from executive.record.journal import Journal, read_journal
 from executive.record.recorded_run import recorded_run
-from executive.runtime.outcome import Outcome
-
-
-class PretendedRun:
-    """Emits two events and ends; what a test wants otherwise it sets on the class."""
-
-    error: BaseException | None = None
-    closed = 0
-    root = py_trees.behaviours.Success("tree")
-    control = SimpleNamespace(pause=lambda: None)
-
-    def __init__(self, loaded, skills, *, seed, gui, realtime, requests, keyboard, kind):
-        self._observers = []
-
-    def observe(self, observer):
-        self._observers.append(observer)
-
-    def record(self, recorder):
-        self._observers.append(recorder)
-
-    def log_to(self, path):
-        path.write_bytes(b"the world")
-
-    def execute(self):
-        for event in (Event("run", 0, 0.0, {"seed": 7}), Event("decision", 3, 0.1, {"item": "cube-1"})):
-            for observer in self._observers:
-                observer(event)
-        if self.error is not None:
-            raise self.error
-        return Outcome("SUCCESS", "", "", "", "", 240, 1.0)
-
-    def items(self):
-        return {"seen": 1, "placed": 1, "rejected": 0, "lost": 0, "phantom": 0, "rows": []}
-
-    def audit(self):
-        return {"right": 1, "wrong_bin": 0, "left": 0, "elsewhere": 0, "unseen": 0}
-
-    def close(self):
-        type(self).closed += 1
+from executive.record.result import ledger_agrees
+from executive.runtime.run import Run
+from executive.testing.fake_cell import FakeCell
 
 
 class Watcher:
-    def __init__(self):
-        self.seen = []
+    """A view that notes what it hears."""
+
+    def __init__(self) -> None:
+        self.seen: list = []
 
     def open(self, run):
         self.seen.append(run.root)
@@ -72,51 +37,57 @@ class Watcher:
 
 
 @pytest.fixture
-def runtime(monkeypatch):
-    class Runtime(PretendedRun):
-        pass
+def run(bring_one, tmp_path, monkeypatch):
+    """Run the mission that brings one object once; each cell that is closed is counted."""
+    closed = []
+    monkeypatch.setattr(FakeCell, "close", lambda self: closed.append(self))
 
-    module = ModuleType("executive.runtime.run")
-    module.Run = Runtime  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "executive.runtime.run", module)
-    return Runtime
+    def once(*views, **options):
+        loaded = load_mission(bring_one, discover())
+        try:
+            return recorded_run(
+                loaded, discover(), seed=3, runs=tmp_path / "runs", kind=FakeCell, views=views, **options
+            )
+        finally:
+            assert len(closed) == 1
 
-
-LOADED = SimpleNamespace(
-    text="mission: sort\n",
-    params={"attempts": 3},
-    libraries={"library/own.yaml": "library: own\n"},
-    mission=SimpleNamespace(name="sort"),
-    cell_config=SimpleNamespace(model_dump=lambda mode, exclude_unset: {"cell": "overhead"}),
-)
+    return once
 
 
-def test_leaves_a_directory_that_explains_the_run(tmp_path, runtime):
-    result = recorded_run(LOADED, {}, seed=7, runs=tmp_path)
-    left = tmp_path / "latest"
-    names = {path.name for path in left.iterdir()}
-    assert names == {
-        "mission.yaml", "library", "params.yaml", "cell.yaml", "tree.json", "journal.jsonl", "world.log",
-        "result.json",
+def test_leaves_a_directory_that_explains_the_run(run, tmp_path):
+    result, left = run(), tmp_path / "runs" / "latest"
+    assert {path.name for path in left.iterdir()} == {
+        "mission.yaml", "params.yaml", "cell.yaml", "tree.json", "journal.jsonl", "world.log",
+        "result.json", "frames",
     }  # fmt: skip
     assert json.loads((left / "result.json").read_text()) == result
-    assert [entry["kind"] for entry in read_journal(left / "journal.jsonl")] == ["run", "decision"]
-    assert result["items"] == {"seen": 1, "placed": 1, "rejected": 0, "lost": 0, "phantom": 0}
-    assert runtime.closed == 1
+    assert ledger_agrees(result)
+    entries = read_journal(left / "journal.jsonl")
+    (decision,) = (entry for entry in entries if entry["kind"] == "decision")
+    assert (left / "frames" / f"{decision['tick']:06d}_{decision['item']}.jpg").is_file()
+    assert (entries[0]["kind"], entries[-1]["kind"]) == ("run", "end")
+    assert "frame_object" not in (left / "journal.jsonl").read_text()
 
 
-def test_a_view_is_told_the_tree_first_and_the_end_last(tmp_path, runtime):
+def test_a_view_is_told_the_tree_first_and_the_end_last(run):
     view, other = Watcher(), Watcher()
-    recorded_run(LOADED, {}, seed=7, runs=tmp_path, views=[view, other])
-    assert view.seen == other.seen == [PretendedRun.root, "run", "decision", "closed"]
+    run(view, other, frames=False)
+    assert view.seen == other.seen
+    root, first, *_, last, closed = view.seen
+    assert isinstance(root, py_trees.behaviour.Behaviour)
+    assert (first, last, closed) == ("run", "end", "closed")
 
 
 @pytest.mark.parametrize("error", [InputError("no such weights"), KeyboardInterrupt()])
-def test_whatever_ends_a_run_early_view_journal_and_cell_are_closed(tmp_path, runtime, error):
-    runtime.error = error
+def test_whatever_ends_a_run_early_view_journal_and_cell_are_closed(run, tmp_path, monkeypatch, error):
+    def fails(self):
+        raise error
+
+    monkeypatch.setattr(Run, "audit", fails)
     view, other = Watcher(), Watcher()
     with pytest.raises(type(error)):
-        recorded_run(LOADED, {}, seed=7, runs=tmp_path, views=[view, other])
+        run(view, other)
     assert view.seen[-1] == other.seen[-1] == "closed"
-    assert runtime.closed == 1
-    assert len(read_journal(tmp_path / "latest" / "journal.jsonl")) == 2
+    left = tmp_path / "runs" / "latest"
+    assert not (left / "result.json").exists()
+    Journal(left / "journal.jsonl", again=True).close()

@@ -25,17 +25,10 @@ ALL = sorted(path.stem for path in (Path(__file__).parents[2] / "missions").glob
 QUICK = "sort_overhead"
 
 
-def recorded(missions: Path, runs: Path, name: str, **options: Any) -> Path:
+def recorded(missions: Path, runs: Path, name: str, kind: Any = FakeCell) -> Path:
     loaded = load_mission(missions / f"{name}.yaml", discover())
     requests = [*loaded.routes] * 4
-    recorded_run(
-        loaded,
-        discover(),
-        runs=runs,
-        requests=requests,
-        frames=False,
-        **{"seed": 3, "kind": FakeCell} | options,
-    )
+    recorded_run(loaded, discover(), seed=3, runs=runs, requests=requests, frames=False, kind=kind)
     return find_run("latest", runs)
 
 
@@ -58,7 +51,7 @@ def test_so_it_does_without_the_simulator(missions: Path, tmp_path: Path) -> Non
     assert (done.same, done.edited) == (True, False)
 
 
-def edited(path: Path, missions: Path, old: str, new: str) -> Path:
+def edited(path: Path, old: str, new: str) -> Path:
     text = (path / "mission.yaml").read_text()
     assert old in text
     # Beside its library, as a mission lies.
@@ -69,18 +62,15 @@ def edited(path: Path, missions: Path, old: str, new: str) -> Path:
 
 def test_the_first_decision_of_an_edited_mission_that_differs_is_told(missions: Path, tmp_path: Path) -> None:
     path = recorded(missions, tmp_path, "inspect_then_sort")
-    done = again(path, edited(path, missions, "try: {SelectTarget: {prefer: surest}}", "try: SelectTarget"))
+    done = again(path, edited(path, "try: {SelectTarget: {prefer: surest}}", "try: SelectTarget"))
     assert done.edited
-    assert done.recorded is not None
-    assert done.replayed is not None
-    assert (done.recorded["kind"], done.replayed["kind"]) == ("decision", "decision")
-    assert done.recorded["item"] != done.replayed["item"]
-    assert done.difference == (
-        f"the record says at {done.recorded['clock']:.3f} s (step {done.recorded['tick']}) decision: "
-        f"item {done.recorded['item']}, label {done.recorded['label']}, bin {done.recorded['bin']}, "
-        f"and now it is at {done.replayed['clock']:.3f} s (step {done.replayed['tick']}) decision: "
-        f"item {done.replayed['item']}, label {done.replayed['label']}, bin {done.replayed['bin']}"
+    before, now = (
+        f"at {each['clock']:.3f} s (step {each['tick']}) decision: "
+        f"item {each['item']}, label {each['label']}, bin {each['bin']}"
+        for each in (done.recorded, done.replayed)
     )
+    assert done.recorded["item"] != done.replayed["item"]
+    assert done.difference == f"the record says {before}, and now it is {now}"
 
 
 def test_a_mission_that_gives_up_sooner_says_where(missions: Path) -> None:
@@ -89,19 +79,13 @@ def test_a_mission_that_gives_up_sooner_says_where(missions: Path) -> None:
     past = Past.of([entry_of(event) for event in run_mission(file, seed=3, disturbances=four_times).events])
     assert compare(load_mission(file, skills), skills, past, 3).same
     done = compare(load_mission(file, skills, {"attempts": "2"}), skills, past, 3, edited=True)
-    assert done.replayed is not None
     assert done.replayed["node"] == "RejectTarget"
 
 
 def test_where_the_record_has_no_answer_it_says_so(missions: Path, tmp_path: Path) -> None:
     path = recorded(missions, tmp_path, "sort_fruit")
-    done = again(
-        path,
-        edited(
-            path, missions, "  - use: take_stock\n", "  - {MoveToScan: {pose: aside}}\n  - use: take_stock\n"
-        ),
-    )
-    assert done.replayed is not None
+    stock = "  - use: take_stock\n"
+    done = again(path, edited(path, stock, "  - {MoveToScan: {pose: aside}}\n" + stock))
     assert (done.replayed["node"], done.replayed["status"]) == ("MoveToScan", "INVALID")
     assert done.difference.endswith(
         "reason fault: the record holds no answer to what is asked here first: plan.ready; "
@@ -109,10 +93,9 @@ def test_where_the_record_has_no_answer_it_says_so(missions: Path, tmp_path: Pat
     )
 
 
-def test_a_directory_without_answers_cannot_be_replayed(missions: Path, tmp_path: Path) -> None:
-    path = recorded(missions, tmp_path, "sort_fruit")
+def test_a_directory_without_answers_cannot_be_replayed(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"no run that can be replayed: its journal tells of no answers"):
-        replay(path, [], discover())
+        replay(tmp_path, [], discover())
 
 
 def test_a_decision_too_many_is_a_difference_in_a_run_that_was_cut_off_too(missions: Path) -> None:

@@ -6,13 +6,10 @@ import json
 import os
 import signal
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, Phase, example, given, settings
-from hypothesis import strategies as st
 
 from executive.discovery import discover
 from executive.errors import InputError
@@ -62,19 +59,26 @@ def load(missions: Path, name: str) -> LoadedMission:
     return load_mission(missions / f"{name}.yaml", discover())
 
 
-def cut_off(loaded: LoadedMission, runs: Path, **options: Any) -> Path:
+def run_of(loaded: LoadedMission, runs: Path, **options: Any) -> dict[str, Any]:
+    """Run a mission on the fake cell, asking for every class four times."""
+    options = {"skills": discover(), "requests": [*loaded.routes] * 4, **options}
+    return recorded_run(loaded, seed=SEED, runs=runs, kind=FakeCell, frames=False, **options)
+
+
+def cut_off(loaded: LoadedMission, runs: Path, tick: int, nth: int = 1) -> Path:
     """Begin a run that is cut off, and return its directory."""
-    kind = options.pop("kind", FakeCell)
-    requests = [*loaded.routes] * 4
     with pytest.raises(Cut):
-        recorded_run(
-            loaded, discover(), seed=SEED, runs=runs, kind=kind, requests=requests, frames=False, **options
-        )
+        run_of(loaded, runs, views=[Cutter(tick, nth)])
     return find_run("latest", runs)
 
 
-def resumed(path: Path) -> dict[str, Any]:
-    return resumed_run(path, discover(), frames=False, kind=FakeCell)
+def resumed(path: Path, **options: Any) -> dict[str, Any]:
+    return resumed_run(path, **{"skills": discover(), **options}, frames=False, kind=FakeCell)
+
+
+def redecided(path: Path) -> str:
+    """Decide the whole run once more, its cuts included, and return what differs."""
+    return replay(path, read_journal(path / "journal.jsonl"), discover()).difference
 
 
 def placed(path: Path) -> Counter[str]:
@@ -90,92 +94,46 @@ def placed(path: Path) -> Counter[str]:
 
 
 MISSIONS = ("sort_overhead", "sort_wrist", "kit_fasteners", "pick_on_request")
-CASES = [(name, after) for name in MISSIONS for after in (1, 333, 700, 1100)]
+WITHIN_A_STEP = [(444, 7), (1203, 3), (2100, 11)]
+CASES = [(name, after, 1) for name in MISSIONS for after in (1, 333, 700, 1100)] + [
+    ("sort_overhead", *cut) for cut in WITHIN_A_STEP
+]
+QUICK = ("sort_overhead", 700, 1)
 
 
 @pytest.mark.parametrize(
-    ("name", "after"),
-    [pytest.param(*case, marks=[] if case == ("sort_overhead", 700) else pytest.mark.slow) for case in CASES],
+    ("name", "after", "nth"),
+    [pytest.param(*case, marks=[] if case == QUICK else pytest.mark.slow) for case in CASES],
 )
-def test_it_ends_as_if_nothing_had_happened(missions: Path, tmp_path: Path, name: str, after: int) -> None:
+def test_it_ends_as_if_nothing_had_happened(missions: Path, tmp_path: Path, name, after, nth) -> None:
     loaded = load(missions, name)
-    whole = recorded_run(
-        loaded,
-        discover(),
-        seed=SEED,
-        runs=tmp_path,
-        kind=FakeCell,
-        requests=[*loaded.routes] * 4,
-        frames=False,
-    )
-    path = cut_off(loaded, tmp_path, views=[Cutter(after)])
+    whole = run_of(loaded, tmp_path)
+    path = cut_off(loaded, tmp_path, after, nth)
     result = resumed(path)
     assert (result["status"], result["items"]) == (whole["status"], whole["items"])
     assert ledger_agrees(result)
     assert set(placed(path).values()) <= {1}
-    # And the whole of it, the cut included, can be decided once more.
-    assert replay(path, read_journal(path / "journal.jsonl"), discover()).difference == ""
+    assert redecided(path) == ""
     assert json.loads((path / "result.json").read_text()) == result
 
 
 @pytest.mark.slow
-@settings(
-    max_examples=4,
-    deadline=None,
-    # Each run takes a second: shrinking would take long.
-    phases=[Phase.explicit, Phase.reuse, Phase.generate],
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
-@given(st.integers(0, 2700), st.integers(1, 12))
-@example(444, 7)
-def test_in_the_middle_of_a_control_step_it_may_be_cut_off_too(
-    missions: Path, tmp_path_factory: pytest.TempPathFactory, tick: int, nth: int
-) -> None:
-    path = cut_off(
-        load(missions, "sort_overhead"), tmp_path_factory.mktemp("runs"), views=[Cutter(tick, nth)]
-    )
-    result = resumed(path)
-    assert result["status"] == "SUCCESS"
-    assert result["items"]["placed"] == result["items"]["seen"] == result["audit"]["right"]
-    assert set(placed(path).values()) == {1}
-    assert replay(path, read_journal(path / "journal.jsonl"), discover()).difference == ""
-
-
-@pytest.mark.slow
 def test_it_may_be_cut_off_again_and_again(missions: Path, tmp_path: Path) -> None:
-    path = cut_off(load(missions, "sort_overhead"), tmp_path, views=[Cutter(300)])
+    path = cut_off(load(missions, "sort_overhead"), tmp_path, 300)
     for after in (301, 800, 1500):
         with pytest.raises(Cut):
-            resumed_run(path, discover(), frames=False, kind=FakeCell, views=[Cutter(after)])
-    result = resumed(path)
-    assert result["status"] == "SUCCESS"
+            resumed(path, views=[Cutter(after)])
+    assert resumed(path)["status"] == "SUCCESS"
     assert set(placed(path).values()) == {1}
     assert [e["kind"] for e in read_journal(path / "journal.jsonl")].count("resume") == 4
-    assert replay(path, read_journal(path / "journal.jsonl"), discover()).difference == ""
+    assert redecided(path) == ""
 
 
-def changed(
-    missions: Path, runs: Path, after: int, act: Callable[[Hand], None]
-) -> tuple[Path, dict[str, Any]]:
-    """Cut a run off, change the world, and take the run up again."""
-    loaded = load(missions, "sort_overhead")
-    path = cut_off(loaded, runs, views=[Cutter(after)])
-    meanwhile(path / "world.log", loaded, SEED, act, FakeCell)
-    return path, resumed(path)
-
-
-def moments(missions: Path, runs: Path, skill: str) -> list[int]:
-    """Control steps in the middle of each activation of a skill in the whole run."""
-    loaded = load(missions, "sort_overhead")
-    recorded_run(loaded, discover(), seed=SEED, runs=runs, kind=FakeCell, frames=False)
-    begun, found = 0, []
-    for entry in read_journal(find_run("latest", runs) / "journal.jsonl"):
-        if entry["kind"] == "status" and entry["node"].endswith(f"/{skill}"):
-            if entry["status"] == "RUNNING":
-                begun = entry["tick"]
-            else:
-                found.append((begun + entry["tick"]) // 2)
-    return found
+def moment(path: Path, skill: str) -> int:
+    """Control step in the middle of the second activation of a skill in a whole run."""
+    entries = read_journal(path / "journal.jsonl")
+    ticks = [e["tick"] for e in entries if e["kind"] == "status" and e["node"].endswith(f"/{skill}")]
+    return (ticks[2] + ticks[3]) // 2
 
 
 @pytest.mark.parametrize("skill", [pytest.param("Grasp", marks=pytest.mark.slow), "Transit"])
@@ -183,11 +141,13 @@ def test_what_fell_from_the_tool_is_picked_again(missions: Path, tmp_path: Path,
     fell: list[str] = []
 
     def act(hand: Hand) -> None:
-        assert hand.held is not None
         fell.append(hand.held.label)
         hand.part()
 
-    path, result = changed(missions, tmp_path, moments(missions, tmp_path, skill)[1], act)
+    loaded = load(missions, "sort_overhead")
+    path = cut_off(loaded, tmp_path, moment(Path(run_of(loaded, tmp_path)["run"]), skill))
+    meanwhile(path / "world.log", loaded, SEED, act, FakeCell)
+    result = resumed(path)
     assert fell
     assert (result["status"], ledger_agrees(result)) == ("SUCCESS", True)
     assert result["items"]["placed"] == 6
@@ -200,17 +160,14 @@ def test_a_run_that_was_halted_goes_on(missions: Path, tmp_path: Path) -> None:
             if event.kind == "item" and event.data["state"] == "held":
                 os.kill(os.getpid(), signal.SIGINT)
 
-    loaded = load(missions, "sort_overhead")
-    halted = recorded_run(
-        loaded, discover(), seed=SEED, runs=tmp_path, kind=FakeCell, views=[Stopper(0, 0)], frames=False
-    )
+    halted = run_of(load(missions, "sort_overhead"), tmp_path, views=[Stopper(0, 0)])
     assert (halted["status"], bool(halted["holds"])) == ("HALTED", True)
-    path = find_run("latest", tmp_path)
+    path = Path(halted["run"])
     result = resumed(path)
     assert (result["status"], result["items"]["placed"]) == ("SUCCESS", 6)
     assert set(placed(path).values()) == {1}
+    assert redecided(path) == ""
     entries = read_journal(path / "journal.jsonl")
-    assert replay(path, entries, discover()).difference == ""
     since = [entry["kind"] for entry in entries].index("resume")
     ahead = [entry["ahead"] for entry in entries[since:] if entry["kind"] == "plan"]
     assert sum(ahead) == 6 + 5, "on the cell itself the ways into bins and to next targets are planned ahead"
@@ -218,16 +175,13 @@ def test_a_run_that_was_halted_goes_on(missions: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["Detect", "Grasp"])
-def test_a_run_that_a_bug_has_ended_goes_on_once_it_is_mended(
-    missions: Path, tmp_path: Path, name: str
-) -> None:
+def test_a_run_that_a_bug_has_ended_goes_on_once_it_is_mended(missions: Path, tmp_path: Path, name) -> None:
     skills = discover()
     buggy = {**skills, name: raising(skills[name], ZeroDivisionError("a bug"), after=3)}
-    loaded = load_mission(missions / "sort_overhead.yaml", buggy)
-    first = recorded_run(loaded, buggy, seed=SEED, runs=tmp_path, kind=FakeCell, frames=False)
+    first = run_of(load(missions, "sort_overhead"), tmp_path, skills=buggy)
     assert (first["status"], "a bug" in first["message"]) == ("FAULT", True)
     run = Path(first["run"])
-    again = resumed_run(run, buggy, frames=False, kind=FakeCell)
+    again = resumed(run, skills=buggy)
     assert again["message"] == first["message"], "it is not mended yet"
     result = resumed(run)
     assert (result["status"], result["audit"]["right"]) == ("SUCCESS", result["items"]["seen"])
@@ -235,9 +189,7 @@ def test_a_run_that_a_bug_has_ended_goes_on_once_it_is_mended(
 
 
 def test_there_must_be_something_to_take_up(missions: Path, tmp_path: Path) -> None:
-    loaded = load(missions, "sort_overhead")
-    recorded_run(loaded, discover(), seed=SEED, runs=tmp_path, kind=FakeCell, frames=False)
-    path = find_run("latest", tmp_path)
+    path = Path(run_of(load(missions, "sort_overhead"), tmp_path)["run"])
     with pytest.raises(InputError, match=r"came to its end: SUCCESS; there is nothing to take up again"):
         resumed(path)
     (path / "journal.jsonl").write_text("")
@@ -250,7 +202,7 @@ def test_there_must_be_something_to_take_up(missions: Path, tmp_path: Path) -> N
 
 
 def test_a_mission_that_is_decided_otherwise_now_is_not_gone_on_with(missions: Path, tmp_path: Path) -> None:
-    path = cut_off(load(missions, "inspect_then_sort"), tmp_path, views=[Cutter(900)])
+    path = cut_off(load(missions, "inspect_then_sort"), tmp_path, 900)
     file = path / "mission.yaml"
     old, new = "try: {SelectTarget: {prefer: surest}}", "try: SelectTarget"
     assert old in file.read_text()

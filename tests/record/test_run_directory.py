@@ -30,50 +30,33 @@ def full(*args, **kwargs):
 
 
 def test_latest_points_to_the_last_run_and_survives_moving_the_folder(tmp_path):
-    create(tmp_path / "runs").save_inputs(mission="", params={}, cell={})
-    last = create(tmp_path / "runs")
-    last.save_inputs(mission="", params={}, cell={})
-    (last.path / "mark").touch()
+    for number in range(2):
+        directory = create(tmp_path / "runs")
+        directory.save_inputs(mission=f"mission: {number}", params={}, cell={})
     (tmp_path / "runs").rename(tmp_path / "moved")
-    assert (tmp_path / "moved" / "latest" / "mark").exists()
+    assert (tmp_path / "moved" / "latest" / "mission.yaml").read_text() == "mission: 1"
 
 
-def test_what_repeats_a_run_is_on_the_disk_before_it_begins(tmp_path, monkeypatch):
+def test_what_repeats_a_run_is_on_the_disk_and_libraries_lie_where_the_mission_looks(tmp_path, monkeypatch):
     synced = []
     monkeypatch.setattr(os, "fsync", lambda file: synced.append(os.fstat(file).st_ino))
-    directory = create(tmp_path)
-    directory.save_inputs(mission="sort", params={"a": 1}, cell={}, libraries={"own.yaml": "own"})
-    names = ("own.yaml", "mission.yaml", "params.yaml", "cell.yaml")
-    assert synced == [(directory.path / name).stat().st_ino for name in names]
-
-
-def test_libraries_lie_where_the_mission_looks_for_them(tmp_path):
-    directory = create(tmp_path)
     check_place(tmp_path)
+    directory = create(tmp_path)
     libraries = {"library/sorting.yaml": "library: sorting\n", "own.yaml": "library: own\n"}
     directory.save_inputs(
         mission="mission: a  # mine\n", params={}, cell={"size": (1, 2)}, libraries=libraries
     )
-    assert (directory.path / "mission.yaml").read_text() == "mission: a  # mine\n"
+    left = {**libraries, "mission.yaml": "mission: a  # mine\n", "params.yaml": "{}\n"}
+    assert {name: (directory.path / name).read_text() for name in left} == left
     assert yaml.safe_load((directory.path / "cell.yaml").read_text()) == {"size": [1, 2]}
-    assert (directory.path / "library" / "sorting.yaml").read_text() == "library: sorting\n"
-    assert (directory.path / "own.yaml").read_text() == "library: own\n"
+    assert synced == [(directory.path / name).stat().st_ino for name in (*left, "cell.yaml")]
 
 
-def test_a_place_that_cannot_be_written_to_is_a_sentence(tmp_path):
-    (tmp_path / "runs").write_text("a file, no folder")
-    with pytest.raises(InputError) as raised:
-        create(tmp_path / "runs")
-    assert str(raised.value) == (
-        f'cannot make a run directory below "{tmp_path}/runs": not a directory; '
-        "name another place with --runs DIR"
-    )
-
-
-def test_a_place_that_takes_no_folder_is_a_sentence(tmp_path):
+@pytest.mark.parametrize("make", [create, check_place])
+def test_a_place_that_cannot_be_written_to_is_a_sentence(tmp_path, make):
     (tmp_path / "file").touch()
     with pytest.raises(InputError) as raised:
-        check_place(tmp_path / "file" / "runs")
+        make(tmp_path / "file" / "runs")
     assert str(raised.value) == (
         f'cannot make a run directory below "{tmp_path}/file/runs": not a directory; '
         "name another place with --runs DIR"

@@ -62,7 +62,7 @@ def record(subject: Subject, rehearsal: Rehearsal, faults: Numbered, runs: Path)
     trying = _Trying(subject, rehearsal, faults)
     with closing(trying.run):
         directory = new_directory(trying.run, loaded, subject.seed, runs)
-        recording = Recording(trying.run, loaded, subject.skills, directory, Recorder(directory), None)
+        recording = Recording(trying.run, loaded, subject.skills, directory, Recorder(directory), ())
         result = recording.execute(subject.seed, began)
         leave_report(result)
         outcome = Outcome(

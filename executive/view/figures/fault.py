@@ -36,9 +36,14 @@ def _lines(figures: FaultFigures) -> Iterator[str]:
         yield from _matrix(trials)
         yield ""
     yield from _sums(trials)
-    yield from _failed(figures)
+    yield f"  not as it has to be: {len(figures.failed) or 'none'}"
+    for trial in figures.failed:
+        yield from (f"    {line}" for line in _trial(trial))
     yield from _remarks(trials)
-    yield from _coverage(figures)
+    all_ways, none = figures.branches, figures.unentered
+    yield f"  ways on after a failure: {len(all_ways) - len(none)} of {len(all_ways)} entered"
+    for branch in none:
+        yield f"    never entered: {branch.place}: {branch.what}"
 
 
 def _matrix(trials: Sequence[Trial]) -> Iterator[str]:
@@ -87,12 +92,6 @@ def _sums(trials: Sequence[Trial]) -> Iterator[str]:
         yield f"  failures: {', '.join(f'{reason} {number}' for reason, number in ends.most_common())}"
 
 
-def _failed(figures: FaultFigures) -> Iterator[str]:
-    yield f"  not as it has to be: {len(figures.failed) or 'none'}"
-    for trial in figures.failed:
-        yield from (f"    {line}" for line in _trial(trial))
-
-
 def _remarks(trials: Sequence[Trial]) -> Iterator[str]:
     """Yield a line per remark, with the faults after which it was made."""
     made: dict[str, list[str]] = defaultdict(list)
@@ -104,13 +103,6 @@ def _remarks(trials: Sequence[Trial]) -> Iterator[str]:
     for remark, labels in made.items():
         more = f" and {len(labels) - 3} more" if len(labels) > 3 else ""
         yield f"    {remark}: fault {', '.join(labels[:3])}{more}"
-
-
-def _coverage(figures: FaultFigures) -> Iterator[str]:
-    all_ways, none = figures.branches, figures.unentered
-    yield f"  ways on after a failure: {len(all_ways) - len(none)} of {len(all_ways)} entered"
-    for branch in none:
-        yield f"    never entered: {branch.place}: {branch.what}"
 
 
 def _trial(trial: Trial) -> Iterator[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from executive.errors import InputError
-from executive.record.journal import read_journal
+from executive.record.journal import read_journal, start_of
 from executive.record.recorded_mission import read_tree, recorded_cell
 from executive.record.result import read_result
 from executive.record.run_directory import RunDirectory
@@ -34,20 +34,16 @@ class Source:
     def __init__(self, directory: RunDirectory) -> None:
         _require_log(directory)
         entries = read_journal(directory.journal)
-        past = Past.of(entries)
-        if past.start is None:
-            raise InputError(
-                f'the run in "{directory.path}" had not begun when it was cut off; there is nothing to film'
-            )
         self.directory = directory
-        self.entries, self.start = past.entries, past.start
+        self.start = start_of(entries, directory.path, "there is nothing to film")
+        self.entries = Past.of(entries).entries
         self.nodes = read_tree(directory.tree)
         self.config = recorded_cell(directory.path)
         self.bins = {
             name: "#" + "".join(f"{round(255 * share):02x}" for share in bin.colour)
             for name, bin in self.config.bins.items()
         }
-        self.items = len({entry["item"] for entry in past.entries if entry["kind"] == "item"})
+        self.items = len({entry["item"] for entry in self.entries if entry["kind"] == "item"})
         self.result = read_result(directory, entries)
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
-from executive.errors import InputError
 from executive.events import Event
 from executive.mission.text.files import shipped_folder
-from executive.record.journal import read_journal
+from executive.record.journal import read_journal, start_of
 from executive.record.recorded_mission import read_tree
 from executive.record.result import ENDED, read_result, requests_of
 from executive.record.run_directory import RunDirectory
@@ -52,11 +51,7 @@ class Facts:
     def __init__(self, path: Path) -> None:
         directory = RunDirectory(path)
         entries = read_journal(directory.journal)
-        start = next((entry for entry in entries if entry["kind"] == "run"), None)
-        if start is None:
-            raise InputError(
-                f'the run in "{path}" had not begun when it was cut off; there is nothing to report'
-            )
+        start = start_of(entries, path, "there is nothing to report")
         table = ItemTable()
         for entry in entries:
             if entry["kind"] == "item":

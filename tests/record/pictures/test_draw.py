@@ -43,10 +43,6 @@ def test_the_chosen_box_is_thick_and_rimmed_the_others_are_thin():
     assert set(other) == {(GREY,) * 3, rgb(PALETTE[1])}
 
 
-def test_without_a_choice_every_box_is_thin():
-    assert set(edge(draw(scene(CUBE)), 230, 100)) == {(GREY,) * 3, rgb(PALETTE[0])}
-
-
 def test_the_strip_is_below_the_image_with_a_close_up_of_the_choice():
     image = np.full((480, 640, 3), GREY, np.uint8)
     image[200:260, 100:160] = (200, 30, 30)
@@ -58,8 +54,17 @@ def test_the_strip_is_below_the_image_with_a_close_up_of_the_choice():
     assert tuple(picture[-1, -1]) == rgb(GROUND)
 
 
-def test_without_a_choice_there_is_no_close_up():
-    assert tuple(draw(scene(CUBE))[480 + HEIGHT // 2, 1]) == rgb(GROUND)
+def test_without_a_choice_every_box_is_thin_and_there_is_no_close_up():
+    picture = draw(scene(CUBE))
+    assert set(edge(picture, 230, 100)) == {(GREY,) * 3, rgb(PALETTE[0])}
+    assert tuple(picture[480 + HEIGHT // 2, 1]) == rgb(GROUND)
+
+
+def test_a_choice_at_the_edge_of_an_image_is_drawn_and_the_image_left_alone():
+    cut_off = replace(CUBE, box=(-10.0, 460.0, 20.0, 490.0))
+    drawn = scene(cut_off, chosen=0, visible=np.zeros((480, 640), bool))
+    assert draw(drawn).shape == (480 + HEIGHT, WIDTH, 3)
+    assert (drawn.image == GREY).all()
 
 
 def test_what_the_strip_says_is_written_on_it():
@@ -82,17 +87,6 @@ def test_every_picture_is_as_wide_and_its_boxes_go_with_it(width):
     picture = draw(scene(small, height=round(480 * scale), width=width))
     assert picture.shape == (480 + HEIGHT, WIDTH, 3)
     assert tuple(picture[230, 100]) == rgb(PALETTE[0])
-
-
-def test_a_choice_at_the_edge_of_the_image_can_be_drawn():
-    cut_off = replace(CUBE, box=(-10.0, 460.0, 20.0, 490.0))
-    assert draw(scene(cut_off, chosen=0)).shape == (480 + HEIGHT, WIDTH, 3)
-
-
-def test_the_image_itself_is_left_alone():
-    drawn = scene(CUBE, chosen=0, visible=np.zeros((480, 640), bool))
-    draw(drawn)
-    assert (drawn.image == GREY).all()
 
 
 def test_a_label_says_the_class_and_the_confidence_that_of_the_choice_the_item():

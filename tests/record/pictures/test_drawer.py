@@ -6,7 +6,6 @@ import threading
 
 import cv2
 import numpy as np
-import pytest
 
 from executive.messages import Detection
 from executive.record.pictures import drawer as module
@@ -34,26 +33,14 @@ def test_a_scene_becomes_a_small_file(tmp_path):
     assert 0 < (tmp_path / "frames" / "b.jpg").stat().st_size < 100_000
 
 
-@pytest.mark.parametrize(
-    ("in_the_way", "problem"),
-    [
-        ("frames", 'cannot make the folder "{}/frames": File exists'),
-        ("b.jpg", 'cannot write the picture "{}/b.jpg"'),
-    ],
-)
-def test_a_picture_that_cannot_be_written_is_a_problem_and_the_others_are_drawn(
-    tmp_path, in_the_way, problem
-):
-    if in_the_way == "frames":
-        (tmp_path / "frames").touch()
-    else:
-        (tmp_path / "b.jpg").mkdir()
-    drawer = Drawer(tmp_path / "frames" if in_the_way == "frames" else tmp_path)
+def test_a_picture_that_cannot_be_written_is_a_problem_and_the_others_are_drawn(tmp_path):
+    (tmp_path / "b.jpg").mkdir()
+    drawer = Drawer(tmp_path)
     for name in ("b.jpg", "a.jpg"):
         drawer.draw(name, SCENE)
     drawer.close()
-    assert drawer.problem == f"not every picture was drawn: {problem.format(tmp_path)}"
-    assert (tmp_path / "a.jpg").exists() == (in_the_way == "b.jpg")
+    assert drawer.problem == f'not every picture was drawn: cannot write the picture "{tmp_path}/b.jpg"'
+    assert (tmp_path / "a.jpg").exists()
 
 
 def test_no_more_pictures_wait_than_the_memory_holds(tmp_path, monkeypatch):

@@ -15,25 +15,22 @@ def at_most(count: int):
     return lambda text: len(text) <= count
 
 
-def test_a_decision_is_told_with_where_the_item_goes():
-    said = strip_text(Scene(IMAGE, item="cube-1", bin="red_bin", phase="SelectTarget"))
-    assert said.title == "cube-1 to red_bin"
-    assert said.lines == ("phase: SelectTarget",)
-
-
-def test_a_failure_is_told_with_its_reason_and_what_failed_before():
-    said = strip_text(
-        Scene(
-            IMAGE, item="cube-1", bin="red_bin", phase="Grasp", attempts=2,
-            failure="Grasp.missed", message="no seal on cube-1",
-        )
-    )  # fmt: skip
-    assert said.title == "Grasp.missed: cube-1"
-    assert said.lines == ("phase: Grasp, 2 failed attempts", "no seal on cube-1")
-
-
-def test_a_failure_about_no_item_is_told_by_its_reason():
-    assert strip_text(Scene(IMAGE, failure="SelectTarget.unseen")).title == "SelectTarget.unseen"
+@pytest.mark.parametrize(
+    ("scene", "title", "lines"),
+    [
+        ({"item": "cube-1", "bin": "red_bin", "phase": "SelectTarget"},
+         "cube-1 to red_bin", ("phase: SelectTarget",)),
+        ({"item": "cube-1", "bin": "red_bin", "phase": "Grasp", "attempts": 2, "failure": "Grasp.missed",
+          "message": "no seal on cube-1"},
+         "Grasp.missed: cube-1", ("phase: Grasp, 2 failed attempts", "no seal on cube-1")),
+        ({"failure": "SelectTarget.unseen"}, "SelectTarget.unseen", ()),
+    ],
+)  # fmt: skip
+def test_a_decision_is_told_with_its_bin_and_a_failure_with_its_reason(scene, title, lines):
+    fates = {"red_bin": ["cube-1", "cube-2"], "rejected": ["duck-1"]}
+    said = strip_text(Scene(IMAGE, fates=fates, **scene))
+    assert (said.title, said.lines) == (title, lines)
+    assert said.fates == (("red_bin", ("cube-1", "cube-2")), ("rejected", ("duck-1",)))
 
 
 def test_the_strip_says_where_and_when():
@@ -44,23 +41,13 @@ def test_the_strip_says_where_and_when():
     assert strip_text(Scene(IMAGE, ~hidden, camera="wrist")).notes == ("0.00 s", "wrist, 0.00 s old")
 
 
-def test_the_strip_says_what_became_of_every_item():
-    fates = {"red_bin": ["cube-1", "cube-2"], "rejected": ["duck-1"]}
-    assert strip_text(Scene(IMAGE, fates=fates)).fates == (
-        ("red_bin", ("cube-1", "cube-2")), ("rejected", ("duck-1",)),
-    )  # fmt: skip
-
-
 @pytest.mark.parametrize(
     ("room", "expected"),
     [(30, "a-1, a-2, a-3, a-4"), (17, "a-2, a-3, a-4 +1"), (12, "a-3, a-4 +2"), (7, "a-4 +3"), (3, "4")],
 )
 def test_a_long_list_keeps_its_newest(room, expected):
     assert listed(["a-1", "a-2", "a-3", "a-4"], at_most(room)) == expected
-
-
-def test_an_empty_list_says_nothing():
-    assert listed([], at_most(10)) == ""
+    assert listed([], at_most(room)) == ""
 
 
 def test_a_text_is_wrapped_between_words_and_cut_where_it_must():

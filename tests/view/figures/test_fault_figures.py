@@ -71,21 +71,15 @@ def test_what_went_wrong_and_what_was_never_entered_is_told_with_its_place() -> 
     ]
 
 
-def test_pairs_have_no_matrix_and_a_campaign_cut_short_says_so() -> None:
+def test_pairs_have_no_matrix_a_campaign_cut_short_says_so_and_one_run_is_a_few_lines() -> None:
+    told = ["fault 1+5: tree/Grasp missed, first: nothing seals", "  it found no occasion", "  SUCCESS"]
+    assert trial_text(NOWHERE).splitlines() == told
     lines = fault_text(replace(FIGURES, pairs=True, complete=False, trials=(NOWHERE,))).splitlines()
     assert lines[:3] == [
         "sort (fake), seed 3: 1 runs with pairs of faults; undisturbed it takes 11.5 s",
         "  ended by the user; there was more to try",
         "  as undisturbed: 0; fewer objects sorted: 0; ended as a failure: 0; a bug came up: 0; "
         "no occasion: 1; wrong: 0",
-    ]
-
-
-def test_one_run_is_told_in_a_few_lines() -> None:
-    assert trial_text(NOWHERE).splitlines() == [
-        "fault 1+5: tree/Grasp missed, first: nothing seals",
-        "  it found no occasion",
-        "  SUCCESS",
     ]
 
 

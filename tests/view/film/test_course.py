@@ -41,20 +41,20 @@ def test_what_happens_in_a_step_is_seen_in_it_and_not_before(course: Course) -> 
     assert course.picture == Path("frames/000003_cube-1.jpg")
 
 
-def test_a_node_that_begins_again_knows_nothing_of_the_round_before() -> None:
-    again = [*ENTRIES[:7], status(910, "tree", "RUNNING")]
-    course = Course(again, NODES, [])
-    course.go_to(900, 3.75)
-    assert course.status["tree/Grasp"] == "SUCCESS"
-    course.go_to(910, 3.8)
-    assert (course.status, course.beside) == ({"tree": "RUNNING"}, {"tree": ""})
-
-
-def test_of_a_tree_that_succeeded_a_failure_in_it_stays_folded() -> None:
-    ended = [*ENTRIES[:-1], status(960, "tree", "SUCCESS")]
-    course = Course(ended, NODES, [])
+@pytest.mark.parametrize(
+    ("entries", "opened", "known"),
+    [
+        ([*ENTRIES[:7], status(910, "tree", "RUNNING")], {"tree"}, {"tree": "RUNNING"}),
+        ([*ENTRIES[:-1], status(960, "tree", "SUCCESS")], {"tree"},
+         {"tree": "SUCCESS", "tree/Grasp": "SUCCESS", "tree/Transit": "FAILURE"}),
+    ],
+    ids=["a node that begins again knows nothing of the round before", "a failure under a success is folded"],
+)  # fmt: skip
+def test_a_round_is_over_where_its_root_begins_again_or_succeeds(entries, opened, known) -> None:
+    course = Course(entries, NODES, [])
     course.go_to(960, 4.0)
-    assert course.open == {"tree"}
+    assert (course.open, course.status) == (opened, known)
+    assert set(course.beside) <= set(known)
 
 
 def test_a_failure_with_an_item_is_told_for_a_while(course: Course) -> None:

@@ -77,14 +77,11 @@ def test_picture_and_tree_are_in_step(filmed_run: RunDirectory) -> None:
     assert entries[-1]["tick"] == steps_in(filmed_run.world) == len(holds) - 1
 
 
-def test_the_source_is_the_record(filmed_run: RunDirectory) -> None:
-    source = Source(filmed_run)
+def test_the_source_is_the_record_and_may_be_cut_off(copy: RunDirectory) -> None:
+    source = Source(copy)
     assert (source.start["mission"], source.start["seed"]) == ("bring_one", 5)
     assert (source.config.cell, source.nodes[0].path) == ("overhead", "tree")
     assert (source.result["status"], source.items) == ("SUCCESS", 6)
-
-
-def test_a_run_that_was_cut_off_can_be_filmed(copy: RunDirectory) -> None:
     lines = copy.journal.read_text().splitlines(keepends=True)
     copy.journal.write_text("".join(lines[:-1]))
     copy.result.write_text("{")
@@ -97,18 +94,12 @@ def test_a_run_that_was_cut_off_can_be_filmed(copy: RunDirectory) -> None:
         ("tree.json", None, 'cannot read the tree "'),
         ("cell.yaml", None, "holds no cell that can be read"),
         ("journal.jsonl", "", "had not begun when it was cut off; there is nothing to film"),
-        (
-            "world.log",
-            "{}",
-            "its cell has no simulated world to look at; film a run on a cell of `kind: sim`",
-        ),
-        (
-            "world.log",
-            None,
-            "it has no world.log, from which its world is rebuilt; sweeps keep none. Run the",
-        ),
+        ("world.log", "{}",
+         "its cell has no simulated world to look at; film a run on a cell of `kind: sim`"),
+        ("world.log", None,
+         "it has no world.log, from which its world is rebuilt; sweeps keep none. Run the"),
     ],
-)
+)  # fmt: skip
 def test_a_record_that_lacks_a_part_is_refused(copy, file: str, content: str | None, sentence: str) -> None:
     (copy.path / file).unlink()
     if content is not None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import http.server
 import os
 import re
 import subprocess
@@ -68,27 +67,6 @@ def address(tmp_path: Path) -> Iterator[str]:
     process.wait(60)
 
 
-@pytest.fixture
-def elsewhere() -> Iterator[str]:
-    """A page of another origin, on this machine, too."""
-
-    class Handler(http.server.BaseHTTPRequestHandler):
-        def do_GET(self) -> None:
-            self.send_response(200)
-            self.send_header("Content-Type", "text/html")
-            self.end_headers()
-            self.wfile.write(FOREIGN.encode())
-
-        def log_message(self, *said: object) -> None:
-            pass
-
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    yield f"http://127.0.0.1:{server.server_port}/"
-    server.shutdown()
-    server.server_close()
-
-
 def test_a_run_is_seen_paused_and_stopped(visit, address: str) -> None:
     page = visit.page
     page.goto(address)
@@ -118,20 +96,14 @@ def test_a_run_is_seen_paused_and_stopped(visit, address: str) -> None:
     assert hosts == {"127.0.0.1"}
 
 
-def test_a_page_elsewhere_can_neither_see_nor_command_it(visit, address: str, elsewhere: str) -> None:
+def test_a_page_elsewhere_can_neither_see_nor_command_it(visit, address: str) -> None:
     page = visit.page
     page.goto(address)
     page.wait_for_selector("#tree g.node.skill", timeout=START)
-    other = page.context.new_page()
+    other, elsewhere = page.context.new_page(), "http://127.0.0.1:9999/"
+    answer = {"body": FOREIGN, "content_type": "text/html"}
+    other.route(lambda url: url.startswith(elsewhere), lambda route: route.fulfill(**answer))
     other.goto(f"{elsewhere}?of={address}")
     other.wait_for_function("document.title.startsWith('{')", timeout=START)
     assert other.title() == '{"live":"refused","scene":"refused","page":"refused","frame":"refused"}'
     assert page.inner_text("#status") == "paused"
-
-
-@pytest.mark.parametrize("token", ["", "A" * 32 + "/"])
-def test_without_its_token_there_is_no_page(visit, address: str, token: str) -> None:
-    site = address.rsplit("/", 2)[0]
-    answer = visit.page.goto(f"{site}/{token}")
-    assert answer.status == 403
-    assert "the address lacks the token of this run" in visit.page.inner_text("body")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import socket
 from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -26,44 +27,45 @@ NO_TOKEN = "the address lacks the token of this run; take it from the terminal t
 OTHER_PAGE = "another page may neither see nor command this run"
 
 
-def refused(path: str = f"/{TOKEN}/", **headers: str) -> str:
-    return refusal(make_mocked_request("GET", path, headers={"Host": HOST} | headers), TOKEN, HOST)
-
-
-def test_the_page_itself_is_let_in() -> None:
-    assert refused() == refused(Origin=f"http://{HOST}", Upgrade="websocket") == ""
+PATHS = ("/", "", "*", "/another/", "/a-toke/", "/a-token2/", "//a-token/", "/A-TOKEN/", "/live", "/%ff/")
+ORIGINS = (
+    "http://evil.example",
+    "null",
+    "",
+    f"https://{HOST}",
+    "http://127.0.0.1:8124",
+    f"http://{HOST}.evil",
+)
+NAMES = ("evil.example", "localhost:8123", "127.0.0.1", f"{HOST}.evil")
 
 
 @pytest.mark.parametrize(
-    "path", ["/", "", "*", "/another/", "/a-toke/", "/a-token2/", "//a-token/", "/A-TOKEN/", "/live", "/%ff/"]
+    ("path", "headers", "said"),
+    [
+        (f"/{TOKEN}/", {}, ""),
+        (f"/{TOKEN}/", {"Origin": f"http://{HOST}", "Upgrade": "websocket"}, ""),
+        *((path, {}, NO_TOKEN) for path in PATHS),
+        *((f"/{TOKEN}/", {"Origin": origin}, OTHER_PAGE) for origin in ORIGINS),
+        (f"/{TOKEN}/", {"Upgrade": "WebSocket"}, "a connection must say which page it is of"),
+        *(
+            (f"/{TOKEN}/", {"Host": name}, "this page goes by the address of this machine only")
+            for name in NAMES
+        ),
+    ],
 )
-def test_without_the_token_nobody_is_let_in(path: str) -> None:
-    assert refused(path) == NO_TOKEN
+def test_only_the_page_itself_is_let_in_and_only_with_the_token(path: str, headers: dict, said: str) -> None:
+    assert refusal(make_mocked_request("GET", path, headers={"Host": HOST} | headers), TOKEN, HOST) == said
 
 
-@pytest.mark.parametrize(
-    "origin",
-    ["http://evil.example", "null", "", f"https://{HOST}", "http://127.0.0.1:8124", f"http://{HOST}.evil"],
-)
-def test_a_page_of_another_origin_is_not_let_in_even_with_the_token(origin: str) -> None:
-    assert refused(Origin=origin) == OTHER_PAGE
-
-
-def test_a_socket_that_does_not_name_its_page_is_not_let_in() -> None:
-    assert refused(Upgrade="WebSocket") == "a connection must say which page it is of"
-
-
-@pytest.mark.parametrize("host", ["evil.example", "localhost:8123", "127.0.0.1", f"{HOST}.evil"])
-def test_a_name_that_leads_here_is_not_let_in(host: str) -> None:
-    assert refused(Host=host) == "this page goes by the address of this machine only"
-
-
+@dataclass
 class Site:
     """A server at work, and a browser's connection to it."""
 
-    def __init__(self, server: Server, session: aiohttp.ClientSession, address: str, board: Board) -> None:
-        self.server, self.session, self.address, self.board = server, session, address, board
-        self.wishes: list[dict[str, Any]] = []
+    server: Server
+    session: aiohttp.ClientSession
+    address: str
+    board: Board
+    wishes: list[dict[str, Any]]
 
 
 def serve(do: Callable[[Site], Awaitable[None]]) -> None:
@@ -78,9 +80,7 @@ def serve(do: Callable[[Site], Awaitable[None]]) -> None:
         await runner.setup()
         await web.SockSite(runner, listener).start()
         async with aiohttp.ClientSession() as session:
-            site = Site(server, session, f"http://127.0.0.1:{port}", board)
-            site.wishes = wishes
-            await do(site)
+            await do(Site(server, session, f"http://127.0.0.1:{port}", board, wishes))
         await runner.cleanup()
 
     asyncio.run(work())
@@ -115,13 +115,9 @@ def test_serves_the_page_to_the_page_and_nothing_else() -> None:
         assert site.wishes == []
 
     serve(look)
-
-
-def test_the_policy_and_the_headers_keep_the_page_to_itself() -> None:
     assert POLICY.startswith("default-src 'none'; script-src 'self'; ")
     assert "frame-ancestors 'none'" in POLICY
-    assert HEADERS["Referrer-Policy"] == "no-referrer"
-    assert HEADERS["Cache-Control"] == "no-store"
+    assert (HEADERS["Referrer-Policy"], HEADERS["Cache-Control"]) == ("no-referrer", "no-store")
 
 
 def test_a_watcher_is_told_everything_then_news_and_is_heard() -> None:
@@ -182,9 +178,7 @@ class Built:
 
 
 @pytest.mark.parametrize("looked_at", [True, False])
-def test_the_scene_is_built_once_when_somebody_looks_and_it_is_known_what_to_show(
-    monkeypatch, looked_at
-) -> None:
+def test_the_scene_is_built_once_when_somebody_looks_and_there_is_one(monkeypatch, looked_at) -> None:
     monkeypatch.setattr(Built, "made", [])
     monkeypatch.setattr(scene, "Scene", Built)
 

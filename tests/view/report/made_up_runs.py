@@ -27,29 +27,16 @@ TREE = (
 """A pick: what moves, what looks, what decides, and what only lets time pass."""
 
 
-def ran(
-    name: str,
-    began: float,
-    ended: float,
-    item: str = "",
-    status: str = "SUCCESS",
-    reason: str = "",
-    message: str = "",
-) -> Span:
-    """Return one time that a skill of the tree ran."""
+def ran(name: str, began: float, ended: float, item: str = "", status: str = "SUCCESS", *why: str) -> Span:
+    """Return one time that a skill of the tree ran; `why` is the reason and the message of a failure."""
+    reason, message = why or ("", "")
     return Span(f"tree/{name}", began, ended, status, reason, message, item)
 
 
 def told(clock: float, node: str, status: str, **data: Any) -> Entry:
     """Return what a journal says of a node at a time."""
-    return {
-        "tick": round(240 * clock),
-        "clock": clock,
-        "kind": "status",
-        "node": node,
-        "status": status,
-        **data,
-    }
+    stamp = {"tick": round(240 * clock), "clock": clock, "kind": "status"}
+    return {**stamp, "node": node, "status": status, **data}
 
 
 def picks(count: int, pace: float = 5.0) -> Sequence[Span]:
@@ -57,10 +44,10 @@ def picks(count: int, pace: float = 5.0) -> Sequence[Span]:
     looks = {"MoveToScan": 0.2, "Detect": 0.01}
     acts = {"SelectTarget": 0.0, "Approach": 0.3, "Grasp": 0.02, "Transit": 0.4, "Release": 0.02}
     course: list[Span] = []
+    began = 0.0
     for number in range(count):
-        began = number * pace
         for name, share in {**looks, **acts}.items():
-            ended = began + share * pace
-            course.append(ran(name, began, ended, f"cube-{number + 1}" if name in acts else ""))
-            began = ended
+            course.append(ran(name, began, began + share * pace, f"cube-{number + 1}" * (name in acts)))
+            began += share * pace
+        began = (number + 1) * pace
     return course

@@ -92,13 +92,6 @@ def test_a_shipped_mission_is_repeated_by_its_name_and_with_what_was_asked_for(d
     assert (facts.requests, facts.disturbances) == (["apple"], [(1.8, "object removed")])
 
 
-def test_a_phantom_is_no_object(done, copy):
-    run = copy(done)
-    before = [row.item for row in Facts(run).objects]
-    append(run, tick=400, clock=1.7, kind="item", item="cube-9", label="cube", state="phantom", why="nothing")
-    assert [row.item for row in Facts(run).objects] == before
-
-
 def test_a_run_that_had_not_begun_has_nothing_to_report(done, copy):
     run = copy(done)
     (run / "journal.jsonl").write_text("")

@@ -27,11 +27,8 @@ def content(picture: Picture) -> bytes:
     return base64.b64decode(picture.source.removeprefix("data:image/jpeg;base64,"))
 
 
-def test_a_run_without_pictures_has_none(tmp_path):
-    assert pictures(tmp_path / "frames", ["cube-1"]) == []
-
-
 def test_a_name_says_when_it_was_what_it_is_about_and_what_went_wrong(folder):
+    assert pictures(folder / "none", ["cube-1"]) == []
     save(folder, "000012_cube-1.jpg", "000490_cube-1_missed.jpg", "000500_unsure.jpg", "notes.txt")
     decision, *failures = pictures(folder, ["cube-1"])
     assert (decision.item, decision.tick, decision.reason) == ("cube-1", 12, "")

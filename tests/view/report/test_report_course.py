@@ -29,6 +29,8 @@ def test_what_a_skill_was_about_may_be_known_at_its_start_or_only_at_its_end():
         told(0.1, "tree/SelectTarget", "SUCCESS", item="duck-1"),
     ])  # fmt: skip
     assert [span.item for span in course] == ["cube-1", "duck-1"]
+    # An end without a beginning is nothing that ran.
+    assert spans([told(0.2, "tree/Detect", "SUCCESS")]) == spans([]) == []
 
 
 def test_what_was_under_way_when_the_record_ends_ran_until_then():
@@ -50,11 +52,6 @@ def test_what_begins_anew_after_a_cut_was_halted_by_it():
     assert [(span.began, span.ended, span.status) for span in course] == [
         (1.0, 1.5, "INVALID"), (1.5, 3.0, "SUCCESS"),
     ]  # fmt: skip
-
-
-def test_an_end_without_a_beginning_is_nothing_that_ran():
-    assert spans([told(0.2, "tree/Detect", "SUCCESS")]) == []
-    assert spans([]) == []
 
 
 def test_a_tally_counts_the_ends_of_a_node_and_keeps_its_last_failure():

@@ -45,16 +45,17 @@ def test_the_verdict_comes_first_and_then_why_objects_timeline_and_tree(failed):
     assert found.texts["header"].startswith(
         "FAILURE Grasp.missed Grasp of sphere-1 failed (missed) on the last of 2 attempts: no seal on"
     )
-    assert "trial , seed 3, 1.2 s on the robot's clock" in found.texts["header"]
-
-
-def test_the_story_is_told_with_the_picture_of_the_failure(failed):
-    found = page(failed)
-    told = found.texts["story"]
-    assert "Why nothing in the mission stopped it, from the root down: retry all 2 attempts failed" in told
-    assert "tree/5:retry/do/Grasp" in told
-    assert "left to do 2: sphere-1" in told
+    for section, words in (
+        ("header", "trial , seed 3, 1.2 s on the robot's clock"),
+        ("story", "Why nothing in the mission stopped it, from the root down: retry all 2 attempts failed"),
+        ("story", "tree/5:retry/do/Grasp"),
+        ("story", "left to do 2: sphere-1"),
+        ("tree", "2 failed missed: no seal on"),
+        ("timeline", "Grasp Grasp of sphere-1: FAILURE"),
+    ):
+        assert words in found.texts[section]
     assert "The last picture before the end" in [attributes.get("alt") for _, attributes in found.elements]
+    assert {"timeline", "behaviour-tree"} <= {attributes.get("class") for _, attributes in found.elements}
 
 
 def test_a_success_has_no_story_and_says_what_is_in_the_bins(done):
@@ -84,13 +85,6 @@ def test_the_rows_of_time_sum_up_to_the_time_of_the_run(failed, done, killed, co
         rows = re.findall(r"</td><td>([0-9.]+)</td>\s*<td class=\"bar\">", report(facts))
         assert len(rows) == len(facts.shares.rows)
         assert sum(map(float, rows)) == pytest.approx(facts.end, abs=0.01 * len(rows))
-
-
-def test_the_tree_says_how_each_node_fared_and_the_timeline_when(failed):
-    found = page(failed)
-    assert "2 failed missed: no seal on" in found.texts["tree"]
-    assert "Grasp Grasp of sphere-1: FAILURE" in found.texts["timeline"]
-    assert {"timeline", "behaviour-tree"} <= {attributes.get("class") for _, attributes in found.elements}
 
 
 def test_params_versions_and_the_commands_that_repeat_it_are_there(failed):

@@ -30,149 +30,118 @@ def node(name: str, path: str, *children: Behaviour, detail: str = "") -> Behavi
     return made
 
 
-TREE = node(
-    "sort",
-    "tree/sort",
-    node("repeat", "tree/sort/repeat", node("Detect", "tree/sort/repeat/Detect"), node("Grasp", GRASP)),
-    node("Release", "tree/sort/Release", detail="slot: 1"),
-)
+REPEAT = node("repeat", "tree/sort/repeat", node("Detect", "tree/sort/repeat/Detect"), node("Grasp", GRASP))
+TREE = node("sort", "tree/sort", REPEAT, node("Release", "tree/sort/Release", detail="slot: 1"))
 RUN = SimpleNamespace(root=TREE, control=RunControl())
 
 
 def item(state: str, **data) -> Event:
-    return Event(
-        "item", 9, 1.5, {"item": "cube-1", "label": "cube", "state": state, "bin": "", "why": "", **data}
-    )
+    row = {"item": "cube-1", "label": "cube", "state": state, "bin": "", "why": ""}
+    return Event("item", 9, 1.5, row | data)
 
 
 def status(node: str, status: str, clock: float = 1.0, **data) -> Event:
     return Event("status", 1, clock, {"node": node, "status": status, **data})
 
 
-def test_skills_are_the_leaves():
-    assert skills(outline(TREE)) == {
-        "tree/sort/repeat/Detect": "Detect", GRASP: "Grasp", "tree/sort/Release": "Release"
-    }  # fmt: skip
-
-
-def test_what_rests_is_folded():
+def test_skills_are_the_leaves_and_what_rests_is_folded():
     nodes = outline(TREE)
+    leaves = {"tree/sort/repeat/Detect": "Detect", GRASP: "Grasp", "tree/sort/Release": "Release"}
+    assert skills(nodes) == leaves
     assert [node.path for node in opened(nodes, set())] == ["tree/sort"]
     assert [node.name for node in opened(nodes, {"tree/sort"})] == ["sort", "repeat", "Release"]
     assert opened(nodes, {"tree/sort", "tree/sort/repeat"}) == nodes
     assert [node.name for node in opened(nodes, {"tree/sort/repeat"})] == ["sort"]
 
 
-@pytest.fixture
-def lines():
+MISSED = {"item": "cube-1", "reason": "missed", "message": "no seal 0.1 s after contact"}
+AGAIN = {"node": "tree/sort/repeat", "choice": "attempt 2 of 3", "reason": "Grasp.missed"}
+
+
+@pytest.mark.parametrize(
+    ("events", "shown"),
+    [
+        ([status(GRASP, "RUNNING", 1.0, item="cube-1"), status(GRASP, "FAILURE", 1.1, **MISSED)],
+         ["     1.00 s  Grasp [cube-1] ...",
+          "     1.10 s  Grasp [cube-1] failed: missed: no seal 0.1 s after contact"]),
+        ([status("tree/sort/repeat", "RUNNING"), Event("choice", 1, 2.0, AGAIN),
+          status("tree/sort/repeat", "FAILURE", reason="Grasp.missed")],
+         ["     2.00 s  repeat: attempt 2 of 3, after Grasp.missed"]),
+        ([item("seen"), item("seen", looks=2), item("placed", bin="red_bin")],
+         ["     1.50 s  cube-1 seen", "     1.50 s  cube-1 placed in red_bin"]),
+    ],
+    ids=["a line where a skill starts and one where it ends", "control nodes only where they decide",
+         "items where their state changes"],
+)  # fmt: skip
+def test_there_is_a_line_for_all_that_is_news(events, shown):
     stream = io.StringIO()
     view = Lines(stream)
     view.open(RUN)
-    return view, stream
-
-
-def test_a_skill_gets_a_line_when_it_starts_and_one_when_it_ends(lines):
-    view, stream = lines
-    view(status(GRASP, "RUNNING", 1.0, item="cube-1"))
-    view(status(GRASP, "FAILURE", 1.1, item="cube-1", reason="missed", message="no seal 0.1 s after contact"))
-    assert stream.getvalue().splitlines() == [
-        "     1.00 s  Grasp [cube-1] ...",
-        "     1.10 s  Grasp [cube-1] failed: missed: no seal 0.1 s after contact",
-    ]
-
-
-def test_control_nodes_say_only_what_they_decide(lines):
-    view, stream = lines
-    view(status("tree/sort/repeat", "RUNNING"))
-    view(
-        Event(
-            "choice",
-            1,
-            2.0,
-            {"node": "tree/sort/repeat", "choice": "attempt 2 of 3", "reason": "Grasp.missed"},
-        )
-    )
-    view(status("tree/sort/repeat", "FAILURE", reason="Grasp.missed"))
-    assert stream.getvalue() == "     2.00 s  repeat: attempt 2 of 3, after Grasp.missed\n"
-
-
-def test_an_item_is_told_when_its_state_changes_and_not_at_every_look(lines):
-    view, stream = lines
-    for event in (item("seen"), item("seen", looks=2), item("placed", bin="red_bin")):
+    for event in events:
         view(event)
-    assert [line[13:] for line in stream.getvalue().splitlines()] == [
-        "cube-1 seen",
-        "cube-1 placed in red_bin",
-    ]
+    assert stream.getvalue().splitlines() == shown
+
+
+def page(view: Terminal) -> str:
+    """Return what a screen shows."""
+    console = Console(file=io.StringIO(), width=100)
+    console.print(view.render())
+    return console.file.getvalue()
 
 
 def test_the_live_view_shows_the_running_path_the_items_and_the_clock():
-    stream = io.StringIO()
-    view = Terminal(Console(file=stream, force_terminal=True, width=100, color_system=None))
+    view = Terminal(Console(file=io.StringIO(), force_terminal=True, width=100, color_system=None))
     view.open(RUN)
-    view(Event("run", 0, 0.0, {"mission": "sort", "seed": 7}))
-    view(status("tree/sort", "RUNNING"))
-    view(status("tree/sort/repeat", "RUNNING"))
-    view(status(GRASP, "FAILURE", reason="missed"))
-    view(item("placed", bin="red_bin"))
-    page = Console(file=io.StringIO(), width=100)
-    page.print(view.render())
+    for event in (
+        Event("run", 0, 0.0, {"mission": "sort", "seed": 7}), status("tree/sort", "RUNNING"),
+        status("tree/sort/repeat", "RUNNING"), status(GRASP, "FAILURE", reason="missed"),
+        item("placed", bin="red_bin"),
+    ):  # fmt: skip
+        view(event)
+    shown = page(view)
     view.close()
-    shown = page.file.getvalue()
-    assert "sort  seed 7  1.5 s" in shown
-    assert "▶ repeat" in shown
-    assert "✗ Grasp  missed" in shown
-    assert "cube-1" in shown and "placed" in shown and "red_bin" in shown
+    for what in ("sort  seed 7  1.5 s", "▶ repeat", "✗ Grasp  missed", "cube-1", "placed", "red_bin"):
+        assert what in shown
 
 
 def test_the_live_view_redraws_ten_times_a_second(monkeypatch):
     renders = []
     render = Terminal.render
-    monkeypatch.setattr(Terminal, "render", lambda self: renders.append(time.perf_counter()) or render(self))
+    monkeypatch.setattr(Terminal, "render", lambda self: renders.append(self) or render(self))
     view = Terminal(Console(file=io.StringIO(), force_terminal=True, width=100))
     view.open(RUN)
     for tick in range(300):
         view(status("tree/sort/repeat/Detect", "RUNNING", tick / 240))
     time.sleep(0.55)
-    assert 3 < len(renders) < 10
     view.close()
+    assert 3 < len(renders) <= 10
 
 
 RESULT = {
-    "status": "FAILURE",
-    "reason": "Transit.dropped",
-    "message": "lost at 1.2 m/s",
-    "node": "sort/0/3",
-    "robot_time_s": 34.25,
-    "wall_time_s": 6.84,
-    "run": "runs/latest",
-}
+    "status": "FAILURE", "reason": "Transit.dropped", "message": "lost at 1.2 m/s", "node": "sort/0/3",
+    "robot_time_s": 34.25, "wall_time_s": 6.84, "run": "runs/latest",
+}  # fmt: skip
 
 
-def test_the_summary_says_how_it_ended_how_long_it_took_and_how_to_repeat_it():
+def test_the_summary_says_how_it_ended_how_long_it_took_and_how_to_repeat_it_in_a_shell():
     items = ItemTable()
-    items(item("placed", bin="red_bin"))
-    items(item("placed", item="cube-2", bin="red_bin"))
-    items(item("rejected", item="duck-1", why="three misses"))
-    repeat = repeat_command("sort", seed=7, overrides={"attempts": "5"}, requests=["cube"])
-    assert summary(RESULT, items, repeat).splitlines() == [
+    for event in (
+        item("placed", bin="red_bin"), item("placed", item="cube-2", bin="red_bin"),
+        item("rejected", item="duck-1", why="three misses"),
+    ):  # fmt: skip
+        items(event)
+    repeat = repeat_command("my mission.yaml", seed=7, overrides={"attempts": "a b"}, requests=["cube"])
+    lines = [
         "FAILURE Transit.dropped at sort/0/3: lost at 1.2 m/s",
         "34.2 s on the robot's clock, 6.8 s by the wall clock",
-        "runs/latest  (repeat: executive run sort --seed 7 --set attempts=5 --request cube)",
+        "runs/latest  (repeat: executive run 'my mission.yaml' --seed 7 --set 'attempts=a b' --request cube)",
         "  red_bin: cube-1, cube-2",
         "  rejected: duck-1 (three misses)",
     ]
-
-
-def test_the_summary_of_a_success_names_the_report_and_its_command_survives_a_shell():
+    assert summary(RESULT, items, repeat).splitlines() == lines
     result = {**RESULT, "status": "SUCCESS", "reason": "", "node": "", "message": ""}
-    repeat = repeat_command("my mission.yaml", seed=0, overrides={"a": "x y"})
-    assert summary(result, ItemTable(), repeat, "runs/x/report.html").splitlines() == [
-        "SUCCESS",
-        "34.2 s on the robot's clock, 6.8 s by the wall clock",
-        "runs/latest  (repeat: executive run 'my mission.yaml' --seed 0 --set 'a=x y')",
-        "report: runs/x/report.html",
-    ]
+    shown = summary(result, ItemTable(), repeat, "runs/x/report.html").splitlines()
+    assert shown == ["SUCCESS", *lines[1:3], "report: runs/x/report.html"]
 
 
 def test_the_keys_are_named_beside_the_clock_where_there_is_a_keyboard(monkeypatch):
@@ -181,8 +150,6 @@ def test_the_keys_are_named_beside_the_clock_where_there_is_a_keyboard(monkeypat
     view, control = Terminal(Console(file=io.StringIO(), force_terminal=True), keyboard=0), RunControl()
     view.open(SimpleNamespace(root=TREE, control=control))
     for words in ("p pause, s step, Ctrl-C stop", "paused: p go on, s step, Ctrl-C stop"):
-        page = Console(file=io.StringIO(), width=100)
-        page.print(view.render())
-        assert page.file.getvalue().splitlines()[0].rstrip() == f"  0.0 s   {words}"
+        assert page(view).splitlines()[0].rstrip() == f"  0.0 s   {words}"
         control.pause()
     view.close()

@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from executive.view.tree.layout import Layout, Rectangle, Size, layout
+from executive.view.tree.layout import Rectangle, Size, layout
 
 
 def drawn_by_chance(seed: int) -> tuple[list[int], list[Size]]:
@@ -50,22 +50,13 @@ def overlap(one: Rectangle, other: Rectangle) -> bool:
 
 
 def contains(outer: Rectangle, inner: Rectangle) -> bool:
-    slack = 1e-6
-    return (
-        outer.x <= inner.x + slack
-        and outer.y <= inner.y + slack
-        and outer.right >= inner.right - slack
-        and outer.y + outer.height >= inner.y + inner.height - slack
-    )
-
-
-def laid_out(depths: list[int], nodes: list[Size]) -> Layout:
-    return layout(depths, below(depths), nodes)
+    right, bottom = outer.right - inner.right, outer.y + outer.height - inner.y - inner.height
+    return min(inner.x - outer.x, inner.y - outer.y, right, bottom) >= -1e-6
 
 
 def test_nodes_stand_clear_of_each_other_in_their_order_and_level_with_their_first_child(tree):
     depths, nodes = tree
-    plan = laid_out(depths, nodes)
+    plan = layout(depths, below(depths), nodes)
     assert not any(overlap(one, other) for one, other in itertools.combinations(plan.boxes, 2))
     for parent, among in enumerate(below(depths)):
         middles = [plan.boxes[child].middle for child in among]
@@ -81,7 +72,7 @@ def test_nodes_stand_clear_of_each_other_in_their_order_and_level_with_their_fir
 
 def test_a_frame_holds_its_subtree_and_nothing_else(tree):
     depths, nodes = tree
-    plan = laid_out(depths, nodes)
+    plan = layout(depths, below(depths), nodes)
     assert set(plan.frames) == {index for index, size in enumerate(nodes) if size.name}
     for index, frame in plan.frames.items():
         within = inside(index, depths)

@@ -67,18 +67,14 @@ def test_a_skill_tells_what_the_mission_connects_and_what_it_declares():
     assert node.reasons == ("missed", "blocked")
 
 
-def test_every_node_knows_what_it_is_to_its_parent_and_which_subtree_begins_with_it():
-    assert [(node.slot, node.title, node.subtrees) for node in outline(tree())] == [
-        ("", "try", ()),
-        ("do", "retry", ()),
-        ("recover", "sequence", ("look",)),
-        ("", "Pick", ()),
-        ("do", "Pick", ()),
-        ("catch 1", "sequence", ("look",)),
-        ("", "Pick", ()),
-        ("finally", "sequence", ("look",)),
-        ("", "Pick", ()),
-    ]
+def test_every_node_knows_its_children_what_it_is_to_its_parent_and_which_subtree_begins_with_it():
+    nodes = outline(tree())
+    look, taken = ("sequence", ("look",)), ("", "Pick", ())
+    assert [(node.slot, node.title, node.subtrees) for node in nodes] == [
+        ("", "try", ()), ("do", "retry", ()), ("recover", *look), taken, ("do", "Pick", ()),
+        ("catch 1", *look), taken, ("finally", *look), taken,
+    ]  # fmt: skip
+    assert children(nodes) == [[1, 5, 7], [2, 4], [3], [], [], [6], [], [8], []]
 
 
 def test_a_node_knows_after_which_failures_it_runs():
@@ -89,10 +85,6 @@ def test_a_node_knows_after_which_failures_it_runs():
     handlers = [([("Pick", "missed")], look("tree/try/catch/1/look"))]
     root = Says(Site("tree/try"), pick("tree/try/Pick"), handlers)
     assert [node.when for node in outline(root)] == ["", "", "on Pick.missed", ""]
-
-
-def test_children_stand_below_their_parents():
-    assert children(outline(tree())) == [[1, 5, 7], [2, 4], [3], [], [], [6], [], [8], []]
 
 
 def test_ports_and_reasons_stand_below_the_skill():

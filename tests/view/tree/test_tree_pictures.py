@@ -65,13 +65,26 @@ def tooltip(group: Element) -> str:
     return group.findtext(f"{SVG}title") or ""
 
 
-def test_every_node_is_a_group_that_a_page_can_find():
-    found = groups(parsed(NODES))
-    assert list(found) == [node.path for node in NODES]
+def test_every_node_is_a_group_with_its_symbol_title_and_short_lines_and_a_subtree_one_with_its_name():
+    picture = parsed(NODES)
+    found = groups(picture)
     assert [group.attrib["data-kind"] for group in found.values()] == [node.kind for node in NODES]
-    assert found["tree/try/retry/do/Grasp"].attrib["class"] == "node skill"
-    assert found["tree/try/retry"].attrib["class"] == "node control retry"
+    shown = {
+        path: [texts(group, kind) for kind in ("slot", "symbol", "title", "line")]
+        for path, group in found.items()
+    }
+    assert shown == {
+        "tree/try": [[], ["↯"], ["try"], []],
+        "tree/try/retry": [
+            ["do"], ["↻"], ["retry"], ["up to 3 attempts,", "on Grasp.missed,", "Grasp.blocked"]
+        ],
+        "tree/try/retry/do/Grasp": [["do"], [], ["Grasp"], ["settle: 0.2"]],
+        "tree/try/catch/1/look": [["catch 1"], ["→"], ["sequence"], ["on Grasp.missed"]],
+        "tree/try/catch/1/look/2:Detect": [[], [], ["again"], ["Detect, view: full"]],
+    }  # fmt: skip
     assert found["tree/try/catch/1/look/2:Detect"].attrib["id"] == "node-tree-try-catch-1-look-2--3a-Detect"
+    (frame,) = [group for group in picture.iter(f"{SVG}g") if group.attrib["class"] == "subtree"]
+    assert (frame.attrib["data-path"], texts(frame, "name")) == ("tree/try/catch/1/look", ["look"])
 
 
 def test_an_id_says_its_path_and_no_two_are_alike():
@@ -81,41 +94,16 @@ def test_an_id_says_its_path_and_no_two_are_alike():
     assert all(re.fullmatch(r"node-[A-Za-z0-9_-]+", each) for each in found)
 
 
-def test_a_node_shows_its_symbol_its_title_and_short_lines():
-    found = groups(parsed(NODES))
-    retry, again = found["tree/try/retry"], found["tree/try/catch/1/look/2:Detect"]
-    assert (texts(retry, "symbol"), texts(retry, "title")) == (["↻"], ["retry"])
-    assert texts(retry, "line") == ["up to 3 attempts,", "on Grasp.missed,", "Grasp.blocked"]
-    assert (texts(again, "symbol"), texts(again, "title")) == ([], ["again"])
-    assert texts(again, "line") == ["Detect, view: full"]
-
-
-def test_a_line_says_what_the_node_is_to_its_parent():
-    slots = {path: texts(group, "slot") for path, group in groups(parsed(NODES)).items()}
-    assert list(slots.values()) == [[], ["do"], ["do"], ["catch 1"], []]
-
-
 def test_the_title_of_a_node_says_everything():
     found = groups(parsed(NODES))
     assert tooltip(found["tree/try/retry/do/Grasp"]).splitlines() == [
-        "Grasp",
-        "Close the tool.",
-        "settle: 0.2",
-        "reads $target, only <- $item?",
-        "writes held -> $thing",
-        "may fail: missed, blocked",
-        "tree/try/retry/do/Grasp",
-    ]
+        "Grasp", "Close the tool.", "settle: 0.2", "reads $target, only <- $item?", "writes held -> $thing",
+        "may fail: missed, blocked", "tree/try/retry/do/Grasp",
+    ]  # fmt: skip
     assert tooltip(found["tree/try/catch/1/look"]).splitlines() == [
         "sequence", "on Grasp.missed", "subtree look", "tree/try/catch/1/look",
     ]  # fmt: skip
     assert tooltip(found["tree/try/catch/1/look/2:Detect"]).startswith("again: Detect\n")
-
-
-def test_a_subtree_has_a_frame_with_its_name():
-    (frame,) = [group for group in parsed(NODES).iter(f"{SVG}g") if group.attrib["class"] == "subtree"]
-    assert frame.attrib["data-path"] == "tree/try/catch/1/look"
-    assert texts(frame, "name") == ["look"]
 
 
 def test_a_word_that_nobody_knows_is_drawn_like_any_other():
@@ -125,19 +113,14 @@ def test_a_word_that_nobody_knows_is_drawn_like_any_other():
     assert "shape=ellipse" in dot([node], "x")
 
 
-def test_the_picture_needs_nothing_else():
-    text = svg(NODES, "sort")
-    elements = {element.tag.removeprefix(SVG) for element in ElementTree.fromstring(text).iter()}
+def test_the_picture_needs_nothing_else_and_its_colours_come_from_the_style_sheet_alone():
+    picture, text = parsed(NODES), svg(NODES, "sort")
+    elements = {element.tag.removeprefix(SVG) for element in picture.iter()}
     assert elements == {"svg", "title", "style", "g", "rect", "text", "path"}
     assert not re.search(r"href|url\(|@import|http(?!://www\.w3\.org/2000/svg)", text)
-
-
-def test_colours_come_from_the_style_sheet_alone():
-    picture = parsed(NODES)
     assert not any({"fill", "stroke", "style"} & set(element.attrib) for element in picture.iter())
-    style = picture.findtext(f"{SVG}style") or ""
-    for status in ("running", "success", "failure"):
-        assert f".{status} .box" in style
+    style = picture.findtext(f"{SVG}style")
+    assert all(f".{status} .box" in style for status in ("running", "success", "failure"))
     assert all(rule.lstrip().startswith(".behaviour-tree ") for rule in re.findall(r"[^{}]+(?={)", style))
 
 
@@ -152,27 +135,22 @@ def test_text_from_a_mission_cannot_leave_its_place_in_the_svg():
 
 
 def test_text_from_a_mission_cannot_leave_its_place_in_the_dot():
-    node = skill(f"tree/{NASTY}", 0, "Grasp", title=NASTY, detail=NASTY, subtrees=(NASTY,))
-    text = dot([node], NASTY)
+    text = dot([skill(f"tree/{NASTY}", 0, "Grasp", title=NASTY, detail=NASTY, subtrees=(NASTY,))], NASTY)
     text.encode()
-    outside = re.sub(r'"(?:[^"\\]|\\.)*"', "_", text)
-    assert outside.splitlines() == [
+    outside = re.sub(r'"(?:[^"\\]|\\.)*"', "_", text).splitlines()
+    assert (outside[0], outside[3:]) == (
         "digraph _ {",
-        "  ordering=out; nodesep=0.15; fontname=_; fontsize=11;",
-        "  node [fontname=_, fontsize=11]; edge [fontname=_, fontsize=9];",
-        "  subgraph _ {",
-        "  label=_; style=dashed; color=gray;",
-        "  _ [label=_, shape=box, style=_, tooltip=_];",
-        "  }",
-        "}",
-    ]
+        ["  subgraph _ {", "  label=_; style=dashed; color=gray;",
+         "  _ [label=_, shape=box, style=_, tooltip=_];", "  }", "}"],
+    )  # fmt: skip
     assert "&amp;amp;" in text
 
 
 def test_the_dot_has_every_node_and_every_line():
-    lines = [re.sub(r", tooltip=.*", "", line.strip()) for line in dot(NODES, "sort").splitlines()]
-    assert lines[0] == 'digraph "sort" {'
-    assert lines[3:] == [
+    assert [re.sub(r", tooltip=.*", "", line.strip()) for line in dot(NODES, "sort").splitlines()] == [
+        'digraph "sort" {',
+        'ordering=out; nodesep=0.15; fontname="sans-serif"; fontsize=11;',
+        'node [fontname="sans-serif", fontsize=11]; edge [fontname="sans-serif", fontsize=9];',
         '"tree/try" [label="↯ try", shape=ellipse',
         r'"tree/try/retry" [label="↻ retry\nup to 3 attempts,\non Grasp.missed,\nGrasp.blocked", '
         "shape=hexagon",
@@ -192,10 +170,8 @@ def test_the_dot_has_every_node_and_every_line():
 
 def test_a_skill_has_two_lines_of_params_at_most():
     detail = ", ".join(f"param_{number}: {number}" for number in range(9))
-    assert card(skill("tree/A", 0, "A", detail=detail)).lines == (
-        "param_0: 0, param_1: 1,",
-        "param_2: 2, param_3: 3, …",
-    )
+    lines = ("param_0: 0, param_1: 1,", "param_2: 2, param_3: 3, …")
+    assert card(skill("tree/A", 0, "A", detail=detail)).lines == lines
     assert card(skill("tree/A", 0, "A", detail="x" * 100)).lines == ("x" * 28, "x" * 27 + "…")
 
 
