@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -79,19 +79,6 @@ def empty_trial(faults: Numbered) -> Trial:
     return Trial(tuple(faults), told, last.name, last.place, last.what, last.when)
 
 
-class _StoppingCell(WrappedCell):
-    """A work cell with something to do after every control step."""
-
-    def __init__(self, inner: Workcell, after: Callable[[], None]) -> None:
-        super().__init__(inner)
-        self._after = after
-
-    def advance(self) -> None:
-        """Let one control step pass, with what is to be done after it."""
-        super().advance()
-        self._after()
-
-
 class _Trying:
     """A run and all that is seen of it."""
 
@@ -153,7 +140,7 @@ class _Trying:
     def _kind(self, *args: Any, **options: Any) -> Workcell:
         kind = self._subject.kind or cell_kind(self._subject.loaded.cell_config.kind)
         bounded = BoundedCell(kind(*args, **options), self._rehearsal.longest)
-        return _StoppingCell(bounded, self._stop_if_due)
+        return WrappedCell(bounded, after=self._stop_if_due)
 
     def _see(self, event: Event) -> None:
         if event.kind != "sense":
