@@ -11,7 +11,7 @@ from executive.cell import Request
 from executive.errors import Blocked, NoDepth, Unavailable, Unreachable
 from executive.events import Event
 from executive.testing import disturbances as effects
-from executive.testing.disturbances import Disturbance, DisturbedCell, after, between, during
+from executive.testing.disturbances import Disturbance, DisturbedCell, between, during
 from executive.testing.disturbances.effect import Effect
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_mission import run_mission
@@ -148,11 +148,9 @@ def test_an_unsure_detector_sees_everything_and_believes_nothing() -> None:
 
 
 @pytest.mark.parametrize("share", [0.2, 0.8])
-@pytest.mark.parametrize(
-    "effect", [effects.seal_breaks, lambda share: effects.arm_runs_into("a hand", share)]
-)
-def test_it_happens_so_far_on_the_way(effect: Any, share: float) -> None:
-    cell: Any = cell_with(effect(share=share))
+@pytest.mark.parametrize("name", ["seal_breaks", "arm_runs_into"])
+def test_it_happens_so_far_on_the_way(name: str, share: float) -> None:
+    cell: Any = cell_with(getattr(effects, name)(share=share))
     hold(cell)
     start = cell.cell.arm.tool_pose.position
     whole = follow(cell)
@@ -162,12 +160,11 @@ def test_it_happens_so_far_on_the_way(effect: Any, share: float) -> None:
     assert gone / whole == pytest.approx(share, abs=0.03)
     if cell.told[0]["what"] == "seal_breaks":
         assert not cell.fake.tool.holding and not cell.cell.arm.at_rest
-        assert cell.told[0]["object"] == "cube"
-        assert cell.told[0]["position"][2] > 0.1, "it hung in the air"
+        assert cell.told[0]["object"] == "cube" and cell.told[0]["position"][2] > 0.1, "it hung in the air"
         assert cell.fake.world.objects[0].position[2] == pytest.approx(0.025)
     else:
         assert cell.fake.tool.holding and cell.cell.arm.at_rest
-        assert cell.cell.arm.met == "the arm ran into a hand"
+        assert cell.cell.arm.met == "the arm ran into something"
 
 
 def test_a_seal_breaks_at_once_only_where_something_is_held() -> None:
@@ -207,16 +204,15 @@ def test_a_tool_that_sticks_lets_go_when_it_is_opened_once_more() -> None:
     assert not cell.fake.tool.holding
 
 
-def test_nothing_seals_or_one_object_does_not() -> None:
-    for effect, sealed in (
-        (effects.seal_fails(), False),
-        (effects.object_refuses(2), True),
-        (effects.object_refuses(1), False),
-    ):
-        cell: Any = cell_with(effect)
-        cell.fake.arm._tool.position[:] = [*PLACES["cube"], 0.05]
-        cell.cell.tool.close()
-        assert (cell.fake.tool.holding, bool(cell.told)) == (sealed, not sealed)
+@pytest.mark.parametrize(
+    ("effect", "sealed"),
+    [(effects.seal_fails(), False), (effects.object_refuses(2), True), (effects.object_refuses(1), False)],
+)
+def test_nothing_seals_or_one_object_does_not(effect: Effect, sealed: bool) -> None:
+    cell: Any = cell_with(effect)
+    cell.fake.arm._tool.position[:] = [*PLACES["cube"], 0.05]
+    cell.cell.tool.close()
+    assert (cell.fake.tool.holding, bool(cell.told)) == (sealed, not sealed)
 
 
 @pytest.mark.parametrize(("is_blocked", "error"), [(False, Unreachable), (True, Blocked)])
@@ -313,16 +309,24 @@ def test_with_a_share_an_object_waits_until_the_arm_is_so_far() -> None:
     assert half == pytest.approx((cell.cell.clock.now - began) / 2, abs=0.02)
 
 
-def test_an_object_is_bumped_aside_to_the_first_free_place() -> None:
-    x, y = (0.4, 0.7), (-0.3, 0.3)
+X, Y = (0.4, 0.7), (-0.3, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "neighbour", "place"),
+    [
+        (X, Y, None, (0.66, -0.15)),
+        (X, (-0.16, 0.3), (0.66, -0.15), (0.6, -0.09)),
+        ((0.59, 0.61), (-0.16, -0.14), None, (0.6, -0.15)),
+    ],
+    ids=["free", "a neighbour in the way", "no room"],
+)
+def test_an_object_is_bumped_aside_to_the_first_free_place(
+    x: tuple[float, float], y: tuple[float, float], neighbour: Any, place: tuple[float, float]
+) -> None:
     cell: Any = cell_with(effects.object_bumped(x, y, 1))
+    if neighbour:
+        cell.fake.world.put("cube", *neighbour)
     cell.advance()
-    assert cell.fake.world.objects[0].position[:2] == pytest.approx([0.66, -0.15])
-    cell = cell_with()
-    cell.fake.world.put("cube", 0.66, -0.15)
-    cell = DisturbedCell(cell.fake, [after(0.0, effects.object_bumped(x, (-0.16, 0.3), 1))])
-    cell.advance()
-    assert cell.inner.world.objects[0].position[:2] == pytest.approx([0.6, -0.09])
-    cell = cell_with(effects.object_bumped((0.59, 0.61), (-0.16, -0.14), 1))
-    cell.advance()
-    assert (cell.fake.world.objects[0].position[0], cell.told) == (0.6, []), "there is no room"
+    assert cell.fake.world.objects[0].position[:2] == pytest.approx(place)
+    assert bool(cell.told) is (place != PLACES["cube"])

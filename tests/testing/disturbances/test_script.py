@@ -31,6 +31,7 @@ from executive.testing.wrapped_cell import WrappedCell
 from executive.workcell import CellOptions
 
 SLIPS = effects.seal_fails()
+SHARE = "a share of a motion is more than 0 and less than 1"
 
 
 def sorted_with(*script: Disturbance) -> MissionResult:
@@ -91,15 +92,9 @@ def test_a_chance_is_met_as_often_as_it_says(probability: float, seed: int) -> N
         (lambda: between(5, 5, SLIPS), "from some time until a later one, not from 5 s to 5 s"),
         (lambda: after(-1, SLIPS), "not from -1 s to inf s"),
         (lambda: with_probability(1.5, "*", SLIPS, seed=0), "a probability is 0 to 1, not 1.5"),
-        (lambda: effects.seal_breaks(1.0), "a share of a motion is more than 0 and less than 1, not 1"),
-        (
-            lambda: effects.arm_runs_into(share=0.0),
-            "a share of a motion is more than 0 and less than 1, not 0",
-        ),
-        (
-            lambda: effects.object_removed(share=1.0),
-            "a share of a motion is more than 0 and less than 1, not 1",
-        ),
+        (lambda: effects.seal_breaks(1.0), f"{SHARE}, not 1"),
+        (lambda: effects.arm_runs_into(share=0.0), f"{SHARE}, not 0"),
+        (lambda: effects.object_removed(share=1.0), f"{SHARE}, not 1"),
         (lambda: effects.object_removed(0), "objects are counted from 1, and which is 0"),
         (lambda: effects.object_moved((0.1, 0.0), -1), "objects are counted from 1, and which is -1"),
         (lambda: effects.detector_slow(-0.5), "a slow detector answers later, not by -0.5 s"),
@@ -160,10 +155,9 @@ def test_a_hand_reaches_through_wrapped_cells_and_into_no_unknown_one() -> None:
     fake = FakeCell()
     fake.world.put("cube", 0.5, 0.0)
     assert [thing.label for thing in hand_of(WrappedCell(WrappedCell(fake))).things] == ["cube"]
+    gone = [after(0.0, effects.object_removed(1))]
     strange: Any = SimpleNamespace(cell=FakeCell().cell, advance=lambda: None)
     with pytest.raises(InputError, match="nobody knows how to reach into a SimpleNamespace; give `disturb"):
-        DisturbedCell(strange, [after(0.0, effects.object_removed(1))]).advance()
-    disturbed(
-        lambda **_: strange, [after(0.0, effects.object_removed(1))], hand=lambda _: hand_of(fake)
-    )().advance()
+        DisturbedCell(strange, gone).advance()
+    disturbed(lambda **_: strange, gone, hand=lambda _: hand_of(fake))().advance()
     assert fake.world.objects == []
