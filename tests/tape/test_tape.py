@@ -74,16 +74,6 @@ def test_the_same_questions_get_the_same_answers(steps: list[list[tuple[str, int
         assert [tape.sense(name, never) for name, _ in asked] == [value for _, value in asked]
 
 
-def test_an_answer_that_comes_after_a_command_of_the_same_step_is_not_given_before_it() -> None:
-    recording = Recording()
-    recording.begin(3)
-    for holding in (False, False, True):
-        recording.tape.sense("tool.holding", lambda holding=holding: holding)
-    tape = recording.played()
-    tape.begin_tick(3)
-    assert [tape.sense("tool.holding", never) for _ in range(3)] == [False, False, True]
-
-
 def test_what_the_cell_raised_is_raised_again() -> None:
     recording = Recording()
     for error in (Unreachable("1 mm too far"), Fault("off its path"), KeyError("x")):

@@ -9,13 +9,11 @@ import pytest
 from executive.errors import Fault, InputError
 from executive.messages import Target
 from executive.testing.fake_cell import FakeCell
-from executive.testing.run_mission import run_mission
 from executive.testing.run_skill import run_skill
 from executive.testing.substitutes import endless, failing, raising, raising_when_halted, succeeding
 from skills.approach import Approach
 from skills.grasp import Grasp
 from skills.release import Release
-from skills.transit import Transit
 from skills.wait import Wait
 
 SUBSTITUTES = {
@@ -92,13 +90,3 @@ def test_it_never_ends_but_can_be_taken_away(fake: FakeCell) -> None:
     waiting = endless(Wait)
     assert run_skill(waiting, fake, inputs={"seconds": 0.1}, ticks=500).status == "RUNNING"
     assert run_skill(waiting, fake, inputs={"seconds": 0.1}, halt_at=500).status == "HALTED"
-
-
-def test_a_mission_with_a_bug_ends_as_a_fault_at_that_node_with_the_arm_at_rest() -> None:
-    broken = raising(Transit, RuntimeError("a bug"), after=60)
-    result = run_mission("sort_overhead", substitutes={"*/Transit": broken})
-    assert (result.status, result.message) == ("FAULT", "Transit: RuntimeError: a bug")
-    assert result.node.endswith("/Transit")
-    assert result.cell.arm.at_rest
-    (held,) = (row for row in result.items["rows"] if row["why"] == "still in the tool when the run ended")
-    assert result.holds == held["item"]

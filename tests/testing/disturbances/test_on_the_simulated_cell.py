@@ -56,14 +56,6 @@ def holding(cell: SimCell, event: Event) -> bool:
 
 
 @pytest.mark.slow
-def test_where_nothing_seals_the_object_stays_on_the_table(watched: Watched) -> None:
-    result = watched.run(during("*/Grasp", effects.seal_fails(), nth=2), holding)
-    assert (result.status, result.reasons("*/Grasp")) == ("SUCCESS", ["missed"])
-    assert watched.seen["missed"] is False
-    assert result.agrees
-
-
-@pytest.mark.slow
 def test_when_a_seal_breaks_in_mid_carry_the_object_falls_and_is_picked_up_again(watched: Watched) -> None:
     result = watched.run(during("*/Transit", effects.seal_breaks(), nth=2), places)
     (told,) = result.disturbances()
@@ -90,17 +82,6 @@ def test_what_sticks_hangs_at_the_tool_to_the_end(watched: Watched) -> None:
     assert watched.seen["stuck"] is watched.seen["end"] is True
     assert result.holds == result.disturbances()[0]["item"]
     assert result.agrees
-
-
-@pytest.mark.slow
-def test_what_is_taken_from_under_the_tool_is_gone_and_lost(watched: Watched) -> None:
-    result = watched.run(during("*/Approach", effects.object_removed(), nth=2), places)
-    assert result.reasons("*/Approach") == ["no_contact"]
-    before, left = watched.seen["run"], watched.seen["end"]
-    assert isinstance(before, dict) and isinstance(left, dict)
-    assert len(left) == len(before) - 1
-    assert (result.status, result.reason) == ("FAILURE", "lost")
-    assert (result.items["lost"], result.agrees) == (1, True)
 
 
 def test_what_is_taken_out_of_the_tool_is_parted_from_it_first(watched: Watched) -> None:
