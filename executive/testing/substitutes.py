@@ -16,7 +16,7 @@ from executive.cell import Cell, Steps
 from executive.errors import InputError
 from executive.skill import Direction, Skill
 
-Body = Callable[[Skill, Cell], Steps]
+Body = Callable[[Skill, Cell], Steps | None]
 """The `run` of a skill."""
 
 
@@ -119,7 +119,7 @@ def in_place_of(
     """
     number = count(1)
 
-    def run(self: Skill, cell: Cell) -> Steps:
+    def run(self: Skill, cell: Cell) -> Steps | None:
         goes_wrong = starts is None or next(number) in starts
         return body(self, cell) if goes_wrong else _steps(skill, self, cell)
 

@@ -80,8 +80,7 @@ def test_every_run_leaves_its_record_and_its_report(tmp_path):
 def test_after_ctrl_c_no_further_run_begins_and_the_results_so_far_are_kept():
     told = []
     results = swept(range(9), interrupt, workers=1, halting=lambda: told.append("halting"))
-    assert [entry["seed"] for entry in results] == [0]
-    assert told == ["halting"]
+    assert ([entry["seed"] for entry in results], told) == ([0], ["halting"])
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 

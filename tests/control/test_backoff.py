@@ -44,14 +44,11 @@ def test_a_retry_waits_on_the_clock_then_recovers_then_tries_again(
 ) -> None:
     body, fix = leaf("A", "R lost", "S"), leaf("fix", "R S")
     node = Retry(site(), body, 3, [], fix, Backoff(0.5), clock)
-    assert runs(node, clock, [0.0, 0.125, 0.25, 0.5]) == "RRRR"
-    assert log == ["A starts"]
+    assert (runs(node, clock, [0.0, 0.125, 0.25, 0.5]), log) == ("RRRR", ["A starts"])
     assert (body.status, fix.status) == (Status.FAILURE, Status.INVALID)
     # Half a second after the failure at 0.125 s.
-    assert runs(node, clock, [0.625]) == "R"
-    assert log == ["A starts", "fix starts"]
-    assert runs(node, clock, [0.75]) == "S"
-    assert log == ["A starts", "fix starts", "A starts"]
+    assert (runs(node, clock, [0.625]), log) == ("R", ["A starts", "fix starts"])
+    assert (runs(node, clock, [0.75]), log) == ("S", ["A starts", "fix starts", "A starts"])
 
 
 def test_every_wait_is_the_next_one_of_the_backoff(leaf: Any, site: Any, clock: Any, log: Any) -> None:
@@ -64,8 +61,7 @@ def test_every_wait_is_the_next_one_of_the_backoff(leaf: Any, site: Any, clock: 
         began += [clock.now] * (len(log) - before)
         if node.status is Status.FAILURE:
             break
-    assert began == [0.0, 0.25, 0.75, 1.5]
-    assert clock.now == 1.5
+    assert (began, clock.now) == ([0.0, 0.25, 0.75, 1.5], 1.5)
 
 
 def test_a_wait_counts_as_time_so_that_the_attempt_follows_at_once(leaf: Any, site: Any, clock: Any) -> None:

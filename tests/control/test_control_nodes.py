@@ -81,8 +81,7 @@ def test_every_change_of_status_is_told_once(leaf: Any, site: Any, ticks: Any, e
 
 def test_a_stock_behaviour_may_stand_in_a_tree(site: Any, ticks: Any) -> None:
     node = Sequence(site("tree"), [py_trees.behaviours.Success("yes"), py_trees.behaviours.Failure("no")])
-    assert ticks(node) == "F"
-    assert str(node.failure) == "no.failed"
+    assert (ticks(node), str(node.failure)) == ("F", "no.failed")
 
 
 def test_a_tree_may_stand_in_a_stock_tree(leaf: Any, site: Any, log: Any) -> None:

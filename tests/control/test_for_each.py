@@ -139,5 +139,4 @@ def test_what_is_no_list_is_a_fault(make: Any, scope: Scope, value: Any, kind: s
 
 
 def test_details_say_what_the_mission_says(make: Any) -> None:
-    assert make("todo").detail == "$it in $todo"
-    assert make(["cube", 2]).detail == "$it in [cube, 2]"
+    assert (make("todo").detail, make(["cube", 2]).detail) == ("$it in $todo", "$it in [cube, 2]")

@@ -95,8 +95,7 @@ def test_every_start_gets_a_fresh_instance_and_fresh_inputs(make: Any, scope: Sc
     node = make()
     ticks(node)
     scope.write({"input": "brick", "extra": "new"})
-    assert ticks(node) == "RS"
-    assert scope["result"] == "brick new"
+    assert (ticks(node), scope["result"]) == ("RS", "brick new")
 
 
 @pytest.mark.parametrize(
@@ -160,8 +159,7 @@ def test_a_skill_without_a_yield_is_done_at_once(make: Any, ticks: Any) -> None:
             CLEANED.append("done")
             return None  # type: ignore[return-value]
 
-    assert ticks(make(skill=AtOnce)) == "S"
-    assert CLEANED == ["done"]
+    assert (ticks(make(skill=AtOnce)), CLEANED) == ("S", ["done"])
 
 
 def test_events_say_what_happened_to_which_item(site: Any, events: Any) -> None:

@@ -61,17 +61,14 @@ def test_the_cell_is_arranged_before_the_run(look: Path) -> None:
 
     seen: list[Event] = []
     result = run_mission(look, arrange=arrange, observers=[seen.append])
-    assert list(result.events) == seen
-    assert [row["item"] for row in result.items["rows"]] == ["duck-1"]
+    assert (list(result.events), [row["item"] for row in result.items["rows"]]) == (seen, ["duck-1"])
 
 
 def test_what_was_entered_and_what_failed_is_told_in_order() -> None:
     result = run_mission("sort_overhead", disturbances=[during("*/Grasp", seal_fails(), nth=1)])
     assert len(result.entered("*/Grasp")) == result.items["placed"] + 1
-    assert result.entered("tree/look*")[0] == "tree/look/try"
-    assert result.reasons()[0] == "missed"
-    assert result.reasons("*/Grasp") == ["missed"]
-    assert result.reasons("*/Approach") == []
+    assert (result.entered("tree/look*")[0], result.reasons()[0]) == ("tree/look/try", "missed")
+    assert (result.reasons("*/Grasp"), result.reasons("*/Approach")) == (["missed"], [])
 
 
 def test_a_failure_that_only_passes_through_a_control_node_is_none_of_its_own(look: Path) -> None:

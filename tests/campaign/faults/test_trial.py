@@ -144,8 +144,7 @@ def test_a_fault_repeated_is_recorded(campaign: Campaign, tmp_path: Path) -> Non
     trial, path = record(campaign.subject, campaign.rehearsal, campaign.these(numbers), tmp_path)
     assert trial == tried(campaign, *numbers)
     kinds = [entry["kind"] for entry in read_journal(path / "journal.jsonl")]
-    assert kinds.count("disturbance") == 1
-    assert kinds[-1] == "end"
+    assert (kinds.count("disturbance"), kinds[-1]) == (1, "end")
     assert (path / "report.html").is_file()
 
 
