@@ -64,11 +64,6 @@ def test_every_wait_is_the_next_one_of_the_backoff(leaf: Any, site: Any, clock: 
     assert (began, clock.now) == ([0.0, 0.25, 0.75, 1.5], 1.5)
 
 
-def test_a_wait_counts_as_time_so_that_the_attempt_follows_at_once(leaf: Any, site: Any, clock: Any) -> None:
-    node = Retry(site(), leaf("A", "lost", "S"), 2, [], None, Backoff(0.25), clock)
-    assert runs(node, clock, [0.0, 0.125, 0.25]) == "RRS"
-
-
 def test_the_wait_is_told_and_is_in_the_details(leaf: Any, site: Any, clock: Any, events: Any) -> None:
     node = Retry(site(), leaf("A", "lost"), 3, [("A", "lost")], None, Backoff(0.5, 2, 8), clock)
     node.tick_once()

@@ -4,17 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-from executive.arm import Goal, Task
-from executive.discovery import discover
 from executive.errors import Blocked, Unreachable
-from executive.events import Event
-from executive.mission.load import load_mission
-from executive.motion.plans import Plan
-from executive.runtime.run import Run
 from executive.skill import EMPTY, SkillFailed
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
@@ -88,37 +81,6 @@ def test_the_check_knows_that_the_tool_is_empty_after_a_drop_alone() -> None:
     assert "dropped" in PutDown.reasons
     assert PutDown.tool_left["dropped"] is EMPTY
     assert not {"unreachable", "blocked", "stuck"} & PutDown.tool_left.keys()
-
-
-def test_a_sorting_mission_finds_again_what_fell_and_places_it(
-    missions: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    events: list[Event] = []
-    loaded = load_mission(missions / "sort_overhead.yaml", discover())
-    run = Run(loaded, discover(), seed=1, observers=[events.append], kind=FakeCell)
-    fake = run.workcell
-    assert isinstance(fake, FakeCell)
-    plan, advance = fake.arm.plan, fake.advance
-    carries: list[Goal | str] = []
-
-    def plan_all_but_the_first_carry(goal: Goal | str, task: Task = Task()) -> Plan:
-        if task.load is not None:
-            carries.append(goal)
-        made = plan(goal, task)
-        first = task.load is not None and len(carries) == 1
-        return replace(made, outcome=Unreachable("too far")) if first else made
-
-    def advance_and_lose_the_second() -> None:
-        advance()
-        if len(carries) == 2 and fake.arm.tool_pose.position[2] > 0.08:
-            fake.tool.open()
-
-    monkeypatch.setattr(fake.arm, "plan", plan_all_but_the_first_carry)
-    monkeypatch.setattr(fake, "advance", advance_and_lose_the_second)
-    outcome, items = run.execute(), run.items()
-    failed = [event.data["reason"] for event in events if event.data.get("status") == "FAILURE"]
-    assert [failed.count(reason) for reason in ("unreachable", "dropped")] == [1, 1]
-    assert (outcome.status, items["placed"], run.audit()["right"]) == ("SUCCESS", *[items["seen"]] * 2)
 
 
 @pytest.fixture

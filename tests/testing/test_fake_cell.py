@@ -72,9 +72,7 @@ def test_a_window_too_many_objects_and_unknown_ones_are_refused(load: Load, fake
     options = CellOptions(SilentOperator(), base=Path(), gui=True)
     with pytest.raises(InputError, match='overhead is of kind "fake" and has no window; run it without'):
         FakeCell(load(), options=options)
-    with pytest.raises(
-        InputError, match='"cub" can be put on the fake table. \nDid you mean "cube"'.replace("\n", "")
-    ):
+    with pytest.raises(InputError, match=r'"cub" can be put on the fake table\. Did you mean "cube"'):
         fake.world.put("cub", 0.5, 0.0)
     assert not fake.world.objects
     with pytest.raises(

@@ -11,7 +11,7 @@ import pytest
 
 from executive.campaign.faults.breakages import broken_skills
 from executive.campaign.faults.campaign import Campaign
-from executive.campaign.faults.fault import Breakage, Fault
+from executive.campaign.faults.fault import Breakage
 from executive.campaign.faults.trial import record, try_out
 from executive.discovery import discover
 from executive.record.journal import read_journal
@@ -160,8 +160,3 @@ def test_a_skill_that_says_in_its_second_start_that_it_dropped_something_has_let
     ends = [event.data for event in result.events if event.kind == "status" and event.data["node"] == path]
     assert [end["reason"] for end in ends if end["status"] != "RUNNING"][:3] == ["", "dropped", ""]
     assert (result.status, result.agrees) == ("SUCCESS", True)
-
-
-def test_a_fault_in_words_says_where_what_when_and_by_what() -> None:
-    fault = Fault("tree/Grasp", "Grasp", "a.yaml:3", "missed", "first", "nothing seals", reason=True)
-    assert str(fault) == "tree/Grasp missed, first: nothing seals"

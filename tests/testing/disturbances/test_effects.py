@@ -63,20 +63,24 @@ MISSIONS: list[tuple[Disturbance, str, list[str], str, int]] = [
     (during("*/Transit", effects.seal_breaks(), nth=1), "*/Transit", ["dropped"], "SUCCESS", 0),
     (during("*/Release", effects.tool_sticks(), nth=(2, 3, 4)), "*/Release", ["stuck"] * 3, "FAILURE", 5),
     (during("*/Approach", effects.arm_runs_into("a hand"), nth=2), "*/Approach", ["blocked"], "SUCCESS", 0),
+    (during("tree/look/*/Detect", effects.detector_dead(), nth=1), "*/Detect", ["unavailable"], "SUCCESS", 0),
+    (during("*/Transit", effects.object_removed(), nth=2), "*/Transit", ["dropped"], "FAILURE", 0),
+]
+"""A disturbance, a pattern of nodes, their failures, the status of sort_overhead, and what it rejects."""
+MORE: list[tuple[Disturbance, str, list[str], str, int]] = [
     (during("*/Transit", effects.arm_runs_into(), nth=(1, 2, 3)), "*/Transit", ["blocked"] * 3, "SUCCESS", 1),
     (during("*/Approach", effects.no_way(), nth=2), "*/Approach", ["unreachable"], "SUCCESS", 1),
-    (during("tree/look/*/Detect", effects.detector_dead(), nth=1), "*/Detect", ["unavailable"], "SUCCESS", 0),
     (during("tree/look/*/Detect", effects.detector_unsure(), nth=1), "*/Detect", ["unsure"], "SUCCESS", 0),
     (during("tree/look/*/Detect", effects.workspace_hidden(), nth=1), "*/Detect", ["hidden"], "SUCCESS", 0),
     (during("*/watch/*/Localize", effects.no_depth(), nth=1), "*/Localize", ["no_depth"], "SUCCESS", 0),
     (during("*/watch/*/Localize", effects.table_bumped(), nth=1), "*/Localize", ["stale"], "SUCCESS", 0),
-    (during("*/Transit", effects.object_removed(), nth=2), "*/Transit", ["dropped"], "FAILURE", 0),
 ]
-"""A disturbance, a pattern of nodes, their failures, the status of sort_overhead, and what it rejects."""
 
 
 @pytest.mark.parametrize(
-    ("one", "pattern", "reasons", "status", "rejected"), MISSIONS, ids=lambda one: getattr(one, "what", None)
+    ("one", "pattern", "reasons", "status", "rejected"),
+    [*MISSIONS, *(pytest.param(*more, marks=pytest.mark.slow) for more in MORE)],
+    ids=lambda one: getattr(one, "what", None),
 )
 def test_a_mission_deals_with_it_and_its_books_are_right(
     one: Disturbance, pattern: str, reasons: list[str], status: str, rejected: int

@@ -75,15 +75,6 @@ def test_what_falls_or_is_put_down_is_not_taken_for_something_else(name: str) ->
     assert run_mission("sort_overhead", oracle_cell(), disturbances=script).agrees
 
 
-@pytest.mark.slow
-def test_what_sticks_hangs_at_the_tool_to_the_end(watched: Watched) -> None:
-    result = watched.run(during("*/Release", effects.tool_sticks(), nth=(2, 3, 4)), holding)
-    assert (result.status, result.reason) == ("FAILURE", "Release.stuck")
-    assert watched.seen["stuck"] is watched.seen["end"] is True
-    assert result.holds == result.disturbances()[0]["item"]
-    assert result.agrees
-
-
 def test_what_is_taken_out_of_the_tool_is_parted_from_it_first(watched: Watched) -> None:
     result = watched.run(during("*/Transit", effects.object_removed(), nth=2), holding)
     assert (watched.seen["disturbance"], watched.seen["dropped"]) == (True, False)
