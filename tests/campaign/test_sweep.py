@@ -69,6 +69,7 @@ def sigint():
     signal.signal(signal.SIGINT, before)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("sigint")
 def test_every_run_leaves_its_record_and_its_report(tmp_path):
     few = {"cell.kind": "fake", "cell.table.objects": "[1, 1]"}

@@ -14,7 +14,9 @@ from executive.mission.load import load_mission
 from executive.testing.fake_cell import FakeCell
 
 
-@pytest.mark.parametrize("mission", ["sort_overhead", "pick_on_request"])
+@pytest.mark.parametrize(
+    "mission", ["pick_on_request", pytest.param("sort_overhead", marks=pytest.mark.slow)]
+)
 def test_every_reason_of_every_node_is_there_once_and_lasting_and_so_is_a_bug_in_each(mission: str) -> None:
     subject = Subject(load_mission(mission, discover()), discover(), FakeCell, "fake", 0)
     listed = {(fault.about, fault.what, fault.when) for fault in Campaign(subject).faults}

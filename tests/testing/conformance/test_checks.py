@@ -185,7 +185,13 @@ def test_nothing_is_found_in_a_skill_that_conforms(skill: type[Skill]) -> None:
         check()
 
 
-@pytest.mark.parametrize("name", discover())
+QUICK = ("Grasp", "Release", "SelectTarget")
+"""Shipped skills that are tried in the default tier; the others take seconds."""
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name in QUICK else pytest.mark.slow) for name in discover()]
+)
 def test_every_shipped_skill_conforms(name: str) -> None:
     for check in conformance(discover()[name], name=name):
         check()
