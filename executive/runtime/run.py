@@ -88,6 +88,7 @@ class Run:
         self._holds = ""
         self.control = RunControl()
         self._plant = Plant(observers)
+        self._emit = self._plant.emit
         kind = kind or cell_kind(loaded.cell_config.kind)
         options = CellOptions(
             self._operator(),
@@ -291,9 +292,6 @@ class Run:
         cell = self._plant.cell
         if cell.tool.holding:
             self._holds = cell.ledger.in_tool() or "something"
-
-    def _emit(self, kind: str, **data: Any) -> None:
-        self._plant.emit(kind, **data)
 
 
 def _cell_past(past: Past, log: Path) -> CellPast:

@@ -7,7 +7,7 @@ all nodes and runs that it stands in for: make a new one for every run.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Container, Generator, Mapping
 from contextlib import closing
 from itertools import count, islice
 from typing import Any, cast
@@ -16,7 +16,7 @@ from executive.cell import Cell, Steps
 from executive.errors import InputError
 from executive.skill import Direction, Skill
 
-Body = Callable[[Skill, Cell], Steps]
+Body = Callable[[Skill, Cell], Steps | None]
 """The `run` of a skill."""
 
 
@@ -40,7 +40,7 @@ def failing(
         yield from ()
         raise self.failed(reason, message)
 
-    return _in_place_of(skill, "Failing", body, times)
+    return in_place_of(skill, "Failing", body, _first(times))
 
 
 def succeeding(
@@ -66,7 +66,7 @@ def succeeding(
         for name, value in given.items():
             setattr(self, name, value)
 
-    return _in_place_of(skill, "Succeeding", body)
+    return in_place_of(skill, "Succeeding", body)
 
 
 def raising(skill: type[Skill], error: Exception, *, after: int = 0, times: int | None = None) -> type[Skill]:
@@ -84,7 +84,7 @@ def raising(skill: type[Skill], error: Exception, *, after: int = 0, times: int 
             if ran == after:
                 raise error
 
-    return _in_place_of(skill, "Raising", body, times)
+    return in_place_of(skill, "Raising", body, _first(times))
 
 
 def raising_when_halted(skill: type[Skill], error: Exception) -> type[Skill]:
@@ -96,7 +96,7 @@ def raising_when_halted(skill: type[Skill], error: Exception) -> type[Skill]:
         except GeneratorExit:
             raise error from None
 
-    return _in_place_of(skill, "RaisingWhenHalted", body)
+    return in_place_of(skill, "RaisingWhenHalted", body)
 
 
 def endless(skill: type[Skill]) -> type[Skill]:
@@ -107,19 +107,28 @@ def endless(skill: type[Skill]) -> type[Skill]:
         while True:
             yield
 
-    return _in_place_of(skill, "Endless", body)
+    return in_place_of(skill, "Endless", body)
 
 
-def _in_place_of(skill: type[Skill], what: str, body: Body, times: int | None = None) -> type[Skill]:
-    """Return a subclass that runs `body` the first so many times it is started, then what `skill` runs."""
-    starts = count()
+def in_place_of(
+    skill: type[Skill], what: str, body: Body, starts: Container[int] | None = None
+) -> type[Skill]:
+    """Return a subclass that runs `body` in these of its starts, counted from 1, else what `skill` runs.
 
-    def run(self: Skill, cell: Cell) -> Steps:
-        goes_wrong = times is None or next(starts) < times
+    With None for `starts` it always runs `body`.
+    """
+    number = count(1)
+
+    def run(self: Skill, cell: Cell) -> Steps | None:
+        goes_wrong = starts is None or next(number) in starts
         return body(self, cell) if goes_wrong else _steps(skill, self, cell)
 
     members = {"run": run, "__doc__": skill.__doc__, "__module__": skill.__module__}
     return cast(type[Skill], type(f"{what}{skill.__name__}", (skill,), members))
+
+
+def _first(times: int | None) -> Container[int] | None:
+    return None if times is None else range(1, times + 1)
 
 
 def _steps(skill: type[Skill], instance: Skill, cell: Cell) -> Generator[None, None, None]:

@@ -32,20 +32,21 @@ def test_an_arm_that_moves_is_told(fake: FakeCell) -> None:
     assert found[0] == "the arm is not at rest"
 
 
-def test_a_journal_whose_nodes_all_ended_is_complete() -> None:
-    ended = entries(("a", "RUNNING"), ("b", "RUNNING"), ("b", "SUCCESS"), ("b", "RUNNING"), ("b", "INVALID"))
-    assert list(check_journal([*ended[:-1], {**ended[0], "status": "INVALID"}, ended[-1]], HALTED)) == []
-
-
-def test_a_node_without_an_end_in_the_journal_is_told() -> None:
-    assert list(check_journal(entries(("a", "RUNNING"), ("b", "RUNNING"), ("b", "INVALID")), HALTED)) == [
-        "the journal says no end of a, which began at tick 0"
-    ]
-
-
-def test_a_node_that_begins_twice_in_the_journal_is_told() -> None:
-    begun = entries(("a", "RUNNING"), ("a", "RUNNING"), ("a", "INVALID"))
-    assert list(check_journal(begun, HALTED)) == ["the journal lets a begin at tick 1 while it runs"]
+@pytest.mark.parametrize(
+    ("told", "problems"),
+    [
+        ([("a", "RUNNING"), ("b", "RUNNING"), ("b", "SUCCESS"), ("b", "RUNNING"), ("b", "INVALID"),
+          ("a", "INVALID")], []),
+        ([("a", "RUNNING"), ("b", "RUNNING"), ("b", "INVALID")],
+         ["the journal says no end of a, which began at tick 0"]),
+        ([("a", "RUNNING"), ("a", "RUNNING"), ("a", "INVALID")],
+         ["the journal lets a begin at tick 1 while it runs"]),
+    ],
+)  # fmt: skip
+def test_every_node_of_a_journal_begins_once_and_ends(
+    told: list[tuple[str, str]], problems: list[str]
+) -> None:
+    assert list(check_journal(entries(*told), HALTED)) == problems
 
 
 @pytest.mark.parametrize("journal", [[], [*entries(), *entries()], [*entries(), {"kind": "item"}]])

@@ -17,20 +17,20 @@ from executive.errors import InputError
 
 
 def result(seed: int, status: str = "SUCCESS", right: int = 4, left: int = 0, **more) -> dict:
+    reason = "" if status == "SUCCESS" else "Grasp.missed"
+    items = {"seen": right + left, "placed": right, "rejected": left, "lost": 0, "phantom": 0}
+    audit = {"right": right, "wrong_bin": 0, "left": left, "elsewhere": 0, "unseen": 0}
+    planning = {"motions": 10, "ahead": 8, "waited_s": 0.1}
     return {
-        "seed": seed,
-        "status": status,
-        "reason": "" if status == "SUCCESS" else "Grasp.missed",
-        "message": "",
-        "node": "",
-        "items": {"seen": right + left, "placed": right, "rejected": left, "lost": 0, "phantom": 0},
-        "audit": {"right": right, "wrong_bin": 0, "left": left, "elsewhere": 0, "unseen": 0},
-        "planning": {"motions": 10, "ahead": 8, "waited_s": 0.1},
-        "robot_time_s": 30.0 + seed,
-        "wall_time_s": 6.0,
-        "run": f"runs/{seed}",
-        **more,
-    }
+        "seed": seed, "status": status, "reason": reason, "message": "", "node": "", "items": items,
+        "audit": audit, "planning": planning, "robot_time_s": 30.0 + seed, "wall_time_s": 6.0,
+        "run": f"runs/{seed}", **more,
+    }  # fmt: skip
+
+
+def swept(seeds: range, work, **options) -> list:
+    """Sweep without a mission: `work` says what comes of it."""
+    return sweep("sort", seeds, overrides={"a": "1"}, runs=Path("runs"), work=work, **options)
 
 
 def work(job: Job) -> dict:
@@ -44,15 +44,11 @@ def work(job: Job) -> dict:
 
 def test_every_seed_is_run_once_in_another_process():
     told = []
-    results = sweep(
-        "sort", range(1, 5), overrides={"a": "1"}, runs=Path("runs"), work=work,
-        progress=lambda done, total: told.append((done, total)),
-    )  # fmt: skip
+    results = swept(range(1, 5), work, progress=lambda done, total: told.append((done, total)))
     assert [entry["seed"] for entry in results] == [1, 2, 3, 4]
     assert results[0]["process"] != os.getpid()
     assert results[0]["overrides"] == {"a": "1"}
-    assert results[2]["status"] == "FAULT"
-    assert results[2]["message"] == "ValueError: seed three"
+    assert (results[2]["status"], results[2]["message"]) == ("FAULT", "ValueError: seed three")
     assert (results[3]["status"], results[3]["message"]) == ("FAULT", "there is no place for seed four")
     assert results[2]["planning"] == {"motions": 0, "ahead": 0, "waited_s": 0.0}
     assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
@@ -73,6 +69,7 @@ def sigint():
     signal.signal(signal.SIGINT, before)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("sigint")
 def test_every_run_leaves_its_record_and_its_report(tmp_path):
     few = {"cell.kind": "fake", "cell.table.objects": "[1, 1]"}
@@ -83,12 +80,8 @@ def test_every_run_leaves_its_record_and_its_report(tmp_path):
 
 def test_after_ctrl_c_no_further_run_begins_and_the_results_so_far_are_kept():
     told = []
-    results = sweep(
-        "sort", range(9), overrides={}, runs=Path("runs"), workers=1, work=interrupt,
-        halting=lambda: told.append("halting"),
-    )  # fmt: skip
-    assert [entry["seed"] for entry in results] == [0]
-    assert told == ["halting"]
+    results = swept(range(9), interrupt, workers=1, halting=lambda: told.append("halting"))
+    assert ([entry["seed"] for entry in results], told) == ([0], ["halting"])
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
@@ -101,11 +94,10 @@ def die(job: Job) -> dict:
 
 @pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_run_that_takes_its_process_down_costs_only_what_runs_beside_it(workers):
-    results = sweep("sort", range(4), overrides={}, runs=Path("runs"), workers=workers, work=die)
+    results = swept(range(4), die, workers=workers)
     assert [entry["seed"] for entry in results] == [0, 1, 2, 3]
     lost = [entry for entry in results if entry["status"] != "SUCCESS"]
-    assert lost[0]["seed"] == 0
-    assert len(lost) <= workers
+    assert lost[0]["seed"] == 0 and len(lost) <= workers
     assert all("BrokenProcessPool" in entry["message"] for entry in lost)
 
 
@@ -122,9 +114,7 @@ class Torn:
 def test_a_pool_found_broken_is_replaced_and_no_run_is_lost(monkeypatch):
     pools = iter([Torn(), ThreadPoolExecutor(1)])
     monkeypatch.setattr("executive.campaign.pool.Workers", lambda count: next(pools))
-    results = sweep(
-        "sort", range(2), overrides={}, runs=Path("runs"), workers=1, work=lambda job: result(job.seed)
-    )
+    results = swept(range(2), lambda job: result(job.seed), workers=1)
     assert [entry["status"] for entry in results] == ["SUCCESS", "SUCCESS"]
 
 
@@ -134,8 +124,7 @@ def test_the_summary_counts_objects_and_lists_what_went_wrong():
     figures = summarize([result(0), result(1, "FAILURE", right=3, left=1), wrong], asked=3)
     assert (figures["asked"], figures["cut_off"]) == (3, False)
     assert (figures["runs"], figures["succeeded"]) == (3, 2)
-    assert figures["objects"]["right"] == 9
-    assert figures["objects"]["total"] == 11
+    assert (figures["objects"]["right"], figures["objects"]["total"]) == (9, 11)
     assert [entry["seed"] for entry in figures["disagreements"]] == [2]
     assert [(entry["seed"], entry["reason"]) for entry in figures["failures"]] == [(1, "Grasp.missed")]
     assert figures["robot_time_s"] == {"least": 30.0, "median": 31.0, "mean": 31.0, "most": 32.0}
@@ -148,12 +137,9 @@ def test_runs_that_were_halted_or_never_began_make_it_cut_off_and_count_in_nothi
     figures = summarize([whole, halted], asked=6)
     assert (figures["asked"], figures["cut_off"]) == (6, True)
     assert summarize([whole], asked=1) == {**figures, "asked": 1, "cut_off": False}
-
-
-def test_a_run_without_an_audit_counts_no_objects():
+    # Without an audit no object counts.
     figures = summarize([result(0, audit=None)], asked=1)
-    assert figures["objects"]["total"] == 0
-    assert figures["disagreements"] == []
+    assert (figures["objects"]["total"], figures["disagreements"]) == (0, [])
     assert figures["robot_time_per_object_s"] is None
 
 

@@ -15,19 +15,14 @@ from executive.control.timeout import Timeout
 from executive.errors import Fault
 
 
-def test_finally_does_not_run_after_a_halt(leaf: Any, site: Any, log: Any) -> None:
-    node = Try(site(), leaf("A", "R S"), [], leaf("finish"))
+def test_finally_runs_neither_after_a_halt_nor_after_a_fault(leaf: Any, site: Any, log: Any) -> None:
+    node = Try(site(), leaf("A", "R S", "!"), [([("A", "lost")], leaf("rescue"))], leaf("finish"))
     node.tick_once()
     assert halt(node) == []
-    assert log == ["A starts", "A halted"]
-
-
-def test_finally_does_not_run_after_a_fault(leaf: Any, site: Any, log: Any) -> None:
-    node = Try(site(), leaf("A", "!"), [([("A", "lost")], leaf("rescue"))], leaf("finish"))
     with pytest.raises(RuntimeError, match="broken"):
         node.tick_once()
     halt(node)
-    assert log == ["A starts"]
+    assert log == ["A starts", "A halted", "A starts"]
 
 
 def test_a_timeout_halts_its_body_and_says_timeout(leaf: Any, site: Any, clock: Any, log: Any) -> None:
@@ -39,18 +34,18 @@ def test_a_timeout_halts_its_body_and_says_timeout(leaf: Any, site: Any, clock: 
     assert log == ["A starts", "A halted"]
 
 
-def test_a_body_that_ends_in_the_last_moment_has_made_it(leaf: Any, site: Any, clock: Any) -> None:
-    node = Timeout(site(), leaf("A", "R S"), 0.3, clock)
-    for clock.now in (0.0, 5.0):
+@pytest.mark.parametrize(
+    ("script", "times", "status"),
+    [("R S", (0.0, 5.0), Status.SUCCESS), ("R R S", (1.0, 1.2), Status.RUNNING)],
+    ids=["done in the last moment", "the time counts from the start"],
+)
+def test_a_body_has_its_time(
+    leaf: Any, site: Any, clock: Any, script: str, times: tuple[float, ...], status: Status
+) -> None:
+    node = Timeout(site(), leaf("A", script), 0.3, clock)
+    for clock.now in times:
         node.tick_once()
-    assert node.status is Status.SUCCESS
-
-
-def test_a_timeout_counts_anew_every_time(leaf: Any, site: Any, clock: Any) -> None:
-    node = Timeout(site(), leaf("A", "R R S"), 0.3, clock)
-    for clock.now in (1.0, 1.2):
-        node.tick_once()
-    assert node.status is Status.RUNNING
+    assert node.status is status
 
 
 def test_a_body_that_cannot_be_halted_is_a_fault(leaf: Any, site: Any, clock: Any) -> None:
@@ -86,8 +81,7 @@ def test_every_change_of_status_is_told_once(leaf: Any, site: Any, ticks: Any, e
 
 def test_a_stock_behaviour_may_stand_in_a_tree(site: Any, ticks: Any) -> None:
     node = Sequence(site("tree"), [py_trees.behaviours.Success("yes"), py_trees.behaviours.Failure("no")])
-    assert ticks(node) == "F"
-    assert str(node.failure) == "no.failed"
+    assert (ticks(node), str(node.failure)) == ("F", "no.failed")
 
 
 def test_a_tree_may_stand_in_a_stock_tree(leaf: Any, site: Any, log: Any) -> None:

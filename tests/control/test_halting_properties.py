@@ -28,8 +28,7 @@ def test_running_nodes_end_once_from_the_leaves_up_and_no_other_is_touched(plan:
         assert problems == [f"{node.path}: cannot stop" for node in broken]
         for node, status in before.items():
             assert node.status is (Status.INVALID if status is Status.RUNNING else status)
-        assert dict(world.scope) == {}
-        assert halt(root) == []
+        assert (dict(world.scope), halt(root)) == ({}, [])
         for node in bottom_up(root):
             if not isinstance(node, Leaf):
                 words = [line.split()[1] for line in world.log if line.startswith(f"{node.path} ")]
@@ -55,5 +54,4 @@ def test_a_halted_tree_runs_again_as_a_fresh_one(plan: Plan) -> None:
         for node in bottom_up(root):
             if isinstance(node, Leaf):
                 node.rewind()
-        assert list(run(root, world, MOST)) == lived
-        assert world.log == fresh.log
+        assert (list(run(root, world, MOST)), world.log) == (lived, fresh.log)

@@ -14,20 +14,6 @@ from executive.control.while_loop import While
 from executive.errors import InputError
 
 
-def test_a_retry_halted_in_its_recovery_begins_with_the_body(leaf: Any, site: Any, log: Any) -> None:
-    node = Retry(site(), leaf("A", "lost"), 3, [], leaf("fix", "R S"))
-    node.tick_once()
-    node.stop(Status.INVALID)
-    assert log == ["A starts", "fix starts", "fix halted"]
-    node.tick_once()
-    assert log[3] == "A starts"
-
-
-def test_a_body_is_not_repeated_a_negative_number_of_times(leaf: Any, site: Any) -> None:
-    with pytest.raises(InputError, match="tree/x: a body can be repeated 0 times or more, not -1 times"):
-        Repeat(site("tree/x"), leaf("A"), times=-1)
-
-
 def test_a_failed_condition_is_a_success_that_is_told(leaf: Any, site: Any, ticks: Any, events: Any) -> None:
     node = While(site("here"), leaf("more", "none"), leaf("A"))
     assert ticks(node) == "S"
@@ -35,19 +21,6 @@ def test_a_failed_condition_is_a_success_that_is_told(leaf: Any, site: Any, tick
     assert events[1] == {
         "kind": "choice", "node": "here", "choice": "done", "reason": "more.none", "message": "none happened",
     }  # fmt: skip
-
-
-def test_while_halted_in_its_body_begins_with_its_condition(leaf: Any, site: Any, log: Any) -> None:
-    node = While(site(), leaf("more"), leaf("A", "R S"))
-    node.tick_once()
-    node.stop(Status.INVALID)
-    node.tick_once()
-    assert log == ["more starts", "A starts", "A halted", "more starts", "A starts"]
-
-
-def test_a_retry_makes_at_least_one_attempt(leaf: Any, site: Any) -> None:
-    with pytest.raises(InputError, match="tree/x: a retry makes 1 attempt or more, not 0"):
-        Retry(site("tree/x"), leaf("A"), 0)
 
 
 def test_a_loop_of_many_rounds_needs_no_deep_stack(leaf: Any, site: Any) -> None:
@@ -63,3 +36,10 @@ def test_details_say_what_the_mission_says(leaf: Any, site: Any, attempts: int) 
     assert Repeat(site(), leaf("A"), until=[("A", "lost"), ("B", "x")]).detail == "until A.lost, B.x"
     assert Repeat(site(), leaf("A"), times=3).detail == "3 times"
     assert Repeat(site(), leaf("A"), 3, [("A", "lost")]).detail == "3 times or until A.lost"
+
+
+def test_a_number_of_rounds_that_makes_no_sense_is_refused(leaf: Any, site: Any) -> None:
+    with pytest.raises(InputError, match="tree/x: a body can be repeated 0 times or more, not -1 times"):
+        Repeat(site("tree/x"), leaf("A"), times=-1)
+    with pytest.raises(InputError, match="tree/x: a retry makes 1 attempt or more, not 0"):
+        Retry(site("tree/x"), leaf("A"), 0)

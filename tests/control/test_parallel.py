@@ -44,5 +44,4 @@ def test_details_say_what_the_mission_says(leaf: Any, site: Any) -> None:
         return Parallel(site(), [leaf("A"), leaf("B"), leaf("C")], *args, **more).detail
 
     assert detail() == detail(3) == "wait for all"
-    assert detail(2) == "wait for 2 of 3"
-    assert detail(1, halt=True) == "wait for 1 of 3, halt"
+    assert (detail(2), detail(1, halt=True)) == ("wait for 2 of 3", "wait for 1 of 3, halt")

@@ -100,5 +100,4 @@ def test_a_node_without_a_status_is_a_fault_and_not_an_interruption(value: Any, 
     root = Fallback(site("root"), [sequence, leaf("instead")])
     with pytest.raises(Fault, match="odd was ticked and has no status") as caught:
         root.tick_once()
-    assert caught.value.node == "here"
-    assert halt(root) == []
+    assert (caught.value.node, halt(root)) == ("here", [])

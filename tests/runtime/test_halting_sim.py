@@ -128,8 +128,7 @@ def test_braking_stays_on_the_planned_path_and_within_the_stop_limits(halt: Halt
 
 
 def test_no_node_goes_on_and_the_journal_is_complete(halt: Halt) -> None:
-    assert halt.running == []
-    assert [entry["kind"] for entry in halt.journal].count("end") == 1
+    assert (halt.running, [entry["kind"] for entry in halt.journal].count("end")) == ([], 1)
     assert (halt.journal[-1]["kind"], halt.journal[-1]["status"]) == ("end", "HALTED")
     left = {e["node"]: e["status"] for e in halt.journal if e["kind"] == "status"}
     assert "RUNNING" not in left.values()

@@ -53,8 +53,9 @@ def test_a_reason_nobody_catches_ends_the_mission(missions: Path) -> None:
     fake_of(run).detector.answers = lambda look, true: "the server is gone"
     outcome = run.execute()
     assert (outcome.status, outcome.reason) == ("FAILURE", "Detect.unavailable")
-    assert outcome.message == "detector embedded: the server is gone"
-    assert outcome.node.endswith("Detect")
+    assert (outcome.message, outcome.node.rpartition("/")[2]) == (
+        "detector embedded: the server is gone", "Detect",
+    )  # fmt: skip
 
 
 def test_a_bug_in_a_part_is_a_fault_and_the_arm_is_at_rest(missions: Path) -> None:
@@ -66,12 +67,9 @@ def test_a_bug_in_a_part_is_a_fault_and_the_arm_is_at_rest(missions: Path) -> No
 
     fake.tool.seals = broken
     outcome = run.execute()
-    assert outcome.status == "FAULT"
-    assert "vacuum gauge" in outcome.message
-    assert outcome.node.endswith("Grasp")
-    assert fake.arm.at_rest
-    assert running(run) == []
-    assert events[-1].kind == "end"
+    assert (outcome.status, outcome.node.rpartition("/")[2]) == ("FAULT", "Grasp")
+    assert "vacuum gauge" in outcome.message and fake.arm.at_rest
+    assert (running(run), events[-1].kind) == ([], "end")
 
 
 def test_ctrl_c_halts_every_node_and_brakes_the_arm(missions: Path) -> None:
@@ -86,8 +84,7 @@ def test_ctrl_c_halts_every_node_and_brakes_the_arm(missions: Path) -> None:
     outcome = run.execute()
     assert (outcome.status, outcome.message) == ("HALTED", "halted by the user")
     assert fake_of(run).arm.at_rest
-    assert running(run) == []
-    assert events[-1].kind == "end"
+    assert (running(run), events[-1].kind) == ([], "end")
     assert signal.getsignal(signal.SIGINT) is before
 
 

@@ -21,33 +21,20 @@ def make(missions: Path, observer) -> Run:
     return Run(loaded, discover(), seed=3, kind=FakeCell, observers=[observer])
 
 
-def test_a_paused_run_stands_still_until_it_goes_on(missions: Path) -> None:
+@pytest.mark.parametrize("steps", [0, 3])
+def test_a_paused_run_stands_still_and_a_step_is_a_tick(missions: Path, steps: int) -> None:
     ticks: list[int] = []
 
     def pause_once(event: Event) -> None:
         if event.tick >= 50 and not ticks:
             ticks.append(event.tick)
-            run.control.pause()
+            run.control.step(steps) if steps else run.control.pause()
             threading.Timer(0.2, lambda: (ticks.append(run.tick), run.control.resume())).start()
 
     run = make(missions, pause_once)
     assert run.execute().status == "SUCCESS"
-    # It ends the tick it is in, and begins no other.
-    assert ticks[1] == ticks[0] + 1
-
-
-def test_a_step_is_a_tick(missions: Path) -> None:
-    seen: list[int] = []
-
-    def step(event: Event) -> None:
-        if event.tick >= 50 and not seen:
-            run.control.step(3)
-            threading.Timer(0.2, lambda: (seen.append(run.tick), run.control.resume())).start()
-            seen.append(event.tick)
-
-    run = make(missions, step)
-    assert run.execute().status == "SUCCESS"
-    assert seen[1] == seen[0] + 1 + 3
+    # It ends the tick it is in before it stands still.
+    assert ticks[1] == ticks[0] + 1 + steps
 
 
 def test_a_paused_run_can_be_stopped(missions: Path) -> None:

@@ -20,31 +20,27 @@ def item(fake: FakeCell) -> str:
     return str(target.item)
 
 
-def test_what_was_sealed_and_not_known_to_be_is_put_back_where_it_is(fake: FakeCell, item: str) -> None:
-    fake.tool.close()
-    reconcile(fake.cell, "close")
-    assert (fake.tool.holding, fake.ledger.in_tool()) == (False, None)
-
-
-def test_what_is_held_and_known_to_be_stays(fake: FakeCell, item: str) -> None:
-    fake.tool.close()
-    fake.ledger.held(item)
-    reconcile(fake.cell, "close")
-    assert (fake.tool.holding, fake.ledger.in_tool()) == (True, item)
-
-
-def test_what_fell_from_the_tool_meanwhile_is_dropped(fake: FakeCell, item: str) -> None:
-    fake.ledger.held(item)
-    reconcile(fake.cell, "close")
-    assert fake.ledger.in_tool() is None
+@pytest.mark.parametrize(
+    ("sealed", "known", "intent", "left"),
+    [
+        (True, False, "close", (False, False, "seen")),
+        (True, True, "close", (True, True, "held")),
+        (False, True, "close", (False, False, "dropped")),
+        # What the run itself let go is for the skill to say.
+        (False, True, "open", (False, True, "held")),
+    ],
+)
+def test_tool_and_ledger_agree_afterwards(
+    fake: FakeCell, item: str, sealed: bool, known: bool, intent: str, left: tuple[bool, bool, str]
+) -> None:
+    if sealed:
+        fake.tool.close()
+    if known:
+        fake.ledger.held(item)
+    reconcile(fake.cell, intent)
     (row,) = fake.ledger.rows()
-    assert (row["state"], row["attempts"]) == ("dropped", 1)
-
-
-def test_what_the_run_itself_let_go_is_for_the_skill_to_say(fake: FakeCell, item: str) -> None:
-    fake.ledger.held(item)
-    reconcile(fake.cell, "open")
-    assert fake.ledger.in_tool() == item
+    assert (fake.tool.holding, fake.ledger.in_tool() == item, row["state"]) == left
+    assert row["attempts"] == (row["state"] == "dropped")
 
 
 def test_everything_on_the_table_is_in_doubt(fake: FakeCell) -> None:

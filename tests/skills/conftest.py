@@ -24,3 +24,16 @@ def no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
 def look(fake: FakeCell) -> Callable[..., list[Target]]:
     """Looks at the fake table and returns what was localized."""
     return partial(at_hand.look, fake)
+
+
+@pytest.fixture
+def target(fake: FakeCell, look: Callable[..., list[Target]]) -> Target:
+    """A cube in the middle of the fake table, seen once."""
+    fake.world.put("cube", 0.5, 0.0)
+    return look()[0]
+
+
+@pytest.fixture
+def held(fake: FakeCell, target: Target) -> str:
+    """The cube, in the tool."""
+    return at_hand.pick(fake, target)

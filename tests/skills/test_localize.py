@@ -28,8 +28,7 @@ def test_a_frame_from_before_a_missed_grasp_is_stale(fake: FakeCell, look) -> No
     old = run_skill(Detect(), fake).outputs["detections"]
     fake.ledger.missed("cube-1")
     result = run_skill(Localize(detections=old), fake)
-    assert result.reason == "stale"
-    assert result.message == "frame 2 shows the table before change 1; look again"
+    assert (result.reason, result.message) == ("stale", "frame 2 shows the table before change 1; look again")
 
 
 def test_a_frame_stays_good_after_a_pick_elsewhere(fake: FakeCell, look) -> None:

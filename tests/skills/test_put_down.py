@@ -4,33 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-from executive.arm import Goal, Task
-from executive.discovery import discover
 from executive.errors import Blocked, Unreachable
-from executive.events import Event
-from executive.mission.load import load_mission
-from executive.motion.plans import Plan
-from executive.runtime.run import Run
 from executive.skill import EMPTY, SkillFailed
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
-from skills.approach import Approach
-from skills.grasp import Grasp
 from skills.put_down import PutDown
 from skills.transit import Transit
-
-
-@pytest.fixture
-def held(fake: FakeCell, look) -> str:
-    """A cube from the middle of the fake table, in the tool."""
-    fake.world.put("cube", 0.5, 0.0)
-    (target,) = look()
-    run_skill(Approach(target=target), fake)
-    return run_skill(Grasp(target=target), fake).outputs["held"]
 
 
 def lost(fake: FakeCell, held: str, when: Callable[[], bool]) -> SkillFailed:
@@ -60,9 +42,8 @@ def test_what_falls_on_the_way_is_dropped_where_the_arm_stops(fake: FakeCell, he
     )
     assert fake.arm.at_rest
     assert fake.arm.tool_pose.position[1] == pytest.approx(-0.1, abs=0.01)
-    assert fake.ledger.in_tool() is None
-    assert fake.ledger.attempts(held) == 1, "it counts as a failure, as any loss in the tool does"
-    assert fake.ledger.is_open(held), "it is looked for again"
+    ledger = fake.ledger
+    assert (ledger.in_tool(), ledger.attempts(held), ledger.is_open(held)) == (None, 1, True)
 
 
 def test_what_is_torn_off_by_running_into_something_is_dropped(fake: FakeCell, held: str) -> None:
@@ -74,10 +55,9 @@ def test_what_is_torn_off_by_running_into_something_is_dropped(fake: FakeCell, h
 
 
 def test_what_falls_while_the_way_is_planned_is_dropped_though_there_is_none(
-    fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch
+    fake: FakeCell, held: str, nowhere: Callable[[Exception], None]
 ) -> None:
-    plan, nothing = fake.arm.plan, Unreachable("too far")
-    monkeypatch.setattr(fake.arm, "plan", lambda *asked: replace(plan(*asked), outcome=nothing))
+    nowhere(Unreachable("too far"))
     assert run_skill(PutDown(held=held), fake).reason == "unreachable"
     assert lost(fake, held, lambda: True).reason == "dropped"
     assert fake.ledger.in_tool() is None
@@ -87,8 +67,7 @@ def test_a_run_into_something_keeps_what_it_holds(fake: FakeCell, held: str) -> 
     fake.arm.runs_into = "the held cube ran into a hand"
     result = run_skill(PutDown(held=held), fake)
     assert (result.reason, result.message) == ("blocked", "the held cube ran into a hand")
-    assert fake.tool.holding
-    assert fake.ledger.in_tool() == held
+    assert (fake.tool.holding, fake.ledger.in_tool()) == (True, held)
 
 
 def test_what_does_not_come_off_is_stuck(fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -104,42 +83,19 @@ def test_the_check_knows_that_the_tool_is_empty_after_a_drop_alone() -> None:
     assert not {"unreachable", "blocked", "stuck"} & PutDown.tool_left.keys()
 
 
-def test_a_sorting_mission_finds_again_what_fell_and_places_it(
-    missions: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    events: list[Event] = []
-    loaded = load_mission(missions / "sort_overhead.yaml", discover())
-    run = Run(loaded, discover(), seed=1, observers=[events.append], kind=FakeCell)
-    fake = run.workcell
-    assert isinstance(fake, FakeCell)
-    plan, advance = fake.arm.plan, fake.advance
-    carries: list[Goal | str] = []
-
-    def plan_all_but_the_first_carry(goal: Goal | str, task: Task = Task()) -> Plan:
-        if task.load is not None:
-            carries.append(goal)
-        made = plan(goal, task)
-        first = task.load is not None and len(carries) == 1
-        return replace(made, outcome=Unreachable("too far")) if first else made
-
-    def advance_and_lose_the_second() -> None:
-        advance()
-        if len(carries) == 2 and fake.arm.tool_pose.position[2] > 0.08:
-            fake.tool.open()
-
-    monkeypatch.setattr(fake.arm, "plan", plan_all_but_the_first_carry)
-    monkeypatch.setattr(fake, "advance", advance_and_lose_the_second)
-    outcome, items = run.execute(), run.items()
-    failed = [event.data["reason"] for event in events if event.data.get("status") == "FAILURE"]
-    assert [failed.count(reason) for reason in ("unreachable", "dropped")] == [1, 1]
-    assert (outcome.status, items["placed"], run.audit()["right"]) == ("SUCCESS", *[items["seen"]] * 2)
+@pytest.fixture
+def nowhere(fake: FakeCell, monkeypatch: pytest.MonkeyPatch) -> Callable[[Exception], None]:
+    """Makes every plan from now on end with an error."""
+    plan = fake.arm.plan
+    return lambda error: monkeypatch.setattr(
+        fake.arm, "plan", lambda *asked: replace(plan(*asked), outcome=error)
+    )
 
 
 def test_what_cannot_be_carried_away_and_was_not_lifted_is_left_where_it_stood(
-    fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch
+    fake: FakeCell, held: str, nowhere: Callable[[Exception], None]
 ) -> None:
-    plan, nothing = fake.arm.plan, Blocked("bolt-2 is too near")
-    monkeypatch.setattr(fake.arm, "plan", lambda *asked: replace(plan(*asked), outcome=nothing))
+    nowhere(Blocked("bolt-2 is too near"))
     result = run_skill(PutDown(held=held), fake)
     assert (result.status, fake.tool.holding, fake.ledger.in_tool()) == ("SUCCESS", False, None)
     (row,) = fake.ledger.rows()
@@ -158,10 +114,9 @@ def test_what_hangs_in_the_air_and_cannot_be_carried_on_is_not_let_fall(fake: Fa
 
 
 def test_what_hangs_in_a_bin_is_not_left_there(
-    fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch
+    fake: FakeCell, held: str, nowhere: Callable[[Exception], None]
 ) -> None:
     run_skill(Transit(held=held, bin="red_bin"), fake)
-    plan, nothing = fake.arm.plan, Blocked("something is too near")
-    monkeypatch.setattr(fake.arm, "plan", lambda *asked: replace(plan(*asked), outcome=nothing))
+    nowhere(Blocked("something is too near"))
     result = run_skill(PutDown(held=held, drop=0.05), fake)
     assert (result.reason, fake.tool.holding) == ("blocked", True)

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import pytest
 
 from executive.discovery import discover
-from executive.messages import Target
 from executive.skill import Skill
-from executive.testing.fake_cell import FakeCell, bare_table
-from executive.testing.run_skill import run_skill
 from skills.approach import Approach
 from skills.detect import Detect
 from skills.grasp import Grasp
@@ -64,26 +61,3 @@ def test_the_least_time_follows_from_cell_and_params(
 @pytest.mark.parametrize("skill", discover().values())
 def test_every_skill_can_be_asked_with_nothing_but_its_defaults(skill: type[Skill]) -> None:
     assert skill.shortest(Least(), defaults(skill)) >= 0.0
-
-
-def test_no_skill_succeeds_sooner(fake: FakeCell, look: Callable[..., list[Target]]) -> None:
-    least = FakeCell.least_times(bare_table())
-
-    def run(skill: Skill, **given: Any) -> Mapping[str, Any]:
-        params = {name: getattr(skill, name) for name in skill.params}
-        before = fake.cell.clock.now
-        result = run_skill(skill, fake)
-        assert result.status == "SUCCESS"
-        taken = fake.cell.clock.now - before
-        shortest = skill.shortest(least, {**params, **given})
-        assert 0 < shortest <= taken + 1e-9, type(skill).__name__
-        return result.outputs
-
-    fake.world.put("cube", 0.5, 0.0)
-    run(Detect())
-    (target,) = look()
-    run(Approach(target=target))
-    held = run(Grasp(target=target))["held"]
-    run(Transit(held=held, bin="red_bin"), bin="red_bin")
-    run(Release(held=held, bin="red_bin"))
-    run(Wait(seconds=0.5))

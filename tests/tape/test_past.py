@@ -26,8 +26,7 @@ def test_answers_are_in_order_by_what_was_asked() -> None:
         (0, 1, False),
         (7, 2, True),
     ]
-    assert past.number_of_answers("arm.met") == 1
-    assert past.number_of_answers("arm.q") == 0
+    assert (past.number_of_answers("arm.met"), past.number_of_answers("arm.q")) == (1, 0)
 
 
 def test_what_a_kill_left_of_a_control_step_is_void_once_the_run_was_taken_up() -> None:
@@ -35,8 +34,7 @@ def test_what_a_kill_left_of_a_control_step_is_void_once_the_run_was_taken_up() 
     assert Past.of(killed).last_intent == "open"
     taken_up = Past.of([*killed, entry(5, "resume", ticked=5, intent="open"), sense(5, True, nth=3)])
     assert [one.value for one in taken_up.senses["tool.holding"]] == [True, True]
-    assert taken_up.last_intent == ""
-    assert taken_up.resumes[5]["intent"] == "open"
+    assert (taken_up.last_intent, taken_up.resumes[5]["intent"]) == ("", "open")
 
 
 def test_a_second_time_voids_only_what_came_after_the_first() -> None:
@@ -52,8 +50,7 @@ def test_a_second_time_voids_only_what_came_after_the_first() -> None:
 def test_what_came_after_a_halt_does_not_count() -> None:
     halted = [START, sense(8, 1), entry(9, "halt", ticked=True), sense(30, 2), entry(30, "end")]
     past = Past.of(halted)
-    assert past.complete(30) == 9
-    assert [one.value for one in past.before(9).senses["tool.holding"]] == [1]
+    assert (past.complete(30), [one.value for one in past.before(9).senses["tool.holding"]]) == (9, [1])
     # Once it goes on, the halt is void.
     assert Past.of([*halted, entry(30, "resume", ticked=9, intent="")]).halt is None
 
@@ -68,5 +65,5 @@ def test_a_control_step_counts_once_the_world_has_made_it_and_the_journal_knows_
 
 def test_how_it_began() -> None:
     assert Past.of([]).start is None
-    assert Past.of([START]).step == 1 / 240
-    assert Past.of([START, entry(3, "request"), entry(4, "request")]).number_of("request") == 2
+    past = Past.of([START, entry(3, "request"), entry(4, "request")])
+    assert (past.step, past.number_of("request")) == (1 / 240, 2)

@@ -97,15 +97,12 @@ def test_a_motion_that_runs_into_something_ends_half_way_and_the_next_does_not(f
     assert fake.arm.met is None
 
 
-def test_it_follows_no_motion_of_another_arm(fake: FakeCell) -> None:
+def test_it_follows_one_motion_at_a_time_and_none_of_another_arm(fake: FakeCell) -> None:
     class Hop:
         duration = 1.0
 
     with pytest.raises(Fault, match="the fake arm follows its own planned motions, not a Hop"):
         fake.arm.start(Hop())
-
-
-def test_it_follows_one_motion_at_a_time(fake: FakeCell) -> None:
     motion = motion_to(fake, "aside")
     fake.arm.start(motion)
     with pytest.raises(Fault, match="the arm was started while it moves"):

@@ -53,12 +53,6 @@ def test_bins_classes_and_places_are_those_of_the_file(load: Load) -> None:
     assert (cell.descent, cell.descent_speed) == (config.motion.descent, config.motion.descent_speed)
 
 
-def test_a_seed_decides_which_objects_lie_where(load: Load) -> None:
-    one, again, other = (placements(FakeCell(load(), seed=seed)) for seed in (4, 4, 5))
-    assert one == again
-    assert one != other
-
-
 def test_as_many_objects_as_the_file_says_lie_apart_on_its_table(load: Load) -> None:
     config = load(table__objects="[5, 7]", table__x="[0.3, 0.5]")
     counts = set()
@@ -70,10 +64,17 @@ def test_as_many_objects_as_the_file_says_lie_apart_on_its_table(load: Load) -> 
             for neighbour, u, v in things[:number]:
                 room = config.objects[label].radius + config.objects[neighbour].radius + config.table.gap
                 assert np.hypot(x - u, y - v) >= room - 1e-9
+        assert placements(FakeCell(config, seed=seed)) == things, "a seed decides"
     assert counts == {5, 6, 7}
 
 
-def test_more_objects_than_places_are_refused(load: Load) -> None:
+def test_a_window_too_many_objects_and_unknown_ones_are_refused(load: Load, fake: FakeCell) -> None:
+    options = CellOptions(SilentOperator(), base=Path(), gui=True)
+    with pytest.raises(InputError, match='overhead is of kind "fake" and has no window; run it without'):
+        FakeCell(load(), options=options)
+    with pytest.raises(InputError, match=r'"cub" can be put on the fake table\. Did you mean "cube"'):
+        fake.world.put("cub", 0.5, 0.0)
+    assert not fake.world.objects
     with pytest.raises(
         InputError, match=r"90 objects find no room on the workspace of cell overhead, which has 18 places"
     ):
@@ -128,12 +129,6 @@ def test_each_bin_and_a_safe_place_beyond_the_arm_are_reported(load: Load) -> No
     )
 
 
-def test_a_window_is_refused_with_what_to_do(load: Load) -> None:
-    options = CellOptions(SilentOperator(), base=Path(), gui=True)
-    with pytest.raises(InputError, match='overhead is of kind "fake" and has no window; run it without'):
-        FakeCell(load(), options=options)
-
-
 def test_nothing_is_done_sooner_than_the_least_times_say(load: Load) -> None:
     fake, least = FakeCell(), FakeCell.least_times(load())
     # The corner of the workspace that is nearest to the red bin.
@@ -147,10 +142,6 @@ def test_nothing_is_done_sooner_than_the_least_times_say(load: Load) -> None:
     assert 0 < least.answer("") == least.answer("embedded") <= look.ticks * step
     assert 0 < least.descent <= approach.ticks * step
     assert 0.2 < least.carry("red_bin") <= transit.ticks * step < 3 * least.carry("red_bin")
-
-
-def test_the_nearest_bin_stands_for_any_and_what_is_not_there_takes_no_time(load: Load) -> None:
-    least = FakeCell.least_times(load())
     assert least.carry(None) == min(least.carry(name) for name in load().bins)
     assert (least.carry("no_bin"), least.answer("no_detector")) == (0.0, 0.0)
 
@@ -171,8 +162,7 @@ def test_a_mission_is_rehearsed_in_a_cell_of_kind_fake_and_its_trays_fill_evenly
     outcome = run.execute()
     assert outcome.status == "SUCCESS", outcome
     bins = [row["bin"] for row in run.items()["rows"] if row["bin"]]
-    assert sorted(bins) == ["tray_1", "tray_1", "tray_2", "tray_2"]
-    assert dict(run.audit() or {})["right"] == 4
+    assert (sorted(bins), dict(run.audit() or {})["right"]) == (["tray_1", "tray_1", "tray_2", "tray_2"], 4)
 
 
 @pytest.mark.parametrize(
@@ -183,13 +173,3 @@ def test_what_fell_between_two_bins_is_in_the_nearer(load: Load, x: float, what:
     cell = FakeCell(load("fruit", table__objects="[0, 0]"), routes={"banana": ("premium_crate",)})
     cell.world.put("banana", x, 0.4).fell = True
     assert {count: n for count, n in cell.audit().items() if count != "unseen" and n} == {what: 1}
-
-
-def test_what_no_class_of_the_cell_is_cannot_be_put_on_the_table(fake: FakeCell) -> None:
-    with pytest.raises(InputError) as raised:
-        fake.world.put("cub", 0.5, 0.0)
-    assert str(raised.value) == (
-        'nothing of the class "cub" can be put on the fake table. '
-        'Did you mean "cube"? The cell file has the classes: cube, sphere, duck.'
-    )
-    assert not fake.world.objects

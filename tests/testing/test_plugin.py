@@ -10,6 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from executive.testing import run_mission as missions
+from executive.testing import run_skill as skills
+from executive.testing.fake_cell import FakeCell
+
 HEAVY = ("pybullet", "cv2", "py_trees", "scipy", "onnxruntime", "numpy", "pydantic")
 
 TESTS = """\
@@ -42,41 +46,35 @@ def python(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_it_is_registered_with_pytest() -> None:
-    (entry,) = (entry for entry in entry_points(group="pytest11") if entry.name == "executive")
-    assert entry.value == "executive.testing.plugin"
-
-
 @pytest.mark.slow
 def test_its_fixtures_work_in_a_project_that_only_installs_the_executive(tmp_path: Path) -> None:
+    (entry,) = (entry for entry in entry_points(group="pytest11") if entry.name == "executive")
     (tmp_path / "test_mine.py").write_text(TESTS, encoding="utf-8")
-    done = python("-m", "pytest", "-p", "executive.testing.plugin", "-q", folder=tmp_path)
+    done = python("-m", "pytest", "-p", entry.value, "-q", folder=tmp_path)
     assert "3 passed" in done.stdout, done.stdout + done.stderr
 
 
-def test_pytest_starts_without_anything_heavy(tmp_path: Path) -> None:
-    ask = f"import sys, executive.testing.plugin; print([m for m in {HEAVY} if m in sys.modules])"
-    assert python("-c", ask, folder=tmp_path).stdout.strip() == "[]"
-
-
-@pytest.mark.slow
-def test_the_kit_itself_needs_no_simulator(tmp_path: Path) -> None:
-    ask = (
-        "import sys, executive.testing.run_skill, executive.testing.run_mission; "
-        "from executive.testing.disturbances import *; print('pybullet' in sys.modules)"
-    )
+@pytest.mark.parametrize(
+    ("imports", "packages"),
+    [
+        ("import executive.testing.plugin", HEAVY),
+        pytest.param(
+            "import executive.testing.run_mission; from executive.testing.disturbances import *",
+            ("pybullet",),
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
+def test_pytest_starts_without_anything_heavy_and_the_kit_without_a_simulator(
+    imports: str, packages: tuple[str, ...], tmp_path: Path
+) -> None:
+    ask = f"import sys; {imports}; print([m for m in {packages} if m in sys.modules])"
     done = python("-c", ask, folder=tmp_path)
-    assert done.stdout.strip() == "False", done.stderr
+    assert done.stdout.strip() == "[]", done.stderr
 
 
-def test_the_fixtures_are_the_functions_of_the_kit(run_skill: object, run_mission: object) -> None:
-    from executive.testing import run_mission as missions
-    from executive.testing import run_skill as skills
-
-    assert run_skill is skills.run_skill
-    assert run_mission is missions.run_mission
-
-
-@pytest.mark.usefixtures("fake_cell")
-def test_the_fake_cell_of_a_fixture_has_an_empty_table(fake_cell: object) -> None:
-    assert fake_cell.world.objects == []  # type: ignore[attr-defined]
+def test_the_fixtures_are_the_functions_of_the_kit_and_an_empty_cell(
+    run_skill: object, run_mission: object, fake_cell: FakeCell
+) -> None:
+    assert (run_skill, run_mission) == (skills.run_skill, missions.run_mission)
+    assert fake_cell.world.objects == []

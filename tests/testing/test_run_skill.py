@@ -67,74 +67,50 @@ class Coaster(Skill):
             yield
 
 
-@pytest.fixture
-def target(fake: FakeCell) -> Target:
-    fake.world.put("cube", 0.5, 0.0)
-    detections = run_skill(Detect, fake).outputs["detections"]
-    return run_skill(Localize, fake, inputs={"detections": detections}).outputs["targets"][0]
-
-
-def test_a_class_gets_its_params_and_inputs_by_name(fake: FakeCell) -> None:
+def test_params_and_inputs_are_given_to_the_class_or_to_the_instance(fake: FakeCell) -> None:
     result = run_skill(Worker, fake, inputs={"given": "stone"})
     assert (result.status, result.outputs, result.ticks) == ("SUCCESS", {"made": "made of stone"}, 1)
-
-
-def test_an_instance_has_its_inputs_already(fake: FakeCell) -> None:
     assert run_skill(Worker(given="wood"), fake).outputs == {"made": "made of wood"}
     with pytest.raises(InputError, match="this Worker has its inputs already; pass the class Worker with"):
         run_skill(Worker(given="wood"), fake, inputs={"way": "fail"})
 
 
-def test_a_failure_tells_its_reason_and_commits_nothing(fake: FakeCell) -> None:
+def test_a_failure_has_a_reason_and_commits_nothing(fake: FakeCell) -> None:
     result = run_skill(Worker, fake, inputs={"given": "stone", "way": "fail"})
-    assert (result.status, result.reason, result.message) == ("FAILURE", "bad", "3 mm off")
-    assert result.outputs == {}
+    assert (result.status, result.reason, result.message, result.outputs) == (
+        "FAILURE", "bad", "3 mm off", {},
+    )  # fmt: skip
+
+
+class Sly(Worker):
+    """Fails for a reason of its parent's that it does not declare."""
+
+    reasons: ClassVar = ()
+
+    def run(self, cell: Any) -> Iterator[None]:
+        yield
+        raise Worker(given="").failed("bad", "")
 
 
 @pytest.mark.parametrize(
-    ("inputs", "sentence"),
+    ("skill", "inputs", "error", "sentence"),
     [
-        ({"givne": "stone"}, 'Worker has no param or input "givne"; it has: way, given'),
-        ({"made": "stone", "given": ""}, 'Worker has no param or input "made"; it has: way, given'),
-        ({}, 'Worker needs a value for "given"'),
+        (Worker, {"givne": "stone"}, InputError, 'Worker has no param or input "givne"; it has: way, given'),
+        (Worker, {"made": "stone", "given": ""}, InputError,
+         'Worker has no param or input "made"; it has: way, given'),
+        (Worker, {}, InputError, 'Worker needs a value for "given"'),
+        (Worker, {"given": "", "way": "forget"}, Fault, "it succeeded without setting its output made"),
+        (Worker, {"given": "", "way": "yield"}, Fault,
+         'it yielded a tuple_iterator; to run steps of others write "yield from"'),
+        (Worker, {"given": "", "way": "break"}, ValueError, "a bug"),
+        (Sly, {"given": ""}, Fault, 'it failed with the undeclared reason "bad"; it declares: none'),
     ],
-)
-def test_inputs_are_checked_by_name_as_in_a_mission(
-    fake: FakeCell, inputs: dict[str, str], sentence: str
+)  # fmt: skip
+def test_what_would_be_refused_or_a_fault_in_a_mission_is_raised(
+    fake: FakeCell, skill: type[Skill], inputs: dict[str, str], error: type[Exception], sentence: str
 ) -> None:
-    with pytest.raises(InputError, match=sentence):
-        run_skill(Worker, fake, inputs=inputs)
-
-
-@pytest.mark.parametrize(
-    ("way", "sentence"),
-    [
-        ("forget", "it succeeded without setting its output made"),
-        ("yield", 'it yielded a tuple_iterator; to run steps of others write "yield from"'),
-    ],
-)
-def test_what_would_be_a_fault_in_a_mission_is_one_here(fake: FakeCell, way: str, sentence: str) -> None:
-    with pytest.raises(Fault, match=sentence):
-        run_skill(Worker, fake, inputs={"given": "stone", "way": way})
-
-
-def test_a_bug_comes_out_as_it_is(fake: FakeCell) -> None:
-    with pytest.raises(ValueError, match="a bug"):
-        run_skill(Worker, fake, inputs={"given": "stone", "way": "break"})
-
-
-def test_a_reason_that_is_not_declared_is_a_fault_however_it_is_raised(fake: FakeCell) -> None:
-    class Sly(Worker):
-        """Fails for a reason of its parent's that it does not declare."""
-
-        reasons: ClassVar = ()
-
-        def run(self, cell: Any) -> Iterator[None]:
-            yield
-            raise Worker(given="").failed("bad", "")
-
-    with pytest.raises(Fault, match='it failed with the undeclared reason "bad"; it declares: none'):
-        run_skill(Sly, fake, inputs={"given": "stone"})
+    with pytest.raises(error, match=sentence):
+        run_skill(skill, fake, inputs=inputs)
 
 
 def test_a_run_without_a_yield_is_done_at_once(fake: FakeCell) -> None:
@@ -172,23 +148,12 @@ def test_a_named_pose_and_a_question_to_the_operator_are_told_too(fake: FakeCell
 
         def run(self, cell: Any) -> Iterator[None]:
             yield
+            assert cell.arm.at_rest and not cell.tool.holding, "questions are no commands"
             cell.arm.plan(goal="home")
             cell.camera.next_pose()
 
     assert run_skill(GoHome, fake).commanded == ["arm.plan home", "camera.next_pose"]
     assert run_skill(AwaitRequest, fake).commanded == ["operator.ask"]
-
-
-def test_what_only_asks_commands_nothing(fake: FakeCell) -> None:
-    class Asks(Skill):
-        """Ask every part something."""
-
-        def run(self, cell: Any) -> Iterator[None]:
-            yield
-            assert not (cell.tool.holding or cell.tool.touching or cell.arm.met)
-            assert cell.arm.at_rest and cell.camera.sees_table() and cell.ledger.epoch == 0
-
-    assert run_skill(Asks, fake).commanded == []
 
 
 def test_a_halt_brakes_the_arm_and_tells_how_long_that_took(fake: FakeCell, target: Target) -> None:

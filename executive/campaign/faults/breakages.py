@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from itertools import count
-from typing import cast
 
 from executive.campaign.faults.fault import Breakage, InjectedError
 from executive.cell import Cell, Steps
 from executive.skill import EMPTY, Skill
 from executive.slip import slipped
-from executive.testing.substitutes import raising, raising_when_halted
+from executive.testing.substitutes import in_place_of, raising, raising_when_halted
 
 WANTED = "as the campaign wants it"
 """What a skill says that fails by itself."""
@@ -21,7 +19,8 @@ def broken_skills(breakages: Iterable[Breakage], skills: Mapping[str, type[Skill
     found: dict[str, type[Skill]] = {}
     for breakage in breakages:
         skill = found.get(breakage.node, skills[breakage.node])
-        found[breakage.node] = _in_starts(skill, _broken(skill, breakage), breakage.starts)
+        body = _broken(skill, breakage).run
+        found[breakage.node] = in_place_of(skill, "Broken", body, breakage.starts or None)
     return found
 
 
@@ -41,7 +40,7 @@ def _failing(skill: type[Skill], reason: str) -> type[Skill]:
     """
     empties = skill.tool_left.get(reason) is EMPTY
 
-    def run(self: Skill, cell: Cell) -> Steps:
+    def body(self: Skill, cell: Cell) -> Steps:
         if empties:
             cell.tool.open()
             if cell.tool.holding:
@@ -51,20 +50,4 @@ def _failing(skill: type[Skill], reason: str) -> type[Skill]:
                 slipped(cell, item)
         raise self.failed(reason, WANTED)
 
-    return _subclass(skill, run)
-
-
-def _in_starts(skill: type[Skill], broken: type[Skill], starts: tuple[int, ...]) -> type[Skill]:
-    """Return the skill that is the broken one in these of its activations."""
-    number = count(1)
-
-    def run(self: Skill, cell: Cell) -> Steps:
-        runs = broken if next(number) in starts or not starts else skill
-        yield from runs.run(self, cell) or ()
-
-    return _subclass(skill, run)
-
-
-def _subclass(skill: type[Skill], run: object) -> type[Skill]:
-    members = {"run": run, "__doc__": skill.__doc__, "__module__": skill.__module__}
-    return cast(type[Skill], type(f"Broken{skill.__name__}", (skill,), members))
+    return in_place_of(skill, "Failing", body)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 
 from executive.campaign.faults.branches import branches
 from executive.campaign.faults.fault import Fault
 from executive.campaign.faults.listing import list_faults
-from executive.campaign.faults.rehearsal import Rehearsal, rehearse
-from executive.campaign.faults.trial import empty_trial, try_out
+from executive.campaign.faults.rehearsal import rehearse
+from executive.campaign.faults.trial import Numbered, empty_trial, try_out
 from executive.campaign.pool import do_all
 from executive.campaign.subject import Subject
 from executive.errors import InputError
@@ -21,16 +22,6 @@ DEEPEST = 4
 
 Numbers = tuple[int, ...]
 """Faults by their numbers in the list, the one that a run is about last."""
-
-
-@dataclass(frozen=True)
-class Job:
-    """One run to do."""
-
-    subject: Subject
-    rehearsal: Rehearsal
-    numbers: Numbers
-    faults: tuple[Fault, ...]
 
 
 class Campaign:
@@ -152,21 +143,14 @@ class Campaign:
             if self._progress is not None:
                 self._progress(before + done, before + all)
 
-        jobs = [
-            Job(self.subject, self.rehearsal, numbers, tuple(map(self.fault, numbers))) for numbers in wanted
-        ]
-        trials = do_all(jobs, do, _broken, workers=self._workers, progress=told, halting=self._halting)
+        work = partial(try_out, self.subject, self.rehearsal)
+        jobs = [self.these(numbers) for numbers in wanted]
+        trials = do_all(jobs, work, _broken, workers=self._workers, progress=told, halting=self._halting)
         done = [trial for trial in trials if trial is not None and not trial.cut]
         return done, len(done) == len(wanted)
 
 
-def do(job: Job) -> Trial:
-    """Do one run."""
-    return try_out(job.subject, job.rehearsal, dict(zip(job.numbers, job.faults, strict=True)))
-
-
-def _broken(job: Job, error: BaseException) -> Trial:
-    """Return the trial of a run that told nothing."""
-    numbered = dict(zip(job.numbers, job.faults, strict=True))
+def _broken(faults: Numbered, error: BaseException) -> Trial:
+    """Return the trial of a run that left none."""
     problem = f"the run broke: {type(error).__name__}: {error}"
-    return replace(empty_trial(numbered), status="FAULT", problems=(problem,))
+    return replace(empty_trial(faults), status="FAULT", problems=(problem,))

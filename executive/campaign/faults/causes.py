@@ -7,21 +7,7 @@ from dataclasses import dataclass
 
 from executive.cell_config import TableConfig
 from executive.skill import Skill
-from executive.testing.disturbances import (
-    arm_runs_into,
-    detector_dead,
-    detector_unsure,
-    no_depth,
-    no_way,
-    object_bumped,
-    operator_asks_rescan,
-    operator_quits,
-    seal_breaks,
-    seal_fails,
-    table_bumped,
-    tool_sticks,
-    workspace_hidden,
-)
+from executive.testing import disturbances as effects
 from executive.testing.disturbances.effect import Effect
 
 
@@ -49,19 +35,19 @@ class Cause:
 
 def causes(table: TableConfig) -> Mapping[str, Cause]:
     """Return what makes skills fail, by the name of the reason; of one that is missing nobody knows."""
-    aside = object_bumped(table.x, table.y)
+    aside = effects.object_bumped(table.x, table.y)
     return {
-        "missed": Cause(seal_fails(), "nothing seals", "tool"),
-        "dropped": Cause(seal_breaks(), "the seal breaks half-way", "moves"),
+        "missed": Cause(effects.seal_fails(), "nothing seals", "tool"),
+        "dropped": Cause(effects.seal_breaks(), "the seal breaks half-way", "moves"),
         "no_contact": Cause(aside, "the object is bumped aside", "moves"),
-        "blocked": Cause(arm_runs_into(), "the arm runs into something", "moves"),
-        "unreachable": Cause(no_way(), "the planner finds no way", "moves"),
-        "stuck": Cause(tool_sticks(), "the tool does not let go", "tool"),
-        "unavailable": Cause(detector_dead(), "the detector is dead", "camera"),
-        "unsure": Cause(detector_unsure(), "the detector is sure of nothing", "camera"),
-        "hidden": Cause(workspace_hidden(), "the arm hides the workspace", "camera"),
-        "stale": Cause(table_bumped(), "something bumps the table", lasts=False),
-        "no_depth": Cause(no_depth(), "no detection can be localized"),
-        "quit": Cause(operator_quits(), "the operator quits", "senses"),
-        "rescan": Cause(operator_asks_rescan(), "the operator wants a look", "senses", lasts=False),
+        "blocked": Cause(effects.arm_runs_into(), "the arm runs into something", "moves"),
+        "unreachable": Cause(effects.no_way(), "the planner finds no way", "moves"),
+        "stuck": Cause(effects.tool_sticks(), "the tool does not let go", "tool"),
+        "unavailable": Cause(effects.detector_dead(), "the detector is dead", "camera"),
+        "unsure": Cause(effects.detector_unsure(), "the detector is sure of nothing", "camera"),
+        "hidden": Cause(effects.workspace_hidden(), "the arm hides the workspace", "camera"),
+        "stale": Cause(effects.table_bumped(), "something bumps the table", lasts=False),
+        "no_depth": Cause(effects.no_depth(), "no detection can be localized"),
+        "quit": Cause(effects.operator_quits(), "the operator quits", "senses"),
+        "rescan": Cause(effects.operator_asks_rescan(), "the operator wants a look", "senses", lasts=False),
     }

@@ -81,13 +81,13 @@ def check_books(
     then is lost to the robot, wherever it lies, and so is what fell where no look shows it. Of the `taken`
     objects some may have been taken where nobody had to look any more.
     """
-    told = f"the ledger says {_counts(items)}"
+    told = f"the ledger says {counts_text(items)}"
     if items["seen"] != items["placed"] + items["rejected"] + items["lost"]:
         yield f"the ledger does not balance: {told}"
     if audit is None:
         return
     if audit["wrong_bin"]:
-        yield f"{audit['wrong_bin']} misplaced; {told}; the audit {_counts(audit)}"
+        yield f"{audit['wrong_bin']} misplaced; {told}; the audit {counts_text(audit)}"
     unnoticed = min(max(audit["elsewhere"] - items["lost"], 0), taken)
     left = audit["left"] + unnoticed
     if outcome.status == "FAULT" or outcome.node:
@@ -101,7 +101,7 @@ def check_books(
             for inside in range(hidden.inside + 1)
         )
     if not agrees:
-        yield f"{told}; the audit {_counts(audit)}"
+        yield f"{told}; the audit {counts_text(audit)}"
 
 
 def check_success(
@@ -110,7 +110,7 @@ def check_success(
     """Yield a sentence if the run looked, says success, and never saw what lies there."""
     looked = any(event.kind == "look" for event in events)
     if looked and outcome.status == "SUCCESS" and audit is not None and audit["unseen"]:
-        yield f"success, and {audit['unseen']} objects were never seen; the audit {_counts(audit)}"
+        yield f"success, and {audit['unseen']} objects were never seen; the audit {counts_text(audit)}"
 
 
 def check_losses(audit: Mapping[str, int] | None, events: Sequence[Event]) -> Iterator[str]:
@@ -142,5 +142,6 @@ def remark(outcome: Outcome, faults: Sequence[Fault]) -> str:
     return f"it says {outcome.reason}" + (f", and {' and '.join(meant)} was brought about" if meant else "")
 
 
-def _counts(counts: Mapping[str, Any]) -> str:
+def counts_text(counts: Mapping[str, Any]) -> str:
+    """Return counts by name in words: `seen 3, placed 2`."""
     return ", ".join(f"{name} {count}" for name, count in counts.items() if isinstance(count, int))

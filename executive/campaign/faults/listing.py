@@ -12,23 +12,8 @@ from executive.campaign.subject import Subject
 from executive.messages import Target
 from executive.mission.model import nodes
 from executive.skill import HOLDING, Direction, Skill
-from executive.testing.disturbances import (
-    after,
-    between,
-    detector_dead,
-    detector_given_up,
-    detector_hangs,
-    detector_slow,
-    detector_unsure,
-    during,
-    object_bumped,
-    object_refuses,
-    object_removed,
-    seal_breaks,
-    seal_breaks_over_wrong_bin,
-    seal_fails,
-)
-from executive.testing.disturbances.script import Disturbance
+from executive.testing import disturbances as effects
+from executive.testing.disturbances.script import Disturbance, after, between, during
 
 SHORT, LONG = 0.5, 5.0
 """How long a detector is slow, hangs or is dead [s]; the longer is also the deadline of one that hangs."""
@@ -117,33 +102,36 @@ class _Listing:
         starts: tuple[tuple[When, float], ...] = (("first", 0.0), ("middle", half))
         for when, start in starts:
             for by in (SHORT, LONG):
-                yield _detector(f"slow by {by:g} s", when, after(start, detector_slow(by)))
+                yield _detector(f"slow by {by:g} s", when, after(start, effects.detector_slow(by)))
             for lasts in (SHORT, LONG):
                 end = start + lasts
-                hangs, dead = between(start, end, detector_hangs()), between(start, end, detector_dead())
-                unsure = between(start, end, detector_unsure())
+                hangs, dead = (
+                    between(start, end, effects.detector_hangs()),
+                    between(start, end, effects.detector_dead()),
+                )
+                unsure = between(start, end, effects.detector_unsure())
                 yield _detector(f"hangs for {lasts:g} s", when, hangs)
                 yield _detector(f"unsure for {lasts:g} s", when, unsure, "unsure")
                 yield _detector(f"dead for {lasts:g} s", when, dead)
-            yield _detector("hangs for ever", when, after(start, detector_given_up(LONG)))
-            yield _detector("dead for ever", when, after(start, detector_dead()))
-            yield _detector("unsure for ever", when, after(start, detector_unsure()), "unsure")
+            yield _detector("hangs for ever", when, after(start, effects.detector_given_up(LONG)))
+            yield _detector("dead for ever", when, after(start, effects.detector_dead()))
+            yield _detector("unsure for ever", when, after(start, effects.detector_unsure()), "unsure")
 
     def _objects(self) -> Iterator[Fault]:
         """Yield objects taken away and bumped aside, on the table and under the arm that comes for them."""
         table = self._table
         for when, share in QUARTERS:
             start = share * self._rehearsal.robot_time
-            bumped = object_bumped(table.x, table.y, "nearest")
-            yield _other("object", "taken", when, after(start, object_removed("nearest")))
+            bumped = effects.object_bumped(table.x, table.y, "nearest")
+            yield _other("object", "taken", when, after(start, effects.object_removed("nearest")))
             yield _other("object", "bumped", when, after(start, bumped))
         for node in self._nodes:
             if not _goes_to_target(self._skills[node.skill]) or not self._runs(node):
                 continue
             nth = 1 + len(self._rehearsal.activations[node.path]) // 2
             for when, share in QUARTERS:
-                taken = object_removed("node", share)
-                bumped = object_bumped(table.x, table.y, "node", share)
+                taken = effects.object_removed("node", share)
+                bumped = effects.object_bumped(table.x, table.y, "node", share)
                 for what, effect in (("target taken", taken), ("target bumped", bumped)):
                     happening = during(node.path, effect, nth=nth)
                     yield self._fault(node, what, when, means=f"at {share:g}", happenings=(happening,))
@@ -154,18 +142,18 @@ class _Listing:
             if not _carries(self._skills[node.skill]) or not self._runs(node):
                 continue
             for when, share in CARRIES:
-                happening = during(node.path, seal_breaks(share), nth=1)
+                happening = during(node.path, effects.seal_breaks(share), nth=1)
                 yield self._fault(node, "lets go", when, means=f"at {share:g}", happenings=(happening,))
-            over = during(node.path, seal_breaks_over_wrong_bin())
+            over = during(node.path, effects.seal_breaks_over_wrong_bin())
             yield self._fault(
                 node, "lets go over another bin", "lasting", means="every time", happenings=(over,)
             )
         half = self._rehearsal.robot_time / 2
         for lasts in (SHORT, LONG):
-            happening = between(half, half + lasts, seal_fails())
+            happening = between(half, half + lasts, effects.seal_fails())
             yield _other("tool", f"no seal for {lasts:g} s", "middle", happening)
         for number in (1, 2):
-            refuses = after(0.0, object_refuses(number))
+            refuses = after(0.0, effects.object_refuses(number))
             yield _other("tool", f"no seal on object {number}", "lasting", refuses)
 
     def _fault(self, node: nodes.SkillNode, what: str, when: When, **more: object) -> Fault:

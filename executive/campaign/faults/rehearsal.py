@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass
 
+from executive.campaign.faults.judgement import counts_text
 from executive.campaign.subject import Subject
 from executive.errors import InputError
 from executive.events import Event
@@ -89,12 +90,9 @@ def rehearse(subject: Subject) -> Rehearsal:
         )
     if not ledger_agrees({"items": items, "audit": audit}):
         raise InputError(
-            f"{undisturbed} leaves books that are not the world: the ledger says {_counts(items)}; the audit "
-            f"{_counts(audit or {})}; choose another seed, or a mission that looks at the whole table"
+            f"{undisturbed} leaves books that are not the world: the ledger says {counts_text(items)}; "
+            f"the audit {counts_text(audit or {})}; choose another seed, or a mission that looks at the "
+            "whole table"
         )
     found = {node: tuple(ticks) for node, ticks in activations.lasted.items()}
     return Rehearsal(outcome.robot_time, items["placed"], found)
-
-
-def _counts(counts: Mapping[str, object]) -> str:
-    return ", ".join(f"{name} {count}" for name, count in counts.items() if isinstance(count, int))

@@ -3,25 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from executive.campaign.faults import judgement
 from executive.campaign.faults.breakages import WANTED, broken_skills
 from executive.campaign.faults.fault import Breakage, Fault, InjectedError
-from executive.campaign.faults.judgement import (
-    Hidden,
-    check_books,
-    check_end,
-    check_losses,
-    check_success,
-    check_tree,
-    count_of,
-    out_of_sight,
-    remark,
-)
 from executive.campaign.faults.listing import skill_nodes
 from executive.campaign.faults.rehearsal import Activations, Rehearsal
 from executive.campaign.halt_checks import check_journal, check_rest, check_tool
@@ -79,19 +69,6 @@ def empty_trial(faults: Numbered) -> Trial:
     return Trial(tuple(faults), told, last.name, last.place, last.what, last.when)
 
 
-class _StoppingCell(WrappedCell):
-    """A work cell with something to do after every control step."""
-
-    def __init__(self, inner: Workcell, after: Callable[[], None]) -> None:
-        super().__init__(inner)
-        self._after = after
-
-    def advance(self) -> None:
-        """Let one control step pass, with what is to be done after it."""
-        super().advance()
-        self._after()
-
-
 class _Trying:
     """A run and all that is seen of it."""
 
@@ -120,15 +97,16 @@ class _Trying:
         """Return what came of the run, which is over."""
         run = self.run
         items, audit = run.items(), run.audit()
+        taken = judgement.count_of(self._events, ObjectRemoved.name)
         raised = any(self._raised(fault) for fault in self._faults.values() if fault.ends_run)
         faults = tuple(self._faults.values())
         problems = [
-            *check_end(outcome, faults, self._subject.loaded.endings, raised),
-            *check_tree(run.root),
+            *judgement.check_end(outcome, faults, self._subject.loaded.endings, raised),
+            *judgement.check_tree(run.root),
             *check_journal([_entry(event) for event in self._events], outcome),
-            *check_books(outcome, items, audit, count_of(self._events, ObjectRemoved.name), self._hidden()),
-            *check_success(outcome, audit, self._events),
-            *check_losses(audit, self._events),
+            *judgement.check_books(outcome, items, audit, taken, self._hidden()),
+            *judgement.check_success(outcome, audit, self._events),
+            *judgement.check_losses(audit, self._events),
             *check_tool(outcome, run.workcell),
             *check_rest(run.workcell),
         ]
@@ -147,13 +125,13 @@ class _Trying:
             robot_time=outcome.robot_time,
             entered=frozenset(self._activations.counts),
             problems=tuple(problems),
-            remark=remark(outcome, faults),
+            remark=judgement.remark(outcome, faults),
         )
 
     def _kind(self, *args: Any, **options: Any) -> Workcell:
         kind = self._subject.kind or cell_kind(self._subject.loaded.cell_config.kind)
         bounded = BoundedCell(kind(*args, **options), self._rehearsal.longest)
-        return _StoppingCell(bounded, self._stop_if_due)
+        return WrappedCell(bounded, after=self._stop_if_due)
 
     def _see(self, event: Event) -> None:
         if event.kind != "sense":
@@ -170,10 +148,10 @@ class _Trying:
         is_meant = self._activations.counts[breakage.node] in breakage.starts
         return began is not None and is_meant and self.run.tick >= began + breakage.after
 
-    def _hidden(self) -> Hidden:
+    def _hidden(self) -> judgement.Hidden:
         workcell = self.run.workcell
         assert isinstance(workcell, DisturbedCell)
-        return out_of_sight(workcell.hand.things, workcell.cell.bins.values(), self._events)
+        return judgement.out_of_sight(workcell.hand.things, workcell.cell.bins.values(), self._events)
 
     def _happened(self, fault: Fault) -> bool:
         """Tell whether a fault found its occasion."""

@@ -6,22 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from executive.skill import Skill
-from executive.testing.disturbances import (
-    arm_runs_into,
-    detector_blind,
-    detector_dead,
-    detector_unsure,
-    no_depth,
-    no_way,
-    object_removed,
-    operator_asks_rescan,
-    operator_quits,
-    seal_breaks,
-    seal_fails,
-    table_bumped,
-    tool_sticks,
-    workspace_hidden,
-)
+from executive.testing import disturbances as effects
 from executive.testing.disturbances.effect import Effect, Occasion
 from executive.testing.fake_arm import FakeMotion
 
@@ -74,24 +59,24 @@ def adversities(skill: type[Skill], ticks: int, *, holding: bool) -> Iterator[Ad
             yield adversity
     if "tool" in skill.uses:
         for tick in sorted({round(ticks * part / SEAL_BREAKS) for part in range(SEAL_BREAKS + 1)}):
-            breaks = seal_breaks(None)
+            breaks = effects.seal_breaks(None)
             yield Adversity(f"while the seal breaks at tick {tick}", breaks, tick=tick)
 
 
 _ADVERSITIES = (
-    Adversity("while nothing seals", seal_fails(), "tool"),
-    Adversity("while what the tool holds does not come off", tool_sticks(), "tool", holding=True),
-    Adversity("while everything on the table is gone", object_removed("nearest"), times=MAX_OBJECTS),
-    Adversity("while the table has changed since the look", table_bumped()),
-    Adversity("while the arm runs into something", arm_runs_into(), "arm"),
+    Adversity("while nothing seals", effects.seal_fails(), "tool"),
+    Adversity("while what the tool holds does not come off", effects.tool_sticks(), "tool", holding=True),
+    Adversity("while everything on the table is gone", effects.object_removed("nearest"), times=MAX_OBJECTS),
+    Adversity("while the table has changed since the look", effects.table_bumped()),
+    Adversity("while the arm runs into something", effects.arm_runs_into(), "arm"),
     Adversity("while the arm still moves at the start", ArmMoves(), "arm"),
-    Adversity("while no plan reaches the goal", no_way(), "arm"),
-    Adversity("while every way is blocked", no_way(is_blocked=True), "arm"),
-    Adversity("while the arm hides the table", workspace_hidden()),
-    Adversity("while no depth is seen", no_depth()),
-    Adversity("while no detector answers", detector_dead()),
-    Adversity("while the detectors see nothing", detector_blind()),
-    Adversity("while the detectors are unsure", detector_unsure()),
-    Adversity("while the operator quits", operator_quits()),
-    Adversity("while the operator wants a fresh look", operator_asks_rescan()),
+    Adversity("while no plan reaches the goal", effects.no_way(), "arm"),
+    Adversity("while every way is blocked", effects.no_way(is_blocked=True), "arm"),
+    Adversity("while the arm hides the table", effects.workspace_hidden()),
+    Adversity("while no depth is seen", effects.no_depth()),
+    Adversity("while no detector answers", effects.detector_dead()),
+    Adversity("while the detectors see nothing", effects.detector_blind()),
+    Adversity("while the detectors are unsure", effects.detector_unsure()),
+    Adversity("while the operator quits", effects.operator_quits()),
+    Adversity("while the operator wants a fresh look", effects.operator_asks_rescan()),
 )

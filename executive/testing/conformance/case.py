@@ -27,14 +27,10 @@ class Case:
         name: Name of the skill.
         skill: Its class.
         arrange: What its author wants to be otherwise on the stage.
-
-    Attributes:
-        tries: Number of runs that were begun.
     """
 
     def __init__(self, name: str, skill: type[Skill], arrange: Arrange) -> None:
         self.name, self.skill, self._arrange = name, skill, arrange
-        self.tries = 0
         self._stuck = ""
 
     @cached_property
@@ -79,7 +75,6 @@ class Case:
         """
         if self._stuck:
             raise GotStuck(self._stuck)
-        self.tries += 1
         rehearsal = Rehearsal(self.skill, situation, self._arrange, adversity, halt_at)
         if rehearsal.status == "STUCK":
             halted = ", halted there," if rehearsal.ticks == halt_at else ""

@@ -10,7 +10,6 @@ from typing import Any
 from executive.skill import Skill
 from executive.testing.conformance import conduct, declarations
 from executive.testing.conformance.case import Case
-from executive.testing.conformance.patience import Stuck, patience
 from executive.testing.conformance.situations import Arrange, NotTried
 from executive.testing.conformance.stage import Stage
 
@@ -89,12 +88,9 @@ class Check:
     def verdict(self) -> Verdict:
         """Return what the check finds."""
         try:
-            with patience(self.case.skill, lambda: self.case.tries):
-                problems = tuple(self.rule(self.case))
+            problems = tuple(self.rule(self.case))
         except NotTried as problem:
             return Verdict(self.case.name, self.name, self.doc, "not run", (str(problem),))
-        except Stuck as stuck:
-            problems = (f"what {self} asks of it {stuck}. A skill answers every question at once.",)
         return Verdict(self.case.name, self.name, self.doc, "failed" if problems else "ok", problems)
 
     def __call__(self) -> None:

@@ -1,8 +1,7 @@
-"""Observer of a skill's calls of its cell, which may be answered otherwise."""
+"""Observer of a skill's calls of its cell."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -37,19 +36,14 @@ class Watch:
         cell: The cell that the skill is to see instead.
         calls: Every call of a method, in order.
         tick: The control step of the calls to come.
-        instead: Functions that answer a call, by its name, in place of the part.
     """
 
     def __init__(self, cell: Cell) -> None:
         self.calls: list[Call] = []
         self.tick = 0
-        self.instead: dict[str, Callable[..., Any]] = {}
         self.cell = intercept(cell, self._answer, _ROLES)
 
     def _answer(self, access: Access) -> Any:
-        if not access.is_call or access.role not in _ROLES:
-            return access.proceed()
-        self.calls.append(Call(self.tick, access.name, access.values))
-        if instead := self.instead.get(access.name):
-            return instead(*access.arguments, **access.named)
+        if access.is_call and access.role in _ROLES:
+            self.calls.append(Call(self.tick, access.name, access.values))
         return access.proceed()

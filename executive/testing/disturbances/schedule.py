@@ -49,13 +49,12 @@ class Schedule:
         for occasion in self._happening:
             self._act(occasion)
 
-    def through(self, hook: str, question: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
+    def through(self, hook: str, ask: Callable[[], Any]) -> Any:
         """Return the cell's answer to a question after everything that happens now has had to do with it.
 
-        `hook` says which method of an effect has to do with such questions, `question` asks the cell.
+        `hook` says which method of an effect has to do with such questions, `ask` asks the cell.
         """
         self.step()
-        ask: Callable[[], Any] = partial(question, *arguments, **named)
         for occasion in self._happening:
             disturb = getattr(occasion.effect, hook, None)
             if disturb is not None:

@@ -83,15 +83,14 @@ def test_every_fault_is_tried_once_in_the_order_of_the_list(figures: FaultFigure
 def test_every_way_on_is_entered_the_one_behind_another_fault_with_it(figures: FaultFigures) -> None:
     ways = [(branch.what, branch.place.rpartition(":")[2]) for branch in figures.branches]
     assert ways == [
-        ("finally", "18"),
-        ("choice 2", "10"),
-        ("catch on Grasp.missed", "15"),
+        ("finally", "18"), ("choice 2", "10"), ("catch on Grasp.missed", "15"),
         ("catch on Approach.blocked", "17"),
-    ]
+    ]  # fmt: skip
     assert figures.unentered == ()
     behind = next(trial for trial in figures.trials if trial.name == "RejectTarget")
-    assert len(behind.numbers) == 2
-    assert behind.told[0].endswith("Grasp missed, first: nothing seals")
+    assert (len(behind.numbers), behind.told[0].rpartition("/")[2]) == (
+        2, "Grasp missed, first: nothing seals",
+    )  # fmt: skip
 
 
 def test_a_way_that_no_run_took_is_told_with_its_place(figures: FaultFigures, small: Subject) -> None:
@@ -109,8 +108,7 @@ def test_pairs_are_drawn_by_the_seed_and_come_in_the_same_order_from_any_number_
     two = Campaign(small, workers=2).pairs(3)
     monkeypatch.setattr("executive.campaign.faults.campaign.do_all", one_after_the_other)
     one, other = Campaign(small).pairs(3), Campaign(replace(small, seed=3)).pairs(3)
-    assert one == two
-    assert [len(trial.numbers) for trial in one.trials] == [2] * 3
+    assert (one, [len(trial.numbers) for trial in one.trials]) == (two, [2] * 3)
     assert [trial.label for trial in one.trials] != [trial.label for trial in other.trials]
 
 
@@ -145,14 +143,18 @@ def test_a_number_that_there_is_not_is_told_with_those_that_there_are(campaign: 
     )
 
 
-def test_a_mission_that_does_not_succeed_by_itself_is_not_tried(small: Subject) -> None:
-    loaded = load_mission(small.loaded.path, discover(), {"cell.table.objects": "[0, 0]"})
-    broken = replace(small, loaded=loaded, kind=Empty)
+class Empty(FakeCell):
+    """A cell that breaks."""
+
+    def advance(self) -> None:
+        raise RuntimeError("broken")
+
+
+def test_a_mission_that_does_not_succeed_by_itself_or_with_wrong_books_is_not_tried(
+    small: Subject, tmp_path: Path
+) -> None:
     with pytest.raises(InputError, match=r"undisturbed, small with seed 0 ends as FAULT .* another seed"):
-        Campaign(broken)
-
-
-def test_a_mission_with_books_that_are_not_the_world_is_not_tried(small: Subject, tmp_path: Path) -> None:
+        Campaign(replace(small, kind=Empty))
     file = tmp_path / "blind.yaml"
     shutil.copytree(small.loaded.path.parent / "cells", tmp_path / "cells")
     file.write_text(
@@ -161,10 +163,3 @@ def test_a_mission_with_books_that_are_not_the_world_is_not_tried(small: Subject
     )
     with pytest.raises(InputError, match=r"undisturbed, blind .* or a mission that looks at the whole table"):
         Campaign(replace(small, loaded=load_mission(file, discover())))
-
-
-class Empty(FakeCell):
-    """A cell that breaks."""
-
-    def advance(self) -> None:
-        raise RuntimeError("broken")

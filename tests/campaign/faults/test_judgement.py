@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import pytest
 
 from executive.campaign.faults.fault import Breakage, Fault
 from executive.campaign.faults.judgement import (
@@ -32,6 +35,10 @@ PLACES = ((0.5, 0.0, 0.025), (1.6, 0.0, 0.025), (0.24, -0.48, 0.025))
 
 def outcome(status: str, reason: str = "", message: str = "", node: str = "") -> Outcome:
     return Outcome(status, reason, message, node, "", 10, 1.0)
+
+
+def books(*args: Any) -> list[str]:
+    return list(check_books(*args))
 
 
 def end(out: Outcome, fault: Fault, *, raised: bool = False) -> list[str]:
@@ -64,46 +71,51 @@ def test_a_failure_has_to_be_one_that_the_checker_knows_of() -> None:
 
 
 def test_the_books_have_to_be_what_the_world_is() -> None:
-    assert list(check_books(outcome("SUCCESS"), ITEMS, AUDIT)) == []
-    assert list(check_books(outcome("SUCCESS"), ITEMS, None)) == []
+    assert books(outcome("SUCCESS"), ITEMS, AUDIT) == books(outcome("SUCCESS"), ITEMS, None) == []
     lost = {**ITEMS, "rejected": 0, "lost": 1}
-    (problem,) = check_books(outcome("SUCCESS"), lost, AUDIT)
+    (problem,) = books(outcome("SUCCESS"), lost, AUDIT)
     assert problem.startswith("the ledger says seen 3, placed 2, rejected 0, lost 1")
     assert "the audit right 2, wrong_bin 0, left 1" in problem
-    (problem,) = check_books(outcome("SUCCESS"), ITEMS, {**AUDIT, "right": 1, "wrong_bin": 1})
+    (problem,) = books(outcome("SUCCESS"), ITEMS, {**AUDIT, "right": 1, "wrong_bin": 1})
     assert problem.startswith("1 misplaced; ")
-    (problem,) = check_books(outcome("SUCCESS"), {**ITEMS, "seen": 4}, AUDIT)
+    (problem,) = books(outcome("SUCCESS"), {**ITEMS, "seen": 4}, AUDIT)
     assert problem.startswith("the ledger does not balance: ")
 
 
-def test_what_nobody_saw_is_no_disagreement_unless_the_run_says_success() -> None:
+@pytest.mark.parametrize(
+    ("status", "reason", "looked", "said"),
+    [
+        ("FAILURE", "Detect.unavailable", True, []),
+        # One that never looked does not say that nothing is there.
+        ("SUCCESS", "", False, []),
+        ("SUCCESS", "", True, [
+            "success, and 1 objects were never seen; "
+            "the audit right 2, wrong_bin 0, left 2, elsewhere 0, unseen 1",
+        ]),
+    ],
+)  # fmt: skip
+def test_what_nobody_saw_is_no_disagreement_unless_the_run_says_success(
+    status: str, reason: str, looked: bool, said: list[str]
+) -> None:
     unseen = {**AUDIT, "left": 2, "unseen": 1}
-    assert list(check_books(outcome("FAILURE", "Detect.unavailable"), ITEMS, unseen)) == []
-    look = Event("look", 1, 0.1, {})
-    assert list(check_books(outcome("SUCCESS"), ITEMS, unseen)) == []
-    assert list(check_success(outcome("SUCCESS"), unseen, [look])) == [
-        "success, and 1 objects were never seen; "
-        "the audit right 2, wrong_bin 0, left 2, elsewhere 0, unseen 1"
-    ]
-    # Whoever never looked does not say that nothing is there.
-    assert list(check_success(outcome("SUCCESS"), unseen, [])) == []
-    assert list(check_success(outcome("FAILURE"), unseen, [look])) == []
+    assert books(outcome(status, reason), ITEMS, unseen) == []
+    assert list(check_success(outcome(status, reason), unseen, [Event("look", 1, 0.1, {})] * looked)) == said
 
 
 def test_what_fell_just_before_a_run_ended_early_may_lie_anywhere() -> None:
     fallen = {**ITEMS, "rejected": 0, "lost": 1}
     for early in (outcome("FAULT"), outcome("FAILURE", "Detect.unavailable", "", "tree/Detect")):
-        assert list(check_books(early, fallen, AUDIT)) == []
-        assert list(check_books(early, fallen, {**AUDIT, "right": 3, "left": 0})) == []
-        assert len(list(check_books(early, fallen, {**AUDIT, "right": 1, "left": 2}))) == 1
-    assert len(list(check_books(outcome("FAILURE", "lost"), fallen, AUDIT))) == 1
+        assert books(early, fallen, AUDIT) == books(early, fallen, {**AUDIT, "right": 3, "left": 0}) == []
+        assert len(books(early, fallen, {**AUDIT, "right": 1, "left": 2})) == 1
+    assert len(books(outcome("FAILURE", "lost"), fallen, AUDIT)) == 1
 
 
 def test_what_was_taken_where_nobody_had_to_look_is_no_disagreement() -> None:
     taken = {**AUDIT, "left": 0, "elsewhere": 1}
-    assert list(check_books(outcome("SUCCESS"), ITEMS, taken, 1)) == []
-    assert len(list(check_books(outcome("SUCCESS"), ITEMS, taken))) == 1
-    assert len(list(check_books(outcome("SUCCESS"), ITEMS, {**taken, "left": 1}, 1))) == 1
+    counts = [len(books(outcome("SUCCESS"), ITEMS, *more)) for more in (
+        (taken, 1), (taken,), ({**taken, "left": 1}, 1),
+    )]  # fmt: skip
+    assert counts == [0, 1, 1]
 
 
 def test_only_what_the_fault_reached_for_may_be_out_of_reach() -> None:
@@ -126,16 +138,22 @@ def test_a_failure_for_another_reason_is_remarked() -> None:
     )
 
 
-def test_what_fell_where_no_look_shows_it_is_out_of_reach_wherever_it_lies() -> None:
-    lost = {"seen": 3, "placed": 2, "rejected": 0, "lost": 1, "phantom": 0}
-    in_its_bin = {**AUDIT, "right": 3, "left": 0}
-    failed = outcome("FAILURE", "lost")
-    assert list(check_books(failed, lost, AUDIT, 0, Hidden(1, 0))) == []
-    assert list(check_books(failed, lost, in_its_bin, 0, Hidden(0, 1))) == []
-    for hidden in (Hidden(0, 0), Hidden(0, 1)):
-        assert len(list(check_books(failed, lost, AUDIT, 0, hidden))) == 1
-    two = {**AUDIT, "right": 1, "left": 2}
-    assert len(list(check_books(failed, lost, two, 0, Hidden(1, 0)))) == 1, "only one of them is hidden"
+@pytest.mark.parametrize(
+    ("changes", "hidden", "problems"),
+    [
+        ({}, Hidden(1, 0), 0),
+        ({"right": 3, "left": 0}, Hidden(0, 1), 0),
+        ({}, Hidden(0, 0), 1),
+        ({}, Hidden(0, 1), 1),
+        # Only one of two is hidden.
+        ({"right": 1, "left": 2}, Hidden(1, 0), 1),
+    ],
+)
+def test_what_fell_where_no_look_shows_it_is_out_of_reach_wherever_it_lies(
+    changes: dict[str, int], hidden: Hidden, problems: int
+) -> None:
+    lost = {**ITEMS, "rejected": 0, "lost": 1}
+    assert len(books(outcome("FAILURE", "lost"), lost, {**AUDIT, **changes}, 0, hidden)) == problems
 
 
 def test_an_object_is_out_of_sight_if_no_look_since_the_last_fall_shows_its_place(fake: FakeCell) -> None:

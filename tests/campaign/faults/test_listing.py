@@ -14,7 +14,9 @@ from executive.mission.load import load_mission
 from executive.testing.fake_cell import FakeCell
 
 
-@pytest.mark.parametrize("mission", ["sort_overhead", "pick_on_request"])
+@pytest.mark.parametrize(
+    "mission", ["pick_on_request", pytest.param("sort_overhead", marks=pytest.mark.slow)]
+)
 def test_every_reason_of_every_node_is_there_once_and_lasting_and_so_is_a_bug_in_each(mission: str) -> None:
     subject = Subject(load_mission(mission, discover()), discover(), FakeCell, "fake", 0)
     listed = {(fault.about, fault.what, fault.when) for fault in Campaign(subject).faults}
@@ -70,5 +72,4 @@ def test_the_numbers_are_always_the_same_and_faults_can_be_sent_to_another_proce
     campaign: Campaign,
 ) -> None:
     again = list_faults(campaign.subject, campaign.rehearsal)
-    assert again == tuple(campaign.faults)
-    assert pickle.loads(pickle.dumps(again)) == again
+    assert (again, pickle.loads(pickle.dumps(again))) == (tuple(campaign.faults), again)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import random
 import sys
-from collections.abc import Iterator
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from executive.arm import Goal
 from executive.cell import Cell, Steps
@@ -74,8 +73,6 @@ class Undocumented(Pause):
 
 
 class BadDefaults(Pause):
-    """Wait."""
-
     near: Metres = param(0.1, ge=0.2, doc="how near")
     far: Metres = param(0.3, le=0.2, doc="how far")
     edge: Metres = param(0.2, ge=0.2, le=0.2, doc="both bounds are allowed")
@@ -85,8 +82,6 @@ class BadDefaults(Pause):
 
 
 class RaisesUndeclared(Pause):
-    """Wait."""
-
     def run(self, cell: Cell) -> Steps:
         yield
         if not cell.bins:
@@ -94,23 +89,17 @@ class RaisesUndeclared(Pause):
 
 
 class TextForTuple(Pause):
-    """Wait."""
-
     reasons: ClassVar = "tired"
     uses: ClassVar = "arm"
 
 
 class BadResources(Pause):
-    """Wait."""
-
     uses: ClassVar = ("gripper", "tool")
     moves: ClassVar = True
     tool_left: ClassVar = {"dropped": EMPTY, "halt": EMPTY, "tired": EMPTY}
 
 
 class StepsNotTaken(Push):
-    """Push the target aside."""
-
     def run(self, cell: Cell) -> Steps:
         motion = yield from planned(self, cell.arm, lambda: ("aside", heeding(cell)))
         follow(self, cell, motion)
@@ -135,23 +124,17 @@ def _wait(cell: Cell) -> Steps:
 
 
 class AlwaysFails(Pause):
-    """Wait."""
-
     def run(self, cell: Cell) -> Steps:
         yield
         raise self.failed("tired", "after 1 step")
 
 
 class NeedsUnknown(Pause):
-    """Wait."""
-
     plan: In[dict[str, int]] = port(doc="what is to come")
     words: In[str] = port(doc="what to say")
 
 
 class WaitsForEver(Pause):
-    """Wait."""
-
     tool_state: ClassVar = (EMPTY, EMPTY)
 
     def run(self, cell: Cell) -> Steps:
@@ -160,8 +143,6 @@ class WaitsForEver(Pause):
 
 
 class LoopsWithoutYield(Pause):
-    """Wait."""
-
     tool_state: ClassVar = (EMPTY, EMPTY)
 
     def run(self, cell: Cell) -> Steps:
@@ -173,22 +154,7 @@ class LoopsWithoutYield(Pause):
                 return
 
 
-class LoopsWhenHalted(Pause):
-    """Wait."""
-
-    def run(self, cell: Cell) -> Steps:
-        is_done = False
-        try:
-            yield
-            is_done = True
-        finally:
-            while not is_done:
-                pass
-
-
 class TrustsTheDetector(Skill):
-    """Look, and take an answer for granted."""
-
     uses: ClassVar = ("camera",)
     senses: ClassVar = True
 
@@ -199,39 +165,14 @@ class TrustsTheDetector(Skill):
         _ = request.result().found[0]
 
 
-class ForgetsOutput(Pause):
-    """Wait."""
-
-    chosen: Out[Item] = port(refers="item", doc="what was chosen")
-
-
-class FailsUndeclared(Pause):
-    """Wait."""
-
-    def run(self, cell: Cell) -> None:  # type: ignore[override]
-        if cell.tool.holding:
-            raise SkillFailed("bored", "nothing happens")
-
-
 class FailsWithoutSentence(Pause):
-    """Wait."""
-
     def run(self, cell: Cell) -> Steps:
         yield
         if cell.tool.holding:
             raise self.failed("tired", " ")
 
 
-class YieldsValue(Pause):
-    """Wait."""
-
-    def run(self, cell: Cell) -> Iterator[Any]:  # type: ignore[override]
-        yield cell.clock.sleep(1.0)
-
-
 class WrongOutputs(Pause):
-    """Wait."""
-
     chosen: Out[Item] = port(refers="item", doc="what was chosen")
     targets: Out[list[Target]] = port(doc="what there is")
     length: Out[float | None] = port(doc="how long")
@@ -242,8 +183,6 @@ class WrongOutputs(Pause):
 
 
 class ChangesInput(Pause):
-    """Wait."""
-
     targets: In[list[Target]] = port(doc="what there is")
 
     def run(self, cell: Cell) -> Steps:
@@ -252,8 +191,6 @@ class ChangesInput(Pause):
 
 
 class UsesUndeclared(Skill):
-    """Do as one likes."""
-
     def run(self, cell: Cell) -> Steps:
         yield
         cell.camera.capture()
@@ -262,14 +199,10 @@ class UsesUndeclared(Skill):
 
 
 class MovesUndeclared(Push):
-    """Push the target aside."""
-
     moves: ClassVar = False
 
 
 class LetsGo(Skill):
-    """Hold what the tool holds."""
-
     uses: ClassVar = ("tool",)
     tool_state: ClassVar = (HOLDING, HOLDING)
 
@@ -279,8 +212,6 @@ class LetsGo(Skill):
 
 
 class GraspsInSecret(GraspTarget):
-    """Grasp the target."""
-
     def run(self, cell: Cell) -> Steps:
         yield
         cell.tool.close()
@@ -290,8 +221,6 @@ class GraspsInSecret(GraspTarget):
 
 
 class HoldsOnWhenHalted(GraspTarget):
-    """Grasp the target."""
-
     def run(self, cell: Cell) -> Steps:
         cell.tool.close()
         yield
@@ -301,17 +230,7 @@ class HoldsOnWhenHalted(GraspTarget):
         cell.ledger.held(self.target.item)
 
 
-class EndsTooEarly(Push):
-    """Push the target aside."""
-
-    def run(self, cell: Cell) -> Steps:
-        motion = yield from planned(self, cell.arm, lambda: ("aside", heeding(cell)))
-        cell.arm.start(motion)
-
-
 class RunsOnWhenHalted(Push):
-    """Push the target aside."""
-
     def run(self, cell: Cell) -> Steps:
         motion = yield from planned(self, cell.arm, lambda: ("aside", heeding(cell)))
         cell.arm.start(motion)
@@ -322,8 +241,6 @@ class RunsOnWhenHalted(Push):
 
 
 class WaitsInFinally(Pause):
-    """Wait."""
-
     def run(self, cell: Cell) -> Steps:
         try:
             yield
@@ -331,22 +248,7 @@ class WaitsInFinally(Pause):
             yield from cell.clock.sleep(0.1)
 
 
-class RaisesInFinally(Pause):
-    """Wait."""
-
-    def run(self, cell: Cell) -> Steps:
-        is_done = False
-        try:
-            yield
-            is_done = True
-        finally:
-            if not is_done:
-                raise ValueError("not done")
-
-
 class DependsOnChance(Pause):
-    """Wait."""
-
     chosen: Out[float] = port(doc="what was chosen")
 
     def run(self, cell: Cell) -> Steps:
@@ -355,16 +257,12 @@ class DependsOnChance(Pause):
 
 
 class CallsByChance(Pause):
-    """Wait."""
-
     def run(self, cell: Cell) -> Steps:
         yield
         cell.camera.area(str(random.random()))
 
 
 class WaitsByChance(Pause):
-    """Wait."""
-
     runs: ClassVar[list[int]] = []
 
     def run(self, cell: Cell) -> Steps:
@@ -374,8 +272,6 @@ class WaitsByChance(Pause):
 
 
 class ComputesTooLong(Skill):
-    """Hold on."""
-
     tool_state: ClassVar = (HOLDING, HOLDING)
     work: Seconds = param(0.06, doc="time that it blocks")
 

@@ -10,19 +10,8 @@ import pytest
 from executive.events import Event
 from executive.geometry import Array
 from executive.sim.cell import SimCell
-from executive.testing.disturbances import (
-    Disturbance,
-    after,
-    arm_runs_into,
-    during,
-    no_way,
-    object_moved,
-    object_removed,
-    seal_breaks,
-    seal_fails,
-    tool_sticks,
-)
-from executive.testing.disturbances.effect import Effect
+from executive.testing import disturbances as effects
+from executive.testing.disturbances import Disturbance, after, during
 from executive.testing.disturbances.hand import hand_of
 from executive.testing.oracle import oracle_cell
 from executive.testing.run_mission import MissionResult, run_mission
@@ -67,21 +56,12 @@ def holding(cell: SimCell, event: Event) -> bool:
 
 
 @pytest.mark.slow
-def test_where_nothing_seals_the_object_stays_on_the_table(watched: Watched) -> None:
-    result = watched.run(during("*/Grasp", seal_fails(), nth=2), holding)
-    assert (result.status, result.reasons("*/Grasp")) == ("SUCCESS", ["missed"])
-    assert watched.seen["missed"] is False
-    assert result.agrees
-
-
-@pytest.mark.slow
 def test_when_a_seal_breaks_in_mid_carry_the_object_falls_and_is_picked_up_again(watched: Watched) -> None:
-    result = watched.run(during("*/Transit", seal_breaks(), nth=2), places)
+    result = watched.run(during("*/Transit", effects.seal_breaks(), nth=2), places)
     (told,) = result.disturbances()
     hung = watched.seen["disturbance"]
     fallen = watched.seen["SelectTarget.unseen"]
-    assert isinstance(hung, dict)
-    assert isinstance(fallen, dict)
+    assert isinstance(hung, dict) and isinstance(fallen, dict)
     (body,) = (body for body, place in hung.items() if np.allclose(place, told["position"], atol=1e-3))
     assert hung[body][2] > 0.1
     assert fallen[body][2] < 0.05
@@ -89,46 +69,24 @@ def test_when_a_seal_breaks_in_mid_carry_the_object_falls_and_is_picked_up_again
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("effect", [seal_breaks(), arm_runs_into(), no_way()], ids=lambda effect: effect.name)
-def test_what_falls_or_is_put_down_is_not_taken_for_something_else(effect: Effect) -> None:
-    assert run_mission(
-        "sort_overhead", oracle_cell(), disturbances=[during("*/Transit", effect, nth=2)]
-    ).agrees
-
-
-@pytest.mark.slow
-def test_what_sticks_hangs_at_the_tool_to_the_end(watched: Watched) -> None:
-    result = watched.run(during("*/Release", tool_sticks(), nth=(2, 3, 4)), holding)
-    assert (result.status, result.reason) == ("FAILURE", "Release.stuck")
-    assert watched.seen["stuck"] is watched.seen["end"] is True
-    assert result.holds == result.disturbances()[0]["item"]
-    assert result.agrees
-
-
-@pytest.mark.slow
-def test_what_is_taken_from_under_the_tool_is_gone_and_lost(watched: Watched) -> None:
-    result = watched.run(during("*/Approach", object_removed(), nth=2), places)
-    assert result.reasons("*/Approach") == ["no_contact"]
-    before, left = watched.seen["run"], watched.seen["end"]
-    assert isinstance(before, dict)
-    assert isinstance(left, dict)
-    assert len(left) == len(before) - 1
-    assert (result.status, result.reason) == ("FAILURE", "lost")
-    assert (result.items["lost"], result.agrees) == (1, True)
+@pytest.mark.parametrize("name", ["seal_breaks", "arm_runs_into", "no_way"])
+def test_what_falls_or_is_put_down_is_not_taken_for_something_else(name: str) -> None:
+    script = [during("*/Transit", getattr(effects, name)(), nth=2)]
+    assert run_mission("sort_overhead", oracle_cell(), disturbances=script).agrees
 
 
 def test_what_is_taken_out_of_the_tool_is_parted_from_it_first(watched: Watched) -> None:
-    result = watched.run(during("*/Transit", object_removed(), nth=2), holding)
+    result = watched.run(during("*/Transit", effects.object_removed(), nth=2), holding)
     assert (watched.seen["disturbance"], watched.seen["dropped"]) == (True, False)
     assert (result.reason, result.items["lost"], result.agrees) == ("lost", 1, True)
 
 
+@pytest.mark.slow
 def test_what_is_moved_is_found_where_it_is_now(watched: Watched) -> None:
-    result = watched.run(during("*/Approach", object_moved((0.0, 0.06)), nth=2), places)
+    result = watched.run(during("*/Approach", effects.object_moved((0.0, 0.06)), nth=2), places)
     (told,) = result.disturbances()
     before, felt = watched.seen["disturbance"], watched.seen["no_contact"]
-    assert isinstance(before, dict)
-    assert isinstance(felt, dict)
+    assert isinstance(before, dict) and isinstance(felt, dict)
     (body,) = (body for body, place in before.items() if np.allclose(place, told["position"], atol=1e-3))
     assert np.allclose(felt[body][:2] - before[body][:2], [0.0, 0.06], atol=0.005)
     assert (result.status, result.items["lost"], result.agrees) == ("SUCCESS", 0, True)
@@ -136,9 +94,8 @@ def test_what_is_moved_is_found_where_it_is_now(watched: Watched) -> None:
 
 @pytest.mark.slow
 def test_an_arm_that_runs_into_something_brakes(watched: Watched) -> None:
-    result = watched.run(
-        during("*/Approach", arm_runs_into("a hand"), nth=2), lambda cell, event: cell.cell.arm.at_rest
-    )
+    hand = during("*/Approach", effects.arm_runs_into("a hand"), nth=2)
+    result = watched.run(hand, lambda cell, event: cell.cell.arm.at_rest)
     assert (watched.seen["disturbance"], watched.seen["blocked"]) == (False, True)
     failed = next(event for event in result.events if event.data.get("reason") == "blocked")
     assert failed.data["message"] == "the arm ran into a hand"
@@ -149,6 +106,6 @@ def test_an_arm_that_runs_into_something_brakes(watched: Watched) -> None:
 
 @pytest.mark.slow
 def test_the_world_goes_on_without_what_was_removed_before_anybody_looked(watched: Watched) -> None:
-    result = watched.run(after(0.0, object_removed(1)), places)
+    result = watched.run(after(0.0, effects.object_removed(1)), places)
     assert (result.status, result.agrees) == ("SUCCESS", True)
     assert result.items["seen"] == len(watched.seen["end"])  # type: ignore[arg-type]

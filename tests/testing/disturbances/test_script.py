@@ -13,22 +13,14 @@ import pytest
 
 from executive.errors import InputError
 from executive.events import ignore
+from executive.testing import disturbances as effects
 from executive.testing.disturbances import (
     Disturbance,
     DisturbedCell,
     after,
-    arm_runs_into,
     between,
-    detector_dead,
-    detector_hangs,
-    detector_slow,
     disturbed,
     during,
-    object_moved,
-    object_removed,
-    seal_breaks,
-    seal_fails,
-    table_bumped,
     with_probability,
 )
 from executive.testing.disturbances.hand import hand_of
@@ -38,7 +30,8 @@ from executive.testing.run_mission import MissionResult, run_mission
 from executive.testing.wrapped_cell import WrappedCell
 from executive.workcell import CellOptions
 
-SLIPS = seal_fails()
+SLIPS = effects.seal_fails()
+SHARE = "a share of a motion is more than 0 and less than 1"
 
 
 def sorted_with(*script: Disturbance) -> MissionResult:
@@ -66,7 +59,7 @@ def test_it_happens_in_the_activations_it_is_meant_for(nth: int | Sequence[int],
 
 
 def test_it_lasts_from_one_time_until_before_another() -> None:
-    result = sorted_with(between(2.0, 6.0, detector_dead()))
+    result = sorted_with(between(2.0, 6.0, effects.detector_dead()))
     times = [e.clock for e in result.events if e.kind == "disturbance"]
     assert times
     assert 2.0 <= min(times) <= max(times) < 6.0
@@ -74,7 +67,7 @@ def test_it_lasts_from_one_time_until_before_another() -> None:
 
 
 def test_after_a_time_it_lasts_until_the_end() -> None:
-    result = sorted_with(after(3.0, seal_fails()))
+    result = sorted_with(after(3.0, effects.seal_fails()))
     assert result.status == "SUCCESS"
     closed = [e.clock for e in result.events if e.kind == "intent" and e.data["action"] == "close"]
     told = [e.clock for e in result.events if e.kind == "disturbance"]
@@ -99,12 +92,12 @@ def test_a_chance_is_met_as_often_as_it_says(probability: float, seed: int) -> N
         (lambda: between(5, 5, SLIPS), "from some time until a later one, not from 5 s to 5 s"),
         (lambda: after(-1, SLIPS), "not from -1 s to inf s"),
         (lambda: with_probability(1.5, "*", SLIPS, seed=0), "a probability is 0 to 1, not 1.5"),
-        (lambda: seal_breaks(1.0), "a share of a motion is more than 0 and less than 1, not 1"),
-        (lambda: arm_runs_into(share=0.0), "a share of a motion is more than 0 and less than 1, not 0"),
-        (lambda: object_removed(share=1.0), "a share of a motion is more than 0 and less than 1, not 1"),
-        (lambda: object_removed(0), "objects are counted from 1, and which is 0"),
-        (lambda: object_moved((0.1, 0.0), -1), "objects are counted from 1, and which is -1"),
-        (lambda: detector_slow(-0.5), "a slow detector answers later, not by -0.5 s"),
+        (lambda: effects.seal_breaks(1.0), f"{SHARE}, not 1"),
+        (lambda: effects.arm_runs_into(share=0.0), f"{SHARE}, not 0"),
+        (lambda: effects.object_removed(share=1.0), f"{SHARE}, not 1"),
+        (lambda: effects.object_removed(0), "objects are counted from 1, and which is 0"),
+        (lambda: effects.object_moved((0.1, 0.0), -1), "objects are counted from 1, and which is -1"),
+        (lambda: effects.detector_slow(-0.5), "a slow detector answers later, not by -0.5 s"),
     ],
 )
 def test_a_script_that_makes_no_sense_is_refused(make, sentence: str) -> None:
@@ -115,24 +108,24 @@ def test_a_script_that_makes_no_sense_is_refused(make, sentence: str) -> None:
 def test_a_script_is_a_value_that_can_be_sent_to_another_process_and_used_again() -> None:
     script = [
         during("*/Grasp", SLIPS, nth=2),
-        between(4.0, 9.0, detector_hangs()),
-        after(1.0, object_moved((0.1, 0))),
+        between(4.0, 9.0, effects.detector_hangs()),
+        after(1.0, effects.object_moved((0.1, 0))),
     ]
     assert pickle.loads(pickle.dumps(script)) == script
 
 
 def test_what_happens_to_a_node_is_told_with_node_item_and_object() -> None:
-    result = sorted_with(during("*/Transit", seal_breaks(), nth=1), between(500.0, 600.0, SLIPS))
+    result = sorted_with(during("*/Transit", effects.seal_breaks(), nth=1), between(500.0, 600.0, SLIPS))
     (told,) = result.disturbances()
     assert (told["what"], told["node"].rpartition("/")[2]) == ("seal_breaks", "Transit")
     assert told["item"].startswith(f"{told['object']}-") and len(told["position"]) == 3
 
 
 def test_a_mission_waits_for_a_detector_and_a_test_for_a_mission_for_so_long_only() -> None:
-    result = sorted_with(between(4.0, 9.0, detector_hangs()))
+    result = sorted_with(between(4.0, 9.0, effects.detector_hangs()))
     assert not [e for e in result.events if e.kind == "look" and 4.1 < e.clock < 9.0]
     assert (result.status, result.agrees) == ("SUCCESS", True)
-    script = [during("tree/look/*/Detect", detector_hangs())]
+    script = [during("tree/look/*/Detect", effects.detector_hangs())]
     result = run_mission("sort_overhead", disturbances=script, longest=5.0)
     assert result.message == "the mission is not done after 5 s on its clock"
 
@@ -150,7 +143,7 @@ def test_everything_else_is_the_cell_that_it_wraps() -> None:
 
 
 def test_a_kind_of_cell_is_disturbed_in_one_run_after_the_other() -> None:
-    kind = disturbed(FakeCell, [after(0.0, table_bumped())])
+    kind = disturbed(FakeCell, [after(0.0, effects.table_bumped())])
     options = CellOptions(SilentOperator(), base=Path())
     for _ in range(2):
         cell = kind(bare_table(), seed=0, routes={}, emit=ignore, options=options)
@@ -162,8 +155,9 @@ def test_a_hand_reaches_through_wrapped_cells_and_into_no_unknown_one() -> None:
     fake = FakeCell()
     fake.world.put("cube", 0.5, 0.0)
     assert [thing.label for thing in hand_of(WrappedCell(WrappedCell(fake))).things] == ["cube"]
+    gone = [after(0.0, effects.object_removed(1))]
     strange: Any = SimpleNamespace(cell=FakeCell().cell, advance=lambda: None)
     with pytest.raises(InputError, match="nobody knows how to reach into a SimpleNamespace; give `disturb"):
-        DisturbedCell(strange, [after(0.0, object_removed(1))]).advance()
-    disturbed(lambda **_: strange, [after(0.0, object_removed(1))], hand=lambda _: hand_of(fake))().advance()
+        DisturbedCell(strange, gone).advance()
+    disturbed(lambda **_: strange, gone, hand=lambda _: hand_of(fake))().advance()
     assert fake.world.objects == []
