@@ -25,8 +25,13 @@ from coverage import CoverageData
 
 ROOT = Path(__file__).parents[2]
 
-EXCLUDED_FOLDERS = ("executive/vision/training", "executive/view/live", "executive/cli/init")
-"""Code that only slow tests execute: training needs an extra, the live page a browser, `init` a process."""
+EXCLUDED_FOLDERS = (
+    "executive/cli/init",
+    "executive/view/film",
+    "executive/view/live",
+    "executive/vision/training",
+)
+"""Code that slow tests cover: projects in processes of their own, whole films, browsers, training."""
 
 MAX_SELECTED_TESTS = 400
 """Number of tests up to which they are named one by one; beyond it, their files are named."""
