@@ -23,20 +23,16 @@ def test_epochs_are_put_together_from_the_rows_a_trainer_spreads_them_over(tmp_p
     ]
 
 
-def test_a_card_states_settings_figures_commands_and_limits():
+def test_a_card_states_settings_and_figures():
     text = ModelCard(
         title="Small model",
         summary="Finds cubes.",
         settings={"seed": "1"},
         epochs=[{"train/loss": 6.5, "val/mAP_50": 0.5}],
         measured={"overhead": EVALUATION},
-        commands=["executive train --seed 1"],
-        limits=["Only cubes."],
     ).text()
     assert text.startswith("# Small model\n\nFinds cubes.\n")
     assert "| seed | 1 |" in text
     assert "| overhead | 300 | 900 | 0.9910 | 0.9900 | 0.9950 | 0.8000 | 0.60 / 1.50 / 2.90 |  |" in text
     assert "at confidence 0.5" in text
     assert "| 1 | 6.5000 | 0.5000 |  |  |  |" in text
-    assert "executive train --seed 1" in text
-    assert "* Only cubes." in text

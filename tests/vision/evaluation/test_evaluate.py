@@ -144,7 +144,7 @@ def test_the_cells_localizer_is_held_against_the_true_middle(saying, sample, bot
 def test_the_worst_misses_are_gathered(saying, sample, both):
     worst = WorstMisses()
     evaluate(saying(both[:1]), [sample], worst=worst)
-    assert [miss.text for miss in worst.worst()] == ["duck overlooked", "cube off by 0.0 px"]
+    assert [miss.text for miss in worst.kept] == ["duck overlooked", "cube off by 0.0 px"]
 
 
 def test_no_images_give_zeros_and_no_spreads(saying):

@@ -49,7 +49,7 @@ def test_the_worst_come_first_and_the_others_are_forgotten(sample, knowing):
     worst = WorstMisses(3)
     for share in (0.55, 0.95, 0.75, 0.65):
         worst.add([], knowing(visible_fraction=[share, 0.5]))
-    assert [miss.severity for miss in worst.worst()] == [0.95, 0.75, 0.65]
+    assert [miss.severity for miss in worst.kept] == [0.95, 0.75, 0.65]
 
 
 def test_the_sheet_shows_the_true_and_the_found_box(sample):

@@ -33,7 +33,11 @@ def configured(**options):
         ({"deadline": 0}, "deadline", "greater than 0"),
         ({"deadline": 61}, "deadline", "less than or equal to 60"),
         ({"class_map": {"a": 1}}, "class_map", "valid string"),
-        ({"labels": ["a"], "class_map": {"b": "cube"}}, "class_map", "names b, .* among its labels: a"),
+        (
+            {"labels": ["a"], "class_map": {"b": "cube"}},
+            "class_map",
+            "names b, .* it knows a$",
+        ),
         ({"full": "half"}, "full", "'whole' or 'tiles'"),
         ({"colour": 1}, "colour", "not permitted; its options: model_id"),
         (
