@@ -1,4 +1,4 @@
-"""Figures about a detector, on images whose truth is known."""
+"""Figures about a detector, on images whose truth is known, and those that a cell file states."""
 
 from __future__ import annotations
 
@@ -6,11 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import yaml
 
+from executive.cell_config import DetectorConfig
 from executive.errors import NoDepth
 from executive.vision.evaluation.evaluate import evaluate
 from executive.vision.evaluation.figures import ClassFigures, Spread
 from executive.vision.evaluation.misses import WorstMisses
+from executive.vision.evaluation.reliability import MeasuredReliability, round_up
 
 
 @pytest.fixture
@@ -137,3 +140,44 @@ def test_the_worst_misses_are_gathered(saying, sample, both):
 
 def test_a_spread_names_its_quantiles():
     assert Spread.of(list(range(101))) == Spread(median=50, p95=95, p99=99, worst=100)
+
+
+def rates(whole, overlooked, confused, invented, looks, jitter):
+    return MeasuredReliability.of(
+        whole=whole, overlooked=overlooked, confused=confused, invented=invented, looks=looks, jitter=jitter
+    )
+
+
+def test_a_cell_file_is_advised_to_state_upper_bounds_with_what_was_counted():
+    assert rates(1344, 0, 2, 1, 300, 0.432).yaml().splitlines() == [
+        "misses: 0.0023    # 0 of 1344 objects in full view; upper 95 % bound",
+        "confused: 0.0047  # 2 of 1344 found; upper 95 % bound",
+        "invented: 0.016   # 1 in 300 looks; upper 95 % bound",
+        "jitter: 0.44      # pixels of the frame, as measured",
+    ]
+
+
+@pytest.mark.parametrize("whole", [0, 5])
+def test_a_cell_file_takes_what_it_is_advised_to_state_also_at_the_extremes(whole):
+    stated = yaml.safe_load(rates(whole, whole, 0, 0, 1, 0.0).yaml())
+    config = DetectorConfig(kind="embedded", **stated)
+    assert (config.misses, config.confused, config.invented, config.jitter) == (0.99, 0.99, 3.0, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("whole", "overlooked", "invented", "expected"),
+    [
+        (1344, 0, 0, (1 - 0.05 ** (1 / 1344), 0.029957)),
+        (13, 2, 10, (0.410099, 0.169622)),
+        (5, 5, 400, (1.0, 4.344968)),
+    ],
+)
+def test_the_bounds_are_those_of_the_tables(whole, overlooked, invented, expected):
+    """Clopper and Pearson's, and Garwood's: half the 95 % quantile of chi-squared with 2 k + 2 degrees."""
+    found = rates(whole, overlooked, 0, invented, 100, 0.1)
+    assert (found.misses.bound, found.invented.bound) == pytest.approx(expected, rel=1e-4)
+
+
+def test_a_bound_is_rounded_up():
+    values = [0.00222, 0.0022, 0.0, 1.31, 123.4, 0.00997]
+    assert [round_up(value) for value in values] == pytest.approx([0.0023, 0.0022, 0.0, 1.4, 130.0, 0.01])
