@@ -58,6 +58,7 @@ class ModelCard:
         return "\n\n".join(blocks) + "\n"
 
     def _measured(self) -> list[str]:
+        thresholds = sorted({evaluation.threshold for evaluation in self.measured.values()})
         head = ("on", *FIGURES, "centre [px]", "position [mm]")
         rows = [
             (
@@ -68,9 +69,7 @@ class ModelCard:
             )
             for where, one in self.measured.items()
         ]
-        confidences = ", ".join(
-            f"{one:g}" for one in sorted({one.threshold for one in self.measured.values()})
-        )
+        confidences = ", ".join(f"{threshold:g}" for threshold in thresholds)
         return [
             f"Precision and recall at confidence {confidences} and an overlap of 0.5. Centre and position: "
             "how far the centre of a found box lies from the true one's, in the image and in the world at "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import subprocess
@@ -37,14 +38,11 @@ trees:
     - Localize
 """
 SERVER = "{Detect: {detector: server, view: full, doubtful: pass}}"
-DETECT = {
-    "alone": SERVER[1:-1],
-    "fallback": f"""try: {SERVER}
-      catch: [{{on: Detect.unavailable, do: {SERVER.replace("server", "embedded")}}}]""",
-}
+FALLBACK = f"""try: {SERVER}
+      catch: [{{on: Detect.unavailable, do: {SERVER.replace("server", "embedded")}}}]"""
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def stub():
     """A server with the shipped weights."""
     model = OnnxModel(MODEL, read_labels(LABELS), threads=1)
@@ -53,20 +51,14 @@ def stub():
     server.stop()
 
 
-def restart(stub):
-    if stub.over.is_set():
-        stub.start()
-
-
 @pytest.fixture
 def arrange(stub, tmp_path, monkeypatch):
     """A function that writes a mission and returns it with the overrides of its cell."""
     monkeypatch.setenv("ROBOFLOW_API_KEY", SECRET)
 
-    def arrange(detect, faults, objects=2, deadline=10.0):
-        stub.faults = faults
+    def arrange(detect, objects, deadline):
         path = tmp_path / "two_detectors.yaml"
-        path.write_text(MISSION.replace("DETECT", DETECT[detect]))
+        path.write_text(MISSION.replace("DETECT", detect))
         return path, {
             "cell.detectors.server.url": stub.url,
             "cell.detectors.server.deadline": f"{deadline}",
@@ -76,42 +68,31 @@ def arrange(stub, tmp_path, monkeypatch):
     return arrange
 
 
-@pytest.fixture
-def sort(arrange, stub):
-    """A function that sorts while the server has faults and returns how it ended, and what lies right."""
-
-    def sort(*arguments, told, **options):
-        events = []
-        path, overrides = arrange(*arguments, **options)
-        mission = load_mission(path, discover(), overrides)
-        run = Run(mission, discover(), seed=1, observers=[events.append, told])
-        try:
-            outcome, truth = run.execute(), run.audit()
-        finally:
-            run.close()
-            restart(stub)
-        assert SECRET not in repr(events)
-        assert (truth["wrong_bin"], truth["elsewhere"]) == (0, 0)
-        return outcome.status, outcome.reason, truth["right"]
-
-    return sort
-
-
 @pytest.mark.slow
-def test_every_fault_in_turn_stops_nothing_where_another_detector_is_there(sort, stub):
+def test_every_fault_in_turn_stops_nothing_where_another_detector_is_there(arrange, stub):
     faults = ("401", "500", "broken json", "nan", "hang", "stop", "", "huge")
+    stub.faults = lambda look: faults[look % len(faults)]
+    events = []
 
     def told(event):
-        restart(stub)
+        events.append(event)
+        if stub.over.is_set():
+            stub.start()
 
-    ended = sort("fallback", lambda look: faults[look % len(faults)], objects=4, deadline=1.0, told=told)
-    assert ended == ("SUCCESS", "", 4)
+    path, overrides = arrange(FALLBACK, objects=4, deadline=1.0)
+    with contextlib.closing(
+        Run(load_mission(path, discover(), overrides), discover(), seed=1, observers=[told])
+    ) as run:
+        outcome, truth = run.execute(), run.audit()
+    assert (outcome.status, truth["right"], truth["wrong_bin"], truth["elsewhere"]) == ("SUCCESS", 4, 0, 0)
     assert stub.looks >= 4
+    assert SECRET not in repr(events)
 
 
 @pytest.mark.slow
-def test_the_key_is_in_no_file_and_no_output(arrange, tmp_path):
-    path, overrides = arrange("alone", lambda look: "401")
+def test_the_key_is_in_no_file_and_no_output(arrange, stub, tmp_path):
+    stub.faults = lambda look: "401"
+    path, overrides = arrange(SERVER[1:-1], objects=2, deadline=10.0)
     command = [sys.executable, "-m", "executive.cli.main", "run", str(path), "--json", "--runs", "runs"]
     for key, value in overrides.items():
         command += ["--set", f"{key}={value}"]
