@@ -192,6 +192,5 @@ def _localizer(config: CellConfig) -> Localizer | None:
 
 def _labels_beside(weights: Path) -> Path:
     """Return the label file that belongs to a model; the first that exists, or else the usual one."""
-    usual = weights.with_name("labels.txt")
     own = weights.with_name(f"{weights.stem}.labels.txt")
-    return own if own.is_file() else usual
+    return own if own.is_file() else weights.with_name("labels.txt")

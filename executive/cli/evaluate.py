@@ -104,9 +104,8 @@ def command(
         if sheet is not None:
             from executive.vision.evaluation.sheet import write_sheet
 
-            misses = worst.worst()
-            write_sheet(sheet, misses, ", ".join(measured))
-            click.echo(f"the {len(misses)} worst in {sheet}", err=True)
+            write_sheet(sheet, worst.kept, ", ".join(measured))
+            click.echo(f"the {len(worst.kept)} worst in {sheet}", err=True)
     if as_json:
         given = {"seed": seed, "as_run": as_run, "weights": weights and str(weights)}
         print_json({**given, "measured": measured})

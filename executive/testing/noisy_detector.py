@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -105,19 +105,19 @@ class NoisyDetector:
         return float(random.uniform(self._config.floor, most))
 
 
+@dataclass(frozen=True, eq=False)
 class NoisyRequest:
     """A request to the other detector whose answer will be spoilt; implements `executive.cell.Request`."""
 
-    def __init__(self, detector: NoisyDetector, request: Request, frame: Frame, view: str) -> None:
-        self._detector = detector
-        self._request = request
-        self._frame = frame
-        self._view = view
+    detector: NoisyDetector
+    request: Request
+    frame: Frame
+    view: str
 
     @property
     def ready(self) -> bool:
         """True once the other detector's answer is due."""
-        return self._request.ready
+        return self.request.ready
 
     def result(self) -> Answer:
         """Return the spoilt answer.
@@ -125,4 +125,4 @@ class NoisyRequest:
         Raises:
             Unavailable: The other detector gave no usable answer.
         """
-        return self._detector.spoil(self._request.result(), self._frame, self._view)
+        return self.detector.spoil(self.request.result(), self.frame, self.view)

@@ -6,7 +6,7 @@ took for a duck. The truth goes with the frame, as an image does, so nothing kno
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
@@ -97,12 +97,13 @@ class TruthCamera(SimCamera):
         return self._meshes[label]
 
 
+@dataclass(frozen=True, eq=False)
 class Oracle:
     """A detector that answers with the truth of a `TrueFrame`; implements `executive.cell.Detector`.
 
     It reports what has the centre of its box in the searched part of the image and not behind the arm.
 
-    Args:
+    Attributes:
         name: Its name in the cell file.
         config: Its threshold and latency count; its kind does not.
         camera: The camera whose frames it searches.
@@ -111,49 +112,34 @@ class Oracle:
         seed: Decides the jitter, together with the number of the frame.
     """
 
-    def __init__(
-        self,
-        name: str,
-        config: DetectorConfig,
-        camera: CameraConfig,
-        clock: Clock,
-        *,
-        jitter: float,
-        seed: int,
-    ) -> None:
-        self._name = name
-        self._config = config
-        self._camera = camera
-        self._clock = clock
-        self._jitter = jitter
-        self._seed = seed
+    name: str
+    config: DetectorConfig
+    camera: CameraConfig
+    clock: Clock
+    jitter: float
+    seed: int
 
     def request(self, frame: Frame, view: str) -> Pending:
         """Return the truth about `frame`, visible as late as a real detector's answer."""
         assert isinstance(frame, TrueFrame), "an oracle needs the frames of a TruthCamera"
-        random = np.random.default_rng([self._seed, frame.id])
+        random = np.random.default_rng([self.seed, frame.id])
         found = []
         for true in frame.truth:
-            box = np.array(true.box) + random.normal(0.0, self._jitter, 4)
+            box = np.array(true.box) + random.normal(0.0, self.jitter, 4)
             seen = Detection(true.label, true.confidence, (box[0], box[1], box[2], box[3]))
             if self._shows(frame, view, np.array(seen.centre)):
                 found.append(seen)
-        answer: Future[Sequence[Detection]] = Future()
+        answer: Future[list[Detection]] = Future()
         answer.set_result(found)
-        return Pending(
-            answer,
-            self._clock.now + self._config.latency,
-            self._clock,
-            detector=self._name,
-            reliability=self._config.reliability,
-        )
+        due = self.clock.now + self.config.latency
+        return Pending(answer, due, self.clock, self.name, self.config.reliability)
 
     def close(self) -> None:
         """Have nothing to give back."""
 
     def _shows(self, frame: Frame, view: str, pixel: Array) -> bool:
         height, width = frame.visible.shape
-        area = np.array(self._camera.table_view if view == "table" else (0, 0, width, height))
+        area = np.array(self.camera.table_view if view == "table" else (0, 0, width, height))
         if np.any(pixel < area[:2]) or np.any(pixel >= area[2:]):
             return False
         column, row = pixel.astype(int)
@@ -171,14 +157,6 @@ def oracle_cell(*, jitter: float = 0.7, rendered: bool = False) -> Callable[...,
     return partial(SimCell, camera=camera, detectors=partial(_oracles, jitter=jitter))
 
 
-def _oracles(
-    configs: Mapping[str, DetectorConfig],
-    *,
-    camera: CameraConfig,
-    clock: Clock,
-    base: Path,
-    jitter: float,
-    seed: int,
-) -> dict[str, Oracle]:
+def _oracles(configs: Mapping[str, DetectorConfig], *, base: Path, **settings: Any) -> dict[str, Oracle]:
     del base
-    return {name: Oracle(name, c, camera, clock, jitter=jitter, seed=seed) for name, c in configs.items()}
+    return {name: Oracle(name, config, **settings) for name, config in configs.items()}

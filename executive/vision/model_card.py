@@ -36,8 +36,6 @@ class ModelCard:
         settings: Everything that decided what it became, by name.
         epochs: One row of figures per epoch, by the names of `EPOCH_COLUMNS`.
         measured: How good it is, by what it was measured on.
-        commands: What remakes it, a line each.
-        limits: What it cannot do.
     """
 
     title: str
@@ -45,18 +43,12 @@ class ModelCard:
     settings: Mapping[str, str]
     epochs: Sequence[Mapping[str, float]] = ()
     measured: Mapping[str, Evaluation] = field(default_factory=dict)
-    commands: Sequence[str] = ()
-    limits: Sequence[str] = ()
 
     def text(self) -> str:
         """Return the card as Markdown."""
         blocks = [f"# {self.title}", self.summary, _table(("setting", "value"), list(self.settings.items()))]
         if self.measured:
             blocks += ["## Measured", *self._measured()]
-        if self.limits:
-            blocks += ["## Limits", "\n".join(f"* {limit}" for limit in self.limits)]
-        if self.commands:
-            blocks += ["## Made with", "\n".join(["```", *self.commands, "```"])]
         if self.epochs:
             rows = [
                 (str(number), *(f"{row[name]:.4f}" if name in row else "" for name in EPOCH_COLUMNS))

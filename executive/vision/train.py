@@ -54,7 +54,7 @@ def train(
 
         declare_missing()
         from executive.vision.training.architecture import describe
-        from executive.vision.training.export import STORAGE, export_onnx
+        from executive.vision.training.export import export_onnx
         from executive.vision.training.run import fit
     except ImportError as error:
         raise InputError(
@@ -63,7 +63,7 @@ def train(
     out.mkdir(parents=True, exist_ok=True)
     fit(dataset, out, start=start, epochs=epochs, seed=seed, progress=progress, batches=batches)
     model, labels = out / "model.onnx", out / "labels.txt"
-    export_onnx(out / "checkpoint_best_total.pth", len(read_labels(labels)), model, STORAGE)
+    export_onnx(out / "checkpoint_best_total.pth", len(read_labels(labels)), model)
     card = ModelCard(
         title=f"Small RF-DETR trained on {dataset.name}",
         summary=f"Finds {', '.join(read_labels(labels))} in square images.",
@@ -72,7 +72,7 @@ def train(
             "start": "random weights" if start is None else start.name,
             "epochs": str(epochs),
             "seed": str(seed),
-            "weights stored as": STORAGE,
+            "weights stored as": "int8",
         },
         epochs=read_epochs(out / "metrics.csv"),
         measured={"validation images": evaluate_folder(model, labels, _validation(dataset), CARD_THRESHOLD)},

@@ -15,63 +15,51 @@ from executive.vision.detectors.embedded import LABELS, MODEL
 
 
 @pytest.fixture
-def dataset(tmp_path):
+def dataset(tmp_path, monkeypatch):
     """A labelled image with an object that nobody can find: it is all grey."""
     root = tmp_path / "grey"
     save_image(image_path(root, "coco", "test", "a.jpg"), np.full((120, 160, 3), 128, np.uint8))
     entry = Entry("test", "a.jpg", (160, 120), ("cube",), ((10.0, 10.0, 60.0, 60.0),))
     write_annotations(root, "coco", [entry], ("cube", "sphere", "duck"))
-    return root
+    monkeypatch.chdir(tmp_path)
+    return "grey"
 
 
-@pytest.fixture
-def evaluate():
-    """Runs the command."""
-    return lambda *arguments: CliRunner().invoke(main, ["evaluate", *map(str, arguments)])
+def evaluate(*arguments, code=0):
+    """Return what the command says and the figures it prints."""
+    result = CliRunner().invoke(main, ["evaluate", "--json", *map(str, arguments)])
+    assert result.exit_code == code, result.output
+    return result.stderr, json.loads(result.stdout) if code == 0 else None
 
 
-def test_a_cells_detector_is_measured_as_in_a_run_with_a_sheet_of_its_worst_misses(evaluate, tmp_path):
+def test_a_cells_detector_is_measured_as_in_a_run_with_a_sheet_of_its_worst_misses(tmp_path):
     sheet = tmp_path / "sheet.png"
-    result = evaluate(
-        "--cell", "overhead", "--as-run", "--images", 1, "--workers", 1, "--json", "--sheet", sheet
-    )
-    assert result.exit_code == 0, result.output
-    told = json.loads(result.stdout)
+    said, told = evaluate("--cell", "overhead", "--as-run", "--images", 1, "--workers", 1, "--sheet", sheet)
     measured = told["measured"]["overhead"]
     assert (measured["detector"], measured["kind"], measured["images"]) == ("embedded", "embedded", 1)
-    assert measured["recall"] == 1
-    assert measured["localized"]["median"] < 5
+    assert (measured["recall"], measured["localized"]["median"] < 5) == (1, True)
     assert set(measured["reliability"]["stated"]) == {"misses", "confused", "invented", "jitter"}
-    assert "overhead, detector embedded" in result.stderr
-    assert "misses: " in result.stderr
-    assert f"worst in {sheet}" in result.stderr
+    assert "overhead, detector embedded" in said
+    assert "misses: " in said
+    assert f"worst in {sheet}" in said
     assert cv2.imread(str(sheet)) is not None
 
 
-def test_a_dataset_is_measured_on_without_any_cell(evaluate, dataset):
-    result = evaluate("--dataset", dataset, "--json")
-    assert result.exit_code == 0, result.output
-    measured = json.loads(result.stdout)["measured"][str(dataset)]
-    assert (measured["detector"], measured["images"], measured["objects"], measured["recall"]) == (
-        "embedded", 1, 1, 0,
-    )  # fmt: skip
-    assert measured["confusion"] == {"cube": {"nothing": 1}}
-
-
-def test_a_cells_detector_is_measured_on_a_dataset(evaluate, dataset):
-    result = evaluate("--cell", "wrist", "--detector", "embedded", "--dataset", dataset, "--json")
-    assert result.exit_code == 0, result.output
-    assert list(json.loads(result.stdout)["measured"]) == [f"wrist on {dataset}"]
-
-
-def test_a_model_file_is_measured_with_its_labels(evaluate, dataset):
-    result = evaluate(
-        "--weights", MODEL, "--labels", LABELS, "--dataset", dataset, "--threshold", 0.9, "--json"
-    )
-    assert result.exit_code == 0, result.output
-    told = json.loads(result.stdout)
-    assert told["weights"] == str(MODEL)
-    assert told["measured"][str(dataset)]["threshold"] == 0.9
+@pytest.mark.parametrize(
+    ("arguments", "where", "detector"),
+    [
+        ((), "grey", "embedded"),
+        (("--cell", "wrist", "--detector", "embedded"), "wrist on grey", "embedded"),
+        (("--weights", MODEL, "--labels", LABELS, "--threshold", 0.9), "grey", "model"),
+    ],
+)
+def test_a_dataset_is_measured_on_with_or_without_a_cell_or_a_model_file(dataset, arguments, where, detector):
+    _, told = evaluate("--dataset", dataset, *arguments)
+    ((called, measured),) = told["measured"].items()
+    assert (called, measured["detector"], measured["images"], measured["objects"]) == (where, detector, 1, 1)
+    assert (measured["recall"], measured["confusion"]) == (0, {"cube": {"nothing": 1}})
+    model = detector == "model"
+    assert (told["weights"], measured["threshold"]) == ((str(MODEL), 0.9) if model else (None, 0.5))
 
 
 @pytest.mark.parametrize(
@@ -81,39 +69,29 @@ def test_a_model_file_is_measured_with_its_labels(evaluate, dataset):
             ("--cell", "overhead", "--detector", "embeded"),
             'the cell overhead has no detector "embeded". Did you mean "embedded"? Its detectors: embedded.',
         ),
-        (
-            ("--cell", "overhead", "--detector", "embedded", "--weights", "m.onnx"),
-            "--detector is of a cell and --weights a model file; give one of them",
-        ),
+        (("--cell", "overhead", "--detector", "embedded", "--weights", "m.onnx"), "; give one of them"),
         (("--detector", "eye", "--dataset", "."), "--detector eye is of which cell? Name it with --cell"),
         (("--labels", "names.txt"), "--labels are those of a model file; name it with --weights"),
-        (
-            ("--as-run", "--dataset", "."),
-            "--as-run renders scenes, and --dataset brings images; give one of them",
-        ),
+        (("--as-run", "--dataset", "."), "--as-run renders scenes, and --dataset brings images; give one"),
         (("--view", "full"), "--view full is a part of a run's frame; give --as-run with it"),
         (
             ("--cell", "fruit"),
-            "and fruit is of kind fake; measure its detector on images of your own with --dataset",
+            "fruit is of kind fake; measure its detector on images of your own",
         ),
         (("--dataset", "."), ". holds no labelled images"),
         (("--weights", "no.onnx", "--labels", LABELS, "--dataset", "grey"), "there is no model file"),
         (("--sheet", "sheet.gif"), '"sheet.gif" is no picture; its name must end in .png, .jpg, .jpeg'),
     ],
 )
-def test_options_that_make_no_sense_are_explained(evaluate, dataset, monkeypatch, arguments, sentence):
-    monkeypatch.chdir(dataset.parent)
-    result = evaluate(*arguments)
-    assert result.exit_code == 2
-    assert sentence in result.stderr
+def test_options_that_make_no_sense_are_explained(dataset, arguments, sentence):
+    assert sentence in evaluate(*arguments, code=2)[0]
 
 
-def test_a_detector_that_cannot_be_built_is_told_before_anything_is_rendered(evaluate, missions, tmp_path):
+def test_a_detector_that_cannot_be_built_is_told_before_anything_is_rendered(missions, tmp_path):
     text = (missions / "cells" / "overhead.yaml").read_text(encoding="utf-8")
     cell = tmp_path / "mine.yaml"
     options = "kind: rfdetr\n    model_path: none.onnx\n    labels: [cube]"
     cell.write_text(text.replace("kind: embedded", options), encoding="utf-8")
-    result = evaluate("--cell", cell)
-    assert result.exit_code == 2
-    assert "detector embedded: there is no model file" in result.stderr
-    assert "rendering" not in result.stderr
+    said, _ = evaluate("--cell", cell, code=2)
+    assert "detector embedded: there is no model file" in said
+    assert "rendering" not in said

@@ -3,74 +3,59 @@
 from __future__ import annotations
 
 import threading
+from concurrent.futures import Future, ThreadPoolExecutor
+from types import SimpleNamespace
 
 import pytest
 
 from executive.errors import DeadlinePassed, Unavailable
 from executive.messages import Answer, Detection, Reliability
-from executive.vision.detectors.requests import Pending, Worker
+from executive.vision.detectors.requests import Pending
 
 FOUND = [Detection("cube", 0.9, (0.0, 0.0, 1.0, 1.0))]
 RELIABILITY = Reliability(threshold=0.5, misses=0.1, confused=0.1, invented=0.1, jitter=1.0)
-ANSWER = Answer("eye", tuple(FOUND), RELIABILITY)
-
-
-class Clock:
-    def __init__(self):
-        self.now = 0.0
-        self.step = 1 / 240
-
-    def sleep(self, duration):
-        yield
 
 
 @pytest.fixture
 def clock():
-    return Clock()
+    return SimpleNamespace(now=0.0)
 
 
 @pytest.fixture
-def worker():
-    worker = Worker("test")
-    yield worker
-    worker.close()
+def ended(clock):
+    """Returns a request, due at 0.05 s, whose search has ended with detections or an error."""
+
+    def ended(result, **options):
+        work = Future()
+        (work.set_exception if isinstance(result, Exception) else work.set_result)(result)
+        return Pending(work, 0.05, clock, "eye", RELIABILITY, **options)
+
+    return ended
 
 
-def pending(worker, search, due, clock, **options):
-    return Pending(worker.submit(search), due, clock, detector="eye", reliability=RELIABILITY, **options)
-
-
-def test_an_answer_that_is_in_early_shows_only_when_it_is_due(worker, clock):
-    request = pending(worker, lambda: FOUND, 0.05, clock)
-    worker.submit(list).result()
+def test_an_answer_that_is_in_early_shows_only_when_it_is_due(ended, clock):
+    request = ended(FOUND)
     assert not request.ready
     with pytest.raises(RuntimeError, match=r"due at 0\.050 s and it is 0\.000 s"):
         request.result()
     clock.now = 0.05 - 1e-12
     assert request.ready
-    assert request.result() == ANSWER
+    assert request.result() == Answer("eye", tuple(FOUND), RELIABILITY)
 
 
-def test_the_clock_waits_for_an_answer_that_is_late(worker, clock):
+def test_the_clock_waits_for_an_answer_that_is_late(clock):
     release = threading.Event()
-
-    def search():
-        release.wait()
-        return FOUND
-
-    request = pending(worker, search, 0.05, clock)
     clock.now = 0.05
-    threading.Timer(0.08, release.set).start()
-    assert request.ready
-    assert release.is_set()
+    with ThreadPoolExecutor(1) as thread:
+        request = Pending(thread.submit(release.wait), 0.05, clock, "eye", RELIABILITY)
+        threading.Timer(0.08, release.set).start()
+        assert request.ready
+        assert release.is_set()
 
 
 @pytest.mark.parametrize("error", [Unavailable("the model is gone"), ZeroDivisionError("a bug")])
-def test_what_the_search_raises_comes_out_of_the_result_as_it_is(worker, clock, error):
-    def search():
-        raise error
-
-    request = pending(worker, search, 0.05, clock, given_up=1.0)
+def test_what_the_search_raises_comes_out_of_the_result_as_it_is(ended, clock, error):
+    request = ended(error, given_up=1.0)
     clock.now = 0.05
     assert request.ready
     with pytest.raises(type(error)) as raised:
@@ -78,21 +63,11 @@ def test_what_the_search_raises_comes_out_of_the_result_as_it_is(worker, clock, 
     assert raised.value is error
 
 
-def test_that_a_deadline_has_passed_shows_when_it_has_passed_on_the_runs_clock_too(worker, clock):
-    def search():
-        raise DeadlinePassed("no answer within 1.0 s")
-
-    request = pending(worker, search, 0.05, clock, given_up=1.0)
+def test_that_a_deadline_has_passed_shows_when_it_has_passed_on_the_runs_clock_too(ended, clock):
+    request = ended(DeadlinePassed("no answer within 1.0 s"), given_up=1.0)
     clock.now = 0.9
     assert not request.ready
     clock.now = 1.0 - 1e-12
     assert request.ready
     with pytest.raises(DeadlinePassed, match=r"within 1\.0 s"):
         request.result()
-
-
-def test_closing_ends_the_thread():
-    worker = Worker("closing")
-    worker.submit(list).result()
-    worker.close()
-    assert not any(thread.name.startswith("detector-closing") for thread in threading.enumerate())

@@ -35,8 +35,12 @@ class Oracle:
         self.closed = True
 
 
-def around(base):
-    return {"camera": None, "clock": None, "base": base, "seed": 7}
+def oracle(**options):
+    return DetectorConfig(kind="oracle", **options)
+
+
+def build(base=None, **configs):
+    return build_detectors(configs, camera=None, clock=None, base=base, seed=7)
 
 
 @pytest.fixture
@@ -53,7 +57,7 @@ def test_a_kind_that_is_not_installed_is_found_before_and_at_the_start(tmp_path)
     sentence = f'detector "second" is of kind "yolo", which is not installed; installed: {INSTALLED}'
     assert list(wrong_detectors(configs, tmp_path)) == [(("detectors", "second", "kind"), sentence)]
     with pytest.raises(InputError) as caught:
-        build_detectors({"second": configs["second"]}, **around(tmp_path))
+        build(second=configs["second"])
     assert str(caught.value) == sentence
 
 
@@ -65,12 +69,9 @@ def test_a_wrong_option_is_found_at_its_key(tmp_path):
 
 
 def test_the_labels_of_a_kind_that_does_not_say_them_are_not_known(tmp_path, oracle_installed):
-    kinds = ("embedded", "oracle", "yolo")
-    configs = {kind: DetectorConfig(kind=kind) for kind in kinds}
+    configs = {kind: DetectorConfig(kind=kind) for kind in ("embedded", "oracle", "yolo")}
     known = known_labels(configs, tmp_path)
-    assert list(known) == list(kinds)
-    assert set(known["embedded"]) == {"cube", "sphere", "duck"}
-    assert known["oracle"] is known["yolo"] is None
+    assert known == {"embedded": ("cube", "sphere", "duck"), "oracle": None, "yolo": None}
     assert [keys for keys, _ in wrong_detectors(configs, tmp_path)] == [("detectors", "yolo", "kind")]
 
 
@@ -80,18 +81,13 @@ def test_a_kind_of_somebody_elses_is_found_by_its_entry_point(tmp_path, monkeypa
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text(f"[{registry.GROUP}]\noracle = {__name__}:Oracle\n")
     monkeypatch.syspath_prepend(tmp_path)
-    built = build_detectors({"mine": DetectorConfig(kind="oracle", wish=3)}, **around(tmp_path))
-    setting = built["mine"].setting
-    assert built["mine"].config.options == {"wish": 3}
-    assert (setting.name, setting.base, setting.seed) == ("mine", tmp_path, 7)
+    mine = build(tmp_path, mine=oracle(wish=3))["mine"]
+    assert mine.config.options == {"wish": 3}
+    assert (mine.setting.name, mine.setting.base, mine.setting.seed) == ("mine", tmp_path, 7)
 
 
-def test_detectors_are_built_once_in_the_files_order_whoever_needs_them(tmp_path, oracle_installed):
-    configs = {
-        "first": DetectorConfig(kind="oracle", beside="second"),
-        "second": DetectorConfig(kind="oracle"),
-    }
-    built = build_detectors(configs, **around(tmp_path))
+def test_detectors_are_built_once_in_the_files_order_whoever_needs_them(oracle_installed):
+    built = build(first=oracle(beside="second"), second=oracle())
     assert list(built) == ["first", "second"]
     assert built["first"].other is built["second"]
     assert len(Oracle.made) == 2
@@ -101,17 +97,12 @@ def test_detectors_are_built_once_in_the_files_order_whoever_needs_them(tmp_path
     ("beside", "text"),
     [("a", "the detectors a -> b -> a rest on each other"), ("c", 'no detector "c"; it has: a, b')],
 )
-def test_a_detector_cannot_rest_on_itself_or_on_nobody(tmp_path, oracle_installed, beside, text):
-    configs = {
-        "a": DetectorConfig(kind="oracle", beside="b"),
-        "b": DetectorConfig(kind="oracle", beside=beside),
-    }
+def test_a_detector_cannot_rest_on_itself_or_on_nobody(oracle_installed, beside, text):
     with pytest.raises(InputError, match=text):
-        build_detectors(configs, **around(tmp_path))
+        build(a=oracle(beside="b"), b=oracle(beside=beside))
 
 
-def test_where_one_cannot_be_built_the_others_are_closed(tmp_path, oracle_installed):
-    configs = {"a": DetectorConfig(kind="oracle"), "b": DetectorConfig(kind="oracle", broken=True)}
+def test_where_one_cannot_be_built_the_others_are_closed(oracle_installed):
     with pytest.raises(InputError, match="it is broken"):
-        build_detectors(configs, **around(tmp_path))
+        build(a=oracle(), b=oracle(broken=True))
     assert Oracle.made[0].closed

@@ -2,33 +2,23 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from executive.cell_config import CameraConfig, DetectorConfig
+from executive.cell_config import DetectorConfig
 from executive.errors import InputError
-from executive.geometry import Pose
-from executive.messages import Detection, Frame
+from executive.messages import Detection
 from executive.vision.detectors.embedded import LABELS, MODEL, EmbeddedDetector
 from executive.vision.detectors.rfdetr import RfdetrDetector
 from executive.vision.detectors.setting import Setting
 
-TABLE = (192, 100, 448, 356)
 ONNX = str(MODEL)
-
-
-class Clock:
-    now = 0.0
-    step = 1 / 240
-
-    def sleep(self, duration):
-        yield
 
 
 class BrightSpots:
     """A model that finds the bounding box of what is brighter than half."""
-
-    labels = ("spot",)
 
     def __init__(self, size):
         self.size = size
@@ -43,79 +33,61 @@ class BrightSpots:
         return [Detection("spot", 0.9, box)]
 
 
-def frame_with_spot(left, top, size=20):
+def frame_with_spot(left, top):
     image = np.zeros((480, 640, 3), np.uint8)
-    image[top : top + size, left : left + size] = 255
-    visible = np.ones((480, 640), bool)
-    return Frame(1, "overhead", image, None, np.eye(3), Pose.identity(), 0.0, visible, 0)
-
-
-def detector_around(model):
-    return RfdetrDetector(model, DetectorConfig(kind="rfdetr"), setting())
+    image[top : top + 20, left : left + 20] = 255
+    return SimpleNamespace(image=image)
 
 
 def setting(base=None):
-    return Setting("eye", camera(), Clock(), base, seed=0, other=None)
+    camera = SimpleNamespace(table_view=(192, 100, 448, 356))
+    return Setting("eye", camera, SimpleNamespace(now=0.0), base, seed=0, other=None)
 
 
-def search(detector, frame, view):
+def found_by(detector, frame, view):
     """Return what the detector finds, waited for on its clock."""
     request = detector.request(frame, view)
     detector._setting.clock.now += 0.05
     assert request.ready
-    try:
-        return request.result().found
-    finally:
-        detector.close()
+    detector.close()
+    return request.result().found
+
+
+def spots(size, left, top, view):
+    """Return the spots that a model of an input size finds, and the shapes that it was given."""
+    model = BrightSpots(size)
+    detector = RfdetrDetector(model, DetectorConfig(kind="rfdetr"), setting())
+    return found_by(detector, frame_with_spot(left, top), view), model.shapes
 
 
 @pytest.mark.parametrize("size", [256, 128])
-def test_a_box_found_in_the_table_view_is_returned_in_the_frames_pixels(size):
-    (found,) = search(detector_around(BrightSpots(size)), frame_with_spot(300, 200), "table")
+def test_a_box_in_the_table_view_is_in_the_frames_pixels_and_a_larger_crop_is_shrunk(size):
+    (found,), shapes = spots(size, 300, 200, "table")
     assert found.box == pytest.approx((300, 200, 320, 220), abs=256 / size)
-
-
-def test_a_crop_larger_than_the_models_input_is_shrunk_before_the_model_sees_it():
-    model = BrightSpots(128)
-    search(detector_around(model), frame_with_spot(300, 200), "table")
-    assert model.shapes == [(128, 128, 3)]
+    assert shapes == [(size, size, 3)]
 
 
 def test_the_table_view_does_not_show_what_lies_beside_it():
-    assert search(detector_around(BrightSpots(256)), frame_with_spot(20, 20), "table") == ()
+    assert spots(256, 20, 20, "table")[0] == ()
 
 
 @pytest.mark.parametrize(("left", "top"), [(0, 0), (250, 100), (620, 460), (180, 240)])
 def test_the_full_view_finds_an_object_anywhere_exactly_once(left, top):
-    (found,) = search(detector_around(BrightSpots(256)), frame_with_spot(left, top), "full")
+    (found,), _ = spots(256, left, top, "full")
     assert found.box == pytest.approx((left, top, left + 20, top + 20))
-
-
-def camera():
-    return CameraConfig(
-        mount="fixed", position=(0.5, 0, 1.2), look_at=(0.5, 0, 0), up=(1, 0, 0), fov_deg=55,
-        table_view=TABLE, scan_poses=("home",),
-    )  # fmt: skip
 
 
 def configured(kind, **options):
     return DetectorConfig(kind=kind.__name__, **options)
 
 
-def build(kind, base, **options):
-    return kind.from_config(configured(kind, **options), setting(base))
-
-
-def test_any_exported_model_can_be_used_by_path(tmp_path):
+def test_any_exported_model_can_be_used_by_path_and_the_embedded_one_needs_no_options(tmp_path):
     (tmp_path / "model.onnx").symlink_to(MODEL)
     (tmp_path / "names.txt").write_text("one\ntwo\nthree\n")
-    detector = build(RfdetrDetector, tmp_path, model_path="model.onnx", labels="names.txt", threshold=0.6)
-    assert search(detector, frame_with_spot(300, 200), "table") == ()
-
-
-def test_the_embedded_detector_needs_no_options(tmp_path):
-    detector = build(EmbeddedDetector, tmp_path, threshold=0.6)
-    assert search(detector, frame_with_spot(300, 200), "table") == ()
+    mine = configured(RfdetrDetector, model_path="model.onnx", labels="names.txt", threshold=0.6)
+    for kind, config in ((RfdetrDetector, mine), (EmbeddedDetector, configured(EmbeddedDetector))):
+        detector = kind.from_config(config, setting(tmp_path))
+        assert found_by(detector, frame_with_spot(300, 200), "table") == ()
 
 
 def test_an_answer_shows_after_the_latency_with_its_detector_and_the_cells_names():
@@ -157,26 +129,29 @@ def test_a_wrong_option_is_said_in_a_sentence_before_and_at_the_start(tmp_path, 
     ((found, sentence),) = kind.check(configured(kind, **options), tmp_path, {})
     assert found == option
     with pytest.raises(InputError, match=text) as caught:
-        build(kind, tmp_path, **options)
+        kind.from_config(configured(kind, **options), setting(tmp_path))
     assert str(caught.value) == sentence
 
 
-def test_every_wrong_option_is_found_at_once(tmp_path):
-    config = configured(RfdetrDetector, colour=1, threads=0, model_path="m.onnx", labels=["a"])
-    assert [option for option, _ in RfdetrDetector.check(config, tmp_path, {})] == ["threads", "colour"]
-    config = configured(RfdetrDetector, model_path="m.onnx", labels="no.txt")
-    assert [option for option, _ in RfdetrDetector.check(config, tmp_path, {})] == ["model_path", "labels"]
+@pytest.mark.parametrize(
+    ("options", "wrong"),
+    [
+        ({"colour": 1, "threads": 0, "labels": ["a"]}, ["threads", "colour"]),
+        ({"labels": "no.txt"}, ["model_path", "labels"]),
+    ],
+)
+def test_every_wrong_option_is_found_at_once(tmp_path, options, wrong):
+    config = configured(RfdetrDetector, model_path="m.onnx", **options)
+    assert [option for option, _ in RfdetrDetector.check(config, tmp_path, {})] == wrong
 
 
 def test_the_labels_are_the_cells_names_and_no_model_is_read_for_them(tmp_path):
     (tmp_path / "names.txt").write_text("one\ntwo\n")
-    options = {"model_path": "missing.onnx", "labels": "names.txt", "class_map": {"one": "cube"}}
-    assert RfdetrDetector.labels(configured(RfdetrDetector, **options), tmp_path) == ("cube", "two")
-    assert EmbeddedDetector.labels(configured(EmbeddedDetector), tmp_path) == tuple(
-        LABELS.read_text().split()
-    )
 
+    def labels(**options):
+        return RfdetrDetector.labels(configured(RfdetrDetector, **options), tmp_path)
 
-@pytest.mark.parametrize("options", [{}, {"model_path": "m.onnx", "labels": "no.txt"}])
-def test_labels_that_the_options_do_not_say_are_not_known(tmp_path, options):
-    assert RfdetrDetector.labels(configured(RfdetrDetector, **options), tmp_path) is None
+    assert labels(model_path="m.onnx", labels="names.txt", class_map={"one": "cube"}) == ("cube", "two")
+    assert labels() is labels(model_path="m.onnx", labels="no.txt") is None
+    shipped = EmbeddedDetector.labels(configured(EmbeddedDetector), tmp_path)
+    assert shipped == tuple(LABELS.read_text().split())

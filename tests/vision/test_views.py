@@ -18,11 +18,9 @@ def found(box, confidence=0.9, part=(0, 0, 256, 256), label="cube"):
     return Finding(Detection(label, confidence, box), part)
 
 
-def test_the_table_view_is_the_square_of_the_cell_file():
+def test_the_table_view_is_the_square_of_the_cell_file_and_a_smaller_frame_is_one_tile():
     assert parts_of("table", TABLE, SIZE) == [TABLE]
-
-
-def test_an_unknown_view_is_named():
+    assert parts_of("full", TABLE, (200, 150)) == [(0, 0, 200, 150)]
     with pytest.raises(InputError, match='no view "ceiling"; there are table and full'):
         parts_of("ceiling", TABLE, SIZE)
 
@@ -44,10 +42,6 @@ def test_every_small_object_is_whole_in_some_tile_of_the_full_view(sizes, data):
         part[0] <= left and part[1] <= top and left + extent <= part[2] and top + extent <= part[3]
         for part in parts
     )
-
-
-def test_a_frame_smaller_than_the_table_view_is_one_tile():
-    assert parts_of("full", TABLE, (200, 150)) == [(0, 0, 200, 150)]
 
 
 OTHER = (192, 0, 448, 256)
@@ -79,14 +73,11 @@ def test_an_object_in_two_tiles_is_reported_once(one, other, kept):
 
 
 def test_of_boxes_that_overlap_by_more_than_seven_tenths_the_most_confident_is_kept():
-    boxes = {
-        "first": (0, 0, 10, 10),
-        "again": (0, 0, 10, 14),
-        "beside": (0, 0, 10, 15),
-        "far": (50, 0, 60, 9),
-    }
     detections = [
-        Detection(label, 0.9 - number / 10, box) for number, (label, box) in enumerate(boxes.items())
+        Detection("first", 0.9, (0, 0, 10, 10)),
+        Detection("again", 0.8, (0, 0, 10, 14)),
+        Detection("beside", 0.7, (0, 0, 10, 15)),
+        Detection("far", 0.6, (50, 0, 60, 9)),
     ]
     assert [one.label for one in without_duplicates(detections)] == ["first", "beside", "far"]
     assert [one.label for one in without_duplicates(detections[1:])] == ["again", "far"]

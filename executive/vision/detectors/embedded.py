@@ -16,10 +16,6 @@ MODEL = WEIGHTS / "embedded.onnx"
 LABELS = WEIGHTS / "embedded.labels.txt"
 
 
-class EmbeddedOptions(Section):
-    """It needs nothing beyond what every detector has."""
-
-
 class EmbeddedDetector(RfdetrDetector):
     """Finds cubes, spheres and ducks with the shipped weights; see `weights/embedded.card.md`."""
 
@@ -30,7 +26,7 @@ class EmbeddedDetector(RfdetrDetector):
         Raises:
             InputError: An option was given: there are none.
         """
-        read_options(EmbeddedOptions, config)
+        read_options(Section, config)
         return cls(OnnxModel(MODEL, read_labels(LABELS)), config, setting)
 
     @staticmethod
@@ -39,7 +35,7 @@ class EmbeddedDetector(RfdetrDetector):
     ) -> Iterator[tuple[str, str]]:
         """Yield every option that was given, with a sentence: there are none."""
         del base, others
-        yield from wrong_options(EmbeddedOptions, config)
+        yield from wrong_options(Section, config)
 
     @staticmethod
     def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from typing import TypeVar
 
 from pydantic import ValidationError
@@ -42,3 +42,16 @@ def read_options(options: type[OptionsT], config: DetectorConfig) -> OptionsT:
     for _, sentence in wrong_options(options, config):
         raise InputError(sentence)
     return options.model_validate(config.options)
+
+
+def wrong_class_map(
+    config: DetectorConfig, class_map: Mapping[str, str], labels: Collection[str]
+) -> Iterator[tuple[str, str]]:
+    """Yield the option `class_map` and a sentence if it names a class that the model does not know."""
+    strangers = [name for name in class_map if name not in labels]
+    if strangers:
+        yield (
+            "class_map",
+            f"class_map of a detector of kind {config.kind} names {', '.join(strangers)}, which the model "
+            f"does not know; it knows {', '.join(labels)}",
+        )

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -14,10 +16,10 @@ from executive.cell_config import DetectorConfig, Section
 from executive.errors import InputError
 from executive.messages import Detection, Frame
 from executive.vision.detectors.onnx_model import OnnxModel, no_model, read_labels
-from executive.vision.detectors.options import read_options, wrong_options
-from executive.vision.detectors.requests import Pending, Worker
+from executive.vision.detectors.options import read_options, wrong_class_map, wrong_options
+from executive.vision.detectors.requests import Pending
 from executive.vision.detectors.setting import Setting
-from executive.vision.detectors.views import Finding, Part, merge, parts_of
+from executive.vision.detectors.views import parts_of, search_parts
 
 
 class RfdetrOptions(Section):
@@ -62,7 +64,7 @@ class RfdetrDetector:
         self._config = config
         self._setting = setting
         self._class_map = dict(class_map or {})
-        self._worker = Worker(setting.name)
+        self._thread = ThreadPoolExecutor(1, f"detector-{setting.name}")
 
     @classmethod
     def from_config(cls, config: DetectorConfig, setting: Setting) -> RfdetrDetector:
@@ -86,11 +88,11 @@ class RfdetrDetector:
         The model is not loaded.
         """
         del others
-        try:
-            options = read_options(RfdetrOptions, config)
-        except InputError:
-            yield from wrong_options(RfdetrOptions, config)
+        wrong = list(wrong_options(RfdetrOptions, config))
+        yield from wrong
+        if wrong:
             return
+        options = read_options(RfdetrOptions, config)
         if not (base / options.model_path).is_file():
             yield "model_path", no_model(base / options.model_path)
         try:
@@ -98,13 +100,7 @@ class RfdetrDetector:
         except InputError as error:
             yield "labels", str(error)
             return
-        strangers = [name for name in options.class_map if name not in names]
-        if strangers:
-            yield (
-                "class_map",
-                f"class_map of a detector of kind {config.kind} names {', '.join(strangers)}, which "
-                f"the model does not know; it knows {', '.join(names)}",
-            )
+        yield from wrong_class_map(config, options.class_map, names)
 
     @staticmethod
     def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
@@ -119,39 +115,25 @@ class RfdetrDetector:
         """Start to search `frame`: the `table` part or the `full` image."""
         height, width = frame.image.shape[:2]
         parts = parts_of(view, self._setting.camera.table_view, (width, height))
-
-        def search() -> list[Detection]:
-            return self._search(frame.image, parts)
-
-        return Pending(
-            self._worker.submit(search),
-            self._setting.clock.now + self._config.latency,
-            self._setting.clock,
-            detector=self._setting.name,
-            reliability=self._config.reliability,
-        )
+        work = self._thread.submit(lambda: search_parts(frame.image, parts, self._find, self._class_map))
+        clock = self._setting.clock
+        due = clock.now + self._config.latency
+        return Pending(work, due, clock, self._setting.name, self._config.reliability)
 
     def close(self) -> None:
-        """End the thread and wait for the search under way."""
-        self._worker.close()
+        """End the thread after the search under way; those not begun are dropped."""
+        self._thread.shutdown(cancel_futures=True)
 
-    def _search(self, image: NDArray[np.uint8], parts: Sequence[Part]) -> list[Detection]:
-        height, width = image.shape[:2]
-        findings = [Finding(found, part) for part in parts for found in self._search_part(image, part)]
-        return merge(findings, (width, height))
-
-    def _search_part(self, image: NDArray[np.uint8], part: Part) -> list[Detection]:
-        left, top, right, bottom = part
-        crop = image[top:bottom, left:right]
+    def _find(self, crop: NDArray[np.uint8]) -> list[Detection]:
+        """Return what the model finds in a part of a frame, in that part's pixels."""
+        height, width = crop.shape[:2]
         size = self._model.size
-        if crop.shape[0] > size and crop.shape[1] > size:
-            # Averaging keeps edges where they are; the model's own bilinear resize would skip pixels.
-            crop = np.asarray(cv2.resize(crop, (size, size), interpolation=cv2.INTER_AREA), dtype=np.uint8)
-        scale_x, scale_y = (right - left) / crop.shape[1], (bottom - top) / crop.shape[0]
-        found = []
-        for detection in self._model.detect(crop, self._config.floor):
-            x0, y0, x1, y1 = detection.box
-            box = (left + x0 * scale_x, top + y0 * scale_y, left + x1 * scale_x, top + y1 * scale_y)
-            label = self._class_map.get(detection.label, detection.label)
-            found.append(Detection(label, detection.confidence, box))
-        return found
+        if height <= size or width <= size:
+            return self._model.detect(crop, self._config.floor)
+        # Averaging keeps edges where they are; the model's own bilinear resize would skip pixels.
+        small = np.asarray(cv2.resize(crop, (size, size), interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        x, y = width / size, height / size
+        return [
+            replace(one, box=(one.box[0] * x, one.box[1] * y, one.box[2] * x, one.box[3] * y))
+            for one in self._model.detect(small, self._config.floor)
+        ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,6 +58,31 @@ def parts_of(view: str, table_view: Part, size: tuple[int, int]) -> list[Part]:
     return [
         (left, top, min(left + side, size[0]), min(top + side, size[1])) for top in rows for left in columns
     ]
+
+
+def search_parts(
+    image: NDArray[np.uint8],
+    parts: Sequence[Part],
+    find: Callable[[NDArray[np.uint8]], Iterable[Detection]],
+    class_map: Mapping[str, str],
+) -> list[Detection]:
+    """Return every object in some parts of a frame once, most confident first.
+
+    Args:
+        image: The frame `(H, W, 3)`, RGB.
+        parts: The parts to search.
+        find: Returns the objects in a part, their boxes in its pixels.
+        class_map: From the names that `find` gives to the cell's, where they differ.
+    """
+    findings = []
+    for part in parts:
+        left, top, right, bottom = part
+        for found in find(image[top:bottom, left:right]):
+            x0, y0, x1, y1 = found.box
+            box = left + x0, top + y0, left + x1, top + y1
+            label = class_map.get(found.label, found.label)
+            findings.append(Finding(Detection(label, found.confidence, box), part))
+    return merge(findings, (image.shape[1], image.shape[0]))
 
 
 def merge(findings: Sequence[Finding], size: tuple[int, int]) -> list[Detection]:

@@ -7,9 +7,8 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from executive.cell import Steps
 from executive.cell_config import CameraConfig, DetectorConfig
-from executive.clock import STEP
+from executive.clock import STEP, StepClock
 from executive.errors import Unavailable
 from executive.messages import Answer, Frame
 from executive.vision.detectors.registry import build_detectors
@@ -23,20 +22,6 @@ WHOLE_IMAGE = CameraConfig(
     table_view=(0, 0, 64, 64), scan_poses=("none",),
 ).model_copy(update={"table_view": (0, 0, 1 << 20, 1 << 20)})  # fmt: skip
 """A camera whose view `full` is searched in one piece, whatever the size of the image."""
-
-
-class ManualClock:
-    """A run's clock that its owner advances; implements `executive.cell.Clock`."""
-
-    def __init__(self) -> None:
-        self.now = 0.0
-        self.step = STEP
-
-    def sleep(self, duration: float) -> Steps:
-        """Yield until `duration` [s] has passed on this clock."""
-        end = self.now + duration
-        while self.now < end:
-            yield
 
 
 class CellDetector:
@@ -68,10 +53,9 @@ class CellDetector:
         self._name = name
         self._view = view if camera else "full"
         self._classes = classes
-        self._clock = ManualClock()
-        self._built = build_detectors(
-            configs, camera=camera or WHOLE_IMAGE, clock=self._clock, base=base, seed=0
-        )
+        self._now = 0.0
+        clock = StepClock(lambda: self._now)
+        self._built = build_detectors(configs, camera=camera or WHOLE_IMAGE, clock=clock, base=base, seed=0)
 
     def ask(self, frame: Frame) -> tuple[Answer, float]:
         """Return the detector's answer to a frame, and the wall time that it took [ms].
@@ -79,16 +63,16 @@ class CellDetector:
         Raises:
             Unavailable: The detector gave no usable answer.
         """
-        began, asked = time.perf_counter(), self._clock.now
+        began, asked = time.perf_counter(), self._now
         try:
             request = self._built[self._name].request(replace(frame, stamp=asked), self._view)
             while not request.ready:
-                if self._clock.now - asked > TIMEOUT:
+                if self._now - asked > TIMEOUT:
                     raise Unavailable(f"no answer within {TIMEOUT:g} s of the clock")
-                self._clock.now += STEP
+                self._now += STEP
             answer = request.result()
         finally:
-            self._clock.now += PAUSE
+            self._now += PAUSE
         latency = (time.perf_counter() - began) * 1000
         found = tuple(one for one in answer.found if self._classes is None or one.label in self._classes)
         return replace(answer, found=found), latency

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from typing import Protocol
 
 from executive.cell import Localizer
 from executive.errors import Unavailable
-from executive.messages import Answer, Frame
+from executive.vision.evaluation.asking import CellDetector
 from executive.vision.evaluation.average_precision import AveragePrecision
 from executive.vision.evaluation.figures import Evaluation, Spread
 from executive.vision.evaluation.matching import is_ignored, match
@@ -18,19 +17,8 @@ from executive.vision.evaluation.truth import as_frame
 from executive.vision.samples import LabelledImage
 
 
-class Examinee(Protocol):
-    """A detector that is measured."""
-
-    @property
-    def threshold(self) -> float:
-        """Confidence from which its detections count."""
-
-    def ask(self, frame: Frame) -> tuple[Answer, float]:
-        """Return its answer to a frame and the wall time that it took [ms], or raise `Unavailable`."""
-
-
 def evaluate(
-    examinee: Examinee,
+    detector: CellDetector,
     samples: Iterable[LabelledImage],
     *,
     threshold: float | None = None,
@@ -40,7 +28,7 @@ def evaluate(
     """Return how good a detector is on labelled images; ignored objects may be found or not.
 
     Args:
-        examinee: The detector.
+        detector: The detector.
         samples: The images.
         threshold: Confidence from which a detection counts; None for the detector's own.
         localizer: Turns detections into positions, to be held against the objects' true ones.
@@ -53,7 +41,7 @@ def evaluate(
     for number, sample in enumerate(samples, 1):
         frame = as_frame(sample, number)
         try:
-            answer, latency = examinee.ask(frame)
+            answer, latency = detector.ask(frame)
         except Unavailable as error:
             unavailable, why = unavailable + 1, str(error)
             continue
@@ -68,7 +56,7 @@ def evaluate(
             worst.add(matches, sample)
     map50, map50_95 = precision.result()
     return Evaluation(
-        threshold=examinee.threshold if threshold is None else threshold,
+        threshold=detector.threshold if threshold is None else threshold,
         images=unavailable + answered.total(),
         objects=tally.objects,
         precision=tally.precision,

@@ -39,21 +39,20 @@ class WorstMisses:
 
     Args:
         count: Number of mistakes to keep.
+
+    Attributes:
+        kept: The mistakes.
     """
 
     def __init__(self, count: int = 24) -> None:
         self._count = count
-        self._kept: list[Miss] = []
+        self.kept: list[Miss] = []
 
     def add(self, matches: Sequence[Match], sample: LabelledImage) -> None:
         """Look for mistakes in the answer to one image."""
-        self._kept += misses(matches, sample)
-        self._kept.sort(key=lambda miss: -miss.severity)
-        del self._kept[self._count :]
-
-    def worst(self) -> list[Miss]:
-        """Return the mistakes, the worst first."""
-        return list(self._kept)
+        self.kept += misses(matches, sample)
+        self.kept.sort(key=lambda miss: -miss.severity)
+        del self.kept[self._count :]
 
 
 def misses(matches: Sequence[Match], sample: LabelledImage) -> Iterator[Miss]:
@@ -76,15 +75,11 @@ def misses(matches: Sequence[Match], sample: LabelledImage) -> Iterator[Miss]:
             text = f"{sample.labels[one.number]} taken for {named}"
             yield Miss(confidence, text, _around(box, sample.boxes[one.number]), sample, found)
         else:
-            yield _off(one, one.number, sample, found)
-
-
-def _off(one: Match, number: int, sample: LabelledImage, found: tuple[Detection, ...]) -> Miss:
-    true = sample.boxes[number]
-    offset = float(np.hypot(*offset_of(one, number, sample)))
-    size = max(true[2] - true[0], true[3] - true[1], 1.0)
-    text = f"{one.detection.label} off by {offset:.1f} px"
-    return Miss(min(offset / size, 1.0), text, _around(one.detection.box, true), sample, found)
+            true = sample.boxes[one.number]
+            offset = float(np.hypot(*offset_of(one, one.number, sample)))
+            size = max(true[2] - true[0], true[3] - true[1], 1.0)
+            text = f"{one.detection.label} off by {offset:.1f} px"
+            yield Miss(min(offset / size, 1.0), text, _around(box, true), sample, found)
 
 
 def _around(one: Box, other: Box) -> Box:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
 from pathlib import Path
 
 from executive.cell_config import DetectorConfig
@@ -18,25 +17,23 @@ NAME = "model"
 """What such a detector is called."""
 
 
-def model_detector(model: Path, labels: Path | Sequence[str]) -> DetectorConfig:
+def model_detector(model: Path, labels: Path) -> DetectorConfig:
     """Return the section of a cell file for an exported RF-DETR.
 
     Args:
         model: The ONNX file.
-        labels: Its class names, or the text file that lists them.
+        labels: The text file that lists its class names.
     """
-    names = str(labels.absolute()) if isinstance(labels, Path) else tuple(labels)
-    return DetectorConfig.model_validate(
-        {"kind": "rfdetr", "model_path": str(model.absolute()), "labels": names, "floor": FLOOR}
-    )
+    files = {"model_path": str(model.absolute()), "labels": str(labels.absolute())}
+    return DetectorConfig.model_validate({"kind": "rfdetr", "floor": FLOOR, **files})
 
 
-def evaluate_folder(model: Path, labels: Path | Sequence[str], folder: Path, threshold: float) -> Evaluation:
+def evaluate_folder(model: Path, labels: Path, folder: Path, threshold: float) -> Evaluation:
     """Return how good an exported RF-DETR is on a folder of labelled images.
 
     Args:
         model: The ONNX file.
-        labels: Its class names, or the text file that lists them.
+        labels: The text file that lists its class names.
         folder: A split, or a data set whose `test` or else `valid` split is used.
         threshold: Confidence from which a detection counts.
 

@@ -27,6 +27,7 @@ class Tally:
         localizer: Turns detections into positions, to be compared with the objects' true ones.
 
     Attributes:
+        objects: Number of objects on the images.
         confusion: Number of times that a true class was taken for another, `nothing` among both.
         centre: Distances between the centres of found and true box, of right detections [pixel of the image].
         position: These distances in the world, at the object's height, of objects wholly in view [mm].
@@ -35,7 +36,7 @@ class Tally:
 
     def __init__(self, localizer: Localizer | None = None) -> None:
         self._localizer = localizer
-        self._looks = 0
+        self._looks = self.objects = self._found = self._right = 0
         # Of objects in full view: how many there are, were overlooked and were given a wrong class.
         self._whole = self._overlooked = self._confused = 0
         self._squares: list[float] = []
@@ -47,6 +48,9 @@ class Tally:
     def add(self, matches: Sequence[Match], sample: LabelledImage, frame: Frame) -> None:
         """Count the answer to one image, with the detections that count."""
         self._looks += 1
+        self.objects += len(sample.labels)
+        self._found += len(matches)
+        self._right += sum(one.right for one in matches)
         taken = {one.number: one for one in matches if one.number is not None}
         for number, label in enumerate(sample.labels):
             one = taken.get(number)
@@ -60,24 +64,14 @@ class Tally:
         self.confusion.update((NOTHING, one.detection.label) for one in matches if one.number is None)
 
     @property
-    def objects(self) -> int:
-        """Number of objects on the images."""
-        return sum(count for (true, _), count in self.confusion.items() if true != NOTHING)
-
-    @property
     def precision(self) -> float:
         """Share of the detections that are right; 0 where there were none."""
-        found = sum(count for (_, found), count in self.confusion.items() if found != NOTHING)
-        return self._right / max(found, 1)
+        return self._right / max(self._found, 1)
 
     @property
     def recall(self) -> float:
         """Share of the objects that were found; 0 where there were none."""
         return self._right / max(self.objects, 1)
-
-    @property
-    def _right(self) -> int:
-        return sum(count for (true, found), count in self.confusion.items() if true == found)
 
     def by_class(self) -> dict[str, ClassFigures]:
         """Return the figures of every class that is on the images."""

@@ -1,39 +1,44 @@
-"""Asking a detector of a cell file outside of any run."""
+"""Asking a detector of a cell file outside of any run, with fewer processor cores if need be."""
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 
+import cv2
 import pytest
 
 from executive.cell_config import DetectorConfig
-from executive.errors import Unavailable
+from executive.errors import InputError, Unavailable
 from executive.messages import Answer, Detection
 from executive.vision.detectors.views import parts_of
 from executive.vision.evaluation import asking
-from executive.vision.evaluation.asking import TIMEOUT, WHOLE_IMAGE, CellDetector
+from executive.vision.evaluation.asking import WHOLE_IMAGE, CellDetector
+from executive.vision.evaluation.cores import only_cores
 from executive.vision.evaluation.truth import as_frame
 
 CONFIGS = {"eye": DetectorConfig(kind="embedded", threshold=0.6)}
-BOX = (1.0, 2.0, 3.0, 4.0)
+FOUND = tuple(Detection(label, 0.9, (1.0, 2.0, 3.0, 4.0)) for label in ("cube", "boat"))
+ANSWER = Answer("eye", FOUND, CONFIGS["eye"].reliability)
 
 
 class Delayed:
-    """Answers after a time on the clock; one without an answer never does."""
+    """Gives its answer 0.3 s after it was asked; one without an answer never does."""
 
-    def __init__(self, clock, answer, delay=0.3):
-        self.clock, self.answer, self.delay = clock, answer, delay
+    def __init__(self, camera, clock, answer):
+        self.camera, self.clock, self.answer = camera, clock, answer
         self.stamps, self.views, self.closed = [], [], False
 
     def request(self, frame, view):
         self.stamps.append(frame.stamp)
         self.views.append(view)
-        self.due = self.clock.now + self.delay
         return self
 
     @property
     def ready(self):
-        return self.answer is not None and self.clock.now >= self.due
+        return self.answer is not None and self.clock.now >= self.stamps[-1] + 0.3
 
     def result(self):
         if isinstance(self.answer, Exception):
@@ -45,23 +50,20 @@ class Delayed:
 
 
 @pytest.fixture
-def built(monkeypatch):
-    """Has detectors of a cell answer what `built.answer` is, and keeps what was built."""
+def build(monkeypatch):
+    """Makes a detector of a cell that gives an answer, and returns it with what stands behind it."""
 
-    class Built:
-        def __init__(self):
-            found = Detection("cube", 0.9, BOX), Detection("boat", 0.8, BOX)
-            self.answer = Answer("eye", found, CONFIGS["eye"].reliability)
-            self.detectors, self.cameras = [], []
+    def build(answer=ANSWER, **options):
+        behind = SimpleNamespace()
 
-        def build(self, configs, *, camera, clock, base, seed):
-            self.cameras.append(camera)
-            self.detectors.append(Delayed(clock, self.answer))
-            return {"eye": self.detectors[-1]}
+        def build_detectors(configs, *, camera, clock, base, seed):
+            behind.eye = Delayed(camera, clock, answer)
+            return vars(behind)
 
-    built = Built()
-    monkeypatch.setattr(asking, "build_detectors", built.build)
-    return built
+        monkeypatch.setattr(asking, "build_detectors", build_detectors)
+        return CellDetector(CONFIGS, "eye", base=Path(), **options), behind.eye
+
+    return build
 
 
 @pytest.fixture
@@ -69,50 +71,49 @@ def frame(sample):
     return as_frame(sample, 1)
 
 
-def test_an_answer_is_waited_for_on_the_clock(built, frame):
-    detector = CellDetector(CONFIGS, "eye", base=Path())
+def test_an_answer_is_waited_for_on_the_clock(build, frame):
+    detector, eye = build()
     answer, latency = detector.ask(frame)
-    assert (answer, detector.threshold) == (built.answer, 0.6)
+    assert (answer, detector.threshold) == (ANSWER, 0.6)
     assert latency >= 0
     detector.ask(frame)
-    first, second = built.detectors[0].stamps
-    assert second - first == pytest.approx(1.3, abs=0.01)
+    assert eye.stamps == pytest.approx([0.0, 1.3], abs=0.01)
 
 
-def test_what_the_cell_does_not_handle_is_no_object_of_its(built, frame):
-    answer, _ = CellDetector(CONFIGS, "eye", base=Path(), classes=("cube",)).ask(frame)
-    assert [one.label for one in answer.found] == ["cube"]
+def test_what_the_cell_does_not_handle_is_no_object_of_its(build, frame):
+    answer, _ = build(classes=("cube",))[0].ask(frame)
+    assert answer.found == FOUND[:1]
 
 
-def test_an_unavailable_detector_says_why(built, frame):
-    built.answer = Unavailable("the server is gone")
-    detector = CellDetector(CONFIGS, "eye", base=Path())
+def test_an_unavailable_detector_says_why_and_one_that_never_answers_is_given_up(build, frame):
+    detector, eye = build(Unavailable("the server is gone"))
     for _ in range(2):
         with pytest.raises(Unavailable, match="the server is gone"):
             detector.ask(frame)
-    first, second = built.detectors[0].stamps
-    assert second - first == pytest.approx(1.3, abs=0.01)
+    assert eye.stamps == pytest.approx([0.0, 1.3], abs=0.01)
+    with pytest.raises(Unavailable, match="no answer within 60 s of the clock"):
+        build(None)[0].ask(frame)
 
 
-def test_a_detector_that_never_answers_is_given_up(built, frame):
-    built.answer = None
-    with pytest.raises(Unavailable, match=f"no answer within {TIMEOUT:g} s of the clock"):
-        CellDetector(CONFIGS, "eye", base=Path()).ask(frame)
-
-
-def test_frames_of_a_camera_are_searched_as_in_a_run(built, frame):
+def test_frames_of_a_camera_are_searched_as_in_a_run_and_other_images_as_a_whole(build, frame):
     camera = WHOLE_IMAGE.model_copy(update={"table_view": (0, 0, 256, 256)})
-    detector = CellDetector(CONFIGS, "eye", base=Path(), camera=camera, view="full")
+    detector, eye = build(camera=camera, view="table")
     detector.ask(frame)
-    assert built.cameras == [camera]
-    assert built.detectors[0].views == ["full"]
-
-
-def test_images_of_any_size_are_searched_as_a_whole(built, frame):
-    detector = CellDetector(CONFIGS, "eye", base=Path())
+    assert (eye.camera, eye.views) == (camera, ["table"])
+    detector, eye = build()
     detector.ask(frame)
-    assert built.detectors[0].views == ["full"]
+    assert eye.views == ["full"]
     for size in ((300, 100), (64, 900)):
-        assert parts_of("full", built.cameras[0].table_view, size) == [(0, 0, *size)]
+        assert parts_of("full", eye.camera.table_view, size) == [(0, 0, *size)]
     detector.close()
-    assert built.detectors[0].closed
+    assert eye.closed
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="the system cannot limit cores")
+def test_threads_begun_meanwhile_run_on_so_many_cores_and_later_ones_on_all():
+    before, threads = os.sched_getaffinity(0), cv2.getNumThreads()
+    with only_cores(1), ThreadPoolExecutor(1) as thread, only_cores(None):
+        assert (cv2.getNumThreads(), len(thread.submit(os.sched_getaffinity, 0).result())) == (1, 1)
+    assert (os.sched_getaffinity(0), cv2.getNumThreads()) == (before, threads)
+    with pytest.raises(InputError, match=r"processor cores here, not 4096; ask for fewer"), only_cores(4096):
+        pass

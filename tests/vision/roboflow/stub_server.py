@@ -18,6 +18,8 @@ MODEL = "shapes/1"
 DRIP = 0.05
 """Time between two bytes of a slow answer [s]."""
 
+Spoil = Callable[[list[dict[str, Any]], dict[str, Any]], Any]
+"""From what is there, and the answer around it, to the predictions that it says instead."""
 Finds = Callable[[np.ndarray], Sequence[Mapping[str, Any]]]
 """From an RGB image to predictions as the server says them."""
 
@@ -37,7 +39,6 @@ class StubServer:
         self.asked: list[tuple[str, dict[str, str], bytes]] = []
         """Path, headers and body of every request."""
         self.loaded: set[str] = set()
-        self._guard = threading.Lock()
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             self.port = free.getsockname()[1]
@@ -61,22 +62,16 @@ class StubServer:
         self._server.shutdown()
         self._server.server_close()
 
-    def next_fault(self) -> str:
-        with self._guard:
-            self.looks += 1
-            return self.faults(self.looks)
-
 
 class _Handler(BaseHTTPRequestHandler):
     stub: StubServer
 
     def do_GET(self) -> None:
-        self._note(b"")
         self._json({"models": [{"model_id": m, "task_type": "object-detection"} for m in self.stub.loaded]})
 
     def do_POST(self) -> None:
         body = self.rfile.read(int(self.headers["Content-Length"]))
-        self._note(body)
+        self.stub.asked.append((self.path, dict(self.headers), body))
         if self.path.startswith("/model/add"):
             self.stub.loaded.add(json.loads(body)["model_id"])
             self.do_GET()
@@ -87,7 +82,8 @@ class _Handler(BaseHTTPRequestHandler):
             self._answer(np.ascontiguousarray(bgr[..., ::-1]))
 
     def _answer(self, image: np.ndarray) -> None:
-        fault = self.stub.next_fault()
+        self.stub.looks += 1
+        fault = self.stub.faults(self.stub.looks)
         height, width = image.shape[:2]
         found = [dict(prediction) for prediction in self.stub.finds(image)]
         answer = {"inference_id": "1", "time": 0.01, "image": {"width": width, "height": height}}
@@ -99,7 +95,9 @@ class _Handler(BaseHTTPRequestHandler):
         elif fault == "drip":
             self._drip(json.dumps({**answer, "predictions": found}).encode())
         elif fault.isdecimal():
-            self._json({"message": f"key {self._key()} is no good"}, int(fault))
+            # A server may say anything: this one tells the key that it was given.
+            key = self.headers.get("Authorization", "").removeprefix("Bearer ")
+            self._json({"message": f"key {key} is no good"}, int(fault))
         elif fault in BODIES:
             self._send(BODIES[fault].encode(), "text/html" if fault == "html" else "application/json")
         else:
@@ -125,35 +123,20 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
         self.wfile.write(body)
 
-    def _note(self, body: bytes) -> None:
-        self.stub.asked.append((self.path, dict(self.headers), body))
-
-    def _key(self) -> str:
-        """A server may say anything: this one tells the key that it was given."""
-        return self.headers.get("Authorization", "").removeprefix("Bearer ")
-
     def log_message(self, format: str, *args: Any) -> None:
         """Keep quiet."""
 
 
-def _all(**values: Any) -> Callable[[list[dict[str, Any]], dict[str, Any]], Any]:
+def _all(**values: Any) -> Spoil:
     """Return what puts other values into every prediction; into one where there are none."""
     some = {"x": 9.0, "y": 9.0, "width": 6.0, "height": 6.0, "confidence": 0.9, "class": "cube"}
     return lambda found, answer: [{**one, **values} for one in found or [some]]
-
-
-def _without(key: str) -> Callable[[list[dict[str, Any]], dict[str, Any]], Any]:
-    return lambda found, answer: [
-        {name: value for name, value in one.items() if name != key} for one in _all()(found, answer)
-    ]
 
 
 def _other_size(found: list[dict[str, Any]], answer: dict[str, Any]) -> Any:
     answer["image"] = {"width": 1, "height": 1}
     return found
 
-
-TURNS = {"cube": "sphere", "sphere": "duck", "duck": "cube"}
 
 BODIES = {
     "broken json": '{"predictions": [{"x": 1',
@@ -167,7 +150,7 @@ BODIES = {
 }
 """Bodies of answers that are none."""
 
-SPOILT: Mapping[str, Callable[[list[dict[str, Any]], dict[str, Any]], Any]] = {
+SPOILT: Mapping[str, Spoil] = {
     "nan": _all(x=float("nan")),
     "infinite": _all(width=float("inf")),
     "negative": _all(width=-5.0),
@@ -177,14 +160,13 @@ SPOILT: Mapping[str, Callable[[list[dict[str, Any]], dict[str, Any]], Any]] = {
     "text for number": _all(x="12"),
     "null field": _all(y=None),
     "number for class": _all(**{"class": 3}),
-    "missing field": _without("confidence"),
+    "missing field": lambda found, answer: [{"x": 9.0, "y": 9.0, "width": 6.0, "height": 6.0}],
     "endless": lambda found, answer: _all()(found, answer) * 400,
     "other size": _other_size,
-    "doubtful": lambda found, answer: _all(confidence=0.2)(found, answer),
-    "swapped": lambda found, answer: [{**one, "class": TURNS.get(one["class"], "cube")} for one in found],
+    "doubtful": _all(confidence=0.2),
     "strangers": lambda found, answer: [*found, *_all(**{"class": "banana"})(found, answer)],
 }
-"""From what is there to what it says instead."""
+"""Faults of an answer that can be read."""
 
 
 def predictions(found: Sequence[Any]) -> Iterator[dict[str, Any]]:

@@ -1,16 +1,15 @@
-"""What a server said is checked before anybody believes it."""
+"""Answers of a server, checked before anybody believes them, and sentences about those that are none."""
 
 from __future__ import annotations
-
-import math
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from stub_server import SPOILT
 
 from executive.messages import Detection
 from executive.vision.detectors.roboflow.answers import read_answer
+from executive.vision.detectors.roboflow.complaints import failed, late, plain
+from executive.vision.detectors.roboflow.options import RoboflowOptions
 
 CUBE = {"x": 50.0, "y": 40.0, "width": 20, "height": 10.0, "confidence": 0.9, "class": "cube", "class_id": 0}
 
@@ -19,18 +18,11 @@ def answer(*predictions, **further):
     return {"time": 0.1, "image": {"width": 100, "height": 80}, "predictions": list(predictions), **further}
 
 
-def test_a_box_by_centre_and_size_becomes_one_by_its_corners():
-    (found,) = read_answer(answer(CUBE), (100, 80))
-    assert found == Detection("cube", 0.9, (40.0, 35.0, 60.0, 45.0))
-
-
-def test_nothing_found_is_an_answer():
+def test_boxes_by_centre_and_size_become_boxes_by_corners_cut_off_where_they_stick_out():
+    found = read_answer(answer(CUBE, {**CUBE, "x": 2.0}), (100, 80))
+    assert found[0] == Detection("cube", 0.9, (40.0, 35.0, 60.0, 45.0))
+    assert found[1].box == (0.0, 35.0, 12.0, 45.0)
     assert read_answer({"predictions": []}, (100, 80)) == []
-
-
-def test_a_box_that_sticks_out_a_little_is_cut_off():
-    (found,) = read_answer(answer({**CUBE, "x": 2.0}), (100, 80))
-    assert found.box == (0.0, 35.0, 12.0, 45.0)
 
 
 @pytest.mark.parametrize(
@@ -74,14 +66,6 @@ def test_values_are_not_repeated_for_they_may_be_secret():
     assert "SECRET" not in str(caught.value)
 
 
-@pytest.mark.parametrize("fault", sorted(set(SPOILT) - {"swapped", "strangers", "doubtful"}))
-def test_every_fault_of_the_stub_server_is_one(fault):
-    spoilt = answer()
-    spoilt["predictions"] = SPOILT[fault]([], spoilt)
-    with pytest.raises(ValueError):
-        read_answer(spoilt, (100, 80))
-
-
 NUMBERS = st.one_of(st.integers(), st.floats(), st.floats(-20, 120))
 SCALARS = st.one_of(st.none(), st.booleans(), st.text(max_size=3), NUMBERS)
 PREDICTIONS = st.fixed_dictionaries(
@@ -106,8 +90,37 @@ def test_whatever_a_server_says_only_sound_boxes_get_in(said):
         return
     for detection in found:
         left, top, right, bottom = detection.box
-        assert all(map(math.isfinite, detection.box))
         assert 0 <= left <= right <= 100
         assert 0 <= top <= bottom <= 80
-        assert 0 <= detection.confidence <= 1
-        assert detection.label
+        assert 0 <= detection.confidence <= 1 <= len(detection.label)
+
+
+HOST = "https://serverless.roboflow.com"
+OPTIONS = RoboflowOptions(url=f"{HOST}/", model_id="shapes/1")
+
+
+def test_somebody_elses_words_become_one_short_line():
+    assert plain("<html>\n\x1b[31m  red\x00 </html>") == "<html> [31m red </html>"
+    assert plain("a" * 1000) == "a" * 100 + "..."
+
+
+def test_a_sentence_says_what_where_and_what_to_look_at():
+    refused = {"failure": "status", "status": 404, "said": "no such\nmodel"}
+    assert failed(refused, OPTIONS) == (
+        f"{HOST} has no model shapes/1 (404: no such model); check model_id and url"
+    )
+    unknown = {"failure": "status", "status": 599, "said": ""}
+    assert failed(unknown, OPTIONS) == f"{HOST} gave no answer (599); look at its log"
+
+
+def test_a_deadline_that_has_passed_is_told_with_what_the_server_said_meanwhile():
+    for repeats, end in (
+        ((), "; look at its log and the network, or give it a longer deadline"),
+        (
+            (None, 429),
+            ", which has been asked too often (429); ask less often, or look at the plan of the account",
+        ),
+        ((599,), ", which gave no answer (599); look at its log"),
+        ((None,), ", to which there was no connection; is it running, and is url right?"),
+    ):
+        assert late(repeats, OPTIONS) == f"no answer within 1.0 s from {HOST}{end}"

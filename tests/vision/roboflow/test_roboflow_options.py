@@ -33,7 +33,11 @@ def configured(**options):
         ({"deadline": 0}, "deadline", "greater than 0"),
         ({"deadline": 61}, "deadline", "less than or equal to 60"),
         ({"class_map": {"a": 1}}, "class_map", "valid string"),
-        ({"labels": ["a"], "class_map": {"b": "cube"}}, "class_map", "names b, .* among its labels: a"),
+        (
+            {"labels": ["a"], "class_map": {"b": "cube"}},
+            "class_map",
+            "names b, .* it knows a$",
+        ),
         ({"full": "half"}, "full", "'whole' or 'tiles'"),
         ({"colour": 1}, "colour", "not permitted; its options: model_id"),
         (
@@ -53,14 +57,9 @@ def test_a_wrong_option_is_said_in_a_sentence_that_tells_no_secret(tmp_path, opt
     assert str(caught.value) == sentence
 
 
-@pytest.mark.parametrize(
-    "url", ["http://127.0.0.1:9001", "https://serverless.roboflow.com/", "http://[::1]:9001"]
-)
-def test_addresses_of_servers_are_right(tmp_path, url):
-    assert list(RoboflowDetector.check(configured(url=url), tmp_path, {})) == []
-
-
-def test_the_hosted_service_is_asked_where_no_address_is_given():
+def test_addresses_of_servers_are_right_and_the_hosted_service_is_asked_without_one(tmp_path):
+    for url in ("http://127.0.0.1:9001", "https://serverless.roboflow.com/", "http://[::1]:9001"):
+        assert list(RoboflowDetector.check(configured(url=url), tmp_path, {})) == []
     assert RoboflowOptions(model_id="shapes/1").url == "https://serverless.roboflow.com"
 
 
@@ -74,15 +73,10 @@ def test_the_classes_are_known_where_labels_are_given(tmp_path):
 def test_a_key_is_hidden_wherever_it_stands():
     key = ApiKey({"ROBOFLOW_API_KEY": SECRET})
     assert key.hidden_in(f"?api_key={SECRET}&x and {SECRET}") == "?api_key=***&x and ***"
-    assert SECRET not in repr(key)
+    assert repr(key) == "ApiKey(***)"
     assert key.is_set
-
-
-def test_a_key_with_odd_characters_is_hidden_in_json_too():
-    key = ApiKey({"ROBOFLOW_API_KEY": 'SECRET"\\12345'})
-    assert key.hidden_in(r'{"said": "SECRET\"\\12345"}') == '{"said": "***"}'
-
-
-def test_a_stand_in_for_a_key_is_no_secret():
+    odd = ApiKey({"ROBOFLOW_API_KEY": 'SECRET"\\12345'})
+    assert odd.hidden_in(r'{"said": "SECRET\"\\12345"}') == '{"said": "***"}'
+    # A stand-in for a key is no secret.
     assert ApiKey({"ROBOFLOW_API_KEY": "x"}).hidden_in('{"x": 1}') == '{"x": 1}'
     assert not ApiKey({}).is_set

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +13,14 @@ from numpy.typing import NDArray
 from executive.cell_config import DetectorConfig
 from executive.errors import DeadlinePassed, InputError, Unavailable
 from executive.messages import Detection, Frame
-from executive.vision.detectors.requests import Pending, Worker
+from executive.vision.detectors.requests import Pending
 from executive.vision.detectors.roboflow.answers import read_answer
 from executive.vision.detectors.roboflow.complaints import failed, late, unbelievable
 from executive.vision.detectors.roboflow.helper import Helper, NoAnswer
 from executive.vision.detectors.roboflow.key import ApiKey
 from executive.vision.detectors.roboflow.options import RoboflowOptions, wrong_roboflow
 from executive.vision.detectors.setting import Setting
-from executive.vision.detectors.views import Finding, Part, merge, parts_of, without_duplicates
+from executive.vision.detectors.views import Part, parts_of, search_parts, without_duplicates
 
 
 class RoboflowDetector:
@@ -40,7 +41,7 @@ class RoboflowDetector:
         self._setting = setting
         server = {"url": options.url, "model_id": options.model_id, "api": options.api}
         self._helper = Helper({**server, "confidence": config.floor}, key)
-        self._worker = Worker(setting.name)
+        self._thread = ThreadPoolExecutor(1, f"detector-{setting.name}")
 
     @classmethod
     def from_config(cls, config: DetectorConfig, setting: Setting) -> RoboflowDetector:
@@ -76,51 +77,33 @@ class RoboflowDetector:
         parts = [(0, 0, width, height)]
         if view != "full" or self._options.full == "tiles":
             parts = parts_of(view, self._setting.camera.table_view, (width, height))
-
-        def search() -> list[Detection]:
-            return self._search(frame.image, parts)
-
-        now = self._setting.clock.now
-        return Pending(
-            self._worker.submit(search),
-            now + self._config.latency,
-            self._setting.clock,
-            detector=self._setting.name,
-            reliability=self._config.reliability,
-            given_up=now + self._options.deadline,
-        )
+        work = self._thread.submit(lambda: self._search(frame.image, parts))
+        clock = self._setting.clock
+        due, given_up = clock.now + self._config.latency, clock.now + self._options.deadline
+        return Pending(work, due, clock, self._setting.name, self._config.reliability, given_up)
 
     def close(self) -> None:
         """End the helper process and the thread, whatever they are waiting for."""
         self._helper.stop()
-        self._worker.close()
+        self._thread.shutdown(cancel_futures=True)
         self._helper.close()
 
     def _search(self, image: NDArray[np.uint8], parts: Sequence[Part]) -> list[Detection]:
-        height, width = image.shape[:2]
         self._helper.wait_until_ready()
         until = time.monotonic() + self._options.deadline
-        findings = [Finding(found, part) for part in parts for found in self._search_part(image, part, until)]
-        return merge(findings, (width, height))
+        return search_parts(image, parts, lambda crop: self._find(crop, until), self._options.class_map)
 
-    def _search_part(self, image: NDArray[np.uint8], part: Part, until: float) -> list[Detection]:
-        """Return what the server finds in a part of an image, in the image's pixels."""
-        left, top, right, bottom = part
+    def _find(self, crop: NDArray[np.uint8], until: float) -> list[Detection]:
+        """Return what the server finds in a part of a frame, in that part's pixels."""
         try:
-            message = self._helper.ask(image[top:bottom, left:right], until)
+            message = self._helper.ask(crop, until)
         except NoAnswer as error:
             raise DeadlinePassed(late(error.repeats, self._options)) from None
         if "failure" in message:
             raise Unavailable(failed(message, self._options))
         try:
-            answer = read_answer(message["answer"], (right - left, bottom - top))
+            answer = read_answer(message["answer"], (crop.shape[1], crop.shape[0]))
         except ValueError as error:
             raise Unavailable(unbelievable(str(error), self._options)) from None
-        found = []
-        for detection in sorted(answer, key=lambda detection: -detection.confidence):
-            if detection.confidence >= self._config.floor:
-                x0, y0, x1, y1 = detection.box
-                label = self._options.class_map.get(detection.label, detection.label)
-                box = left + x0, top + y0, left + x1, top + y1
-                found.append(Detection(label, detection.confidence, box))
-        return without_duplicates(found)
+        found = [one for one in answer if one.confidence >= self._config.floor]
+        return without_duplicates(sorted(found, key=lambda one: -one.confidence))

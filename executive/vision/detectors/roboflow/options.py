@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 from pydantic import Field
 
 from executive.cell_config import DetectorConfig, Section
-from executive.vision.detectors.options import wrong_options
+from executive.vision.detectors.options import wrong_class_map, wrong_options
 from executive.vision.detectors.roboflow.key import VARIABLE
 
 HOSTED = "https://serverless.roboflow.com"
@@ -48,7 +48,12 @@ def wrong_roboflow(config: DetectorConfig) -> Iterator[tuple[str, str]]:
     """Yield every option because of which the detector could not be built, with a sentence."""
     wrong = list(wrong_options(RoboflowOptions, config))
     for option, sentence in wrong:
-        yield option, _no_secrets(option) if _is_secret(option) else sentence
+        if any(part in option.lower() for part in SECRETS):
+            sentence = (
+                f'"{option}" does not belong in a cell file, where everybody may read it; '
+                f"delete it there and set the environment variable {VARIABLE}"
+            )
+        yield option, sentence
     if wrong:
         return
     options = RoboflowOptions.model_validate(config.options)
@@ -63,13 +68,8 @@ def wrong_roboflow(config: DetectorConfig) -> Iterator[tuple[str, str]]:
             f"model_id must be project/version for v0, or a name such as rfdetr-nano, "
             f'not "{options.model_id}"',
         )
-    strangers = [name for name in options.class_map if options.labels and name not in options.labels]
-    if strangers:
-        yield (
-            "class_map",
-            f"class_map of a detector of kind {config.kind} names {', '.join(strangers)}, which is not among "
-            f"its labels: {', '.join(options.labels)}",
-        )
+    if options.labels:
+        yield from wrong_class_map(config, options.class_map, options.labels)
 
 
 def _wrong_url(url: str) -> Iterator[tuple[str, str]]:
@@ -83,14 +83,3 @@ def _wrong_url(url: str) -> Iterator[tuple[str, str]]:
         yield "url", "url must be an address such as http://127.0.0.1:9001 or https://serverless.roboflow.com"
     elif "@" in parts.netloc or parts.query or parts.fragment:
         yield "url", f"url must hold no user, query or fragment; a key goes into the variable {VARIABLE}"
-
-
-def _is_secret(option: str) -> bool:
-    return any(part in option.lower() for part in SECRETS)
-
-
-def _no_secrets(option: str) -> str:
-    return (
-        f'"{option}" does not belong in a cell file, where everybody may read it; '
-        f"delete it there and set the environment variable {VARIABLE}"
-    )
