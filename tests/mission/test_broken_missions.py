@@ -18,9 +18,10 @@ import pytest
 from click.testing import CliRunner
 
 from executive.cli.main import main
+from executive.cli.output import stdout_kept_clean
 from executive.discovery import discover
 from executive.mission.findings import CODES, Finding, MissionError
-from executive.mission.load import load_mission
+from executive.mission.load import Kinds, load_mission
 from executive.runtime.cells import cell_kind
 from executive.skill import Skill
 
@@ -59,16 +60,16 @@ def rendered(path: Path, findings: Iterable[Finding]) -> str:
 
 
 @pytest.fixture(scope="module")
-def look() -> Look:
+def look(shared_cells: None) -> Look:
     """What is wrong with a mission; each is loaded once."""
-    skills = discover()
-    return functools.cache(lambda path: findings_of(path, skills))
+    skills, kind = discover(), functools.cache(cell_kind)
+    return functools.cache(lambda path: findings_of(path, skills, kind))
 
 
-def findings_of(path: Path, skills: dict[str, type[Skill]]) -> tuple[Finding, ...]:
+def findings_of(path: Path, skills: dict[str, type[Skill]], kind: Kinds = cell_kind) -> tuple[Finding, ...]:
     """Return the findings of a mission."""
     try:
-        return load_mission(path, skills, kinds=cell_kind).warnings
+        return load_mission(path, skills, kinds=kind).warnings
     except MissionError as error:
         return error.findings
 
@@ -126,5 +127,6 @@ def test_nothing_is_found_in_a_shipped_mission_and_its_cell(path: Path, look: Lo
 
 if __name__ == "__main__":
     os.chdir(FOLDER)
-    texts = [rendered(path, findings_of(path, discover())) for path in BROKEN]
+    with stdout_kept_clean():
+        texts = [rendered(path, findings_of(path, discover())) for path in BROKEN]
     WORDS.write_text("".join(texts), encoding="utf-8")

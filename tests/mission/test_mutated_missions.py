@@ -33,6 +33,8 @@ from executive.runtime.run import Run
 from executive.skill import Skill
 from executive.testing.fake_cell import FakeCell
 
+pytestmark = pytest.mark.usefixtures("shared_cells")
+
 HERE = Path(__file__).parent
 MISSIONS = HERE.parents[1] / "missions"
 OWN_BASES = sorted((HERE / "bases").glob("*.yaml"))
