@@ -134,6 +134,7 @@ def test_no_renderer_draws(monkeypatch, run, why):
     ]
 
 
+@pytest.mark.slow
 def test_a_frame_is_really_drawn_in_a_process_of_its_own():
     milliseconds, problem = doctor.draw_in_process("tiny")
     assert (milliseconds > 1, problem) == (True, "")
