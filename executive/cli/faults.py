@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -20,20 +19,11 @@ from executive.cli.output import print_json, stdout_kept_clean
 from executive.cli.subject import load_subject, oracle_option
 
 
-class FaultNumbers(click.ParamType):
-    """`N`, or `N+M` for several at once."""
-
-    name = "N[+M]"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[int, ...]:
-        """Return the numbers that `value` names."""
-        if isinstance(value, tuple):
-            return value
-        if re.fullmatch(r"\d+(\+\d+)*", str(value)) is None:
-            self.fail(f'"{value}" is no fault; write it as 12, or 3+12 for two at once', param, ctx)
-        return tuple(dict.fromkeys(int(number) for number in str(value).split("+")))
+def fault_numbers(text: str) -> tuple[int, ...]:
+    """Return the numbers that `N`, or `N+M` for several at once, names."""
+    if re.fullmatch(r"\d+(\+\d+)*", text) is None:
+        raise click.BadParameter(f'"{text}" is no fault; write it as 12, or 3+12 for two at once')
+    return tuple(dict.fromkeys(int(number) for number in text.split("+")))
 
 
 @click.command(name="faults")
@@ -42,7 +32,10 @@ class FaultNumbers(click.ParamType):
 @click.option(
     "--pairs", type=click.IntRange(min=1), help="Instead, so many pairs of them, drawn by the seed."
 )
-@click.option("--fault", "numbers", type=FaultNumbers(), help="One of them only, with a record of its run.")
+@click.option(
+    "--fault", "numbers", type=fault_numbers, metavar="N[+M]",
+    help="One of them only, with a record of its run.",
+)  # fmt: skip
 @click.option(
     "--list", "listed", is_flag=True, help="Print them, and run nothing but the undisturbed mission."
 )
