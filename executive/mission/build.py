@@ -119,7 +119,7 @@ class Builder:
 
     def _parallel(self, site: Site, node: nodes.ParallelNode) -> TreeNode:
         branches = self._all(node.branches)
-        wait_for = node.wait_for.value if isinstance(node.wait_for, Literal) else "all"
+        wait_for: Any = getattr(node.wait_for, "value", "all")
         if wait_for == "lead":
             return Beside(site, branches)
         count = {"all": None, "any": 1}.get(wait_for, wait_for)
