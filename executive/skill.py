@@ -10,7 +10,7 @@ alike.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, get_args, get_origin, get_type_hints
 
@@ -108,18 +108,6 @@ class Port:
         return self.direction is Direction.IN and self.default is ...
 
 
-@dataclass(frozen=True)
-class _Declared:
-    """What `param` and `port` leave in a class body until the class is complete."""
-
-    default: Any
-    ge: float | None
-    le: float | None
-    choices: tuple[Any, ...] | None
-    refers: str
-    doc: str
-
-
 def param(
     default: Any = ...,
     *,
@@ -130,12 +118,13 @@ def param(
     doc: str = "",
 ) -> Any:
     """Declare a param of a skill; see `Param` for what the arguments mean."""
-    return _Declared(default, ge, le, choices, refers, doc)
+    # Name, type and unit are known when the class is complete.
+    return Param("", None, "", default, ge, le, choices, refers, doc)
 
 
 def port(*, default: Any = ..., refers: str = "", doc: str = "") -> Any:
     """Give an input port a default for when it is not wired, or a port what it names and its sentence."""
-    return _Declared(default, None, None, None, refers, doc)
+    return param(default, refers=refers, doc=doc)
 
 
 class SkillFailed(Exception):
@@ -184,20 +173,16 @@ class Skill:
             declared = cls.__dict__.get(name)
             direction = next((mark for mark in marks if isinstance(mark, Direction)), None)
             if direction is not None:
-                default = declared.default if isinstance(declared, _Declared) else ...
-                refers, doc = (declared.refers, declared.doc) if isinstance(declared, _Declared) else ("", "")
-                ports[name] = Port(name, base, direction, default, refers, doc)
-            elif isinstance(declared, _Declared):
+                given = declared if isinstance(declared, Param) else port()
+                ports[name] = Port(name, base, direction, given.default, given.refers, given.doc)
+            elif isinstance(declared, Param):
                 unit = next((mark for mark in marks if isinstance(mark, str)), "")
-                params[name] = Param(
-                    name, base, unit, declared.default, declared.ge, declared.le, declared.choices,
-                    declared.refers, declared.doc,
-                )  # fmt: skip
+                params[name] = replace(declared, name=name, type=base, unit=unit)
             else:
                 raise TypeError(
                     f"{cls.__qualname__}.{name}: a skill's attribute is an In[...], Out[...] or param(...)"
                 )
-            if isinstance(declared, _Declared):
+            if isinstance(declared, Param):
                 delattr(cls, name)
         cls.params, cls.ports = params, ports
 
@@ -251,7 +236,7 @@ def _require_annotations(skill: type[Skill]) -> None:
         TypeError: A declaration has no annotation.
     """
     for name, declared in vars(skill).items():
-        if isinstance(declared, _Declared) and name not in skill.__annotations__:
+        if isinstance(declared, Param) and name not in skill.__annotations__:
             plain = isinstance(declared.default, bool | int | float | str)
             kind = type(declared.default).__name__ if plain else "int"
             raise TypeError(

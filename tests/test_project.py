@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -103,20 +104,12 @@ def test_what_is_wrong_is_said_with_the_file(write: Write, text: str, says: str)
         registers()
 
 
-def test_a_file_that_is_no_text_is_refused(write: Write) -> None:
+def test_a_file_that_cannot_be_read_is_refused(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     file = write("")
     file.write_bytes(b'name = "\xff"')
     with pytest.raises(InputError, match=f"^{re.escape(str(file))} is not UTF-8 text: byte 8 does not fit$"):
         project_here()
-
-
-def test_a_file_that_cannot_be_read_is_refused(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
-    file = write("")
-
-    def locked(path: Path) -> bytes:
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr(Path, "read_bytes", locked)
+    monkeypatch.setattr(Path, "read_bytes", Mock(side_effect=PermissionError(13, "Permission denied")))
     with pytest.raises(InputError) as caught:
         project_here()
     assert str(caught.value) == (

@@ -29,7 +29,7 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
     with stdout_kept_clean():
         from executive.discovery import discover
         from executive.errors import InputError
-        from executive.mission.findings import Finding, MissionError
+        from executive.mission.findings import Finding
         from executive.mission.load import load_mission
         from executive.runtime.cells import cell_kind
 
@@ -37,21 +37,16 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
         reports: list[dict[str, Any]] = []
         texts = []
         for mission in missions:
-            report: dict[str, Any] = {"mission": mission, "ok": False, "findings": [], "endings": []}
             try:
                 loaded = load_mission(mission, skills, overrides, cell_kind)
-                report["findings"] = [asdict(finding) for finding in loaded.warnings]
-                report["endings"] = [asdict(ending) for ending in loaded.endings]
-                report["ok"] = True
-                texts.append(_verdict(mission, loaded.warnings, loaded.endings))
-            except MissionError as error:
-                report["findings"] = [asdict(finding) for finding in error.findings]
-                texts.append(str(error))
+                findings, endings, ok = loaded.warnings, loaded.endings, True
+                texts.append(_verdict(mission, findings, endings))
             except InputError as error:
-                finding = Finding(mission, 0, 0, "error", "no-mission", str(error))
-                report["findings"] = [asdict(finding)]
+                missing = (Finding(mission, 0, 0, "error", "no-mission", str(error)),)
+                findings, endings, ok = getattr(error, "findings", missing), (), False
                 texts.append(str(error))
-            reports.append(report)
+            parts = {"findings": [*map(asdict, findings)], "endings": [*map(asdict, endings)]}
+            reports.append({"mission": mission, "ok": ok, **parts})
     if as_json:
         print_json(reports)
     else:

@@ -20,20 +20,11 @@ from executive.cli.output import print_json, stdout_kept_clean
 from executive.cli.subject import load_subject, oracle_option
 
 
-class FaultNumbers(click.ParamType):
-    """`N`, or `N+M` for several at once."""
-
-    name = "N[+M]"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[int, ...]:
-        """Return the numbers that `value` names."""
-        if isinstance(value, tuple):
-            return value
-        if re.fullmatch(r"\d+(\+\d+)*", str(value)) is None:
-            self.fail(f'"{value}" is no fault; write it as 12, or 3+12 for two at once', param, ctx)
-        return tuple(dict.fromkeys(int(number) for number in str(value).split("+")))
+def fault_numbers(text: str) -> tuple[int, ...]:
+    """Return the numbers that `N`, or `N+M` for several at once, names."""
+    if re.fullmatch(r"\d+(\+\d+)*", text) is None:
+        raise click.BadParameter(f'"{text}" is no fault; write it as 12, or 3+12 for two at once')
+    return tuple(dict.fromkeys(int(number) for number in text.split("+")))
 
 
 @click.command(name="faults")
@@ -42,7 +33,10 @@ class FaultNumbers(click.ParamType):
 @click.option(
     "--pairs", type=click.IntRange(min=1), help="Instead, so many pairs of them, drawn by the seed."
 )
-@click.option("--fault", "numbers", type=FaultNumbers(), help="One of them only, with a record of its run.")
+@click.option(
+    "--fault", "numbers", type=fault_numbers, metavar="N[+M]",
+    help="One of them only, with a record of its run.",
+)  # fmt: skip
 @click.option(
     "--list", "listed", is_flag=True, help="Print them, and run nothing but the undisturbed mission."
 )
@@ -85,22 +79,17 @@ def command(
         subject = load_subject(mission, overrides, oracle, seed)
         with bar("tried", quiet=as_json or listed or numbers is not None) as progress:
             campaign = Campaign(subject, workers=workers, progress=progress, halting=say_halting)
+            plain: Any
             if listed:
-                figures = trial = None
+                plain = [{"fault": number, "told": str(one)} for number, one in enumerate(campaign.faults, 1)]
+                text, code = "\n".join(f"{fault['fault']:4} {fault['told']}" for fault in plain), 0
             elif numbers is not None:
-                these = campaign.these(numbers)
-                figures, (trial, path) = None, record(subject, campaign.rehearsal, these, runs)
+                trial, path = record(subject, campaign.rehearsal, campaign.these(numbers), runs)
+                plain = {**trial_as_plain(trial), "run": str(path)}
+                text, code = f"{trial_text(trial)}\n{path}", int(bool(trial.problems))
             else:
-                figures, trial = campaign.pairs(pairs) if pairs else campaign.singles(), None
-    if figures is not None:
-        print_json(as_plain(figures)) if as_json else click.echo(fault_text(figures))
-        ctx.exit(int(bool(figures.failed)) if figures.complete else 130)
-    if trial is not None:
-        told = {**trial_as_plain(trial), "run": str(path)}
-        print_json(told) if as_json else click.echo(f"{trial_text(trial)}\n{path}")
-        ctx.exit(int(bool(trial.problems)))
-    faults = [(number, str(fault)) for number, fault in enumerate(campaign.faults, 1)]
-    if as_json:
-        print_json([{"fault": number, "told": told} for number, told in faults])
-    else:
-        click.echo("\n".join(f"{number:4} {told}" for number, told in faults))
+                figures = campaign.pairs(pairs) if pairs else campaign.singles()
+                plain, text = as_plain(figures), fault_text(figures)
+                code = int(bool(figures.failed)) if figures.complete else 130
+    print_json(plain) if as_json else click.echo(text)
+    ctx.exit(code)

@@ -3,32 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import click
 
 
-class Override(click.ParamType):
-    """`KEY=VALUE`."""
-
-    name = "KEY=VALUE"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[str, str]:
-        """Return the two sides of the first equals sign."""
-        if isinstance(value, tuple):
-            return value
-        key, equals, text = str(value).partition("=")
-        if not key or not equals:
-            self.fail(f'"{value}" is no override; write it as KEY=VALUE, for instance attempts=5', param, ctx)
-        return key, text
-
-
-def _once(ctx: click.Context, param: click.Parameter, values: tuple[tuple[str, str], ...]) -> dict[str, str]:
-    """Return the overrides by key; the same key twice is a mistake, not a choice."""
+def _by_key(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, str]:
+    """Return the overrides, each given as `KEY=VALUE`; the same key twice is a mistake, not a choice."""
     overrides: dict[str, str] = {}
-    for key, text in values:
+    for value in values:
+        key, equals, text = value.partition("=")
+        if not key or not equals:
+            message = f'"{value}" is no override; write it as KEY=VALUE, for instance attempts=5'
+            raise click.BadParameter(message, ctx, param)
         if key in overrides:
             raise click.BadParameter(f'"{key}" is set twice', ctx, param)
         overrides[key] = text
@@ -38,7 +24,7 @@ def _once(ctx: click.Context, param: click.Parameter, values: tuple[tuple[str, s
 MISSION = click.argument("mission", metavar="MISSION")
 
 overrides_option = click.option(
-    "--set", "overrides", type=Override(), multiple=True, callback=_once,
+    "--set", "overrides", metavar="KEY=VALUE", multiple=True, callback=_by_key,
     help="Give a param another value, or with cell.KEY.KEY the cell; repeatable.",
 )  # fmt: skip
 runs_option = click.option(

@@ -111,12 +111,8 @@ def _require_sense(ctx: click.Context, mission: str | None, resume: str | None) 
         raise click.UsageError("name a MISSION, or a run to take up again with --resume RUN")
     if resume is None:
         return
-    given = [
-        name
-        for name in ("mission", "seed", "overrides", "requests")
-        if ctx.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT
-    ]
-    if given:
+    sources = map(ctx.get_parameter_source, ("mission", "seed", "overrides", "requests"))
+    if any(source is not click.core.ParameterSource.DEFAULT for source in sources):
         raise click.UsageError(
             "--resume takes mission, seed, params and requests from the run: leave them out here"
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -145,8 +145,11 @@ def _fully(facts: Facts) -> str:
         lines += [f"{title}:", *([_entry(port) for port in _ports(facts, way)] or ["  nothing"])]
     lines += ["params:", *([_entry(param) for param in facts["params"]] or ["  none"])]
     lines.append(f"may fail with: {', '.join(facts['reasons']) or 'nothing'}")
-    lines.append("; ".join(_effects(facts)))
-    lines.append(_tool(facts["tool"]))
+    effects = ("senses" if facts["senses"] else "", "moves the arm" if facts["moves"] else "")
+    lines.append("; ".join(filter(None, (f"uses: {', '.join(facts['uses']) or 'nothing'}", *effects))))
+    tool = facts["tool"]
+    left = "".join(f", {state} after {ending}" for ending, state in tool["left"].items())
+    lines.append(f"tool: {tool['before']} before, {tool['after']} after{left}")
     return "\n".join(lines)
 
 
@@ -174,17 +177,3 @@ def _entry(of: Facts) -> str:
         text, _WIDTH, initial_indent="  ", subsequent_indent=" " * 6,
         break_long_words=False, break_on_hyphens=False,
     )  # fmt: skip
-
-
-def _effects(facts: Facts) -> Iterator[str]:
-    """Yield what a skill uses and does."""
-    yield f"uses: {', '.join(facts['uses']) or 'nothing'}"
-    if facts["senses"]:
-        yield "senses"
-    if facts["moves"]:
-        yield "moves the arm"
-
-
-def _tool(tool: Facts) -> str:
-    left = "".join(f", {state} after {ending}" for ending, state in tool["left"].items())
-    return f"tool: {tool['before']} before, {tool['after']} after{left}"

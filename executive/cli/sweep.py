@@ -12,27 +12,22 @@ from executive.cli.options import MISSION, json_option, overrides_option, runs_o
 from executive.cli.output import print_json, stdout_kept_clean
 
 
-class SeedRange(click.ParamType):
-    """`A-B`, both included, or a single seed."""
-
-    name = "A-B"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> range:
-        """Return the seeds that `value` names."""
-        if isinstance(value, range):
-            return value
-        match = re.fullmatch(r"(\d+)(?:-(\d+))?", str(value))
-        if match is None:
-            self.fail(f'"{value}" is no range of seeds; write it as 0-99', param, ctx)
-        first, last = int(match[1]), int(match[2] or match[1])
-        if last < first:
-            self.fail(f'"{value}" holds no seed: {last} is less than {first}', param, ctx)
-        return range(first, last + 1)
+def seed_range(text: str) -> range:
+    """Return the seeds that `A-B`, both included, or a single seed names."""
+    match = re.fullmatch(r"(\d+)(?:-(\d+))?", text)
+    if match is None:
+        raise click.BadParameter(f'"{text}" is no range of seeds; write it as 0-99')
+    first, last = int(match[1]), int(match[2] or match[1])
+    if last < first:
+        raise click.BadParameter(f'"{text}" holds no seed: {last} is less than {first}')
+    return range(first, last + 1)
 
 
 @click.command(name="sweep")
 @MISSION
-@click.option("--seeds", type=SeedRange(), required=True, help="First and last seed, for instance 0-99.")
+@click.option(
+    "--seeds", type=seed_range, metavar="A-B", required=True, help="First and last seed, for instance 0-99."
+)
 @workers_option
 @click.option("--frames", is_flag=True, help="Save the pictures behind every decision.")
 @overrides_option

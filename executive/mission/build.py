@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from math import inf
@@ -30,7 +30,7 @@ from executive.events import Emit
 from executive.mission.load import LoadedMission
 from executive.mission.model import nodes
 from executive.mission.model.typed import convert
-from executive.mission.model.values import Match
+from executive.mission.model.values import Literal, Match, Value
 from executive.mission.model.wiring import literals, wires
 from executive.skill import Direction, Param, Port, Skill
 
@@ -75,66 +75,62 @@ class Builder:
 
     def node(self, node: nodes.Node) -> TreeNode:
         """Return the behaviour for a node."""
-        return _BUILDERS[type(node)](self, node)
-
-    def _site(self, node: nodes.Node) -> Site:
-        return Site(node.path, node.label, self.emit)
+        site = Site(node.path, node.label, self.emit)
+        match node:
+            case nodes.SkillNode():
+                return self._skill(site, node)
+            case nodes.SequenceNode():
+                return SequenceOf(site, self._all(node.steps))
+            case nodes.FallbackNode():
+                return Fallback(site, self._all(node.choices))
+            case nodes.ParallelNode():
+                return self._parallel(site, node)
+            case nodes.RetryNode():
+                return self._retry(site, node)
+            case nodes.RepeatNode():
+                times = None if node.times is None else _constant(node.times, int)
+                return Repeat(site, self.node(node.do), times, _names(node.until))
+            case nodes.WhileNode():
+                return While(site, self.node(node.condition), self.node(node.do))
+            case nodes.ForEachNode(each=each, source=source):
+                elements = source.value if isinstance(source, Literal) else source.name
+                return ForEach(site, self.node(node.do), self.scope, each.name, elements)
+            case nodes.TryNode():
+                handlers = [(_names(catch.on), self.node(catch.do)) for catch in node.catches]
+                return Try(site, self.node(node.do), handlers, self._maybe(node.finish))
+            case nodes.TimeoutNode():
+                return Timeout(site, self.node(node.do), _constant(node.seconds, float), self.cell.clock)
+            case nodes.InvertNode():
+                return Invert(site, self.node(node.do))
+            case nodes.SucceedNode():
+                return Succeed(site, self._maybe(node.do))
+            case nodes.UseNode(body=nodes.Node() as written):
+                body = self.node(written)
+                root = SequenceOf(site, [body]) if node.label else body
+                root.subtrees = (node.name, *root.subtrees)
+                return root
+        raise AssertionError(f"a checked mission has no {type(node).__name__}")
 
     def _all(self, children: Sequence[nodes.Node]) -> list[TreeNode]:
         return [self.node(child) for child in children]
 
-    def _sequence(self, node: Any) -> TreeNode:
-        return SequenceOf(self._site(node), self._all(node.steps))
+    def _maybe(self, child: nodes.Node | None) -> TreeNode | None:
+        return None if child is None else self.node(child)
 
-    def _fallback(self, node: Any) -> TreeNode:
-        return Fallback(self._site(node), self._all(node.choices))
+    def _parallel(self, site: Site, node: nodes.ParallelNode) -> TreeNode:
+        branches = self._all(node.branches)
+        wait_for: Any = getattr(node.wait_for, "value", "all")
+        if wait_for == "lead":
+            return Beside(site, branches)
+        count = {"all": None, "any": 1}.get(wait_for, wait_for)
+        return Parallel(site, branches, count, _constant(node.halt, bool))
 
-    def _parallel(self, node: Any) -> TreeNode:
-        if node.wait_for.value == "lead":
-            return Beside(self._site(node), self._all(node.branches))
-        count = {"all": None, "any": 1}.get(node.wait_for.value, node.wait_for.value)
-        return Parallel(self._site(node), self._all(node.branches), count, convert(node.halt.value, bool))
+    def _retry(self, site: Site, node: nodes.RetryNode) -> TreeNode:
+        recover, attempts = self._maybe(node.recover), _constant(node.attempts, int)
+        backoff, do = _backoff(node.backoff), self.node(node.do)
+        return Retry(site, do, attempts, _names(node.on), recover, backoff, self.cell.clock)
 
-    def _retry(self, node: Any) -> TreeNode:
-        recover = None if node.recover is None else self.node(node.recover)
-        attempts, backoff = convert(node.attempts.value, int), _backoff(node.backoff)
-        return Retry(
-            self._site(node), self.node(node.do), attempts, _names(node.on), recover, backoff, self.cell.clock
-        )
-
-    def _repeat(self, node: Any) -> TreeNode:
-        times = None if node.times is None else convert(node.times.value, int)
-        return Repeat(self._site(node), self.node(node.do), times, _names(node.until))
-
-    def _while(self, node: Any) -> TreeNode:
-        return While(self._site(node), self.node(node.condition), self.node(node.do))
-
-    def _for_each(self, node: Any) -> TreeNode:
-        source = node.source.value if hasattr(node.source, "value") else node.source.name
-        return ForEach(self._site(node), self.node(node.do), self.scope, node.each.name, source)
-
-    def _try(self, node: Any) -> TreeNode:
-        handlers = [(_names(catch.on), self.node(catch.do)) for catch in node.catches]
-        finish = None if node.finish is None else self.node(node.finish)
-        return Try(self._site(node), self.node(node.do), handlers, finish)
-
-    def _timeout(self, node: Any) -> TreeNode:
-        seconds = convert(node.seconds.value, float)
-        return Timeout(self._site(node), self.node(node.do), seconds, self.cell.clock)
-
-    def _invert(self, node: Any) -> TreeNode:
-        return Invert(self._site(node), self.node(node.do))
-
-    def _succeed(self, node: Any) -> TreeNode:
-        return Succeed(self._site(node), None if node.do is None else self.node(node.do))
-
-    def _use(self, node: Any) -> TreeNode:
-        body = self.node(node.body)
-        root = SequenceOf(self._site(node), [body]) if node.label else body
-        root.subtrees = (node.name, *root.subtrees)
-        return root
-
-    def _skill(self, node: Any) -> TreeNode:
+    def _skill(self, site: Site, node: nodes.SkillNode) -> TreeNode:
         skill = self.skills[node.skill]
         declared: dict[str, Param | Port] = {**skill.params, **skill.ports}
         wiring = Wiring(
@@ -143,7 +139,7 @@ class Builder:
             outputs={wire.port.name: wire.variable for wire in wires(node, skill, Direction.OUT)},
         )
         runs = self._substitute(node.path) or skill
-        return SkillNode(self._site(node), node.skill, runs, wiring, self.cell, self.scope)
+        return SkillNode(site, node.skill, runs, wiring, self.cell, self.scope)
 
     def _substitute(self, path: str) -> type[Skill] | None:
         fitting = [pattern for pattern in self.substitutes if fnmatchcase(path, pattern)]
@@ -155,29 +151,15 @@ def _names(matches: Sequence[Match]) -> list[tuple[str, str]]:
     return [(match.source, match.reason) for match in matches]
 
 
-def _backoff(node: Any) -> Backoff | None:
-    if node is None:
+def _constant(value: Value, declared: Any) -> Any:
+    """Return a constant as the type declared for it; the check has found that it fits."""
+    assert isinstance(value, Literal)
+    return convert(value.value, declared)
+
+
+def _backoff(backoff: nodes.Backoff | None) -> Backoff | None:
+    if backoff is None:
         return None
-
-    first, factor, most = (
-        inf if value is None else convert(value.value, float)
-        for value in (node.first, node.factor, node.most)
-    )
+    times = (backoff.first, backoff.factor, backoff.most)
+    first, factor, most = (inf if value is None else _constant(value, float) for value in times)
     return Backoff(first, factor, most)
-
-
-_BUILDERS: Mapping[type[nodes.Node], Callable[[Builder, Any], TreeNode]] = {
-    nodes.SkillNode: Builder._skill,
-    nodes.SequenceNode: Builder._sequence,
-    nodes.FallbackNode: Builder._fallback,
-    nodes.ParallelNode: Builder._parallel,
-    nodes.RetryNode: Builder._retry,
-    nodes.RepeatNode: Builder._repeat,
-    nodes.WhileNode: Builder._while,
-    nodes.ForEachNode: Builder._for_each,
-    nodes.TryNode: Builder._try,
-    nodes.TimeoutNode: Builder._timeout,
-    nodes.InvertNode: Builder._invert,
-    nodes.SucceedNode: Builder._succeed,
-    nodes.UseNode: Builder._use,
-}

@@ -17,6 +17,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from executive.cli.main import main
+from executive.mission.text.files import shipped_missions
 
 MISSION = """\
 mission: small
@@ -136,24 +137,6 @@ def test_a_mistake_in_a_file_is_told_once_and_nothing_moves(write: Callable[...,
 
 
 @pytest.mark.parametrize(
-    ("name", "expected"),
-    [
-        ("sort_overhed", 'there is no mission file "sort_overhed", and no shipped mission of that name. Did you mean "sort_overhead"? Shipped missions: detector_cascade, inspect_then_sort, kit_fasteners, pick_on_request, recycle, sort_by_priority, sort_fasteners, sort_fruit, sort_overhead, sort_stacked, sort_wrist, tray_instruments.\n'),
-        ("nowhere.yaml", 'there is no mission file "nowhere.yaml", and no shipped mission of that name. Shipped missions: detector_cascade, inspect_then_sort, kit_fasteners, pick_on_request, recycle, sort_by_priority, sort_fasteners, sort_fruit, sort_overhead, sort_stacked, sort_wrist, tray_instruments.\n'),
-        ("cells", '"cells" is a folder; name one of its files\n'),
-    ],
-)  # fmt: skip
-def test_a_mission_that_is_not_there_is_told_with_those_that_are(
-    write: Callable[..., int], name: str, expected: str
-) -> None:
-    write()
-    ran = invoke("run", name)
-    assert (ran.exit_code, ran.stdout, ran.stderr) == (2, "", expected)
-    checked = invoke("check", name)
-    assert (checked.exit_code, checked.stdout, checked.stderr) == (2, expected, "")
-
-
-@pytest.mark.parametrize(
     ("override", "expected"),
     [
         (
@@ -185,20 +168,33 @@ def test_a_wrong_override_is_shown_as_it_was_given(
     assert ran.stderr == dedent(expected).lstrip("\n")
 
 
-def test_a_request_for_nothing_known_is_told_with_what_there_is(write: Callable[..., int]) -> None:
-    write()
-    ran = invoke("run", "m.yaml", "--runs", "runs", "--request", "cube", "--request", "banana")
-    assert (ran.exit_code, ran.stdout) == (2, "")
-    assert ran.stderr == 'cannot pick "banana"; ask for one of: cube, sphere, duck\n'
-
-
+@pytest.mark.slow
 def test_a_whole_process_says_the_same_and_ends_with_the_same_code(write: Callable[..., int]) -> None:
     write(("- Localize", "- Localise"))
     done = subprocess.run(
         [sys.executable, "-m", "executive.cli.main", "run", "m.yaml"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == dedent(CASES["an unknown skill"].expected).lstrip("\n")
+
+
+SHIPPED = f"Shipped missions: {', '.join(shipped_missions())}.\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("sort_overhed", f'there is no mission file "sort_overhed", and no shipped mission of that name. Did you mean "sort_overhead"? {SHIPPED}'),
+        ("nowhere.yaml", f'there is no mission file "nowhere.yaml", and no shipped mission of that name. {SHIPPED}'),
+        ("cells", '"cells" is a folder; name one of its files\n'),
+        ("m.yaml --request cube --request banana", 'cannot pick "banana"; ask for one of: cube, sphere, duck\n'),
+    ],
+)  # fmt: skip
+def test_what_is_not_there_is_told_with_what_is(write: Callable[..., int], words: str, expected: str) -> None:
+    write()
+    ran = invoke("run", *words.split(), "--runs", "runs")
+    assert (ran.exit_code, ran.stdout, ran.stderr) == (2, "", expected)
+    if "--request" not in words:
+        checked = invoke("check", words)
+        assert (checked.exit_code, checked.stdout, checked.stderr) == (2, expected, "")

@@ -72,6 +72,7 @@ def test_evaluate_shows_how_many_images_were_searched(at_terminal: Callable[...,
     assert "asking embedded" in shown.stderr and "2/2" in shown.stderr
 
 
+@pytest.mark.slow
 def test_dataset_shows_how_many_images_were_rendered(
     at_terminal: Callable[..., Result], tmp_path: Path
 ) -> None:

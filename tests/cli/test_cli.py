@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -89,13 +90,6 @@ def test_sigterm_that_is_to_be_ignored_is_ignored(project, monkeypatch):
         signal.signal(signal.SIGTERM, before)
 
 
-def test_help_names_every_command_and_every_exit_code():
-    shown = invoke("--help")
-    assert shown.exit_code == 0
-    assert all(f"  {command} " in shown.stdout for command in COMMANDS)
-    assert "0 success, 1 mission failed, 2 bad input, 3 fault, 130 halted" in shown.stdout
-
-
 def test_help_loads_nothing_heavy():
     code = (
         "import sys; from executive.cli.main import main\n"
@@ -106,57 +100,6 @@ def test_help_loads_nothing_heavy():
     ).stdout.split()
     assert "click" in loaded
     assert not {"numpy", "pydantic", "py_trees", "pybullet", "cv2", "rich", "yaml"} & set(loaded)
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_explains_itself(command):
-    assert invoke(command, "--help").exit_code == 0
-
-
-def test_a_misspelt_command_is_recognized():
-    shown = invoke("chekc", "x")
-    assert shown.exit_code == 2
-    assert 'there is no command "chekc"; did you mean "check"?' in shown.stderr
-
-
-@pytest.mark.parametrize(("status", "code"), [("SUCCESS", 0), ("FAILURE", 1), ("FAULT", 3), ("HALTED", 130)])
-def test_a_run_ends_with_the_exit_code_of_its_outcome(project, status, code):
-    project.result["status"] = status
-    assert invoke("run", "sort", "--quiet").exit_code == code
-
-
-def test_a_run_passes_on_everything_it_was_asked_for(project):
-    invoke(
-        "run", "sort", "--seed", "7", "--set", "a=1", "--set", "b=x=y", "--runs", "out", "--realtime",
-        "--request", "cube", "--request", "duck",
-    )  # fmt: skip
-    assert project.load == [("sort", {"a": "1", "b": "x=y"})]
-    (options,) = project.run
-    assert (options["seed"], str(options["runs"]), options["gui"], options["realtime"]) == (
-        7,
-        "out",
-        False,
-        True,
-    )
-    assert options["requests"] == ("cube", "duck")
-    assert options["views"]
-
-
-def test_without_requests_the_operator_is_asked(project):
-    invoke("run", "sort")
-    assert project.run[0]["requests"] is None
-
-
-def test_json_is_the_only_thing_on_standard_output(project, tmp_path):
-    shown = invoke("run", "sort", "--json")
-    assert json.loads(shown.stdout) == RESULT
-    assert "repeat: executive run sort --seed 0" in shown.stderr
-
-
-def test_quiet_is_silent(project):
-    shown = invoke("run", "sort", "--quiet")
-    assert shown.output == ""
-    assert project.run[0]["views"] == []
 
 
 def test_quiet_tells_the_story_of_a_run_that_does_not_succeed(missions, tmp_path):
@@ -190,78 +133,6 @@ print_json([1])
     assert done.stderr == "from Python\n"
 
 
-@pytest.mark.parametrize("override", ["novalue", "=1"])
-def test_an_override_without_key_or_value_is_explained(project, override):
-    shown = invoke("run", "sort", "--set", override)
-    assert shown.exit_code == 2
-    assert f'"{override}" is no override; write it as KEY=VALUE' in shown.stderr
-
-
-def test_an_override_given_twice_is_refused(project):
-    shown = invoke("run", "sort", "--set", "a=1", "--set", "a=2")
-    assert shown.exit_code == 2
-    assert '"a" is set twice' in shown.stderr
-
-
-def test_bad_input_is_its_text_and_nothing_else(project):
-    project.load_error = InputError('there is no mission "sort"')
-    shown = invoke("run", "sort")
-    assert (shown.exit_code, shown.stdout, shown.stderr) == (2, "", 'there is no mission "sort"\n')
-
-
-def test_a_fault_outside_of_the_tree_ends_with_its_code(project):
-    project.run_error = Fault("the simulator is gone")
-    shown = invoke("run", "sort", "--quiet")
-    assert (shown.exit_code, shown.stderr) == (3, "the simulator is gone\n")
-
-
-def test_a_second_ctrl_c_ends_with_130(project):
-    project.run_error = KeyboardInterrupt()
-    assert invoke("run", "sort", "--quiet").exit_code == 130
-
-
-def test_a_bug_is_one_sentence_that_says_where_the_details_are(project):
-    project.run_error = ZeroDivisionError("division by zero")
-    shown = invoke("run", "sort", "--quiet")
-    assert shown.exit_code == 3
-    assert "Traceback" not in shown.stderr
-    assert "internal error (ZeroDivisionError: division by zero)" in shown.stderr
-    path = shown.stderr.split("the details are in ")[1].split(",")[0]
-    with open(path) as file:
-        assert "Traceback" in file.read()
-    os.remove(path)
-
-
-def test_debug_shows_the_traceback(project):
-    project.run_error = ZeroDivisionError("division by zero")
-    shown = invoke("--debug", "run", "sort", "--quiet")
-    assert shown.exit_code == 3
-    assert "Traceback" in shown.stderr
-
-
-def test_check_tells_every_finding(project):
-    project.load_error = MissionError(
-        [Finding("sort.yaml", 3, 5, "error", "unknown-skill", 'no skill "Grap"')]
-    )
-    shown = invoke("check", "sort.yaml")
-    assert shown.exit_code == 2
-    assert 'sort.yaml:3:5: error[unknown-skill]: no skill "Grap"' in shown.stdout
-
-
-def test_check_as_json_is_one_array(project):
-    project.load_error = MissionError([Finding("sort.yaml", 3, 5, "error", "unknown-skill", "no")])
-    shown = invoke("check", "a.yaml", "b.yaml", "--json")
-    reports = json.loads(shown.stdout)
-    assert [report["mission"] for report in reports] == ["a.yaml", "b.yaml"]
-    assert reports[0]["findings"][0]["line"] == 3
-    assert shown.exit_code == 2
-
-
-def test_check_says_that_all_is_well(project):
-    shown = invoke("check", "sort")
-    assert (shown.exit_code, shown.stdout) == (0, "sort: ok\n")
-
-
 def test_check_tells_what_can_still_end_the_mission(project):
     project.endings = (
         Ending("Detect", "hidden", "tree/look/Detect", "sort.yaml", 9),
@@ -283,85 +154,138 @@ def test_check_tells_what_can_still_end_the_mission(project):
     }  # fmt: skip
 
 
-def test_a_warning_is_told_and_stops_nothing(project):
-    project.warnings = (Finding("sort.yaml", 3, 5, "warning", "unused", "no skill reads it"),)
-    shown = invoke("check", "sort.yaml")
+def test_help_names_every_command_and_every_exit_code():
+    shown = invoke("--help")
     assert shown.exit_code == 0
-    assert "sort.yaml:3:5: warning[unused]: no skill reads it" in shown.stdout
-    shown = invoke("run", "sort.yaml")
-    assert shown.exit_code == 0
-    assert "warning[unused]" in shown.stderr
-
-
-@pytest.mark.parametrize(("seeds", "words"), [("3-1", "holds no seed"), ("a-b", "is no range of seeds")])
-def test_a_range_of_seeds_is_checked(project, seeds, words):
-    shown = invoke("sweep", "sort", "--seeds", seeds)
-    assert shown.exit_code == 2
-    assert words in shown.stderr
+    assert all(f"  {command} " in shown.stdout for command in COMMANDS)
+    assert "0 success, 1 mission failed, 2 bad input, 3 fault, 130 halted" in shown.stdout
+    assert [invoke(command, "--help").exit_code for command in COMMANDS] == [0] * len(COMMANDS)
 
 
 @pytest.mark.parametrize(
-    ("statuses", "code"), [(["SUCCESS"], 0), (["SUCCESS", "FAILURE"], 1), (["HALTED"], 130)]
-)
-def test_a_sweep_ends_by_its_worst_run(project, monkeypatch, tmp_path, statuses, code):
-    results = [{**RESULT, "seed": seed, "status": status} for seed, status in enumerate(statuses)]
-    monkeypatch.setattr("executive.campaign.sweep.sweep", lambda *args, **options: results)
-    shown = invoke("sweep", "sort", "--seeds", f"0-{len(statuses) - 1}", "--json", "--runs", str(tmp_path))
-    assert shown.exit_code == code
-    assert json.loads(shown.stdout)["results"] == results
-
-
-@pytest.mark.parametrize(
-    ("statuses", "told"),
+    ("words", "sentence"),
     [
-        (["SUCCESS", "FAILURE"], "2 of 6 runs, cut off; 1 of them succeeded\n"),
-        (["SUCCESS", "HALTED"], "1 of 6 runs, cut off; 1 of them succeeded\n"),
-        ([], "0 of 6 runs, cut off\n"),
+        ("chekc x", 'there is no command "chekc"; did you mean "check"?'),
+        ("run sort --set novalue", '"novalue" is no override; write it as KEY=VALUE'),
+        ("run sort --set =1", '"=1" is no override; write it as KEY=VALUE'),
+        ("run sort --set a=1 --set a=2", '"a" is set twice'),
+        ("run sort --gui", "--gui needs a display, and DISPLAY names none; leave it out"),
+        ("run sort --paused", "nobody could let it go on: --paused needs --view or a terminal to type in"),
+        ("sweep sort --seeds 3-1", '"3-1" holds no seed: 1 is less than 3'),
+        ("sweep sort --seeds a-b", '"a-b" is no range of seeds; write it as 0-99'),
+        ("dataset overhed --out x", 'Did you mean "overhead"?'),
     ],
 )
-def test_a_sweep_that_was_cut_off_says_so(project, monkeypatch, tmp_path, statuses, told):
+def test_what_cannot_be_meant_is_refused(project, monkeypatch, words, sentence):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    shown = invoke(*words.split())
+    assert (shown.exit_code, shown.stdout, project.run) == (2, "", [])
+    assert sentence in shown.stderr
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (InputError('there is no mission "sort"'), 2, 'there is no mission "sort"\n'),
+        (Fault("the simulator is gone"), 3, "the simulator is gone\n"),
+        (KeyboardInterrupt(), 130, "halted\n"),
+    ],
+)
+def test_what_ends_a_run_is_its_text_and_nothing_else(project, error, code, said):
+    project.run_error = error
+    shown = invoke("run", "sort", "--quiet")
+    assert (shown.exit_code, shown.stdout, shown.stderr.lstrip("\n")) == (code, "", said)
+
+
+def test_a_bug_is_one_sentence_that_says_where_the_details_are(project):
+    project.run_error = ZeroDivisionError("division by zero")
+    shown = invoke("run", "sort", "--quiet")
+    assert (shown.exit_code, "Traceback" in shown.stderr) == (3, False)
+    assert "internal error (ZeroDivisionError: division by zero)" in shown.stderr
+    path = Path(shown.stderr.split("the details are in ")[1].split(",")[0])
+    assert "Traceback" in path.read_text()
+    path.unlink()
+    debugged = invoke("--debug", "run", "sort", "--quiet")
+    assert (debugged.exit_code, "Traceback" in debugged.stderr) == (3, True)
+
+
+@pytest.mark.parametrize(("status", "code"), [("SUCCESS", 0), ("FAILURE", 1), ("FAULT", 3), ("HALTED", 130)])
+def test_a_run_ends_with_the_exit_code_of_its_outcome(project, status, code):
+    project.result["status"] = status
+    shown = invoke("run", "sort", "--quiet")
+    assert (shown.exit_code, shown.output, project.run[0]["views"]) == (code, "", [])
+
+
+def test_a_run_passes_on_everything_it_was_asked_for(project):
+    words = "run sort --seed 7 --set a=1 --set b=x=y --runs out --realtime --request cube --request duck"
+    shown = invoke(*words.split(), "--json")
+    assert project.load == [("sort", {"a": "1", "b": "x=y"})]
+    (options,) = project.run
+    assert options.pop("views")
+    assert options == {
+        "seed": 7, "runs": Path("out"), "gui": False, "realtime": True, "paused": False, "keyboard": True,
+        "requests": ("cube", "duck"),
+    }  # fmt: skip
+    assert json.loads(shown.stdout) == RESULT, "nothing else is on standard output"
+    assert "repeat: executive run sort --seed 7" in shown.stderr
+    invoke("run", "sort")
+    assert project.run[1]["requests"] is None, "the operator is asked"
+
+
+def test_check_tells_every_finding(project):
+    project.load_error = MissionError(
+        [Finding("sort.yaml", 3, 5, "error", "unknown-skill", 'no skill "Grap"')]
+    )
+    shown = invoke("check", "sort.yaml")
+    assert shown.exit_code == 2
+    assert 'sort.yaml:3:5: error[unknown-skill]: no skill "Grap"' in shown.stdout
+    shown = invoke("check", "a.yaml", "b.yaml", "--json")
+    reports = json.loads(shown.stdout)
+    assert [(report["mission"], report["findings"][0]["line"]) for report in reports] == [
+        ("a.yaml", 3), ("b.yaml", 3),
+    ]  # fmt: skip
+    assert shown.exit_code == 2
+
+
+def test_a_warning_is_told_and_stops_nothing(project):
+    shown = invoke("check", "sort")
+    assert (shown.exit_code, shown.stdout) == (0, "sort: ok\n")
+    project.warnings = (Finding("sort.yaml", 3, 5, "warning", "unused", "no skill reads it"),)
+    checked, ran = invoke("check", "sort.yaml"), invoke("run", "sort.yaml")
+    assert (checked.exit_code, ran.exit_code) == (0, 0)
+    assert "sort.yaml:3:5: warning[unused]: no skill reads it" in checked.stdout
+    assert "warning[unused]" in ran.stderr
+
+
+@pytest.mark.parametrize(
+    ("statuses", "asked", "code", "told"),
+    [
+        (["SUCCESS"], 1, 0, "1 of 1 runs succeeded\n"),
+        (["SUCCESS", "FAILURE"], 2, 1, "1 of 2 runs succeeded\n"),
+        (["SUCCESS", "FAILURE"], 6, 130, "2 of 6 runs, cut off; 1 of them succeeded\n"),
+        (["SUCCESS", "HALTED"], 6, 130, "1 of 6 runs, cut off; 1 of them succeeded\n"),
+        ([], 6, 130, "0 of 6 runs, cut off\n"),
+    ],
+)
+def test_a_sweep_ends_by_its_worst_run(project, monkeypatch, tmp_path, statuses, asked, code, told):
     results = [{**RESULT, "seed": seed, "status": status} for seed, status in enumerate(statuses)]
     monkeypatch.setattr("executive.campaign.sweep.sweep", lambda *args, **options: results)
-    shown = invoke("sweep", "sort", "--seeds", "0-5", "--json", "--runs", str(tmp_path))
-    assert shown.exit_code == 130
+    shown = invoke("sweep", "sort", "--seeds", f"0-{asked - 1}", "--json", "--runs", str(tmp_path))
+    assert shown.exit_code == code
     assert told in shown.stderr
     figures = json.loads(shown.stdout)
-    assert (figures["asked"], figures["cut_off"]) == (6, True)
+    assert (figures["asked"], figures["cut_off"], figures["results"]) == (asked, code == 130, results)
 
 
-def test_a_sweep_into_a_place_that_takes_nothing_is_bad_input(project, monkeypatch, tmp_path):
-    (tmp_path / "file").touch()
-    monkeypatch.setattr("executive.campaign.sweep.sweep", lambda *args, **options: pytest.fail("it began"))
-    shown = invoke("sweep", "sort", "--seeds", "0-9", "--runs", str(tmp_path / "file" / "runs"))
-    assert shown.exit_code == 2
-    assert shown.stderr == (
-        f'cannot make a run directory below "{tmp_path}/file/runs": not a directory; '
-        "name another place with --runs DIR\n"
-    )
-
-
-def test_a_run_without_a_directory_is_told_without_one(project, monkeypatch, tmp_path):
+def test_a_sweep_tells_of_a_run_without_a_directory_and_of_no_place_for_any(project, monkeypatch, tmp_path):
     broken = {**RESULT, "status": "FAULT", "reason": "fault", "message": "it broke", "run": ""}
     monkeypatch.setattr("executive.campaign.sweep.sweep", lambda *args, **options: [broken, RESULT])
     shown = invoke("sweep", "sort", "--seeds", "7-8", "--runs", str(tmp_path))
     assert "1 runs did not succeed:\n  seed 7: FAULT: it broke\n" in shown.stderr
-
-
-def test_an_unknown_cell_is_recognized():
-    shown = invoke("dataset", "overhed", "--out", "x")
-    assert shown.exit_code == 2
-    assert 'Did you mean "overhead"?' in shown.stderr
-
-
-def test_a_window_without_a_display_is_bad_input(project, monkeypatch):
-    monkeypatch.delenv("DISPLAY", raising=False)
-    shown = invoke("run", "sort", "--gui")
-    assert shown.exit_code == 2
-    assert "--gui needs a display, and DISPLAY names none; leave it out" in shown.stderr
-    assert project.run == []
-
-
-def test_a_run_that_nobody_could_let_go_on_is_refused(project):
-    shown = invoke("run", "sort", "--paused")
-    assert shown.exit_code == 2
-    assert "nobody could let it go on: --paused needs --view or a terminal to type in" in shown.output
+    (tmp_path / "file").touch()
+    shown = invoke("sweep", "sort", "--seeds", "0-9", "--runs", str(tmp_path / "file" / "runs"))
+    assert (shown.exit_code, shown.stderr) == (
+        2,
+        f'cannot make a run directory below "{tmp_path}/file/runs": not a directory; '
+        "name another place with --runs DIR\n",
+    )

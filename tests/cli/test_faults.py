@@ -50,28 +50,6 @@ def campaigns(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     return told
 
 
-def test_it_prints_the_matrix_and_what_was_never_entered(campaigns):
-    shown = invoke(*FAKE, "--workers", "1", "--seed", "4")
-    assert shown.exit_code == 0
-    assert campaigns.asked == [("sort_overhead", "fake", 4, 1), "singles"]
-    assert "  Grasp  sort.yaml:7  missed  ok" in shown.stdout
-    assert "    never entered: sort.yaml:14: recover" in shown.stdout
-
-
-def test_a_fault_that_was_not_dealt_with_has_exit_code_1(campaigns):
-    campaigns.problems = ("the arm is not at rest",)
-    shown = invoke(*FAKE)
-    assert shown.exit_code == 1
-    assert "wrong: the arm is not at rest" in shown.stdout
-
-
-def test_a_campaign_that_was_ended_early_has_exit_code_130(campaigns):
-    campaigns.complete = False
-    shown = invoke(*FAKE)
-    assert shown.exit_code == 130
-    assert "ended by the user" in shown.stdout
-
-
 def test_pairs_are_tried_instead_and_an_oracle_where_one_is_wanted(campaigns):
     shown = invoke("sort_overhead", "--oracle", "--pairs", "7", "--json")
     assert campaigns.asked == [("sort_overhead", "sim, detections from the truth", 0, 2), ("pairs", 7)]
@@ -117,6 +95,17 @@ def test_what_cannot_be_tried_is_refused(words, told):
     assert told in shown.stderr
 
 
-def test_it_is_one_of_the_commands():
-    assert "Let every single fault happen in MISSION" in " ".join(invoke("--help").stdout.split())
-    assert "  faults " in CliRunner().invoke(main, ["--help"]).stdout
+@pytest.mark.parametrize(
+    ("problems", "complete", "code", "told"),
+    [
+        ((), True, 0, "    never entered: sort.yaml:14: recover"),
+        (("the arm is not at rest",), True, 1, "wrong: the arm is not at rest"),
+        ((), False, 130, "ended by the user"),
+    ],
+)
+def test_it_prints_the_matrix_and_ends_by_what_it_found(campaigns, problems, complete, code, told):
+    campaigns.problems, campaigns.complete = problems, complete
+    shown = invoke(*FAKE, "--workers", "1", "--seed", "4")
+    assert campaigns.asked == [("sort_overhead", "fake", 4, 1), "singles"]
+    assert (shown.exit_code, told in shown.stdout) == (code, True)
+    assert "  Grasp  sort.yaml:7  missed  " in shown.stdout

@@ -46,31 +46,6 @@ def test_a_film_is_made_where_it_was_wanted(run: Path, tmp_path: Path) -> None:
     assert f"{out}: 1.2 s, 0.0 MB" in done.stderr.replace("\n", "")
 
 
-def test_a_gif_goes_twice_as_fast_unless_told_otherwise(run: Path, tmp_path: Path) -> None:
-    assert invoke("film", str(run), "-o", str(tmp_path / "a.gif"), "--quiet").exit_code == 0
-    assert (tmp_path / "a.gif").read_text() == "10-00-00_sort_s5 .gif 2 2"
-    assert invoke("film", str(run), "-o", str(tmp_path / "b.gif"), "--speed", "1.5").exit_code == 0
-    assert (tmp_path / "b.gif").read_text() == "10-00-00_sort_s5 .gif 1.5 2"
-
-
-def test_a_film_without_a_name_is_in_the_run_directory(run: Path) -> None:
-    assert invoke("film", str(run)).exit_code == 0
-    assert invoke("film", str(run), "--gif").exit_code == 0
-    assert {"film.mp4", "film.gif"} <= {file.name for file in run.iterdir()}
-
-
-def test_nothing_is_written_over_unless_that_is_wanted(run: Path) -> None:
-    (run / "film.mp4").write_text("mine")
-    refused = invoke("film", str(run))
-    assert refused.exit_code == 2
-    assert refused.stderr.endswith(
-        "is there already; name another file with -o, or write over it with --force\n"
-    )
-    assert (run / "film.mp4").read_text() == "mine"
-    assert invoke("film", str(run), "--force").exit_code == 0
-    assert (run / "film.mp4").read_text() != "mine"
-
-
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
@@ -94,3 +69,28 @@ def test_a_run_on_a_cell_that_is_not_simulated_is_refused(tmp_path: Path) -> Non
     assert "its cell has no simulated world to look at; film a run on a cell of `kind: sim`" in refused.stderr
     assert not (tmp_path / "a.mp4").exists()
     assert invoke("film", "nowhere", *runs).exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "file", "made"),
+    [
+        ("--quiet -o {tmp}/a.gif", "{tmp}/a.gif", ".gif 2 2"),
+        ("-o {tmp}/b.gif --speed 1.5", "{tmp}/b.gif", ".gif 1.5 2"),
+        ("", "{run}/film.mp4", ".mp4 1 2"),
+        ("--gif", "{run}/film.gif", ".gif 2 2"),
+    ],
+)
+def test_name_form_and_speed_are_chosen_and_nothing_is_written_over(
+    run: Path, tmp_path: Path, words: str, file: str, made: str
+) -> None:
+    words, path = words.format(tmp=tmp_path), Path(file.format(tmp=tmp_path, run=run))
+    assert invoke("film", str(run), *words.split()).exit_code == 0
+    assert path.read_text() == f"10-00-00_sort_s5 {made}"
+    path.write_text("mine")
+    refused = invoke("film", str(run), *words.split())
+    assert (refused.exit_code, path.read_text()) == (2, "mine")
+    assert refused.stderr.endswith(
+        "is there already; name another file with -o, or write over it with --force\n"
+    )
+    assert invoke("film", str(run), *words.split(), "--force").exit_code == 0
+    assert path.read_text() == f"10-00-00_sort_s5 {made}"

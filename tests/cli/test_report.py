@@ -35,25 +35,6 @@ def run(recorded: Path, tmp_path: Path) -> Path:
     return path
 
 
-def test_it_writes_the_report_of_a_run_directory_and_says_where(run: Path) -> None:
-    shown = invoke("report", str(run))
-    assert (shown.exit_code, shown.stdout, shown.stderr) == (0, f"{run / 'report.html'}\n", "")
-    assert (run / "report.html").read_text().startswith("<!doctype html>")
-
-
-@pytest.mark.parametrize("name", ["latest", "by its name"])
-def test_a_run_is_found_below_the_folder_of_runs(run: Path, name: str) -> None:
-    runs = run.parents[1]
-    asked = name if name == "latest" else str(run.relative_to(runs))
-    assert invoke("report", asked, "--runs", str(runs)).stdout == f"{run / 'report.html'}\n"
-
-
-def test_with_json_it_says_how_large_it_is(run: Path) -> None:
-    shown = invoke("report", str(run), "--json")
-    file = run / "report.html"
-    assert json.loads(shown.stdout) == {"report": str(file), "bytes": file.stat().st_size}
-
-
 def test_it_is_written_once_more_from_what_the_record_says_now(run: Path) -> None:
     invoke("report", str(run))
     lines = (run / "journal.jsonl").read_text().splitlines(keepends=True)
@@ -61,35 +42,6 @@ def test_it_is_written_once_more_from_what_the_record_says_now(run: Path) -> Non
     (run / "result.json").unlink()
     assert invoke("report", str(run)).exit_code == 0
     assert "CUT OFF" in (run / "report.html").read_text()
-
-
-def test_where_there_is_no_such_run_it_says_which_there_are(run: Path) -> None:
-    shown = invoke("report", "nowhere", "--runs", str(run.parents[1]))
-    assert (shown.exit_code, shown.stdout) == (2, "")
-    assert shown.stderr == (
-        f'"nowhere" is no run directory, nor is there one of that name below "{run.parents[1]}"; '
-        f"the last ones there: {run.relative_to(run.parents[1])}\n"
-    )
-
-
-def test_without_a_tree_there_is_no_report(run: Path) -> None:
-    (run / "tree.json").unlink()
-    shown = invoke("report", str(run))
-    assert (shown.exit_code, shown.stdout) == (2, "")
-    assert shown.stderr == (
-        f'cannot read the tree "{run / "tree.json"}": no such file or directory; every run leaves one beside '
-        "its journal since version 0.1\n"
-    )
-
-
-def test_what_cannot_be_written_is_bad_input_and_says_what_helps(run: Path) -> None:
-    (run / "report.html").mkdir()
-    shown = invoke("report", str(run), "--json")
-    assert (shown.exit_code, shown.stdout) == (2, "")
-    assert shown.stderr == (
-        f'cannot write the report "{run / "report.html"}": is a directory; copy the run directory to where '
-        "you may write, and have the report of the copy made\n"
-    )
 
 
 def test_a_run_leaves_a_report_and_names_it(tmp_path: Path) -> None:
@@ -124,3 +76,41 @@ def test_without_its_report_a_run_ends_as_it_did(tmp_path, monkeypatch, quiet, s
     assert json.loads(shown.stdout)["status"] == "SUCCESS"
     assert shown.stderr.count("note: no report was written: ZeroDivisionError: no ink; ") == said
     assert "report:" not in shown.stderr
+
+
+def test_it_writes_the_report_of_a_run_and_says_where(run: Path) -> None:
+    runs, file = run.parents[1], run / "report.html"
+    for words in (
+        [str(run)],
+        ["latest", "--runs", str(runs)],
+        [f"{run.relative_to(runs)}", "--runs", str(runs)],
+    ):
+        shown = invoke("report", *words)
+        assert (shown.exit_code, shown.stdout, shown.stderr) == (0, f"{file}\n", "")
+    assert file.read_text().startswith("<!doctype html>")
+    shown = invoke("report", str(run), "--json")
+    assert json.loads(shown.stdout) == {"report": str(file), "bytes": file.stat().st_size}
+
+
+def refused(*words: str) -> str:
+    shown = invoke("report", *words)
+    assert (shown.exit_code, shown.stdout) == (2, "")
+    return shown.stderr
+
+
+def test_what_has_no_report_is_refused_with_what_helps(run: Path) -> None:
+    runs = run.parents[1]
+    assert refused("nowhere", "--runs", str(runs)) == (
+        f'"nowhere" is no run directory, nor is there one of that name below "{runs}"; '
+        f"the last ones there: {run.relative_to(runs)}\n"
+    )
+    (run / "report.html").mkdir()
+    assert refused(str(run), "--json") == (
+        f'cannot write the report "{run / "report.html"}": is a directory; copy the run directory to where '
+        "you may write, and have the report of the copy made\n"
+    )
+    (run / "tree.json").unlink()
+    assert refused(str(run)) == (
+        f'cannot read the tree "{run / "tree.json"}": no such file or directory; every run leaves one beside '
+        "its journal since version 0.1\n"
+    )

@@ -78,9 +78,3 @@ def test_as_json_all_checks_are_one_array() -> None:
     assert failed["doc"].startswith("Every default is one that a mission could give")
     assert len(failed["problems"]) == 2
     assert result.exit_code == 1
-
-
-def test_a_skill_that_is_not_installed_is_bad_input() -> None:
-    result = conform("Rets")
-    assert (result.exit_code, result.stdout) == (2, "")
-    assert 'no skill "Rets" is installed. Did you mean "Rest"?' in result.stderr

@@ -14,6 +14,7 @@ from executive.cli.main import main
 from executive.mission.text.files import shipped_folder
 
 SHIPPED = sorted(path.stem for path in shipped_folder().glob("*.yaml"))
+QUICK = ("sort_overhead", "kit_fasteners")
 
 EVERY_NODE = """
 mission: every_node
@@ -65,7 +66,9 @@ def every_node(tmp_path: Path) -> str:
     return str(path)
 
 
-@pytest.mark.parametrize("mission", SHIPPED)
+@pytest.mark.parametrize(
+    "mission", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in SHIPPED]
+)
 def test_every_shipped_mission_is_shown_in_every_form(mission):
     nodes = json.loads(shown(mission, "--json").stdout)
     picture = ElementTree.fromstring(shown(mission, "--svg").stdout)
@@ -99,6 +102,8 @@ def test_ports_and_reasons_are_told_on_demand(every_node):
     assert "reads $targets, $same?, wanted <- $kind?; writes $target, $item, $bin" in full
     assert "may fail: no_candidate, unseen" in full
     assert max(map(len, full.splitlines())) <= 100
+    given = shown("sort_overhead", "--reasons", "--set", "attempts=9").stdout
+    assert "on Transit.unreachable, Transit.blocked" in given and "up to 9 attempts" in given
 
 
 def test_json_tells_what_a_skill_reads_writes_and_fails_with(every_node):
@@ -109,10 +114,6 @@ def test_json_tells_what_a_skill_reads_writes_and_fails_with(every_node):
     assert grasp["reasons"] == ["missed"]
     (select,) = [node for node in nodes if "wanted: $kind" in node["detail"]]
     assert {wire["port"]: wire["variable"] for wire in select["reads"]}["wanted"] == "kind"
-
-
-def test_params_given_on_the_command_line_are_in_the_tree():
-    assert "up to 9 attempts" in shown("sort_overhead", "--set", "attempts=9").stdout
 
 
 @pytest.mark.parametrize(
@@ -150,7 +151,3 @@ def test_a_folded_tree_shows_every_subtree_once():
     assert [part.attrib["data-kind"] for part in picture if "use" in part.attrib.get("class", "")] == [
         "use"
     ] * 4
-
-
-def test_a_catch_tells_what_it_is_for():
-    assert "on Transit.unreachable, Transit.blocked" in shown("sort_overhead", "--reasons").stdout

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import functools
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
 
+import executive.sim.cell
+from executive.cell_config import CellConfig
 from executive.mission.load import LoadedMission, load_mission
+from executive.mission.parse import cell_file
 from executive.skill import In, Metres, Out, Skill, param, port
 
 
@@ -57,6 +61,24 @@ class Drop(Skill):
 SKILLS: dict[str, type[Skill]] = {"Look": Look, "Pick": Pick, "Drop": Drop}
 
 SMALL_CELL = Path(__file__).with_name("small_cell.yaml").read_text()
+
+
+@pytest.fixture(scope="module")
+def shared_cells() -> Iterator[None]:
+    """Read each cell file once, and look once at the poses of each cell, for all missions of a module."""
+    unfit_poses, found = executive.sim.cell.unfit_poses, {}
+
+    def look_once(config: CellConfig) -> Any:
+        key = config.model_dump_json()
+        if key not in found:
+            found[key] = list(unfit_poses(config))
+        return found[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cell_file, "read_source", functools.cache(cell_file.read_source))
+        patch.setattr(cell_file, "parse_yaml", functools.cache(cell_file.parse_yaml))
+        patch.setattr(executive.sim.cell, "unfit_poses", look_once)
+        yield
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ _PATIENCE = 30.0
 
 
 class Editor:
-    """A language server, and files that exist in the editor only, in `folder` unless said otherwise.
+    """A language server, and files of `folder` that exist in the editor only.
 
     A `|` in a text is the place of the cursor.
     """
@@ -41,18 +41,6 @@ class Editor:
         self._server.kill()
         self._server.wait()
 
-    def problems(self, text: str, folder: Path | None = None) -> list[tuple[str, str]]:
-        """Return every problem of a file, here or in another folder: what is underlined, and the message."""
-        file = self._open(text, folder)
-        told = self._wait(
-            lambda message: (
-                message.get("method") == "textDocument/publishDiagnostics"
-                and message["params"]["uri"] == file["uri"]
-            )
-        )
-        found = told["params"]["diagnostics"]
-        return [(_part(text, problem["range"]), problem["message"]) for problem in found]
-
     def completions(self, text: str) -> dict[str, str]:
         """Return what is offered at the cursor: for every label the text that would be written."""
         offered = self._at_cursor("textDocument/completion", text)["items"]
@@ -69,9 +57,9 @@ class Editor:
         position = {"line": len(lines) - 1, "character": len(lines[-1])}
         return self._ask(method, textDocument=self._open(before + after), position=position)
 
-    def _open(self, text: str, folder: Path | None = None) -> dict[str, str]:
+    def _open(self, text: str) -> dict[str, str]:
         self._opened += 1
-        file = {"uri": ((folder or self._folder) / f"edited_{self._opened}.yaml").as_uri()}
+        file = {"uri": (self._folder / f"edited_{self._opened}.yaml").as_uri()}
         content = {"languageId": "yaml", "version": 1, "text": text}
         self._tell("textDocument/didOpen", textDocument={**file, **content})
         return file
@@ -112,12 +100,3 @@ class Editor:
             while self._server.stdout.readline().strip():
                 pass
             self._messages.put(json.loads(self._server.stdout.read(length)))
-
-
-def _part(text: str, span: dict[str, dict[str, int]]) -> str:
-    """Return the part of a text that a range of the server means."""
-    starts = [0]
-    for line in text.split("\n"):
-        starts.append(starts[-1] + len(line) + 1)
-    begin, end = (starts[span[edge]["line"]] + span[edge]["character"] for edge in ("start", "end"))
-    return text[begin:end]

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
 
 import yaml
-from draft import Draft
-from mutations_of_data import OF_DATA
-from mutations_of_text import OF_TEXT
+from mutations import Draft, mutate_text, roles
 
 from executive.mission.source import Source
 from executive.mission.text.yaml_text import parse_yaml, plain
-from executive.skill import Skill
 
 _TEXTUAL = 0.15
 """Share of the mutants that come from the text."""
@@ -38,49 +35,32 @@ class Base:
     mission: str
 
 
-@dataclass(frozen=True)
-class Mutant:
-    """A mutated file: what it was, what was done to it, and its text now."""
-
-    base: Base
-    mutations: tuple[str, ...]
-    text: str
-
-
 class Mutator:
-    """Makes mutants of some files; a mutant is wholly decided by its seed.
+    """Makes mutants of some files; a mutant is wholly decided by its seed."""
 
-    Args:
-        bases: The files.
-        skills: Installed skills by name, to insert and to wire.
-    """
-
-    def __init__(self, bases: Sequence[Base], skills: Mapping[str, type[Skill]]) -> None:
-        self._bases, self._skills = bases, skills
+    def __init__(self, bases: Sequence[Base]) -> None:
+        self._bases = bases
         self._data = [_data(base) for base in bases]
+        self._pool: dict[str, list[Any]] = {}
+        for data in self._data:
+            for container, key, role in roles(data):
+                self._pool.setdefault(role, []).append(container[key])
 
-    def mutant(self, seed: int) -> Mutant:
-        """Return the mutant of a seed: one to four mutations of one file."""
+    def mutant(self, seed: int) -> tuple[Base, str]:
+        """Return a base, and its text after one to three mutations."""
         rng = random.Random(seed)
-        index, count = rng.randrange(len(self._bases)), rng.choice((1, 1, 1, 1, 2, 2, 3, 4))
-        changed = self._of_text if rng.random() < _TEXTUAL else self._of_data
-        return changed(rng, index, count)
-
-    def _of_text(self, rng: random.Random, index: int, count: int) -> Mutant:
-        text, changes = self._bases[index].text, rng.choices(OF_TEXT, k=count)
-        for change in changes:
-            text = change(rng, text)
-        return Mutant(self._bases[index], tuple(change.__name__ for change in changes), text)
-
-    def _of_data(self, rng: random.Random, index: int, count: int) -> Mutant:
-        draft, done = Draft(rng, deepcopy(self._data[index]), self._skills), []
-        while len(done) < count:
-            change = rng.choices(list(OF_DATA), list(OF_DATA.values()))[0]
-            if change(draft):
-                done.append(change.__name__)
-        in_braces, width = rng.choice((None, None, False, True)), rng.choice((60, 200))
-        text = yaml.safe_dump(draft.data, sort_keys=False, default_flow_style=in_braces, width=width)
-        return Mutant(self._bases[index], tuple(done), text)
+        index, count = rng.randrange(len(self._bases)), rng.choice((1, 1, 1, 1, 1, 2, 2, 3))
+        text = self._bases[index].text
+        if rng.random() < _TEXTUAL:
+            for _ in range(count):
+                text = mutate_text(rng, text)
+        else:
+            draft = Draft(rng, deepcopy(self._data[index]), self._pool)
+            for _ in range(count):
+                draft.mutate()
+            in_braces, width = rng.choice((None, None, False, True)), rng.choice((60, 200))
+            text = yaml.safe_dump(draft.data, sort_keys=False, default_flow_style=in_braces, width=width)
+        return self._bases[index], text
 
 
 def _data(base: Base) -> Any:

@@ -14,7 +14,6 @@ from executive.events import ignore
 from executive.mission.build import build
 from executive.mission.load import LoadedMission
 from executive.mission.outline import outline
-from executive.mission.text.files import shipped_folder
 from executive.skill import Skill
 
 HEAD = "mission: m\ncell: cells/small.yaml\n"
@@ -56,60 +55,34 @@ def built(load: Callable[..., LoadedMission], skills: dict[str, type[Skill]]) ->
     return built
 
 
-def test_paths_are_readable_and_unique(built: Any) -> None:
-    paths = [node.path for node in outline(built(EVERYTHING))]
-    assert paths == [
-        "tree/repeat",
-        "tree/repeat/do",
-        "tree/repeat/do/look/Look",
-        "tree/repeat/do/2:try",
-        "tree/repeat/do/2:try/retry",
-        "tree/repeat/do/2:try/retry/recover/look/Look",
-        "tree/repeat/do/2:try/retry/do",
-        "tree/repeat/do/2:try/retry/do/Pick",
-        "tree/repeat/do/2:try/retry/do/Drop",
-        "tree/repeat/do/2:try/catch/1",
-        "tree/repeat/do/2:try/catch/1/1:succeed",
-        "tree/repeat/do/2:try/catch/1/2:invert",
-        "tree/repeat/do/2:try/catch/1/2:invert/do/fallback",
-        "tree/repeat/do/2:try/catch/1/2:invert/do/fallback/1:succeed",
-        "tree/repeat/do/2:try/catch/1/2:invert/do/fallback/Look",
-        "tree/repeat/do/2:try/finally/timeout",
-        "tree/repeat/do/2:try/finally/timeout/do/Look",
-        "tree/repeat/do/last_look",
-        "tree/repeat/do/pair",
-        "tree/repeat/do/pair/1:Look",
-        "tree/repeat/do/pair/2:Look",
-    ]
-
-
-def test_the_outline_reads_like_the_mission(built: Any) -> None:
+def test_the_outline_reads_like_the_mission_and_paths_are_unique(built: Any) -> None:
     lines = [
-        "  " * node.depth + node.name + (f" ({node.detail})" if node.detail else "")
+        ("  " * node.depth + node.name + (f" ({node.detail})" if node.detail else ""), node.path)
         for node in outline(built(EVERYTHING))
     ]
+    body, tried, caught = "tree/repeat/do", "tree/repeat/do/2:try", "tree/repeat/do/2:try/catch/1"
     assert lines == [
-        "repeat (2 times)",
-        "  do",
-        "    look: Look (view: table)",
-        "    try",
-        "      retry (up to 2 attempts, on Pick.missed)",
-        "        recover look: Look (view: full)",
-        "        do",
-        "          Pick",
-        "          Drop (bin: red_bin)",
-        "      catch 1",
-        "        succeed",
-        "        invert",
-        "          do: fallback",
-        "            succeed",
-        "            Look",
-        "      finally: timeout (5 s)",
-        "        do: Look",
-        "    last_look (Look, seen: $other)",
-        "    pair (sequence)",
-        "      Look",
-        "      Look",
+        ("repeat (2 times)", "tree/repeat"),
+        ("  do", body),
+        ("    look: Look (view: table)", f"{body}/look/Look"),
+        ("    try", tried),
+        ("      retry (up to 2 attempts, on Pick.missed)", f"{tried}/retry"),
+        ("        recover look: Look (view: full)", f"{tried}/retry/recover/look/Look"),
+        ("        do", f"{tried}/retry/do"),
+        ("          Pick", f"{tried}/retry/do/Pick"),
+        ("          Drop (bin: red_bin)", f"{tried}/retry/do/Drop"),
+        ("      catch 1", caught),
+        ("        succeed", f"{caught}/1:succeed"),
+        ("        invert", f"{caught}/2:invert"),
+        ("          do: fallback", f"{caught}/2:invert/do/fallback"),
+        ("            succeed", f"{caught}/2:invert/do/fallback/1:succeed"),
+        ("            Look", f"{caught}/2:invert/do/fallback/Look"),
+        ("      finally: timeout (5 s)", f"{tried}/finally/timeout"),
+        ("        do: Look", f"{tried}/finally/timeout/do/Look"),
+        ("    last_look (Look, seen: $other)", f"{body}/last_look"),
+        ("    pair (sequence)", f"{body}/pair"),
+        ("      Look", f"{body}/pair/1:Look"),
+        ("      Look", f"{body}/pair/2:Look"),
     ]
 
 
@@ -153,18 +126,3 @@ def test_a_labelled_use_names_its_failures(built: Any) -> None:
         "tree/try", "tree/try/do", "tree/try/do/first", "tree/try/do/first/do",
         "tree/try/do/first/do/Look", "tree/try/do/first/do/Pick", "tree/try/catch/1/succeed",
     ]  # fmt: skip
-
-
-@pytest.mark.parametrize("name", sorted(path.stem for path in shipped_folder().glob("*.yaml")))
-def test_shipped_missions_load_and_build(name: str) -> None:
-    from executive.discovery import discover
-    from executive.mission.load import load_mission
-
-    installed = discover()
-    if not installed:
-        pytest.skip("the project is not installed, so it has no entry points")
-    loaded = load_mission(name, installed)
-    assert loaded.warnings == ()
-    cell: Any = SimpleNamespace(clock=SimpleNamespace(now=0.0))
-    paths = [node.path for node in outline(build(loaded, installed, cell, Scope(), ignore))]
-    assert len(paths) == len(set(paths))

@@ -10,7 +10,6 @@ import pytest
 from executive.errors import InputError
 from executive.mission.findings import MissionError
 from executive.mission.parse.cell_file import load_cell
-from executive.mission.text.files import shipped_folder
 
 
 @pytest.fixture(autouse=True)
@@ -23,28 +22,6 @@ def complaint(text: str, overrides: dict[str, str] | None = None) -> str:
     with pytest.raises(MissionError) as caught:
         load_cell(Path("c.yaml"), overrides)
     return str(caught.value)
-
-
-@pytest.mark.parametrize("path", sorted((shipped_folder() / "cells").glob("*.yaml")), ids=lambda p: p.stem)
-def test_shipped_cells_load(path: Path) -> None:
-    assert load_cell(path).bins
-
-
-def test_a_missing_file_is_named() -> None:
-    with pytest.raises(InputError, match=r"there is no file nowhere\.yaml"):
-        load_cell(Path("nowhere.yaml"))
-
-
-def test_bytes_that_are_no_text_are_refused() -> None:
-    Path("c.yaml").write_bytes(b"cell: \xff\n")
-    with pytest.raises(InputError, match=r"c\.yaml is not UTF-8 text: byte 6 does not fit"):
-        load_cell(Path("c.yaml"))
-
-
-def test_a_huge_file_is_refused() -> None:
-    Path("c.yaml").write_bytes(b"#" * 1_000_001)
-    with pytest.raises(InputError, match="larger than 1000000 bytes"):
-        load_cell(Path("c.yaml"))
 
 
 @pytest.mark.parametrize(
@@ -93,24 +70,6 @@ def test_a_finding_shows_line_and_caret(small_cell: str) -> None:
     )
 
 
-def test_a_model_beside_the_cell_file_is_found_wherever_the_command_is_given(small_cell: str) -> None:
-    folder = Path("cells/models")
-    folder.mkdir(parents=True)
-    (folder / "cup.urdf").write_text("<robot/>")
-    path = Path("cells/c.yaml")
-    path.write_text(small_cell.replace("cube_small.urdf", "models/cup.urdf", 1))
-    config = load_cell(path)
-    assert config.objects["cube"].urdf == str((folder / "cup.urdf").resolve())
-    assert config.arm.urdf == "kuka_iiwa/model.urdf"
-
-
-def test_overrides_replace_values_of_the_file(small_cell: str) -> None:
-    Path("c.yaml").write_text(small_cell)
-    cell = load_cell(Path("c.yaml"), {"cell.table.objects": "[5, 5]", "cell.tool.force": "1e1"})
-    assert cell.table.objects == (5, 5)
-    assert cell.tool.force == 10.0
-
-
 @pytest.mark.parametrize(
     ("key", "value", "expected"),
     [
@@ -139,19 +98,6 @@ def test_a_cell_takes_from_its_base_every_key_that_it_has_not_itself(small_cell:
     assert cell.model_dump(exclude=replaced) == base.model_dump(exclude=replaced)
     assert cell.base == ""
     assert "base" not in cell.model_dump(), "what is recorded of a cell stands by itself"
-
-
-def test_a_base_may_have_a_base_and_the_nearest_file_counts(small_cell: str) -> None:
-    Path("one.yaml").write_text(small_cell + "description: one\nkind: sim\n")
-    Path("two.yaml").write_text("base: one.yaml\ndescription: two\ntable: {objects: [1, 1]}\n")
-    Path("c.yaml").write_text("base: two.yaml\ntable: {objects: [2, 2]}\n")
-    cell = load_cell(Path("c.yaml"))
-    assert (cell.cell, cell.description, cell.table.objects) == ("small", "two", (2, 2))
-
-
-def test_a_shipped_cell_is_a_base_from_anywhere() -> None:
-    Path("c.yaml").write_text("base: cells/overhead.yaml\ncell: mine\n")
-    assert list(load_cell(Path("c.yaml")).bins) == ["red_bin", "blue_bin", "yellow_bin"]
 
 
 def test_a_finding_about_a_value_of_the_base_stands_in_the_base(small_cell: str) -> None:
@@ -200,20 +146,6 @@ def test_a_base_that_cannot_be_one_is_refused_where_it_is_named(
     assert expected in complaint(f"base: {base}\ncell: c\n") + "\n"
 
 
-def test_five_files_may_stand_below_a_cell_file(small_cell: str) -> None:
-    for number in range(1, 5):
-        Path(f"{number}.yaml").write_text(f"base: {number + 1}.yaml\n")
-    Path("5.yaml").write_text(small_cell)
-    Path("c.yaml").write_text("base: 1.yaml\n")
-    assert load_cell(Path("c.yaml")).cell == "small"
-
-
-def test_overrides_change_what_comes_from_the_base(small_cell: str) -> None:
-    Path("base.yaml").write_text(small_cell)
-    Path("c.yaml").write_text("base: base.yaml\n")
-    assert load_cell(Path("c.yaml"), {"cell.tool.force": "9.5"}).tool.force == 9.5
-
-
 def test_the_base_itself_cannot_be_overridden(small_cell: str) -> None:
     text = complaint(small_cell, {"cell.base": "other.yaml"})
     assert text == (
@@ -234,3 +166,37 @@ def test_models_are_looked_for_beside_the_file_that_names_them(small_cell: str) 
     cell = load_cell(Path("c.yaml"))
     assert cell.arm.urdf == str(Path("parts/models/cup.urdf").resolve())
     assert cell.objects["cup"].urdf == str(Path("models/cup.urdf").resolve())
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (None, r"there is no file c\.yaml"),
+        (b"cell: \xff\n", r"c\.yaml is not UTF-8 text: byte 6 does not fit"),
+        (b"#" * 1_000_001, "larger than 1000000 bytes"),
+    ],
+    ids=["missing", "no text", "huge"],
+)
+def test_what_is_no_file_of_text_is_refused(content: bytes | None, sentence: str) -> None:
+    if content is not None:
+        Path("c.yaml").write_bytes(content)
+    with pytest.raises(InputError, match=sentence):
+        load_cell(Path("c.yaml"))
+
+
+def test_overrides_replace_values_of_file_and_base(small_cell: str) -> None:
+    Path("base.yaml").write_text(small_cell)
+    Path("c.yaml").write_text("base: base.yaml\ntable: {objects: [2, 2]}\n")
+    cell = load_cell(Path("c.yaml"), {"cell.table.objects": "[5, 5]", "cell.tool.force": "1e1"})
+    assert (cell.table.objects, cell.tool.force) == ((5, 5), 10.0)
+
+
+def test_five_files_may_stand_below_a_cell_file_and_the_nearest_counts(small_cell: str) -> None:
+    for number in range(1, 5):
+        Path(f"{number}.yaml").write_text(f"base: {number + 1}.yaml\ntable: {{objects: [1, {number}]}}\n")
+    Path("5.yaml").write_text(small_cell + "description: five\n")
+    Path("c.yaml").write_text("base: 1.yaml\n")
+    cell = load_cell(Path("c.yaml"))
+    assert (cell.cell, cell.description, cell.table.objects) == ("small", "five", (1, 1))
+    Path("c.yaml").write_text("base: cells/overhead.yaml\ncell: mine\n")
+    assert list(load_cell(Path("c.yaml")).bins) == ["red_bin", "blue_bin", "yellow_bin"], "a shipped one"

@@ -13,6 +13,7 @@ from executive.errors import InputError
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission
 from executive.mission.model import nodes
+from executive.mission.model.values import Reference
 from executive.mission.text.files import find_mission, shipped_folder
 from executive.testing.fake_cell import FakeCell
 
@@ -103,52 +104,53 @@ def test_a_link_out_of_the_folder_is_refused(load: Load, tmp_path: Path, small_c
         load("mission: m\ncell: link.yaml\ntree: Look\n")
 
 
-def test_arguments_are_put_in_and_defaults_stand_in_for_them(load: Load) -> None:
-    trees = "trees: {look: {args: {view: table}, do: {Look: {view: $view}}}}\n"
-    assert skill(load(HEAD + "tree: {use: look}\n" + trees), "Look").settings["view"].value.value == "table"
-    given = HEAD + "tree: {use: look, with: {view: full}}\n" + trees
-    assert skill(load(given), "Look").settings["view"].value.value == "full"
-
-
-def test_an_argument_may_be_a_variable(load: Load) -> None:
-    text = HEAD + (
-        "tree: [{Look: {seen: $first}}, {use: pick, with: {what: $first}}]\n"
-        "trees: {pick: {args: [what], returns: [held], do: {Pick: {seen: $what}}}}\n"
-    )
-    assert skill(load(text), "Pick").settings["seen"].value.name == "first"
-
-
-def test_a_doubled_dollar_is_a_dollar(load: Load) -> None:
-    text = HEAD + "tree: [Look, {Pick: {only: $$5}}]\n"
-    assert skill(load(text), "Pick").settings["only"].value.value == "$5"
-
-
-def test_subtrees_cannot_blow_up_the_tree(load: Load) -> None:
-    trees = "".join(f"  t{i}: [{', '.join([f'{{use: t{i + 1}}}'] * 10)}]\n" for i in range(8))
-    with pytest.raises(MissionError, match=r"error\[too-large\].*the tree has more than 5000 nodes"):
-        load(HEAD + "tree: {use: t0}\ntrees:\n" + trees + "  t8: Look\n")
-
-
-def test_a_deep_tree_is_refused_without_a_traceback(load: Load) -> None:
-    with pytest.raises(MissionError, match="the tree is more than 40 levels deep"):
-        load(HEAD + "tree: " + "{invert: " * 45 + "Look" + "}" * 45 + "\n")
-
-
 @pytest.mark.parametrize("name", ["sort_overhead", "sort_overhead.yaml", "missions/sort_overhead.yaml"])
 def test_shipped_missions_go_by_name(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert find_mission(name) == shipped_folder() / "sort_overhead.yaml"
 
 
-def test_a_name_that_no_file_can_have_is_not_there(load: Load) -> None:
-    long = "x" * 300
+@pytest.mark.parametrize(
+    ("text", "found", "port", "value"),
+    [
+        ("tree: {use: look}\ntrees: {look: {args: {view: table}, do: {Look: {view: $view}}}}\n", "Look", "view", "table"),
+        ("tree: {use: look, with: {view: full}}\ntrees: {look: {args: {view: table}, do: {Look: {view: $view}}}}\n", "Look", "view", "full"),
+        ("tree: [{Look: {seen: $first}}, {use: pick, with: {what: $first}}]\n"
+         "trees: {pick: {args: [what], returns: [held], do: {Pick: {seen: $what}}}}\n", "Pick", "seen", "first"),
+        ("tree: [Look, {Pick: {only: $$5}}]\n", "Pick", "only", "$5"),
+    ],
+    ids=["a default of an argument", "an argument", "a variable as argument", "a doubled dollar"],
+)  # fmt: skip
+def test_names_are_replaced_by_what_they_stand_for(
+    load: Load, text: str, found: str, port: str, value: str
+) -> None:
+    setting = skill(load(HEAD + text), found).settings[port].value
+    assert (setting.name if isinstance(setting, Reference) else setting.value) == value
+
+
+BUSH = "".join(f"  t{i}: [{', '.join([f'{{use: t{i + 1}}}'] * 10)}]\n" for i in range(8))
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (f"tree: {{use: t0}}\ntrees:\n{BUSH}  t8: Look\n", r"error\[too-large\].*the tree has more than 5000 nodes"),
+        ("tree: " + "{invert: " * 45 + "Look" + "}" * 45 + "\n", "the tree is more than 40 levels deep"),
+        (f"tree: {{repeat: {{times: {'9' * 40}, do: Look}}}}\n", r"repeat\.times must be a whole number"),
+        (f"params: {{a: {{default: 1, min: 0x{'f' * 298}}}}}\ntree: {{repeat: {{times: $a, do: Look}}}}\n", r'the param "a".min must be a number'),
+    ],
+    ids=["a bush", "a deep tree", "40 digits", "298 digits"],
+)  # fmt: skip
+def test_what_is_too_large_is_refused_without_a_traceback(load: Load, text: str, sentence: str) -> None:
+    with pytest.raises(MissionError, match=sentence):
+        load(HEAD + text)
+
+
+def test_a_name_that_no_file_can_have_is_not_there_and_an_empty_one_is_a_finding(load: Load) -> None:
     with pytest.raises(InputError, match="there is no mission file"):
-        find_mission(long)
+        find_mission("x" * 300)
     with pytest.raises(MissionError, match=r"2:7: error\[no-cell\]: there is no file"):
-        load(f"mission: m\ncell: {long}\ntree: Look\n")
-
-
-def test_empty_names_are_findings(load: Load) -> None:
+        load(f"mission: m\ncell: {'x' * 300}\ntree: Look\n")
     with pytest.raises(MissionError) as caught:
         load('mission: ""\ncell: ""\ntree: Look\n')
     assert [(f.line, f.col, f.code) for f in caught.value.findings] == [
@@ -157,22 +159,8 @@ def test_empty_names_are_findings(load: Load) -> None:
     ]
 
 
-def test_a_section_that_the_cell_file_leaves_out_can_be_set(load: Load) -> None:
+def test_a_section_that_the_cell_file_leaves_out_can_be_set_but_not_to_nothing(load: Load) -> None:
     loaded = load(HEAD + "tree: Look\n", {"cell.motion.descent_speed": "0.05"})
     assert loaded.cell_config.motion.descent_speed == 0.05
-
-
-def test_numbers_beyond_64_bits_are_no_whole_numbers(load: Load) -> None:
-    huge = "9" * 40
-    with pytest.raises(MissionError, match=r"repeat\.times must be a whole number"):
-        load(HEAD + f"tree: {{repeat: {{times: {huge}, do: Look}}}}\n")
-    with pytest.raises(MissionError, match=r'the param "a".min must be a number'):
-        load(
-            HEAD
-            + f"params: {{a: {{default: 1, min: 0x{'f' * 298}}}}}\ntree: {{repeat: {{times: $a, do: Look}}}}\n"
-        )
-
-
-def test_an_empty_override_is_nothing_and_no_file(load: Load) -> None:
     with pytest.raises(MissionError, match=r"--set:1:\d+: error\[wrong-type\]"):
         load(HEAD + "tree: Look\n", {"cell.kind": ""})

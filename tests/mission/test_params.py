@@ -22,14 +22,11 @@ def mission(param: str) -> str:
 @pytest.mark.parametrize(
     ("param", "given", "value"),
     [
-        ("3", None, 3),
-        ("3", "5", 5),
-        ("{default: 3}", None, 3),
+        ("3", None, 3), ("3", "5", 5), ("{default: 3}", None, 3), ("{type: integer}", "4", 4),
         ("{default: 3, min: 1, max: 5, doc: how often}", "5", 5),
-        ("{type: integer}", "4", 4),
         ("{default: 3, choices: [3, 6]}", "6", 6),
     ],
-)
+)  # fmt: skip
 def test_a_param_has_its_default_or_what_is_given(
     load: Load, param: str, given: str | None, value: Any
 ) -> None:
@@ -54,20 +51,12 @@ def test_a_list_may_be_looped_over(load: Load) -> None:
     [
         ("{default: 0, min: 1}", None, "m.yaml:3:23: error[out-of-range]: n must be at least 1, not 0"),
         ("{default: 3, max: 5}", "6", "--set:1:3: error[out-of-range]: n must be at most 5, not 6"),
-        (
-            "{default: 3, choices: [3, 6]}",
-            "4",
-            "--set:1:3: error[out-of-range]: n must be one of 3, 6",
-        ),
+        ("{default: 3, choices: [3, 6]}", "4", "--set:1:3: error[out-of-range]: n must be one of 3, 6"),
         ("{type: integer}", None, 'm.yaml:3:10: error[missing-param]: the param "n" has no default'),
         ("{type: integer}", "x", '--set:1:3: error[wrong-type]: n must be a whole number, not the text "x"'),
         ("{default: x, type: integer}", None, "m.yaml:3:23: error[wrong-type]: n must be a whole number"),
         ("{default: 3, type: int}", None, 'm.yaml:3:32: error[wrong-value]: there is no type "int"'),
-        (
-            "{default: 3, min: low}",
-            None,
-            'm.yaml:3:31: error[wrong-type]: the param "n".min must be a',
-        ),
+        ("{default: 3, min: low}", None, 'm.yaml:3:31: error[wrong-type]: the param "n".min must be a'),
         ("{default: 3, max: .inf}", None, 'm.yaml:3:31: error[wrong-type]: the param "n".max must be a'),
         ("{default: 3, least: 1}", None, 'm.yaml:3:26: error[unknown-key]: the param "n" has no key'),
         ("3", "2.5", "--set:1:3: error[wrong-type]: n must be a whole number, not 2.5"),

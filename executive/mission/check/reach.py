@@ -88,14 +88,11 @@ def _unreachable(node: Node, flow: Analysis) -> Iterator[Finding]:
         if child.path in flow.entry:
             yield from _unreachable(child, flow)
         elif why := _why(node, child):
-            yield warning(child.mark, "unreachable", f"{_called(child)} can never run: {why}")
+            bare = isinstance(child, nodes.SequenceNode) and child.listed and not child.label
+            called = "this list" if bare else name_of(child)
+            yield warning(child.mark, "unreachable", f"{called} can never run: {why}")
             if isinstance(node, nodes.SequenceNode | nodes.FallbackNode):
                 return
-
-
-def _called(node: Node) -> str:
-    bare = isinstance(node, nodes.SequenceNode) and node.listed
-    return "this list" if bare and not node.label else name_of(node)
 
 
 def _why(parent: Node, child: Node) -> str:

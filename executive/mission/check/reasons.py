@@ -52,7 +52,13 @@ def matches(case: Case) -> Iterator[Finding]:
             elif not coming:
                 yield _impossible(case, case.flow, match, where, body)
             elif len(meant := _meant(case.flow, match, coming)) > 1:
-                yield _ambiguous(match, meant)
+                places = " and ".join(
+                    f"{node.mark.place(match.mark.source)}:{node.mark.col}" for node in meant
+                )
+                message = f"{match} may come from more than one node here, in {places}"
+                label = f"label.{match.reason}"
+                hint = f"Label them, or the use that leads to them, with as: and name the one meant: {label}."
+                yield error(match.mark, "ambiguous", message, hint)
 
 
 def _expectations(node: Node) -> Iterator[tuple[Match, str, Node]]:
@@ -73,7 +79,9 @@ def _impossible(case: Case, flow: Analysis, match: Match, where: str, body: Node
         rule = "A retry fails as its body does, a fallback as its last choice."
         hint = f"What leaves it: {leaving or 'nothing'}. {rule}"
         return error(match.mark, "impossible-reason", message, hint)
-    if match.source in (*case.skills, *_words(case)):
+    # Labels, and control nodes that fail for a reason of their own.
+    words = {node.label for node in case.nodes() if node.label} | {word for word, _ in _OWN.values()}
+    if match.source in (*case.skills, *words):
         message = f"{match.source} is not in the body of this {where}, so {match} cannot come from it"
         return error(match.mark, "impossible-reason", message, f"In the body: {', '.join(inside) or 'none'}.")
     hint = alternatives(match.source, inside, "In the body")
@@ -88,11 +96,6 @@ def _unknown(case: Case, flow: Analysis, match: Match, body: Node) -> Finding | 
         return None
     hint = alternatives(match.reason, reasons, f"{match.source} may fail with")
     return error(match.mark, "unknown-reason", f'{match.source} never fails with "{match.reason}"', hint)
-
-
-def _words(case: Case) -> set[str]:
-    """Return every label of the mission, and every control node that fails for a reason of its own."""
-    return {node.label for node in case.nodes() if node.label} | {word for word, _ in _OWN.values()}
 
 
 def _reasons(flow: Analysis, body: Node) -> dict[str, list[str]]:
@@ -121,12 +124,3 @@ def _meant(flow: Analysis, match: Match, coming: list[Raise]) -> list[Node]:
     sure = [flow.nodes[failure.origin] for failure in coming if failure.must_match([match])]
     places = {node.mark: node for node in sure}
     return sorted(places.values(), key=lambda node: (node.mark.line, node.mark.col))
-
-
-def _ambiguous(match: Match, meant: list[Node]) -> Finding:
-    places = " and ".join(f"{node.mark.place(match.mark.source)}:{node.mark.col}" for node in meant)
-    message = f"{match} may come from more than one node here, in {places}"
-    hint = (
-        f"Label them, or the use that leads to them, with as: and name the one meant: label.{match.reason}."
-    )
-    return error(match.mark, "ambiguous", message, hint)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from executive.cell import LeastTimes
@@ -46,11 +46,28 @@ def _made_of(case: Case, body: Node, shortest: float) -> str:
 
 def least_time(case: Case, node: Node | None) -> float:
     """Return the least time in which a node can succeed [s]; 0 where nothing is known."""
-    of_kind = _LEAST.get(type(node)) if node else None
-    return of_kind(case, node) if of_kind else 0.0
+    match node:
+        case nodes.SkillNode():
+            return _skill(case, node)
+        case nodes.SequenceNode() | nodes.UseNode():
+            return sum(least_time(case, child) for child in node.children)
+        case nodes.FallbackNode():
+            return min((least_time(case, child) for child in node.children), default=0.0)
+        case nodes.ParallelNode():
+            return _parallel(case, node)
+        case nodes.RetryNode() | nodes.TimeoutNode():
+            return least_time(case, node.do)
+        case nodes.RepeatNode(times=Literal() as times, until=()):
+            return (_number(times) or 0.0) * least_time(case, node.do)
+        case nodes.ForEachNode(source=Literal(value=list() as elements)):
+            return len(elements) * least_time(case, node.do)
+        case nodes.TryNode():
+            ways = [node.do, *(catch.do for catch in node.catches)]
+            return min(least_time(case, way) for way in ways) + least_time(case, node.finish)
+    return 0.0
 
 
-def _skill(case: Case, node: Any) -> float:
+def _skill(case: Case, node: SkillNode) -> float:
     skill = case.skills.get(node.skill)
     if skill is None or case.least is None:
         return 0.0
@@ -91,34 +108,7 @@ class _FromAnywhere:
         return self._least.answer(detector)
 
 
-def _sum(case: Case, node: Any) -> float:
-    return sum(least_time(case, child) for child in node.children)
-
-
-def _least(case: Case, node: Any) -> float:
-    return min((least_time(case, child) for child in node.children), default=0.0)
-
-
-def _body(case: Case, node: Any) -> float:
-    return least_time(case, node.do)
-
-
-def _times(case: Case, node: Any) -> float:
-    times = None if node.times is None else _number(node.times)
-    return 0.0 if times is None or node.until else times * least_time(case, node.do)
-
-
-def _elements(case: Case, node: Any) -> float:
-    listed = node.source.value if isinstance(node.source, Literal) else ()
-    return len(listed) * least_time(case, node.do) if isinstance(listed, list) else 0.0
-
-
-def _try(case: Case, node: Any) -> float:
-    ways = [node.do, *(catch.do for catch in node.catches)]
-    return min(least_time(case, way) for way in ways) + least_time(case, node.finish)
-
-
-def _parallel(case: Case, node: Any) -> float:
+def _parallel(case: Case, node: nodes.ParallelNode) -> float:
     wait_for = node.wait_for.value if isinstance(node.wait_for, Literal) else "any"
     if wait_for == "lead":
         return least_time(case, node.branches[0])
@@ -130,17 +120,3 @@ def _parallel(case: Case, node: Any) -> float:
 def _number(value: Value) -> float | None:
     number = value.value if isinstance(value, Literal) else None
     return number if isinstance(number, int | float) and not isinstance(number, bool) else None
-
-
-_LEAST: Mapping[type[Node], Callable[[Case, Any], float]] = {
-    nodes.SkillNode: _skill,
-    nodes.SequenceNode: _sum,
-    nodes.FallbackNode: _least,
-    nodes.ParallelNode: _parallel,
-    nodes.RetryNode: _body,
-    nodes.RepeatNode: _times,
-    nodes.ForEachNode: _elements,
-    nodes.TryNode: _try,
-    nodes.TimeoutNode: _body,
-    nodes.UseNode: _sum,
-}

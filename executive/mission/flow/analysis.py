@@ -150,7 +150,8 @@ class Analysis:
         body, entry = self._round(node.do, state, lambda flow: None if times == 1 else flow.success)
         ended = [after for failure, after in body.failures.items() if failure.may_match(node.until)]
         success = joined((*ended, None if node.times is None else body.success))
-        return Flow(success, _passed(body, node.until), joined((body.halted, entry)))
+        passed = {one: after for one, after in body.failures.items() if not one.must_match(node.until)}
+        return Flow(success, passed, joined((body.halted, entry)))
 
     def _while(self, node: Any, state: State) -> Flow:
         rounds: list[Flow] = []
@@ -268,10 +269,6 @@ def _anything(node: Node) -> Flow:
 
 def _tried_again(node: nodes.RetryNode, failure: Raise) -> bool:
     return not node.on or failure.may_match(node.on)
-
-
-def _passed(flow: Flow, kept: tuple[Match, ...]) -> dict[Raise, State]:
-    return {failure: after for failure, after in flow.failures.items() if not failure.must_match(kept)}
 
 
 def _constant(value: Value) -> Any:

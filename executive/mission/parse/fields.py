@@ -82,11 +82,6 @@ class Fields:
         node = self.get(key)
         return None if node is None else value_of(node, self.findings)
 
-    def settings(self, key: str) -> dict[str, Setting]:
-        """Return the mapping of values under `key`, empty where it is not given."""
-        node = self.get(key)
-        return {} if node is None else settings_of(node, f"{self.owner}.{key}", self.findings)
-
     def matches(self, key: str) -> tuple[Match, ...]:
         """Return the `Skill.reason` names under `key`: one, or a list of them."""
         node = self.get(key)
