@@ -11,33 +11,29 @@ import shutil
 import tempfile
 import traceback
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 from py_trees.common import Status
 
 from executive.campaign.halt_checks import check_journal, check_rest, check_tool
 from executive.campaign.subject import Subject
 from executive.errors import ExecutiveError
-from executive.events import Event, Observer
 from executive.geometry import Array
 from executive.motion.limits import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.record.journal import Journal, read_journal
-from executive.record.result import ledger_agrees
 from executive.record.trace import Trace
 from executive.runtime.cells import cell_kind
 from executive.runtime.outcome import Outcome
 from executive.runtime.run import Run
 from executive.sim.arm import SimArm
-from executive.workcell import Workcell
+from executive.testing.wrapped_cell import WrappedCell
 from tests.benchmarks.braking import measure_braking
 from tests.benchmarks.forks import Forks
-from tests.benchmarks.report import Figures, describe, run_mission_command
+from tests.benchmarks.report import Figures, describe, record_run, run_mission_command
 
 LIMITS = {"rest_s": 0.5, "deviation_rad": 1e-6, "acceleration_share": 1.0, "jerk_share": 1.02}
 """Limits of a halt: time to rest, distance of a joint's command from the path it was on, and acceleration and
@@ -48,16 +44,17 @@ CHILD_TIMEOUT = 120.0
 """Time that a child may take to halt and be checked [s]."""
 
 
-def measure(subject: Subject, every: int | None = None, points: int | None = None) -> Figures:
+def measure(subject: Subject, every: int | None = None) -> Figures:
     """Halt MISSION at moments all over one run, each time as Ctrl-C would."""
-    undisturbed = run_undisturbed(subject)
     every = every or (10 if subject.loaded.cell_config.kind == "sim" else 1)
-    ticks = spread_ticks(undisturbed[0], every, points)
     with tempfile.TemporaryDirectory() as folder:
-        halts = _HaltedRun(subject, undisturbed, frozenset(ticks), Path(folder)).run()
+        undisturbed, problem = record_run(subject, subject.seed, Path(folder))
+        if problem:
+            raise ExecutiveError(f"{subject.name} with {problem}; choose a seed with which it succeeds")
+        halts = _HaltedRun(subject, every, Path(folder)).run(undisturbed)
     return {
         **describe(subject),
-        "ticks": undisturbed[0],
+        "ticks": undisturbed["ticks"],
         "halts": len(halts),
         "moving": sum(halt["moving"] for halt in halts),
         "holding": sum(bool(halt["holds"]) for halt in halts),
@@ -65,33 +62,6 @@ def measure(subject: Subject, every: int | None = None, points: int | None = Non
         "worst": find_worst(halts),
         "problems": [f"{text} (tick {halt['at']})" for halt in halts for text in halt["problems"]],
     }
-
-
-def run_undisturbed(subject: Subject) -> tuple[int, str]:
-    """Run a mission to its end and return its ticks and its trace.
-
-    Raises:
-        ExecutiveError: It does not succeed, or ledger and audit disagree.
-    """
-    trace = Trace()
-    with closing(_make_run(subject, trace)) as run:
-        outcome = run.execute()
-        agrees = ledger_agrees({"items": run.items(), "audit": run.audit()})
-    if outcome.status == "HALTED":
-        raise KeyboardInterrupt
-    if outcome.status != "SUCCESS" or not agrees:
-        raise ExecutiveError(
-            f"{subject.name} ended as {outcome.status} {outcome.reason} with seed {subject.seed}, ledger and "
-            f"audit {'agree' if agrees else 'disagree'}; choose a seed with which the mission succeeds"
-        )
-    return outcome.ticks, trace.hexdigest()
-
-
-def spread_ticks(ticks: int, every: int, points: int | None = None) -> Sequence[int]:
-    """Return the ticks to halt at: every so many of a run of `ticks`, or so many points evenly spread."""
-    if points is None:
-        return range(0, ticks, every)
-    return sorted({int(tick) for tick in np.linspace(0, ticks - 1, min(points, ticks))})
 
 
 def find_worst(halts: Sequence[Figures]) -> list[Figures]:
@@ -131,12 +101,8 @@ def check_ledger(items: Mapping[str, Any], audit: Mapping[str, int] | None) -> I
 class _HaltedRun:
     """The run, and the results of its children so far."""
 
-    def __init__(
-        self, subject: Subject, undisturbed: tuple[int, str], ticks: frozenset[int], folder: Path
-    ) -> None:
-        self._subject = subject
-        self._undisturbed = undisturbed
-        self._ticks = ticks
+    def __init__(self, subject: Subject, every: int, folder: Path) -> None:
+        self._every = every
         self._forks = Forks(CHILD_TIMEOUT)
         self._path = folder / "journal.jsonl"
         self._journal = Journal(self._path)
@@ -146,10 +112,20 @@ class _HaltedRun:
         self._motion: Trajectory | None = None
         self._halts: list[Figures] = []
         self._halt: Figures = {}
-        self._run = _make_run(subject, self._record, self._trace, kind=self._make_cell)
+        config = subject.loaded.cell_config
+        self._limits = JointLimits.of(config.arm.limits)
+        kind = subject.kind or cell_kind(config.kind)
+
+        def make_cell(*args: Any, **options: Any) -> WrappedCell:
+            return WrappedCell(kind(*args, **options), before=self._try_halt, after=self._keep_command)
+
+        self._run = Run(
+            subject.loaded, subject.skills, seed=subject.seed, requests=subject.requests, kind=make_cell,
+            observers=[lambda event: self._journal(event), self._trace],
+        )  # fmt: skip
         self._arm = self._run.workcell.cell.arm
 
-    def run(self) -> list[Figures]:
+    def run(self, undisturbed: Figures) -> list[Figures]:
         """Run the mission and return what its children sent.
 
         Raises:
@@ -171,34 +147,21 @@ class _HaltedRun:
             self._journal.close()
         if outcome.status == "HALTED":
             raise KeyboardInterrupt
-        if (outcome.ticks, self._trace.hexdigest()) != self._undisturbed:
+        if self._trace.hexdigest() != undisturbed["trace"]:
             raise ExecutiveError(
                 f"the run with halts ended as {outcome.status} after {outcome.ticks} ticks, and differs from "
-                f"the run without them, which took {self._undisturbed[0]} ticks"
+                f"the run without them, which took {undisturbed['ticks']} ticks"
             )
         return self._halts
 
-    def _make_cell(self, *args: Any, **options: Any) -> Workcell:
-        """Return the cell, with something to do before and after every control step."""
-        kind = self._subject.kind or cell_kind(self._subject.loaded.cell_config.kind)
-        workcell: Any = kind(*args, **options)
-        advance = workcell.advance
-
-        def watched() -> None:
-            if not self._forks.is_child and self._run.tick in self._ticks:
-                self._try_halt()
-            advance()
-            if isinstance(self._arm, SimArm):
-                self._commands.append(self._arm._command)
-
-        workcell.advance = watched
-        return workcell
-
-    def _record(self, event: Event) -> None:
-        self._journal(event)
+    def _keep_command(self) -> None:
+        if isinstance(self._arm, SimArm):
+            self._commands.append(self._arm._command)
 
     def _try_halt(self) -> None:
-        """Let a child halt here, and keep what it sends."""
+        """Let a child halt here if it is time to, and keep what it sends."""
+        if self._forks.is_child or self._run.tick % self._every:
+            return
         unknown = dict.fromkeys(LIMITS)
         self._halt = {"at": self._run.tick, "moving": not self._arm.at_rest, "holds": "", **unknown}
         answer = self._forks.fork()
@@ -231,23 +194,13 @@ class _HaltedRun:
         if running:
             problems.append(f"still running: {', '.join(running)}")
         if isinstance(self._arm, SimArm):
-            limits = JointLimits.of(self._subject.loaded.cell_config.arm.limits)
-            halt.update(measure_braking(self._commands, self._before, self._motion, limits))
+            halt.update(measure_braking(self._commands, self._before, self._motion, self._limits))
         problems += check_limits(halt)
         return {**halt, "problems": problems}
-
-
-def _make_run(subject: Subject, *observers: Observer, kind: Callable[..., Workcell] | None = None) -> Run:
-    """Return a run of a mission, ready to be executed."""
-    return Run(
-        subject.loaded, subject.skills, seed=subject.seed, observers=observers,
-        kind=kind or subject.kind, requests=subject.requests,
-    )  # fmt: skip
 
 
 if __name__ == "__main__":
     run_mission_command(
         measure,
         click.option("--every", type=click.IntRange(min=1), help="Control steps from one halt to the next."),
-        click.option("--points", type=click.IntRange(min=1), help="So many halts instead, evenly spread."),
     )

@@ -12,7 +12,6 @@ import os
 import shutil
 import signal
 import time
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -28,16 +27,15 @@ from executive.geometry import Array
 from executive.record.find_run import LATEST, find_run
 from executive.record.journal import ending_of, read_journal
 from executive.record.recorded_mission import recorded_mission
-from executive.record.recorded_run import recorded_run
 from executive.record.replay import compare
 from executive.record.result import ledger_agrees
 from executive.record.resumed_run import resumed_run
 from executive.runtime.cells import cell_kind
 from executive.tape.past import Past
 from executive.testing.disturbances.hand import Hand, Thing
-from executive.testing.meanwhile import meanwhile
 from tests.benchmarks.forks import Forks
-from tests.benchmarks.report import Figures, describe, run_mission_command, show_progress
+from tests.benchmarks.report import Figures, describe, record_run, run_mission_command, show_progress
+from tests.meanwhile import meanwhile
 
 RESUME_TIMEOUT = 300.0
 """Time that a child may take to resume a run [s]."""
@@ -84,10 +82,7 @@ def begin_run(subject: Subject, seed: int, runs: Path) -> int:
     child = os.fork()
     if child == 0:
         try:
-            recorded_run(
-                subject.loaded, subject.skills, seed=seed, runs=runs, requests=subject.requests,
-                kind=subject.kind, frames=False,
-            )  # fmt: skip
+            record_run(subject, seed, runs)
         finally:
             os._exit(0)
     return child
@@ -174,8 +169,7 @@ def find_free_shift(
     for angle in random.uniform(0, math.tau) + np.linspace(0, math.tau, 12, endpoint=False):
         shift = (round(SHIFT * math.cos(angle), 3), round(SHIFT * math.sin(angle), 3))
         place = thing.position[:2] + shift
-        is_free = all(np.linalg.norm(other - place) > distance for other in others)
-        if is_free and is_on_table(place, table):
+        if is_on_table(place, table) and all(np.linalg.norm(other - place) > distance for other in others):
             return shift
     return None
 
@@ -200,18 +194,14 @@ def check_result(result: Mapping[str, Any], *, change: str) -> list[str]:
 
 def find_handled_twice(entries: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return a sentence for every item that was handled again after it had been placed."""
-    problems, placed = [], Counter[str]()
-    last: dict[str, str] = {}
+    problems, last = [], dict[str, str]()
     for entry in entries:
-        if entry["kind"] != "item":
-            continue
-        item, state = entry["item"], entry["state"]
-        if state == "placed" and last.get(item) != "placed":
-            placed[item] += 1
-        elif last.get(item) == "placed" and state != "placed":
-            problems.append(f"{item} was {state} after it had been placed")
-        last[item] = state
-    return problems + [f"{item} was placed {count} times" for item, count in placed.items() if count > 1]
+        if entry["kind"] == "item":
+            item, state = entry["item"], entry["state"]
+            if last.get(item) == "placed" != state:
+                problems.append(f"{item} was {state} after it had been placed")
+            last[item] = state
+    return problems
 
 
 if __name__ == "__main__":

@@ -52,7 +52,7 @@ class _Execution:
         self._scenes = Scenes(cell, planner, world, seed)
         self._margin = cell.motion.margin
         self._gauge = Gauge(world, self._margin)
-        self._slip = self._tracking = 0.0
+        self._slip = 0.0
         self._missed = self._dropped = 0
         self._steps: list[int] = []
         self._failures: list[str] = []
@@ -69,7 +69,6 @@ class _Execution:
 
     def collect_figures(self) -> Figures:
         """Return the figures of all pairs."""
-        contacts = [f"contact: {pair}" for pair in sorted(self._gauge.contacts)]
         return {
             "executed_pairs": len(self._steps),
             "executed_time_s": float(np.mean(self._steps)) * STEP if self._steps else None,
@@ -79,8 +78,7 @@ class _Execution:
             "slip_mm": 1e3 * self._slip,
             "missed": self._missed,
             "dropped": self._dropped,
-            "tracking_deg": math.degrees(self._tracking),
-            "problems": [*contacts, *self._failures, *["an object was dropped"] * self._dropped],
+            "problems": [*self._failures, *["an object was dropped"] * self._dropped],
         }
 
     def _fetch_and_carry(self, scene: Scene) -> None:
@@ -120,22 +118,14 @@ class _Execution:
                 is_braking = True
             self._step()
             steps += 1
-            is_braking = is_braking or arm.met is not None
-            if not is_braking:
-                error = np.abs(arm.q - motion.at(steps * STEP).q)
-                self._tracking = max(self._tracking, float(error.max()))
-            if scene is not None:
-                self._measure(scene, steps, grasp)
+            if scene is not None and steps % GAUGE_STEPS == 0:
+                self._measure(scene, grasp)
         if arm.met is not None:
-            self._gauge.contacts.add(arm.met)
+            self._failures.append(f"contact: {arm.met}")
         return steps
 
-    def _measure(self, scene: Scene, steps: int, grasp: Pose | None) -> None:
-        held = self._tool.held_body
-        self._gauge.collect_contacts(scene, held)
-        if steps % GAUGE_STEPS:
-            return
-        self._gauge.measure(scene, held)
+    def _measure(self, scene: Scene, grasp: Pose | None) -> None:
+        self._gauge.measure(scene, self._tool.held_body)
         now = self._locate_in_tool()
         if grasp is not None and now is not None:
             self._slip = max(self._slip, float(np.linalg.norm(now.position - grasp.position)))

@@ -1,4 +1,4 @@
-"""Distances of arm, tool and load from anything that they must not touch, and their contacts."""
+"""Distances of arm, tool and load from anything that they must not touch."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 
 from executive.motion.surroundings import LOOKED_AT
 from executive.sim.clearance import FIRST_MOVING, SELF_PAIRS, WRIST
-from executive.sim.contacts import PRESSING
 from executive.sim.world import World, held_part
 from tests.benchmarks.motion_scenes import Scene
 
@@ -22,7 +21,7 @@ PRECISION = 1e-5
 
 
 class Gauge:
-    """Keeps the least distance and the contacts of all moments that it measures.
+    """Keeps the least distance of all moments that it measures.
 
     Things that may be touched do not count: the object to pick while the tool is on the guarded last part of
     the way down, and the table under the load until the tool has left the place by `LOOKED_AT`. A thing that
@@ -36,7 +35,6 @@ class Gauge:
     Attributes:
         least: The least distance so far [m].
         nearest: The two things with that distance.
-        contacts: Pairs of things that touched although they must not.
     """
 
     def __init__(self, world: World, margin: float) -> None:
@@ -45,7 +43,6 @@ class Gauge:
         self._spared: dict[str, float] = {}
         self.least = math.inf
         self.nearest = "nothing"
-        self.contacts: set[str] = set()
 
     def begin(self, scene: Scene, held: int | None = None) -> None:
         """Spare the things nearer than the margin as a motion begins; `held` is the body in the tool."""
@@ -63,19 +60,6 @@ class Gauge:
         for pair, distance in nearest.items():
             if pair not in self._spared and distance < self.least:
                 self.least, self.nearest = distance, pair
-
-    def collect_contacts(self, scene: Scene, held: int | None = None) -> None:
-        """Add the forbidden contacts of the last physics step; `held` is the body in the tool."""
-        client, arm = self._world.client, self._world.arm
-        allowed = self._find_touchable(scene, held)
-        for point in client.getContactPoints(bodyA=arm) or ():
-            if point[9] > PRESSING and point[3] >= FIRST_MOVING and point[2] not in (held, arm, *allowed):
-                self.contacts.add(f"{self._world.part_of(point[3])} - {self._world.name_of(point[2])}")
-        if held is None:
-            return
-        for point in client.getContactPoints(bodyA=held) or ():
-            if point[9] > PRESSING and point[2] not in (arm, *allowed):
-                self.contacts.add(f"{self._name_load(held)} - {self._world.name_of(point[2])}")
 
     def _measure_all(self, scene: Scene, held: int | None) -> dict[str, float]:
         """Return the least distance [m] of each pair of things."""

@@ -14,9 +14,7 @@ import click
 
 from executive.campaign.subject import Subject
 from executive.errors import InputError
-from executive.record.recorded_run import recorded_run
-from executive.record.result import ledger_agrees
-from tests.benchmarks.report import Figures, describe, run_mission_command, show_progress
+from tests.benchmarks.report import Figures, describe, record_run, run_mission_command, show_progress
 
 PROCESS = Path("/proc/self")
 """Folder in which Linux lists the resources of this process."""
@@ -28,7 +26,7 @@ MAX_OBJECTS_PER_RUN = 2.0
 """Limit of the Python objects that a run leaves behind; its sample is one."""
 
 
-def measure(subject: Subject, runs: int = 100, frames: bool = False) -> Figures:
+def measure(subject: Subject, runs: int = 100) -> Figures:
     """Run MISSION many times in one process, each run with the next seed and recorded, and compare."""
     if not PROCESS.is_dir():
         raise InputError(f"resources of a process are read from {PROCESS}, which only Linux has; use Linux")
@@ -36,17 +34,8 @@ def measure(subject: Subject, runs: int = 100, frames: bool = False) -> Figures:
     failed: list[str] = []
     with tempfile.TemporaryDirectory() as folder:
         for seed in show_progress(range(subject.seed, subject.seed + runs), "run"):
-            result = recorded_run(
-                subject.loaded, subject.skills, seed=seed, runs=Path(folder), requests=subject.requests,
-                frames=frames, kind=subject.kind,
-            )  # fmt: skip
-            if result["status"] == "HALTED":
-                raise KeyboardInterrupt
-            if result["status"] != "SUCCESS" or not ledger_agrees(result):
-                failed.append(
-                    f"seed {seed} ended with {result['status']} {result['reason']}; the ledger says "
-                    f"{result['items']}, the audit {result['audit']}"
-                )
+            result, problem = record_run(subject, seed, Path(folder))
+            failed += [problem] if problem else []
             shutil.rmtree(result["run"])
             samples.append(take_sample())
     return {**describe(subject), "runs": runs, **compare_samples(samples, failed)}
@@ -107,5 +96,4 @@ if __name__ == "__main__":
         click.option(
             "--runs", type=click.IntRange(min=1), default=100, show_default=True, help="Number of runs."
         ),
-        click.option("--frames", is_flag=True, help="Save the pictures behind every decision, too."),
     )

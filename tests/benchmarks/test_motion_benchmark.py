@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,9 +12,8 @@ from executive.cell_config import CellConfig
 from executive.cli.cells import load_cells
 from executive.errors import Blocked, InputError
 from executive.geometry import Pose
-from executive.goals import approach, into
-from executive.layout import as_bin, as_class, travel_height
-from executive.messages import Obstacle, Target
+from executive.layout import as_class, travel_height
+from executive.messages import Obstacle
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
@@ -27,7 +25,7 @@ from tests.benchmarks import motion
 from tests.benchmarks import motion_rivals as rivals
 from tests.benchmarks.motion_execution import execute_pairs
 from tests.benchmarks.motion_gauge import Gauge
-from tests.benchmarks.motion_scenes import Scene, Scenes, open_world
+from tests.benchmarks.motion_scenes import Scene, open_world
 
 PLACE = (0.5, 0.0)
 
@@ -40,28 +38,6 @@ def cell() -> CellConfig:
 @pytest.fixture(scope="module")
 def kinematics(cell: CellConfig) -> Kinematics:
     return Kinematics(cell.tool.length, JointLimits.of(cell.arm.limits).position)
-
-
-def test_the_goals_of_a_scene_are_those_of_the_skills(cell: CellConfig) -> None:
-    with open_world(cell) as (world, planner):
-        scenes = Scenes(cell, planner, world, seed=1)
-        for scene in (scenes.draw(), scenes.draw()):
-            it, kind = scene.target, scene.kind
-            skill_cell = SimpleNamespace(
-                classes={label: as_class(label, model) for label, model in cell.objects.items()},
-                bins={name: as_bin(name, bin) for name, bin in cell.bins.items()},
-                ledger=SimpleNamespace(
-                    objects_in=lambda bin: 0, attempts=lambda item: 0, standing=list, in_tool=lambda: None,
-                    label=lambda item, kind=kind: kind.label,
-                ),
-                descent=cell.motion.descent, descent_speed=cell.motion.descent_speed,
-            )  # fmt: skip
-            centre = np.array([it.x, it.y, it.top - kind.height / 2])
-            goal, task = approach(skill_cell, Target(it.name, kind.label, centre, 1.0, 0, 0, 0.0))
-            assert scene.approach.position == pytest.approx(goal.position, abs=1e-9)
-            assert scene.fetching.target.top == pytest.approx(task.target.top, abs=1e-9)
-            heights = {into(skill_cell, name, "it").position[2] for name in cell.bins}
-            assert scene.drop.position[2] in heights
 
 
 class Table:
@@ -83,14 +59,6 @@ class Table:
         """Put the cube into the tool, 3 mm over the table."""
         self.put_tool(x, 0.053)
         self.world.place_object(self.body, Pose.of([x, 0.0, 0.028]))
-
-    def press(self, x: float, z: float) -> set[str]:
-        """Let the arm lie on the object under the tool for a moment; return the forbidden contacts."""
-        self.put_tool(x, z)
-        for _ in range(3):
-            self.world.step()
-            self.gauge.collect_contacts(self.scene)
-        return self.gauge.contacts
 
 
 @pytest.fixture
@@ -133,13 +101,6 @@ def test_a_near_object_is_spared_until_it_is_apart(
         assert table.gauge.least == pytest.approx(counted, abs=2e-4)
 
 
-@pytest.mark.parametrize(("x", "z", "contacts"), [(0.51, 0.048, {"the tool - a cube"}), (0.5, 0.0495, set())])
-def test_only_a_touch_at_the_end_of_the_approach_is_allowed(
-    table: Table, x: float, z: float, contacts: set[str]
-) -> None:
-    assert table.press(x, z) == contacts
-
-
 def test_the_rivals_are_in_order_and_pass_the_corners(cell: CellConfig) -> None:
     planner = Planner(cell)
     arm, limits = planner.kinematics, planner.limits
@@ -147,12 +108,12 @@ def test_the_rivals_are_in_order_and_pass_the_corners(cell: CellConfig) -> None:
     start = find_postures(arm, Goal((0.24, 0.48, 0.065)), 0.1, np.zeros(7)).low[0]
     height = travel_height(cell)
     chains = rivals.find_chains(arm, limits, start, touch, drop, height)
-    tips, _ = arm.tips(np.concatenate([chains.fetch, chains.carry]))
+    tips, _ = arm.tips(np.concatenate(chains))
     high_object, high_bin = (0.5, 0.1, height), (0.24, -0.48, height)
     fetch = [(0.24, 0.48, 0.065), (0.24, 0.48, height), high_object, touch.position]
     assert tips == pytest.approx(np.array([*fetch, touch.position, high_object, high_bin, drop.position]))
     stopping, passing = (
-        [follow(chain, limits) for chain in (chains.fetch, chains.carry)]
+        [follow(chain, limits) for chain in chains]
         for follow in (rivals.stop_at_corners, rivals.follow_with_toppra)
     )
     floor, states = rivals.find_floor(arm, limits, start, touch, drop)
@@ -160,7 +121,7 @@ def test_the_rivals_are_in_order_and_pass_the_corners(cell: CellConfig) -> None:
     assert arm.forward(states[1].q[-1]).position == pytest.approx(drop.position, abs=1e-6)
     assert peaks(stopping[0][1], limits).max() == pytest.approx(1.0, abs=1e-3)
     assert peaks(passing[0][1], limits)[2].max() > 5.0
-    for corner in chains.fetch:
+    for corner in chains[0]:
         assert np.abs(passing[0][1].q - corner).max(axis=1).min() < 0.02
 
 
@@ -169,12 +130,8 @@ def test_planned_and_executed_pairs_have_plausible_figures(cell: CellConfig) -> 
     figures = motion.measure(cell, seed=5, pairs=2, execute=2)
     assert (figures["planned_pairs"], figures["executed_pairs"], figures["problems"]) == (2, 2, [])
     times = {row["method"]: row["time_s"] for row in figures["methods"]}
-    assert times["floor"] < times["ours"] < times["stops at corners"] < times["article"] == 6.5
-    peaks_of = {row["method"]: (row["velocity"], row["jerk"]) for row in figures["methods"]}
-    assert max(peaks_of["ours"]) <= 1 + 1e-6
-    assert peaks_of["article"][0] > 3 and peaks_of["article"][1] > 1000
-    assert figures["clearance_mm"] > 4.9
-    assert 0 < figures["slip_mm"] < 1 and 0 < figures["tracking_deg"] < 0.01
+    assert times["floor"] < times["ours"] < times["stops at corners"] < figures["article_s"] == 6.5
+    assert figures["clearance_mm"] > 4.9 and 0 < figures["slip_mm"] < 1
     assert (figures["missed"], figures["dropped"]) == (0, 0)
 
 

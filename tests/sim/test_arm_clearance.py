@@ -8,11 +8,11 @@ import pytest
 from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
 from executive.errors import Blocked
-from executive.geometry import tool_down
 from executive.messages import Load, ObjectClass, Obstacle
 from executive.motion.kinematics import Kinematics, fold
 from executive.motion.planner import Planner
 from executive.sim.clearance import PathClearance
+from tests.motion.joint_states import reach
 
 DUCK = Task(Load(ObjectClass("duck", 0.05, 0.04)))
 TOWER = Obstacle(0.5, 0.1, 0.03, 0.2, "cube-3")
@@ -35,7 +35,7 @@ def kinematics(overhead: CellConfig) -> Kinematics:
 def at(overhead: CellConfig, kinematics: Kinematics):
     """Joint positions with the tool centre point at a place."""
     home = np.radians(overhead.arm.poses_deg["home"])
-    return lambda x, y, z: kinematics.nearest_solution(tool_down([x, y, z]), home)
+    return lambda x, y, z: reach(kinematics, (x, y, z), home)
 
 
 RED_BIN = 0.24, -0.48, 0.15

@@ -9,10 +9,11 @@ import pytest
 import yaml
 
 from executive.cell_config import CellConfig
-from executive.geometry import Array, Pose, tool_down
+from executive.geometry import Array, Pose
 from executive.motion.kinematics import Kinematics
 from executive.sim.tool import SuctionTool
 from executive.sim.world import World
+from tests.motion.joint_states import reach
 
 CELL = Path(__file__).parents[2] / "missions" / "cells" / "overhead.yaml"
 X, Y = 0.5, 0.05
@@ -39,7 +40,7 @@ class Bench:
 
     def put(self, height: float, dx: float = 0.0) -> None:
         """Put the lip `height` [m] over the object's top, `dx` [m] beside its good place."""
-        self.q = self.kinematics.nearest_solution(tool_down([X + dx, Y, self.top + height]), self.q)
+        self.q = reach(self.kinematics, (X + dx, Y, self.top + height), self.q)
         self.world.set_arm(self.q)
         self.steps(1)
 
@@ -49,7 +50,7 @@ class Bench:
         for i in range(1, steps + 1):
             s = i / steps
             goal = start + np.array([0, 0, height * s * s * (3 - 2 * s)])
-            self.q = self.kinematics.nearest_solution(tool_down(goal), self.q)
+            self.q = reach(self.kinematics, goal, self.q)
             self.steps(1)
 
     def steps(self, count: int, pull: float = 0.0) -> None:
