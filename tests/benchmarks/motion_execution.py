@@ -110,7 +110,7 @@ class _Execution:
         motion = arm.plan(goal, task).result()
         grasp, steps, is_braking = self._locate_in_tool(), 0, False
         if scene is not None:
-            self._gauge.begin(scene, self._tool.held_body)
+            self._gauge.begin(self._tool.held_body, scene.body)
         arm.start(motion)
         while not arm.at_rest:
             if not is_braking and until():
@@ -119,13 +119,13 @@ class _Execution:
             self._step()
             steps += 1
             if scene is not None and steps % GAUGE_STEPS == 0:
-                self._measure(scene, grasp)
+                self._measure(grasp)
         if arm.met is not None:
             self._failures.append(f"contact: {arm.met}")
         return steps
 
-    def _measure(self, scene: Scene, grasp: Pose | None) -> None:
-        self._gauge.measure(scene, self._tool.held_body)
+    def _measure(self, grasp: Pose | None) -> None:
+        self._gauge.measure(self._tool.held_body)
         now = self._locate_in_tool()
         if grasp is not None and now is not None:
             self._slip = max(self._slip, float(np.linalg.norm(now.position - grasp.position)))

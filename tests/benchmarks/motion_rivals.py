@@ -17,17 +17,15 @@ from toppra.constraint import JointAccelerationConstraint, JointVelocityConstrai
 
 from executive.arm import Goal
 from executive.clock import STEP
-from executive.geometry import Array, tool_down
+from executive.geometry import Array
 from executive.motion.free import Connector
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits, rest_to_rest
-from executive.motion.postures import LIMIT_MARGIN, Postures, find_postures, upright_line
+from executive.motion.postures import find_postures, upright_line
 from executive.motion.state import State
 from executive.motion.trajectory import Trajectory
 from tests.motion.joint_states import reach
 
-SWIVELS_AROUND = np.radians(np.arange(-5.0, 5.5, 0.5))
-"""Swivels around the best one of the coarse search that the floor tries too [rad]."""
 ARTICLE_S, ARTICLE_CYCLE_S = 6.5, 7.25
 """Time of the article's moves and of its whole cycle [s], the same for every pair."""
 
@@ -103,31 +101,13 @@ def find_floor(kinematics: Kinematics, limits: JointLimits, start: Array, touch:
     """Return the fastest ride through everything.
 
     Each of the two motions is from rest to rest, without a corner. Joint 7 is free at both ends; branch and
-    swivel are those of the shortest sum: of all swivels by 5 degrees, then by half a degree around the best.
+    swivel are those of the shortest sum.
     """
-
-    def find_best(touching: Array, dropping: Array) -> tuple[int, int]:
-        there = rest_to_rest(touching - start, limits)
-        back = rest_to_rest(touching[:, None] - dropping, limits)
-        j = int(np.argmin(there + back.min(axis=1)))
-        return j, int(np.argmin(back[j]))
-
-    coarse = [find_postures(kinematics, goal, 0.0, start) for goal in (touch, drop)]
-    best = find_best(coarse[0].low, coarse[1].low)
-    fine = [
-        _swivel_around(kinematics, goal, postures, number)
-        for goal, postures, number in zip((touch, drop), coarse, best, strict=True)
+    touching, dropping = (find_postures(kinematics, goal, 0.0, start).low for goal in (touch, drop))
+    there = rest_to_rest(touching - start, limits)
+    back = rest_to_rest(touching[:, None] - dropping, limits)
+    i, j = np.unravel_index(np.argmin(there[:, None] + back), back.shape)
+    motions = [
+        stop_at_corners(np.array(ends), limits) for ends in pairwise((start, touching[i], dropping[j]))
     ]
-    i, j = find_best(*fine)
-    motions = [stop_at_corners(np.array(ends), limits) for ends in pairwise((start, fine[0][i], fine[1][j]))]
     return sum(duration for duration, _ in motions), [states for _, states in motions]
-
-
-def _swivel_around(kinematics: Kinematics, goal: Goal, postures: Postures, number: int) -> Array:
-    """Return joint positions `(N, 7)` of a posture, and of those with the elbow a little to its sides."""
-    q = postures.low[number]
-    swivels = postures.swivel[number] + SWIVELS_AROUND
-    found = kinematics.grid(tool_down(goal.position), swivels)[int(postures.branch[number])]
-    found[:, 6] = q[6]
-    inside = np.all(np.abs(found) <= kinematics.position_limit - LIMIT_MARGIN, axis=1)
-    return np.concatenate([q[None], found[inside]])

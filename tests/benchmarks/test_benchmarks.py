@@ -227,20 +227,11 @@ class TestSoak:
         assert problem.startswith("seed 7 ended with FAILURE Detect.unavailable")
 
 
-@pytest.mark.slow
-def test_every_line_and_every_sync_of_the_journal_is_counted(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    syncs, lines = [], []
-    write, fsync = os.write, os.fsync
-    monkeypatch.setattr(os, "write", lambda file, line: lines.append(line) or write(file, line))
-    monkeypatch.setattr(os, "fsync", lambda file: syncs.append(file) or fsync(file))
+def test_every_entry_of_the_journal_is_measured(tmp_path: Path) -> None:
     figures = journal.measure(load(**{"cell.table.objects": "[1, 1]"}), tmp_path)
-    written = [line for line in lines if line.startswith(b'{"tick"')]
-    assert figures["entries"] == len(written) > 50
-    assert (figures["bytes"], figures["syncs"]) == (sum(map(len, written)), len(syncs))
-    parts = {row["part"]: row["ms"] for row in figures["times"]}
-    assert 0 < parts["encode"] + parts["write"] + parts["sync"] <= parts["journal"] < parts["run"]
+    assert figures["entries"] > 50
+    assert 0 < figures["journal_s"] < figures["run_s"]
+    assert figures["percent"] == pytest.approx(100 * figures["journal_s"] / figures["run_s"])
     assert list(tmp_path.iterdir()) == []
 
 

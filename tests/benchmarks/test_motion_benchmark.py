@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
@@ -12,8 +10,7 @@ from executive.cell_config import CellConfig
 from executive.cli.cells import load_cells
 from executive.errors import Blocked, InputError
 from executive.geometry import Pose
-from executive.layout import as_class, travel_height
-from executive.messages import Obstacle
+from executive.layout import travel_height
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
@@ -25,7 +22,8 @@ from tests.benchmarks import motion
 from tests.benchmarks import motion_rivals as rivals
 from tests.benchmarks.motion_execution import execute_pairs
 from tests.benchmarks.motion_gauge import Gauge
-from tests.benchmarks.motion_scenes import Scene, open_world
+from tests.benchmarks.motion_scenes import open_world
+from tests.motion.joint_states import reach
 
 PLACE = (0.5, 0.0)
 
@@ -40,65 +38,24 @@ def kinematics(cell: CellConfig) -> Kinematics:
     return Kinematics(cell.tool.length, JointLimits.of(cell.arm.limits).position)
 
 
-class Table:
-    """A cube to pick, and an arm that can be put over the table."""
-
-    def __init__(self, cell: CellConfig, kinematics: Kinematics, world: World) -> None:
-        self.world, self._kinematics = world, kinematics
-        self.body = world.add_object("cube", Pose.of([*PLACE, 0.025]), (1, 1, 1))
-        kind = as_class("cube", cell.objects["cube"])
-        target = Obstacle(*PLACE, 0.0354, 0.05, "cube-1")
-        goal = Goal((*PLACE, 0.035), guarded=0.021)
-        self.scene = Scene(self.body, kind, 0.051, 7.9, target, (), goal, Goal((0.24, 0.48, 0.065)))
-        self.gauge = Gauge(world, cell.motion.margin)
-
-    def put_tool(self, x: float, z: float) -> None:
-        self.world.set_arm(find_postures(self._kinematics, Goal((x, 0.0, z)), 0.0, np.zeros(7)).low[0])
-
-    def carry_to(self, x: float) -> None:
-        """Put the cube into the tool, 3 mm over the table."""
-        self.put_tool(x, 0.053)
-        self.world.place_object(self.body, Pose.of([x, 0.0, 0.028]))
-
-
-@pytest.fixture
-def table(cell: CellConfig, kinematics: Kinematics) -> Iterator[Table]:
+def test_only_what_must_not_be_touched_counts(cell: CellConfig, kinematics: Kinematics) -> None:
     world = World(cell, visuals=False)
-    yield Table(cell, kinematics, world)
+    cube, _ = (world.add_object("cube", Pose.of([x, 0.0, 0.025]), (1, 1, 1)) for x in (0.5, 0.62))
+    gauge = Gauge(world, cell.motion.margin)
+
+    def move(held: int | None, touched: int | None, start: float, x: float, z: float) -> tuple[str, float]:
+        for place, act in (((0.5, 0.0, start), gauge.begin), ((x, 0.0, z), gauge.measure)):
+            world.set_arm(reach(kinematics, place, np.zeros(7)))
+            if held is not None:
+                world.place_object(held, Pose.of([place[0], 0.0, place[2] - 0.025]))
+            act(*((held, touched) if act == gauge.begin else (held,)))
+        return gauge.nearest, gauge.least
+
+    assert move(None, cube, 0.2, 0.5, 0.054)[0] != "the tool - a cube"
+    assert move(None, None, 0.054, 0.5, 0.054)[0] != "the tool - a cube"
+    assert move(None, None, 0.2, 0.5, 0.060) == ("the tool - a cube", pytest.approx(0.010, abs=1e-3))
+    assert move(cube, None, 0.053, 0.566, 0.053) == ("the held cube - a cube", pytest.approx(0.004, abs=2e-4))
     world.close()
-
-
-def test_the_target_counts_except_on_the_straight_way_down(table: Table) -> None:
-    table.put_tool(0.5, 0.054)
-    table.gauge.measure(table.scene)
-    assert table.gauge.nearest != "the tool - a cube" and table.gauge.least > 0.01
-    for x, z, distance in ((0.5, 0.060, 0.010), (0.504, 0.054, 0.004), (0.5, 0.075, 0.004)):
-        table.put_tool(x, z)
-        table.gauge.measure(table.scene)
-        assert (table.gauge.nearest, table.gauge.least) == (
-            "the tool - a cube", pytest.approx(distance, abs=1e-3),
-        )  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("places", "counted"),
-    [((0.499, 0.490), None), ((0.501,), 0.002), ((0.490, 0.499), 0.004)],
-    ids=["a near object may part", "it must not come nearer", "once apart, it counts again"],
-)
-def test_a_near_object_is_spared_until_it_is_apart(
-    table: Table, places: tuple[float, ...], counted: float | None
-) -> None:
-    table.world.add_object("cube", Pose.of([PLACE[0] + 0.053, 0.0, 0.025]), (1, 1, 1))
-    table.carry_to(PLACE[0])
-    table.gauge.begin(table.scene, held=table.body)
-    for x in places:
-        table.carry_to(x)
-        table.gauge.measure(table.scene, held=table.body)
-    if counted is None:
-        assert table.gauge.least > 0.01
-    else:
-        assert table.gauge.nearest == "the held cube - a cube"
-        assert table.gauge.least == pytest.approx(counted, abs=2e-4)
 
 
 def test_the_rivals_are_in_order_and_pass_the_corners(cell: CellConfig) -> None:
