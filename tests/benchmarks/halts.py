@@ -7,6 +7,7 @@ of its own serves both, so use detections from the truth (`--oracle`) for a simu
 
 from __future__ import annotations
 
+import math
 import shutil
 import tempfile
 import traceback
@@ -16,10 +17,12 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 from py_trees.common import Status
 
 from executive.campaign.halt_checks import check_journal, check_rest, check_tool
 from executive.campaign.subject import Subject
+from executive.clock import STEP
 from executive.errors import ExecutiveError
 from executive.geometry import Array
 from executive.motion.limits import JointLimits
@@ -31,7 +34,6 @@ from executive.runtime.outcome import Outcome
 from executive.runtime.run import Run
 from executive.sim.arm import SimArm
 from executive.testing.wrapped_cell import WrappedCell
-from tests.benchmarks.braking import measure_braking
 from tests.benchmarks.forks import Forks
 from tests.benchmarks.report import Figures, describe, record_run, run_mission_command
 
@@ -96,6 +98,49 @@ def check_ledger(items: Mapping[str, Any], audit: Mapping[str, int] | None) -> I
     )
     if not (balanced and agrees):
         yield f"the ledger says {dict(items)}; the audit {audit}"
+
+
+def measure_braking(
+    commands: Sequence[Array], before: int, path: Trajectory, limits: JointLimits
+) -> dict[str, float]:
+    """Return how the arm came to rest: distance from its path, acceleration and jerk over the stop limits.
+
+    Args:
+        commands: Joint positions of consecutive control steps [rad].
+        before: Number of commands from before the stop.
+        path: The motion under way at the stop.
+        limits: The arm's.
+    """
+    accelerations = np.diff(commands, 2, axis=0) / STEP**2
+    jerks = np.diff(accelerations, axis=0) / STEP
+    return {
+        "deviation_rad": max(measure_distance(command, path) for command in commands[before:]),
+        "acceleration_share": float(np.max(np.abs(accelerations) / limits.stop_acceleration, initial=0.0)),
+        "jerk_share": float(np.max(np.abs(jerks) / limits.stop_jerk, initial=0.0)),
+    }
+
+
+def measure_distance(q: Array, path: Trajectory) -> float:
+    """Return the distance of joint positions `(7,)` from the nearest place of a motion [rad].
+
+    The place is searched around the nearest of the straight lines between the motion's samples. The nearest
+    sample may belong to another part of a path that returns to where it was.
+    """
+    corners = path.samples.q
+    lines = np.diff(corners, axis=0)
+    squares = np.maximum(np.sum(lines**2, axis=1), np.finfo(float).tiny)
+    along = np.clip(np.sum((q - corners[:-1]) * lines, axis=1) / squares, 0.0, 1.0)
+    feet = corners[:-1] + along[:, None] * lines
+    time = int(np.argmin(np.linalg.norm(feet - q, axis=1))) * STEP
+    low, high = time - STEP / 2, time + STEP * 3 / 2
+    ratio = (math.sqrt(5) - 1) / 2
+    for _ in range(60):
+        a, b = high - ratio * (high - low), low + ratio * (high - low)
+        if np.linalg.norm(path.at(a).q - q) < np.linalg.norm(path.at(b).q - q):
+            high = b
+        else:
+            low = a
+    return float(np.abs(path.at((low + high) / 2).q - q).max())
 
 
 class _HaltedRun:
@@ -193,7 +238,7 @@ class _HaltedRun:
         running = [node.name for node in run.root.iterate() if node.status is Status.RUNNING]
         if running:
             problems.append(f"still running: {', '.join(running)}")
-        if isinstance(self._arm, SimArm):
+        if self._motion is not None:
             halt.update(measure_braking(self._commands, self._before, self._motion, self._limits))
         problems += check_limits(halt)
         return {**halt, "problems": problems}

@@ -7,7 +7,6 @@ process never builds a cell, because a fork would copy the locks of the threads 
 
 from __future__ import annotations
 
-import math
 import os
 import shutil
 import signal
@@ -39,8 +38,8 @@ from tests.meanwhile import meanwhile
 
 RESUME_TIMEOUT = 300.0
 """Time that a child may take to resume a run [s]."""
-SHIFT = 0.06
-"""Distance by which an object is moved before a run is resumed [m]."""
+SHIFTS = 0.06 * np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)])
+"""Shifts of an object before a run is resumed, of which one to a free place is made [m]."""
 CHANGES = ("moved", "removed", "dropped")
 """Changes of the world: an object on the table is moved or taken away, or the tool lets go."""
 
@@ -147,12 +146,12 @@ def change_world(subject: Subject, seed: int, path: Path, past: Past, change: st
             done.append(f"dropped {held.label}")
         elif on_table:
             thing = on_table[int(random.integers(len(on_table)))]
-            shift = find_free_shift(thing, standing, distance, config.table, random)
-            if change == "removed" or shift is None:
+            shifts = find_free_shifts(thing, standing, distance, config.table)
+            if change == "removed" or not shifts:
                 hand.remove(thing)
                 done.append(f"removed {thing.label}")
             else:
-                hand.move(thing, shift)
+                hand.move(thing, tuple(random.choice(shifts)))
                 done.append(f"moved {thing.label}")
 
     assert past.start is not None
@@ -161,17 +160,17 @@ def change_world(subject: Subject, seed: int, path: Path, past: Past, change: st
     return "".join(done)
 
 
-def find_free_shift(
-    thing: Thing, standing: Sequence[Thing], distance: float, table: TableConfig, random: np.random.Generator
-) -> tuple[float, float] | None:
-    """Return a random shift `(x, y)` [m] to a place with no object within `distance` [m], or None."""
+def find_free_shifts(
+    thing: Thing, standing: Sequence[Thing], distance: float, table: TableConfig
+) -> Sequence[Array]:
+    """Return the shifts `(2,)` [m] of a thing to places with no object within `distance` [m]."""
     others = [other.position[:2] for other in standing if other.body != thing.body]
-    for angle in random.uniform(0, math.tau) + np.linspace(0, math.tau, 12, endpoint=False):
-        shift = (round(SHIFT * math.cos(angle), 3), round(SHIFT * math.sin(angle), 3))
-        place = thing.position[:2] + shift
-        if is_on_table(place, table) and all(np.linalg.norm(other - place) > distance for other in others):
-            return shift
-    return None
+    places = [(shift, thing.position[:2] + shift) for shift in SHIFTS]
+    return [
+        shift
+        for shift, place in places
+        if is_on_table(place, table) and all(np.linalg.norm(other - place) > distance for other in others)
+    ]
 
 
 def is_on_table(place: Array, table: TableConfig) -> bool:

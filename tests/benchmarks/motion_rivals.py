@@ -2,7 +2,6 @@
 
 Two are from the textbook: over every place first, at the cell's travel height, and straight down. One stops
 at every corner, the other passes with TOPP-RA. The floor is faster than any way: straight through everything.
-The article's cycle is that of the prototype, which holds joint targets for fixed numbers of steps.
 """
 
 from __future__ import annotations
@@ -25,9 +24,6 @@ from executive.motion.postures import find_postures, upright_line
 from executive.motion.state import State
 from executive.motion.trajectory import Trajectory
 from tests.motion.joint_states import reach
-
-ARTICLE_S, ARTICLE_CYCLE_S = 6.5, 7.25
-"""Time of the article's moves and of its whole cycle [s], the same for every pair."""
 
 Ride = tuple[float, list[State]]
 """Time of the two motions of a pair [s], without a dwell, and the joints' states every 1/240 s of each."""

@@ -7,7 +7,7 @@ import os
 import shutil
 import statistics
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -56,31 +56,23 @@ def take_sample() -> Figures:
 def compare_samples(samples: Sequence[Figures], failed: Sequence[str] = ()) -> Figures:
     """Return how much the resources grew over the samples, and every limit that was exceeded."""
     warm, last = samples[min(WARM_RUNS, len(samples)) - 1], samples[-1]
-    memory = [sample["memory_mb"] for sample in samples[min(WARM_RUNS, len(samples)) - 1 :]]
-    quarter = max(1, len(memory) // 4)
     figures = {
-        "growth_mb": statistics.median(memory[-quarter:]) - statistics.median(memory[:quarter]),
-        "memory_mb_per_run": _slope(samples, "memory_mb"),
+        "growth_mb": len(samples) * _slope(samples, "memory_mb"),
         "objects_per_run": _slope(samples, "objects"),
     }
-    limits = {
-        "growth_mb": MAX_GROWTH,
-        "memory_mb_per_run": MAX_GROWTH / len(samples),
-        "objects_per_run": MAX_OBJECTS_PER_RUN,
-    }
-
-    def find_problems() -> Iterator[str]:
-        for name, limit in limits.items():
-            if figures[name] > limit:
-                yield f"{name} is {figures[name]:.4g}; {limit:.3g} is allowed"
-        for name in ("threads", "open_files"):
-            if last[name] > warm[name]:
-                yield f"{last[name]} {name} after the last run; {warm[name]} when warm"
-
+    problems = [
+        f"{name} is {figures[name]:.4g}; {limit:.3g} is allowed"
+        for name, limit in (("growth_mb", MAX_GROWTH), ("objects_per_run", MAX_OBJECTS_PER_RUN))
+        if figures[name] > limit
+    ] + [
+        f"{last[name]} {name} after the last run; {warm[name]} when warm"
+        for name in ("threads", "open_files")
+        if last[name] > warm[name]
+    ]
     return {
         **figures,
         "samples": [{"after": "warm-up", **warm}, {"after": "last run", **last}],
-        "problems": [*find_problems(), *failed],
+        "problems": [*problems, *failed],
     }
 
 

@@ -47,8 +47,6 @@ STEADY_TICKS = 300
 """Ticks in a block of a tree that waits."""
 ENDING_NODES = 1000
 """Nodes that begin and end in a block, in one tick or several."""
-ATTEMPTS = 3
-"""Attempts of every retry."""
 TIMEOUT = 1e9
 """Limit of every timeout, longer than any measurement [s]."""
 
@@ -129,14 +127,14 @@ def build_ours(nodes: int, last: type[Skill], *observers: Observer) -> Behaviour
     skills = [*[_Ends] * (nodes - 4), last]
     leaves = [SkillNode(make_site(skill.__name__), "leaf", skill, Wiring(), cell, scope) for skill in skills]
     timeout = Timeout(make_site("timeout"), SequenceNode(make_site("do"), leaves), TIMEOUT, cell.clock)
-    return Retry(make_site("retry"), timeout, ATTEMPTS)
+    return Retry(make_site("retry"), timeout, 3)
 
 
 def build_bare(nodes: int, last: Status) -> Behaviour:
     """Return the same nodes of py_trees."""
     leaves = [_Answer(status) for status in (*[Status.SUCCESS] * (nodes - 4), last)]
     body = composites.Sequence("do", memory=True, children=leaves)
-    return decorators.Retry("retry", decorators.Timeout("timeout", body, TIMEOUT), ATTEMPTS)
+    return decorators.Retry("retry", decorators.Timeout("timeout", body, TIMEOUT), 3)
 
 
 class _Ends(Skill):

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from rig import Rig, off_path
+from rig import Rig
 
 from executive.arm import Goal, Task
 from executive.geometry import Array
@@ -14,6 +14,7 @@ from executive.layout import NECK_LENGTH, TOOL_RADIUS, as_class
 from executive.messages import Load
 from executive.motion.trajectory import Trajectory
 from executive.sim.contacts import PRESSING
+from tests.benchmarks.halts import measure_distance
 
 LEFT, RIGHT = Goal((0.5, 0.25, 0.15)), Goal((0.5, -0.2, 0.15))
 LONG_DESCENT = Goal(RIGHT.position, guarded=0.1, speed=0.05)
@@ -49,7 +50,7 @@ def bump(rig: Rig, motion: Trajectory, earliest: float = 0.0) -> str:
         rig.step()
     assert s >= earliest, rig.arm.met
     assert rig.run() <= 120
-    assert off_path(rig.arm._command, motion) < 1e-9
+    assert measure_distance(rig.arm._command, motion) < 1e-9
     assert rig.arm.met is not None
     return rig.arm.met
 
