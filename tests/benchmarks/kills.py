@@ -165,12 +165,11 @@ def find_free_shifts(
 ) -> Sequence[Array]:
     """Return the shifts `(2,)` [m] of a thing to places with no object within `distance` [m]."""
     others = [other.position[:2] for other in standing if other.body != thing.body]
-    places = [(shift, thing.position[:2] + shift) for shift in SHIFTS]
-    return [
-        shift
-        for shift, place in places
-        if is_on_table(place, table) and all(np.linalg.norm(other - place) > distance for other in others)
-    ]
+
+    def is_free(place: Array) -> bool:
+        return is_on_table(place, table) and all(np.linalg.norm(one - place) > distance for one in others)
+
+    return [shift for shift in SHIFTS if is_free(thing.position[:2] + shift)]
 
 
 def is_on_table(place: Array, table: TableConfig) -> bool:

@@ -118,8 +118,8 @@ class Scenes:
                 continue
             return scene
         raise InputError(
-            f"none of {MAX_TRIES} random scenes of cell {self._cell.cell} has an object that can be picked and "
-            "placed; move its bins or its table nearer to the arm"
+            f"none of {MAX_TRIES} random scenes of cell {self._cell.cell} has an object that can be picked "
+            "and placed; move its bins or its table nearer to the arm"
         )
 
     def _describe(self, bodies: tuple[int, ...]) -> Scene:
