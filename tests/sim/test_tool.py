@@ -1,21 +1,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pybullet
 import pytest
-import yaml
 
-from executive.cell_config import CellConfig
 from executive.geometry import Array, Pose
 from executive.motion.kinematics import Kinematics
 from executive.sim.tool import SuctionTool
 from executive.sim.world import World
 from tests.motion.joint_states import reach
+from tests.sim.conftest import shipped_cell
 
-CELL = Path(__file__).parents[2] / "missions" / "cells" / "overhead.yaml"
 X, Y = 0.5, 0.05
 CUBE = 0.05
 GOOD_PLACE = {"cube": 0.0, "sphere": 0.0, "duck": -0.01}
@@ -26,7 +23,7 @@ class Bench:
     """A tool over one object on the table, and an arm that is simply put where it should be."""
 
     def __init__(self, label: str) -> None:
-        config = CellConfig(**yaml.safe_load(CELL.read_text(encoding="utf-8")))
+        config = shipped_cell("overhead")
         self.world = World(config)
         self.config = config.tool
         self.tool = SuctionTool(self.world, config.tool)
