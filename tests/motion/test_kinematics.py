@@ -5,16 +5,12 @@ import math
 import numpy as np
 import pybullet
 import pybullet_data
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pybullet_utils.bullet_client import BulletClient
 
-from executive.arm import Goal
-from executive.errors import Unreachable
 from executive.geometry import Pose
 from executive.motion.kinematics import Kinematics
-from executive.motion.postures import find_postures
 
 LIMIT = np.radians([170, 120, 170, 120, 170, 120, 175])
 ARM = Kinematics(0.12, LIMIT)
@@ -64,17 +60,3 @@ def test_tips_are_where_the_tool_is_and_where_it_points() -> None:
         X_WT = ARM.forward(q)
         assert np.allclose(tip, X_WT.position, atol=1e-12)
         assert np.allclose(axis, X_WT.rotation[:, 2], atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("place", "text"),
-    [
-        ((0.9, 0.0, 0.114), r"0\.080 m farther than the arm is long \(0\.82 m\)"),
-        ((0.3, 0.0, 0.114), r"0\.110 m nearer than joint 4 can fold \(0\.41 m\)"),
-        ((0.5, 0.0, 0.1), r"best one leaves joint 6 14\.1° outside ±20°"),
-    ],
-)
-def test_a_pose_that_cannot_be_reached_says_why(place: tuple[float, float, float], text: str) -> None:
-    narrow = np.where(np.arange(7) == 5, math.radians(20), LIMIT) if place[0] == 0.5 else LIMIT
-    with pytest.raises(Unreachable, match=text):
-        find_postures(Kinematics(0.12, narrow), Goal(place), 0.0, np.zeros(7))
