@@ -154,9 +154,13 @@ class Scenes:
             Unreachable: No seal forms there.
         """
         tool = self._cell.tool
-        touching = tool_down((*place, top + tool.reach))
-        seal = measure(self._world.client, touching, {body}, tool.cup_radius, tool.reach)
-        bears = breakaway(seal, tool)
-        if seal is None or bears < tool.least_force:
+        surface, bears = top + tool.reach, 0.0
+        # Twice: the distance found by the rays depends a little on where they start.
+        for _ in range(2):
+            X_WT = tool_down((*place, surface))
+            seal = measure(self._world.client, X_WT, {body}, tool.cup_radius, tool.reach)
+            bears = breakaway(seal, tool)
+            surface -= seal.distance if seal else 0.0
+        if bears < tool.least_force:
             raise Unreachable(f"no seal holds the {self._world.bodies[body]} at its middle")
-        return top + tool.reach - seal.distance, bears
+        return surface, bears
