@@ -72,8 +72,6 @@ class Kinematics:
         self.nearest = math.sqrt(UPPER_ARM**2 + FOREARM**2 + 2 * UPPER_ARM * FOREARM * bend)
         self.farthest = UPPER_ARM + FOREARM
         self._tool_length = tool_length
-        self._swivels = np.radians(np.arange(-180.0, 180.0, 5.0))
-        self._fine_swivels = np.radians(np.arange(-180.0, 180.0, 0.25))
 
     def forward(self, q: ArrayLike) -> Pose:
         """Return the tool pose `X_WT` at the joint positions `q` `(7,)` [rad]."""
@@ -153,26 +151,6 @@ class Kinematics:
         columns = R_47.transpose(2, 0, 1)
         base[:, 4], base[:, 5], base[:, 6] = _zyz(*columns)
         return wrapped(base * _SIGNS[:, None] + _FLIPPED[:, None])
-
-    def solutions(self, X_WT: Pose) -> Array:
-        """Return joint positions `(N, 7)` [rad] inside the limits that bring the tool to `X_WT`, `N` > 0.
-
-        All eight branches at every fifth degree of swivel; where that finds none, at every quarter.
-
-        Raises:
-            Unreachable: There is none; the text says what is too short, too long or outside its limit.
-        """
-        for swivels in (self._swivels, self._fine_swivels):
-            found = self.grid(X_WT, swivels).reshape(-1, 7)
-            inside = found[np.all(np.abs(found) <= self.position_limit, axis=1)]
-            if len(inside):
-                return inside
-        raise self.outside_limits(X_WT, found)
-
-    def nearest_solution(self, X_WT: Pose, q: ArrayLike) -> Array:
-        """Return the solution `(7,)` [rad] whose largest joint difference from `q` is smallest."""
-        found = self.solutions(X_WT)
-        return found[np.argmin(np.max(np.abs(found - np.asarray(q, dtype=float)), axis=1))]
 
     def outside_limits(self, X_WT: Pose, rejected: Array) -> Unreachable:
         """Return the error that says which joint of the `rejected` solutions `(N, 7)` is least outside."""

@@ -27,6 +27,8 @@ class Trajectory:
 
     Attributes:
         duration: Time from start to rest [s].
+        start: Joint positions where it begins `(7,)` [rad].
+        end: Joint positions where it ends `(7,)` [rad].
         guarded: Time from which on the tool is meant to touch something [s]; infinite: never.
     """
 
@@ -41,6 +43,7 @@ class Trajectory:
         self._ends = tuple(accumulate(piece.duration for piece in pieces))
         self.duration = self._ends[-1]
         self._first, self._last = pieces[0].at(0.0), pieces[-1].at(pieces[-1].duration)
+        self.start, self.end = self._first.q, self._last.q
         for number, (before, after) in enumerate(pairwise(pieces), start=1):
             _require_same(before.at(before.duration), after.at(0.0), f"pieces {number} and {number + 1}")
         for state, where in ((self._first, "begins"), (self._last, "ends")):
@@ -49,16 +52,6 @@ class Trajectory:
     def slowed(self, rate: float) -> Trajectory:
         """Return the same motion on the same path at `rate` times its speed, 0 to 1."""
         return Trajectory([_Slowed(piece, rate) for piece in self._pieces], self.guarded / rate)
-
-    @property
-    def start(self) -> Array:
-        """Joint positions where it begins `(7,)` [rad]."""
-        return self._first.q
-
-    @property
-    def end(self) -> Array:
-        """Joint positions where it ends `(7,)` [rad]."""
-        return self._last.q
 
     def at(self, s: float) -> State:
         """Return position, velocity and acceleration of the joints at path time `s` [s].

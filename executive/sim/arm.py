@@ -76,7 +76,7 @@ class SimArm:
         self._met: str | None = None
         self._command = self.q
         if under_way is None:
-            self._send()
+            self.hold()
         else:
             self._command, self._motion, self._time = under_way.command, under_way.motion, under_way.time
             self.stop()
@@ -168,8 +168,8 @@ class SimArm:
             self.stop()
 
     def hold(self) -> None:
-        """Send the last command once more."""
-        self._send()
+        """Send the last command, once more if it was sent."""
+        self._world.command_arm(self._command, self._time)
 
     def advance(self) -> None:
         """Send the command for the coming physics step; called once before each."""
@@ -190,7 +190,7 @@ class SimArm:
             self._time = self._braking.pop(0)
             done = not self._braking
         self._command = self._motion.at(self._time)[0]
-        self._send()
+        self.hold()
         if done:
             self._motion, self._braking = None, None
             self._world.log.note(command_log.DONE)
@@ -206,9 +206,6 @@ class SimArm:
     def _require_pose(self, goal: Goal | str) -> None:
         if isinstance(goal, str) and goal not in self._poses:
             raise Fault(f'the cell file has no arm pose "{goal}"; it has {", ".join(sorted(self._poses))}')
-
-    def _send(self) -> None:
-        self._world.command_arm(self._command, self._time)
 
     def _require_near(self, q: Array, tolerance: float, what: str) -> None:
         """Keep a fault in mind if the arm is farther from `q` than `tolerance`."""

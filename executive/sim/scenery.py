@@ -28,6 +28,9 @@ class SimScenery:
 
     Args:
         world: The world, with all its objects in it.
+
+    Attributes:
+        shapes: Every solid.
     """
 
     def __init__(self, world: World) -> None:
@@ -37,12 +40,7 @@ class SimScenery:
         self._X_IB = {body: _inertia(world, body).inverse() for body in world.bodies}
         bodies = {world.table: "", **{body: "" for own in world.bins.values() for body in own}}
         bodies |= {body: _object(body) for body in world.bodies}
-        self._shapes = tuple(_shapes_of(world, bodies))
-
-    @property
-    def shapes(self) -> Sequence[Shape]:
-        """Every solid."""
-        return self._shapes
+        self.shapes: Sequence[Shape] = tuple(_shapes_of(world, bodies))
 
     def poses(self) -> Mapping[str, Pose]:
         """Return where the links of the arm and the loose objects are, by name."""

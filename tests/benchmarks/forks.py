@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import os
-import pickle
-import select
 import signal
-import time
 from collections.abc import Callable
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
 from typing import Any, NoReturn
 
 
@@ -23,7 +22,7 @@ class Forks:
 
     def __init__(self, timeout: float) -> None:
         self._timeout = timeout
-        self._pipe: int | None = None
+        self._pipe: Connection | None = None
 
     @property
     def is_child(self) -> bool:
@@ -35,28 +34,33 @@ class Forks:
 
         A child must call `send` in any case, or it continues as if it were its parent.
         """
-        reading, writing = os.pipe()
+        reading, writing = Pipe(duplex=False)
         child = os.fork()
         if child == 0:
-            os.close(reading)
             self._pipe = writing
             return None
-        os.close(writing)
-        try:
-            return self._receive(child, reading)
-        finally:
-            os.close(reading)
+        writing.close()
+        with reading:
+            if not reading.poll(self._timeout):
+                os.kill(child, signal.SIGKILL)
+                os.waitpid(child, 0)
+                return None, f"the child sent nothing for {self._timeout:g} s and was killed"
+            try:
+                answer = reading.recv(), ""
+                os.waitpid(child, 0)
+                return answer
+            except EOFError:
+                code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+                return None, f"the child ended with exit code {code} and sent nothing"
 
     def send(self, result: Any) -> NoReturn:
         """Send `result` to the parent and end this child at once, without any clean-up."""
         assert self._pipe is not None, "only a child can send a result"
-        code = 1
         try:
-            with os.fdopen(self._pipe, "wb") as pipe:
-                pipe.write(pickle.dumps(result))
-            code = 0
+            self._pipe.send(result)
+            os._exit(0)
         finally:
-            os._exit(code)
+            os._exit(1)
 
     def call(self, function: Callable[[], Any]) -> tuple[Any, str]:
         """Return what `function` returns in a child and, if it returns nothing, the reason."""
@@ -69,19 +73,3 @@ class Forks:
             self.send(result)
         sent, problem = answer
         return sent or (None, problem)
-
-    def _receive(self, child: int, pipe: int) -> tuple[Any, str]:
-        data, deadline = b"", time.monotonic() + self._timeout
-        while select.select([pipe], [], [], max(0.0, deadline - time.monotonic()))[0]:
-            part = os.read(pipe, 1 << 16)
-            if not part:
-                break
-            data += part
-        else:
-            os.kill(child, signal.SIGKILL)
-            os.waitpid(child, 0)
-            return None, f"the child sent nothing for {self._timeout:g} s and was killed"
-        code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-        if code or not data:
-            return None, f"the child ended with exit code {code} and sent nothing"
-        return pickle.loads(data), ""

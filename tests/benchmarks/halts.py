@@ -7,12 +7,12 @@ of its own serves both, so use detections from the truth (`--oracle`) for a simu
 
 from __future__ import annotations
 
+import math
 import shutil
 import tempfile
 import traceback
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,22 +22,20 @@ from py_trees.common import Status
 
 from executive.campaign.halt_checks import check_journal, check_rest, check_tool
 from executive.campaign.subject import Subject
+from executive.clock import STEP
 from executive.errors import ExecutiveError
-from executive.events import Event, Observer
 from executive.geometry import Array
 from executive.motion.limits import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.record.journal import Journal, read_journal
-from executive.record.result import ledger_agrees
 from executive.record.trace import Trace
 from executive.runtime.cells import cell_kind
 from executive.runtime.outcome import Outcome
 from executive.runtime.run import Run
 from executive.sim.arm import SimArm
-from executive.workcell import Workcell
-from tests.benchmarks.braking import measure_braking
+from executive.testing.wrapped_cell import WrappedCell
 from tests.benchmarks.forks import Forks
-from tests.benchmarks.report import Figures, describe, run_mission_command
+from tests.benchmarks.report import Figures, describe, record_run, run_mission_command
 
 LIMITS = {"rest_s": 0.5, "deviation_rad": 1e-6, "acceleration_share": 1.0, "jerk_share": 1.02}
 """Limits of a halt: time to rest, distance of a joint's command from the path it was on, and acceleration and
@@ -48,16 +46,17 @@ CHILD_TIMEOUT = 120.0
 """Time that a child may take to halt and be checked [s]."""
 
 
-def measure(subject: Subject, every: int | None = None, points: int | None = None) -> Figures:
+def measure(subject: Subject, every: int | None = None) -> Figures:
     """Halt MISSION at moments all over one run, each time as Ctrl-C would."""
-    undisturbed = run_undisturbed(subject)
     every = every or (10 if subject.loaded.cell_config.kind == "sim" else 1)
-    ticks = spread_ticks(undisturbed[0], every, points)
     with tempfile.TemporaryDirectory() as folder:
-        halts = _HaltedRun(subject, undisturbed, frozenset(ticks), Path(folder)).run()
+        undisturbed, problem = record_run(subject, subject.seed, Path(folder))
+        if problem:
+            raise ExecutiveError(f"{subject.name} with {problem}; choose a seed with which it succeeds")
+        halts = _HaltedRun(subject, every, Path(folder)).run(undisturbed)
     return {
         **describe(subject),
-        "ticks": undisturbed[0],
+        "ticks": undisturbed["ticks"],
         "halts": len(halts),
         "moving": sum(halt["moving"] for halt in halts),
         "holding": sum(bool(halt["holds"]) for halt in halts),
@@ -65,33 +64,6 @@ def measure(subject: Subject, every: int | None = None, points: int | None = Non
         "worst": find_worst(halts),
         "problems": [f"{text} (tick {halt['at']})" for halt in halts for text in halt["problems"]],
     }
-
-
-def run_undisturbed(subject: Subject) -> tuple[int, str]:
-    """Run a mission to its end and return its ticks and its trace.
-
-    Raises:
-        ExecutiveError: It does not succeed, or ledger and audit disagree.
-    """
-    trace = Trace()
-    with closing(_make_run(subject, trace)) as run:
-        outcome = run.execute()
-        agrees = ledger_agrees({"items": run.items(), "audit": run.audit()})
-    if outcome.status == "HALTED":
-        raise KeyboardInterrupt
-    if outcome.status != "SUCCESS" or not agrees:
-        raise ExecutiveError(
-            f"{subject.name} ended as {outcome.status} {outcome.reason} with seed {subject.seed}, ledger and "
-            f"audit {'agree' if agrees else 'disagree'}; choose a seed with which the mission succeeds"
-        )
-    return outcome.ticks, trace.hexdigest()
-
-
-def spread_ticks(ticks: int, every: int, points: int | None = None) -> Sequence[int]:
-    """Return the ticks to halt at: every so many of a run of `ticks`, or so many points evenly spread."""
-    if points is None:
-        return range(0, ticks, every)
-    return sorted({int(tick) for tick in np.linspace(0, ticks - 1, min(points, ticks))})
 
 
 def find_worst(halts: Sequence[Figures]) -> list[Figures]:
@@ -128,15 +100,54 @@ def check_ledger(items: Mapping[str, Any], audit: Mapping[str, int] | None) -> I
         yield f"the ledger says {dict(items)}; the audit {audit}"
 
 
+def measure_braking(
+    commands: Sequence[Array], before: int, path: Trajectory, limits: JointLimits
+) -> dict[str, float]:
+    """Return how the arm came to rest: distance from its path, acceleration and jerk over the stop limits.
+
+    Args:
+        commands: Joint positions of consecutive control steps [rad].
+        before: Number of commands from before the stop.
+        path: The motion under way at the stop.
+        limits: The arm's.
+    """
+    accelerations = np.diff(commands, 2, axis=0) / STEP**2
+    jerks = np.diff(accelerations, axis=0) / STEP
+    return {
+        "deviation_rad": max(measure_distance(command, path) for command in commands[before:]),
+        "acceleration_share": float(np.max(np.abs(accelerations) / limits.stop_acceleration, initial=0.0)),
+        "jerk_share": float(np.max(np.abs(jerks) / limits.stop_jerk, initial=0.0)),
+    }
+
+
+def measure_distance(q: Array, path: Trajectory) -> float:
+    """Return the distance of joint positions `(7,)` from the nearest place of a motion [rad].
+
+    The place is searched around the nearest of the straight lines between the motion's samples. The nearest
+    sample may belong to another part of a path that returns to where it was.
+    """
+    corners = path.samples.q
+    lines = np.diff(corners, axis=0)
+    squares = np.maximum(np.sum(lines**2, axis=1), np.finfo(float).tiny)
+    along = np.clip(np.sum((q - corners[:-1]) * lines, axis=1) / squares, 0.0, 1.0)
+    feet = corners[:-1] + along[:, None] * lines
+    time = int(np.argmin(np.linalg.norm(feet - q, axis=1))) * STEP
+    low, high = time - STEP / 2, time + STEP * 3 / 2
+    ratio = (math.sqrt(5) - 1) / 2
+    for _ in range(60):
+        a, b = high - ratio * (high - low), low + ratio * (high - low)
+        if np.linalg.norm(path.at(a).q - q) < np.linalg.norm(path.at(b).q - q):
+            high = b
+        else:
+            low = a
+    return float(np.abs(path.at((low + high) / 2).q - q).max())
+
+
 class _HaltedRun:
     """The run, and the results of its children so far."""
 
-    def __init__(
-        self, subject: Subject, undisturbed: tuple[int, str], ticks: frozenset[int], folder: Path
-    ) -> None:
-        self._subject = subject
-        self._undisturbed = undisturbed
-        self._ticks = ticks
+    def __init__(self, subject: Subject, every: int, folder: Path) -> None:
+        self._every = every
         self._forks = Forks(CHILD_TIMEOUT)
         self._path = folder / "journal.jsonl"
         self._journal = Journal(self._path)
@@ -146,10 +157,20 @@ class _HaltedRun:
         self._motion: Trajectory | None = None
         self._halts: list[Figures] = []
         self._halt: Figures = {}
-        self._run = _make_run(subject, self._record, self._trace, kind=self._make_cell)
+        config = subject.loaded.cell_config
+        self._limits = JointLimits.of(config.arm.limits)
+        kind = subject.kind or cell_kind(config.kind)
+
+        def make_cell(*args: Any, **options: Any) -> WrappedCell:
+            return WrappedCell(kind(*args, **options), before=self._try_halt, after=self._keep_command)
+
+        self._run = Run(
+            subject.loaded, subject.skills, seed=subject.seed, requests=subject.requests, kind=make_cell,
+            observers=[lambda event: self._journal(event), self._trace],
+        )  # fmt: skip
         self._arm = self._run.workcell.cell.arm
 
-    def run(self) -> list[Figures]:
+    def run(self, undisturbed: Figures) -> list[Figures]:
         """Run the mission and return what its children sent.
 
         Raises:
@@ -171,34 +192,21 @@ class _HaltedRun:
             self._journal.close()
         if outcome.status == "HALTED":
             raise KeyboardInterrupt
-        if (outcome.ticks, self._trace.hexdigest()) != self._undisturbed:
+        if self._trace.hexdigest() != undisturbed["trace"]:
             raise ExecutiveError(
                 f"the run with halts ended as {outcome.status} after {outcome.ticks} ticks, and differs from "
-                f"the run without them, which took {self._undisturbed[0]} ticks"
+                f"the run without them, which took {undisturbed['ticks']} ticks"
             )
         return self._halts
 
-    def _make_cell(self, *args: Any, **options: Any) -> Workcell:
-        """Return the cell, with something to do before and after every control step."""
-        kind = self._subject.kind or cell_kind(self._subject.loaded.cell_config.kind)
-        workcell: Any = kind(*args, **options)
-        advance = workcell.advance
-
-        def watched() -> None:
-            if not self._forks.is_child and self._run.tick in self._ticks:
-                self._try_halt()
-            advance()
-            if isinstance(self._arm, SimArm):
-                self._commands.append(self._arm._command)
-
-        workcell.advance = watched
-        return workcell
-
-    def _record(self, event: Event) -> None:
-        self._journal(event)
+    def _keep_command(self) -> None:
+        if isinstance(self._arm, SimArm):
+            self._commands.append(self._arm._command)
 
     def _try_halt(self) -> None:
-        """Let a child halt here, and keep what it sends."""
+        """Let a child halt here if it is time to, and keep what it sends."""
+        if self._forks.is_child or self._run.tick % self._every:
+            return
         unknown = dict.fromkeys(LIMITS)
         self._halt = {"at": self._run.tick, "moving": not self._arm.at_rest, "holds": "", **unknown}
         answer = self._forks.fork()
@@ -230,24 +238,14 @@ class _HaltedRun:
         running = [node.name for node in run.root.iterate() if node.status is Status.RUNNING]
         if running:
             problems.append(f"still running: {', '.join(running)}")
-        if isinstance(self._arm, SimArm):
-            limits = JointLimits.of(self._subject.loaded.cell_config.arm.limits)
-            halt.update(measure_braking(self._commands, self._before, self._motion, limits))
+        if self._motion is not None:
+            halt.update(measure_braking(self._commands, self._before, self._motion, self._limits))
         problems += check_limits(halt)
         return {**halt, "problems": problems}
-
-
-def _make_run(subject: Subject, *observers: Observer, kind: Callable[..., Workcell] | None = None) -> Run:
-    """Return a run of a mission, ready to be executed."""
-    return Run(
-        subject.loaded, subject.skills, seed=subject.seed, observers=observers,
-        kind=kind or subject.kind, requests=subject.requests,
-    )  # fmt: skip
 
 
 if __name__ == "__main__":
     run_mission_command(
         measure,
         click.option("--every", type=click.IntRange(min=1), help="Control steps from one halt to the next."),
-        click.option("--points", type=click.IntRange(min=1), help="So many halts instead, evenly spread."),
     )

@@ -7,12 +7,10 @@ process never builds a cell, because a fork would copy the locks of the threads 
 
 from __future__ import annotations
 
-import math
 import os
 import shutil
 import signal
 import time
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -28,21 +26,20 @@ from executive.geometry import Array
 from executive.record.find_run import LATEST, find_run
 from executive.record.journal import ending_of, read_journal
 from executive.record.recorded_mission import recorded_mission
-from executive.record.recorded_run import recorded_run
 from executive.record.replay import compare
 from executive.record.result import ledger_agrees
 from executive.record.resumed_run import resumed_run
 from executive.runtime.cells import cell_kind
 from executive.tape.past import Past
 from executive.testing.disturbances.hand import Hand, Thing
-from executive.testing.meanwhile import meanwhile
 from tests.benchmarks.forks import Forks
-from tests.benchmarks.report import Figures, describe, run_mission_command, show_progress
+from tests.benchmarks.report import Figures, describe, record_run, run_mission_command, show_progress
+from tests.meanwhile import meanwhile
 
 RESUME_TIMEOUT = 300.0
 """Time that a child may take to resume a run [s]."""
-SHIFT = 0.06
-"""Distance by which an object is moved before a run is resumed [m]."""
+SHIFTS = 0.06 * np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)])
+"""Shifts of an object before a run is resumed, of which one to a free place is made [m]."""
 CHANGES = ("moved", "removed", "dropped")
 """Changes of the world: an object on the table is moved or taken away, or the tool lets go."""
 
@@ -84,10 +81,7 @@ def begin_run(subject: Subject, seed: int, runs: Path) -> int:
     child = os.fork()
     if child == 0:
         try:
-            recorded_run(
-                subject.loaded, subject.skills, seed=seed, runs=runs, requests=subject.requests,
-                kind=subject.kind, frames=False,
-            )  # fmt: skip
+            record_run(subject, seed, runs)
         finally:
             os._exit(0)
     return child
@@ -152,12 +146,12 @@ def change_world(subject: Subject, seed: int, path: Path, past: Past, change: st
             done.append(f"dropped {held.label}")
         elif on_table:
             thing = on_table[int(random.integers(len(on_table)))]
-            shift = find_free_shift(thing, standing, distance, config.table, random)
-            if change == "removed" or shift is None:
+            shifts = find_free_shifts(thing, standing, distance, config.table)
+            if change == "removed" or not shifts:
                 hand.remove(thing)
                 done.append(f"removed {thing.label}")
             else:
-                hand.move(thing, shift)
+                hand.move(thing, tuple(random.choice(shifts)))
                 done.append(f"moved {thing.label}")
 
     assert past.start is not None
@@ -166,18 +160,16 @@ def change_world(subject: Subject, seed: int, path: Path, past: Past, change: st
     return "".join(done)
 
 
-def find_free_shift(
-    thing: Thing, standing: Sequence[Thing], distance: float, table: TableConfig, random: np.random.Generator
-) -> tuple[float, float] | None:
-    """Return a random shift `(x, y)` [m] to a place with no object within `distance` [m], or None."""
+def find_free_shifts(
+    thing: Thing, standing: Sequence[Thing], distance: float, table: TableConfig
+) -> Sequence[Array]:
+    """Return the shifts `(2,)` [m] of a thing to places with no object within `distance` [m]."""
     others = [other.position[:2] for other in standing if other.body != thing.body]
-    for angle in random.uniform(0, math.tau) + np.linspace(0, math.tau, 12, endpoint=False):
-        shift = (round(SHIFT * math.cos(angle), 3), round(SHIFT * math.sin(angle), 3))
-        place = thing.position[:2] + shift
-        is_free = all(np.linalg.norm(other - place) > distance for other in others)
-        if is_free and is_on_table(place, table):
-            return shift
-    return None
+
+    def is_free(place: Array) -> bool:
+        return is_on_table(place, table) and all(np.linalg.norm(one - place) > distance for one in others)
+
+    return [shift for shift in SHIFTS if is_free(thing.position[:2] + shift)]
 
 
 def is_on_table(place: Array, table: TableConfig) -> bool:
@@ -200,18 +192,14 @@ def check_result(result: Mapping[str, Any], *, change: str) -> list[str]:
 
 def find_handled_twice(entries: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return a sentence for every item that was handled again after it had been placed."""
-    problems, placed = [], Counter[str]()
-    last: dict[str, str] = {}
+    problems, last = [], dict[str, str]()
     for entry in entries:
-        if entry["kind"] != "item":
-            continue
-        item, state = entry["item"], entry["state"]
-        if state == "placed" and last.get(item) != "placed":
-            placed[item] += 1
-        elif last.get(item) == "placed" and state != "placed":
-            problems.append(f"{item} was {state} after it had been placed")
-        last[item] = state
-    return problems + [f"{item} was placed {count} times" for item, count in placed.items() if count > 1]
+        if entry["kind"] == "item":
+            item, state = entry["item"], entry["state"]
+            if last.get(item) == "placed" != state:
+                problems.append(f"{item} was {state} after it had been placed")
+            last[item] = state
+    return problems
 
 
 if __name__ == "__main__":

@@ -32,29 +32,21 @@ from tests.benchmarks.motion_scenes import Scene, Scenes, open_world
 from tests.benchmarks.report import CELL_OPTIONS, Figures, run_command, show_progress
 
 T = TypeVar("T")
+PEAKS = ("velocity", "acceleration", "jerk")
+"""Largest velocity, acceleration and jerk of a joint, each over its limit."""
 PEAK_TOLERANCE = 1e-6
 """Rounding of peaks over their limits."""
 
 
-def measure(cell: CellConfig, seed: int = 0, pairs: int = 200, execute: int = 0) -> Figures:
+def measure(cell: CellConfig, seed: int = 0, pairs: int = 200, execute: bool = False) -> Figures:
     """Measure the motions of the arm of CELL from bin to object to bin, and other ways to move."""
+    if execute:
+        return {"cell": cell.cell, "pairs": pairs, "seed": seed, **execute_pairs(cell, pairs, seed)}
     with open_world(cell) as (world, planner):
         trial = _Trial(cell, world, planner, seed)
         for _ in show_progress(range(pairs), "planned"):
             trial.plan_pair()
-        figures = {"cell": cell.cell, "pairs": pairs, "seed": seed, **trial.collect_figures()}
-    if not execute:
-        return figures
-    executed = execute_pairs(cell, execute, seed)
-    return {**figures, **executed, "problems": [*figures["problems"], *executed["problems"]]}
-
-
-def make_row(time: float, peaks: Array, planning: Sequence[float]) -> Figures:
-    """Return mean time [s], peaks over the limits and planning times [ms] as a row of the table."""
-    velocity, acceleration, jerk = peaks.tolist()
-    median, p99 = np.percentile(planning, (50, 99)).tolist() if planning else (None, None)
-    motion = {"time_s": time, "velocity": velocity, "acceleration": acceleration, "jerk": jerk}
-    return {**motion, "planning_median_ms": median, "planning_p99_ms": p99}
+        return {"cell": cell.cell, "pairs": pairs, "seed": seed, **trial.collect_figures()}
 
 
 class _Trial:
@@ -66,12 +58,11 @@ class _Trial:
         self._planner = planner
         self._scenes = Scenes(cell, planner, world, seed)
         self._home = np.radians(cell.arm.poses_deg["home"])
-        self._q = planner.plan(self._home, self._scenes.draw_start()).end
+        self._q = planner.plan(self._home, self._scenes.draw().drop).end
         self._times: dict[str, list[float]] = defaultdict(list)
         self._planning: dict[str, list[float]] = defaultdict(list)
         self._peaks: dict[str, Array] = defaultdict(lambda: np.zeros(3))
         self._failures: list[str] = []
-        self._first: rivals.Chains | None = None
 
     def plan_pair(self) -> None:
         """Move to one more random object and into a bin, by every method."""
@@ -97,29 +88,29 @@ class _Trial:
         Raises:
             InputError: No pair could be moved between.
         """
-        if self._first is None:
+        if "ours" not in self._times:
             raise InputError(f"no motion was found in cell {self._cell.cell}: {self._failures[0]}")
-        article = rivals.measure_article_peaks(self._cell, self._first, self._planner.limits)
-        rows = {
-            "article": make_row(rivals.ARTICLE_S, article, []),
-            **{
-                name: make_row(float(np.mean(self._times[name])), self._peaks[name], self._planning[name])
-                for name in ("stops at corners", "TOPP-RA", "ours", "floor")
-            },
-        }
-        floor, ours = rows["floor"]["time_s"], rows["ours"]
-        names = ("velocity", "acceleration", "jerk")
-        over_limit = [f"{name} over its limit" for name in names if ours[name] > 1 + PEAK_TOLERANCE]
+        rows = {name: self._make_row(name) for name in self._times}
+        floor = rows["floor"]["time_s"]
+        over_limit = [name for name in PEAKS if rows["ours"][name] > 1 + PEAK_TOLERANCE]
         return {
             "planned_pairs": len(self._times["ours"]),
-            "article_cycle_s": rivals.ARTICLE_CYCLE_S,
             "methods": [
-                {"method": name, **row, "over_article": row["time_s"] / rivals.ARTICLE_S,
-                 "over_floor": row["time_s"] / floor}
-                for name, row in rows.items()
+                {"method": name, **row, "over_floor": row["time_s"] / floor} for name, row in rows.items()
             ],
-            "problems": [*over_limit, *(f"not planned: {failure}" for failure in self._failures)],
-        }  # fmt: skip
+            "problems": [
+                *(f"{name} over its limit" for name in over_limit),
+                *(f"not planned: {failure}" for failure in self._failures),
+            ],
+        }
+
+    def _make_row(self, method: str) -> Figures:
+        """Return mean time [s], peaks over the limits and planning times [ms] of a method."""
+        peaks = zip(PEAKS, self._peaks[method].tolist(), strict=True)
+        planning = self._planning[method]
+        median, p99 = np.percentile(planning, (50, 99)).tolist() if planning else (None, None)
+        row = {"time_s": float(np.mean(self._times[method])), **dict(peaks)}
+        return {**row, "planning_median_ms": median, "planning_p99_ms": p99}
 
     def _plan(self, start: Array, scene: Scene) -> tuple[float, tuple[Trajectory, Trajectory]]:
         """Return the time of the planner's ride [s] and its motions; the arm then stands at its end.
@@ -150,12 +141,11 @@ class _Trial:
         kinematics, limits = self._planner.kinematics, self._planner.limits
         height = travel_height(self._cell)
         chains = rivals.find_chains(kinematics, limits, start, scene.touch, scene.drop, height)
-        if self._first is None:
-            self._first = chains
-            rivals.follow_with_toppra(chains.fetch, limits)  # The first call compiles; do not time it.
+        if "floor" not in self._times:
+            rivals.follow_with_toppra(chains[0], limits)  # The first call compiles; do not time it.
         followers = {"stops at corners": rivals.stop_at_corners, "TOPP-RA": rivals.follow_with_toppra}
         for name, follow in followers.items():
-            motions = [self._time(name, follow, chain, limits) for chain in (chains.fetch, chains.carry)]
+            motions = [self._time(name, follow, chain, limits) for chain in chains]
             self._add(name, sum(duration for duration, _ in motions), [states for _, states in motions])
         ride = rivals.find_floor(kinematics, limits, start, scene.touch, scene.drop)
         self._add("floor", *ride)
@@ -168,8 +158,5 @@ if __name__ == "__main__":
         click.option(
             "--pairs", type=click.IntRange(min=1), default=200, show_default=True, help="Random pairs."
         ),
-        click.option(
-            "--execute", type=click.IntRange(min=0), default=0, show_default=True,
-            help="Pairs whose motions the simulated arm makes.",
-        ),
-    )  # fmt: skip
+        click.option("--execute", is_flag=True, help="Have the simulated arm make the motions instead."),
+    )

@@ -2,60 +2,36 @@
 
 Two are from the textbook: over every place first, at the cell's travel height, and straight down. One stops
 at every corner, the other passes with TOPP-RA. The floor is faster than any way: straight through everything.
-The article's cycle is that of the prototype: PyBullet's position control with a force of 500 and without a
-limit of velocity throws the joints at their targets, and the program waits for fixed numbers of steps.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import pybullet
 from toppra import SplineInterpolator
 from toppra.algorithm import TOPPRA
 from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
 
 from executive.arm import Goal
-from executive.cell_config import CellConfig
 from executive.clock import STEP
-from executive.geometry import Array, tool_down
+from executive.geometry import Array
 from executive.motion.free import Connector
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits, rest_to_rest
-from executive.motion.postures import LIMIT_MARGIN, Postures, find_postures, upright_line
-from executive.motion.state import JOINTS, State
-from executive.motion.trajectory import Trajectory, peaks
-from executive.sim.world import World
-
-SWIVELS_AROUND = np.radians(np.arange(-5.0, 5.5, 0.5))
-"""Swivels around the best one of the coarse search that the floor tries too [rad]."""
-MOVE_STEPS = (300, 240, 240, 300, 240, 240)
-"""Steps for which the article holds each target: above the object, on it, above; the same of the bin."""
-DWELL_STEPS = (0, 80, 0, 0, 100, 0)
-"""Steps that the article waits after each, while the tool closes and opens."""
-ARTICLE_S, ARTICLE_CYCLE_S = sum(MOVE_STEPS) * STEP, (sum(MOVE_STEPS) + sum(DWELL_STEPS)) * STEP
-"""Time of the article's moves and of its whole cycle [s]: 6.5 and 7.25, the same for every pair."""
-ARTICLE_FORCE = 500.0
-"""Largest torque of the article's motors [Nm]."""
+from executive.motion.postures import find_postures, upright_line
+from executive.motion.state import State
+from executive.motion.trajectory import Trajectory
+from tests.motion.joint_states import reach
 
 Ride = tuple[float, list[State]]
 """Time of the two motions of a pair [s], without a dwell, and the joints' states every 1/240 s of each."""
 
 
-@dataclass(frozen=True, eq=False)
-class Chains:
-    """Corners of the textbook's way: two chains of joint positions `(4, 7)` [rad].
-
-    Attributes:
-        fetch: Where the arm stands, above that, above the object, on it.
-        carry: On the object, above it, above the place in the bin, there.
-    """
-
-    fetch: Array
-    carry: Array
+Chains = tuple[Array, Array]
+"""Corners of the textbook's way, joint positions `(4, 7)` [rad]: where the arm stands, above that, above the
+object, on it; then on the object, above it, above the place in the bin, there."""
 
 
 def find_chains(
@@ -74,16 +50,16 @@ def find_chains(
     Raises:
         Unreachable: A corner is out of reach.
     """
-    x, y, z = (float(value) for value in kinematics.forward(start).position)
+    x, y, z = kinematics.forward(start).position.tolist()
     line = upright_line(kinematics, start, max(0.0, height - z), 2)
-    up = kinematics.nearest_solution(tool_down((x, y, height)), start) if line is None else line[-1]
+    up = reach(kinematics, (x, y, height), start) if line is None else line[-1]
     fetch = find_postures(kinematics, touch, height - touch.position[2], start)
     carry = find_postures(kinematics, drop, height - drop.position[2], start)
     fetching = rest_to_rest(fetch.high - up, limits) + 2 * rest_to_rest(fetch.high - fetch.low, limits)
     carrying = rest_to_rest(carry.high - fetch.high[:, None], limits)
     carrying += rest_to_rest(carry.low - carry.high, limits)
     i, j = np.unravel_index(np.argmin(fetching[:, None] + carrying), carrying.shape)
-    return Chains(
+    return (
         np.array([start, up, fetch.high[i], fetch.low[i]]),
         np.array([fetch.low[i], fetch.high[i], carry.high[j], carry.low[j]]),
     )
@@ -121,60 +97,13 @@ def find_floor(kinematics: Kinematics, limits: JointLimits, start: Array, touch:
     """Return the fastest ride through everything.
 
     Each of the two motions is from rest to rest, without a corner. Joint 7 is free at both ends; branch and
-    swivel are those of the shortest sum: of all swivels by 5 degrees, then by half a degree around the best.
+    swivel are those of the shortest sum.
     """
-
-    def find_best(touching: Array, dropping: Array) -> tuple[int, int]:
-        there = rest_to_rest(touching - start, limits)
-        back = rest_to_rest(touching[:, None] - dropping, limits)
-        j = int(np.argmin(there + back.min(axis=1)))
-        return j, int(np.argmin(back[j]))
-
-    coarse = [find_postures(kinematics, goal, 0.0, start) for goal in (touch, drop)]
-    best = find_best(coarse[0].low, coarse[1].low)
-    fine = [
-        _swivel_around(kinematics, goal, postures, number)
-        for goal, postures, number in zip((touch, drop), coarse, best, strict=True)
+    touching, dropping = (find_postures(kinematics, goal, 0.0, start).low for goal in (touch, drop))
+    there = rest_to_rest(touching - start, limits)
+    back = rest_to_rest(touching[:, None] - dropping, limits)
+    i, j = np.unravel_index(np.argmin(there[:, None] + back), back.shape)
+    motions = [
+        stop_at_corners(np.array(ends), limits) for ends in pairwise((start, touching[i], dropping[j]))
     ]
-    i, j = find_best(*fine)
-    motions = [stop_at_corners(np.array(ends), limits) for ends in pairwise((start, fine[0][i], fine[1][j]))]
     return sum(duration for duration, _ in motions), [states for _, states in motions]
-
-
-def _swivel_around(kinematics: Kinematics, goal: Goal, postures: Postures, number: int) -> Array:
-    """Return joint positions `(N, 7)` of a posture, and of those with the elbow a little to its sides."""
-    q = postures.low[number]
-    swivels = postures.swivel[number] + SWIVELS_AROUND
-    found = kinematics.grid(tool_down(goal.position), swivels)[int(postures.branch[number])]
-    found[:, 6] = q[6]
-    inside = np.all(np.abs(found) <= kinematics.position_limit - LIMIT_MARGIN, axis=1)
-    return np.concatenate([q[None], found[inside]])
-
-
-def measure_article_peaks(cell: CellConfig, chains: Chains, limits: JointLimits) -> Array:
-    """Return the largest joint velocity, acceleration and jerk `(3,)` of the article's cycle over the limits.
-
-    The arm is simulated in an empty cell, from above the place where it stands; accelerations and jerks are
-    differences between its measured velocities.
-    """
-    up, above_object, on_object = chains.fetch[1:]
-    above_bin, in_bin = chains.carry[2:]
-    targets = (above_object, on_object, above_object, above_bin, in_bin, above_bin)
-    world = World(cell, visuals=False)
-    try:
-        world.set_arm(up)
-        velocities = [np.zeros(JOINTS)]
-        for target, held, dwell in zip(targets, MOVE_STEPS, DWELL_STEPS, strict=True):
-            world.client.setJointMotorControlArray(
-                world.arm, range(JOINTS), pybullet.POSITION_CONTROL,
-                targetPositions=target.tolist(), forces=[ARTICLE_FORCE] * JOINTS,
-            )  # fmt: skip
-            for _ in range(held + dwell):
-                world.step()
-                states = world.client.getJointStates(world.arm, range(JOINTS))
-                velocities.append(np.array([state[1] for state in states]))
-    finally:
-        world.close()
-    qd = np.array(velocities)
-    # The measured velocities stand for positions, too: those have no part in peaks.
-    return peaks(State(qd[1:], qd[1:], np.diff(qd, axis=0) / STEP), limits).max(axis=1)

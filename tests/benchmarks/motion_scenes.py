@@ -14,7 +14,7 @@ from executive.errors import InputError, Unreachable
 from executive.geometry import tool_down
 from executive.goals import onto, over
 from executive.layout import as_bin
-from executive.messages import Bin, Load, ObjectClass, Obstacle
+from executive.messages import Load, ObjectClass, Obstacle
 from executive.motion.planner import Planner
 from executive.sim.clearance import PathClearance
 from executive.sim.models import load_mesh, weighed
@@ -104,37 +104,27 @@ class Scenes:
         Raises:
             InputError: None of `MAX_TRIES` scenes could be used.
         """
-        problem = "it has no object"
         for _ in range(MAX_TRIES):
             for body in tuple(self._world.bodies):
                 self._world.remove_object(body)
             bodies = spawn(self._world, self._cell, int(self._random.integers(2**31)))
-            bin, slot = self._draw_slot()
             if not bodies:
                 continue
             try:
-                scene = self._describe(bodies, bin, slot)
+                scene = self._describe(bodies)
                 self._planner.require_reachable(scene.approach)
                 self._planner.require_reachable(scene.drop)
-            except Unreachable as error:
-                problem = str(error)
+            except Unreachable:
                 continue
             return scene
         raise InputError(
             f"none of {MAX_TRIES} random scenes of cell {self._cell.cell} has an object that can be picked "
-            f"and placed; the last one: {problem}"
+            "and placed; move its bins or its table nearer to the arm"
         )
 
-    def draw_start(self) -> Goal:
-        """Return a random drop, where the arm stands before the first pair."""
-        return over(*self._draw_slot(), self._tallest, self._tallest)
-
-    def _draw_slot(self) -> tuple[Bin, int]:
-        """Return a random bin and the number of one of its slots."""
+    def _describe(self, bodies: tuple[int, ...]) -> Scene:
         bin = self._bins[int(self._random.integers(len(self._bins)))]
-        return bin, int(self._random.integers(len(bin.slots)))
-
-    def _describe(self, bodies: tuple[int, ...], bin: Bin, slot: int) -> Scene:
+        slot = int(self._random.integers(len(bin.slots)))
         first, motion = bodies[0], self._cell.motion
         kind = self._kind(first)
         target, *others = (self._obstacle(body, number) for number, body in enumerate(bodies, start=1))
@@ -160,23 +150,17 @@ class Scenes:
     def _measure_seal(self, body: int, place: tuple[float, float], top: float) -> tuple[float, float]:
         """Return the height of the object under a cup at `place` [m], and the pull a seal bears there [N].
 
-        Measured twice, the second time with the cup where it comes to rest: on a bent surface the distance
-        found by the rays depends a little on where they start.
-
         Raises:
             Unreachable: No seal forms there.
         """
         tool = self._cell.tool
         surface, bears = top + tool.reach, 0.0
+        # Twice: the distance found by the rays depends a little on where they start.
         for _ in range(2):
-            seal = measure(
-                self._world.client, tool_down((*place, surface)), {body}, tool.cup_radius, tool.reach
-            )
+            X_WT = tool_down((*place, surface))
+            seal = measure(self._world.client, X_WT, {body}, tool.cup_radius, tool.reach)
             bears = breakaway(seal, tool)
             surface -= seal.distance if seal else 0.0
         if bears < tool.least_force:
-            raise Unreachable(
-                f"a seal at the middle of the {self._world.bodies[body]} bears {bears:.1f} N; "
-                f"{tool.least_force:.1f} N are needed"
-            )
+            raise Unreachable(f"no seal holds the {self._world.bodies[body]} at its middle")
         return surface, bears

@@ -10,6 +10,7 @@ import json
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import click
@@ -24,6 +25,8 @@ from executive.cli.options import MISSION, json_option, overrides_option, seed_o
 from executive.cli.output import print_json, stdout_kept_clean
 from executive.cli.subject import load_subject, oracle_option
 from executive.errors import ExecutiveError
+from executive.record.recorded_run import recorded_run
+from executive.record.result import ledger_agrees
 
 Figures = dict[str, Any]
 """Figures of a benchmark by name; a name ends with the unit."""
@@ -71,6 +74,22 @@ def run_mission_command(measure: Callable[..., Figures], *options: Option) -> No
 
     measure_mission.__doc__ = measure.__doc__
     run_command(measure_mission, MISSION, *options, oracle_option, seed_option, overrides_option)
+
+
+def record_run(subject: Subject, seed: int, runs: Path) -> tuple[Figures, str]:
+    """Run a mission to its end, recorded below `runs`; return its result and, if it failed, a sentence."""
+    result = recorded_run(
+        subject.loaded, subject.skills, seed=seed, runs=runs, requests=subject.requests, frames=False,
+        kind=subject.kind,
+    )  # fmt: skip
+    if result["status"] == "HALTED":
+        raise KeyboardInterrupt
+    if result["status"] == "SUCCESS" and ledger_agrees(result):
+        return result, ""
+    return result, (
+        f"seed {seed} ended with {result['status']} {result['reason']}; the ledger says {result['items']}, "
+        f"the audit {result['audit']}"
+    )
 
 
 def describe(subject: Subject) -> Figures:

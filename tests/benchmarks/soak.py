@@ -7,16 +7,14 @@ import os
 import shutil
 import statistics
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
 
 from executive.campaign.subject import Subject
 from executive.errors import InputError
-from executive.record.recorded_run import recorded_run
-from executive.record.result import ledger_agrees
-from tests.benchmarks.report import Figures, describe, run_mission_command, show_progress
+from tests.benchmarks.report import Figures, describe, record_run, run_mission_command, show_progress
 
 PROCESS = Path("/proc/self")
 """Folder in which Linux lists the resources of this process."""
@@ -28,7 +26,7 @@ MAX_OBJECTS_PER_RUN = 2.0
 """Limit of the Python objects that a run leaves behind; its sample is one."""
 
 
-def measure(subject: Subject, runs: int = 100, frames: bool = False) -> Figures:
+def measure(subject: Subject, runs: int = 100) -> Figures:
     """Run MISSION many times in one process, each run with the next seed and recorded, and compare."""
     if not PROCESS.is_dir():
         raise InputError(f"resources of a process are read from {PROCESS}, which only Linux has; use Linux")
@@ -36,17 +34,8 @@ def measure(subject: Subject, runs: int = 100, frames: bool = False) -> Figures:
     failed: list[str] = []
     with tempfile.TemporaryDirectory() as folder:
         for seed in show_progress(range(subject.seed, subject.seed + runs), "run"):
-            result = recorded_run(
-                subject.loaded, subject.skills, seed=seed, runs=Path(folder), requests=subject.requests,
-                frames=frames, kind=subject.kind,
-            )  # fmt: skip
-            if result["status"] == "HALTED":
-                raise KeyboardInterrupt
-            if result["status"] != "SUCCESS" or not ledger_agrees(result):
-                failed.append(
-                    f"seed {seed} ended with {result['status']} {result['reason']}; the ledger says "
-                    f"{result['items']}, the audit {result['audit']}"
-                )
+            result, problem = record_run(subject, seed, Path(folder))
+            failed += [problem] if problem else []
             shutil.rmtree(result["run"])
             samples.append(take_sample())
     return {**describe(subject), "runs": runs, **compare_samples(samples, failed)}
@@ -67,31 +56,23 @@ def take_sample() -> Figures:
 def compare_samples(samples: Sequence[Figures], failed: Sequence[str] = ()) -> Figures:
     """Return how much the resources grew over the samples, and every limit that was exceeded."""
     warm, last = samples[min(WARM_RUNS, len(samples)) - 1], samples[-1]
-    memory = [sample["memory_mb"] for sample in samples[min(WARM_RUNS, len(samples)) - 1 :]]
-    quarter = max(1, len(memory) // 4)
     figures = {
-        "growth_mb": statistics.median(memory[-quarter:]) - statistics.median(memory[:quarter]),
-        "memory_mb_per_run": _slope(samples, "memory_mb"),
+        "growth_mb": len(samples) * _slope(samples, "memory_mb"),
         "objects_per_run": _slope(samples, "objects"),
     }
-    limits = {
-        "growth_mb": MAX_GROWTH,
-        "memory_mb_per_run": MAX_GROWTH / len(samples),
-        "objects_per_run": MAX_OBJECTS_PER_RUN,
-    }
-
-    def find_problems() -> Iterator[str]:
-        for name, limit in limits.items():
-            if figures[name] > limit:
-                yield f"{name} is {figures[name]:.4g}; {limit:.3g} is allowed"
-        for name in ("threads", "open_files"):
-            if last[name] > warm[name]:
-                yield f"{last[name]} {name} after the last run; {warm[name]} when warm"
-
+    problems = [
+        f"{name} is {figures[name]:.4g}; {limit:.3g} is allowed"
+        for name, limit in (("growth_mb", MAX_GROWTH), ("objects_per_run", MAX_OBJECTS_PER_RUN))
+        if figures[name] > limit
+    ] + [
+        f"{last[name]} {name} after the last run; {warm[name]} when warm"
+        for name in ("threads", "open_files")
+        if last[name] > warm[name]
+    ]
     return {
         **figures,
         "samples": [{"after": "warm-up", **warm}, {"after": "last run", **last}],
-        "problems": [*find_problems(), *failed],
+        "problems": [*problems, *failed],
     }
 
 
@@ -107,5 +88,4 @@ if __name__ == "__main__":
         click.option(
             "--runs", type=click.IntRange(min=1), default=100, show_default=True, help="Number of runs."
         ),
-        click.option("--frames", is_flag=True, help="Save the pictures behind every decision, too."),
     )

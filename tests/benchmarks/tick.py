@@ -13,7 +13,7 @@ import itertools
 import math
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,6 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.cell import Cell
-from executive.control.fallback import Fallback
 from executive.control.node import Site
 from executive.control.retry import Retry
 from executive.control.scope import Scope
@@ -48,15 +47,13 @@ STEADY_TICKS = 300
 """Ticks in a block of a tree that waits."""
 ENDING_NODES = 1000
 """Nodes that begin and end in a block, in one tick or several."""
-ATTEMPTS = 3
-"""Attempts of every retry."""
 TIMEOUT = 1e9
 """Limit of every timeout, longer than any measurement [s]."""
 
 
 def measure(blocks: int = 50, sizes: Sequence[int] = SIZES) -> Figures:
     """Measure ticks and status changes; each figure is the best of so many blocks."""
-    ticks = [measure_ticks(shape, nodes, blocks) for shape in SHAPES for nodes in sizes]
+    ticks = [measure_ticks(nodes, blocks) for nodes in sizes]
     with tempfile.TemporaryDirectory() as folder:
         changes = [measure_changes(nodes, blocks, Path(folder, str(nodes))) for nodes in sizes]
     slow = [row for row in ticks if row["ratio"] > MAX_RATIO]
@@ -69,24 +66,23 @@ def measure(blocks: int = 50, sizes: Sequence[int] = SIZES) -> Figures:
     }
 
 
-def measure_ticks(shape: str, nodes: int, blocks: int) -> Figures:
+def measure_ticks(nodes: int, blocks: int) -> Figures:
     """Return the cost of a tick of a tree that waits for its last leaf."""
-    ours, bare = SHAPES[shape](Ours(), nodes), SHAPES[shape](Bare(), nodes)
+    ours, bare = build_ours(nodes, _Waits), build_bare(nodes, Status.RUNNING)
     # The first tick runs the leaves that end.
     ours.tick_once()
     bare.tick_once()
     ours_us, bare_us = find_best_costs(ours, bare, blocks, STEADY_TICKS)
-    row = {"shape": shape, "nodes": nodes, "ours_us": ours_us, "py_trees_us": bare_us}
-    return {**row, "ratio": ours_us / bare_us}
+    return {"nodes": nodes, "ours_us": ours_us, "py_trees_us": bare_us, "ratio": ours_us / bare_us}
 
 
 def measure_changes(nodes: int, blocks: int, folder: Path) -> Figures:
     """Return the cost of a tick in which every node begins and succeeds, recorded as a run is."""
     events: list[Event] = []
-    build_ending(Ours([events.append]), nodes).tick_once()
+    build_ours(nodes, _Ends, events.append).tick_once()
     folder.mkdir()
     with closing(Recorder(RunDirectory(folder), frames=False)) as recorder:
-        ours, bare = build_ending(Ours([recorder]), nodes), build_ending(Bare(), nodes)
+        ours, bare = build_ours(nodes, _Ends, recorder), build_bare(nodes, Status.SUCCESS)
         ours_us, bare_us = find_best_costs(ours, bare, blocks, max(1, ENDING_NODES // nodes))
     row = {"changes": len(events), "nodes": nodes, "ours_us": ours_us, "py_trees_us": bare_us}
     return {**row, "extra_us": (ours_us - bare_us) / len(events)}
@@ -113,82 +109,32 @@ def _measure_cost(root: Behaviour, ticks: int) -> float:
     return (time.thread_time() - began) / ticks * 1e6
 
 
-class Ours:
-    """Nodes as a mission has them, on a fake cell; events are stamped and handed on as a run does it."""
+def build_ours(nodes: int, last: type[Skill], *observers: Observer) -> Behaviour:
+    """Return a retry of a timeout of a sequence on a fake cell, whose last leaf runs the skill `last`.
 
-    def __init__(self, observers: Sequence[Observer] = ()) -> None:
-        self._observers = observers
-        self._cell, self._scope = FakeCell().cell, Scope()
-        self._number = itertools.count(1)
+    All other leaves succeed at once. Events are stamped and passed on as a run does it.
+    """
+    cell, scope, number = FakeCell().cell, Scope(), itertools.count(1)
 
-    def leaf(self, *, ends: bool) -> Behaviour:
-        """Return a leaf that succeeds at once, or runs forever."""
-        skill = _Ends if ends else _Waits
-        return SkillNode(self._site(skill.__name__), "leaf", skill, Wiring(), self._cell, self._scope)
-
-    def sequence(self, children: Sequence[Behaviour]) -> Behaviour:
-        """Return a sequence with memory."""
-        return SequenceNode(self._site("sequence"), children)
-
-    def fallback(self, children: Sequence[Behaviour]) -> Behaviour:
-        """Return a fallback with memory."""
-        return Fallback(self._site("fallback"), children)
-
-    def guard(self, body: Behaviour) -> Behaviour:
-        """Return a retry of a timeout of `body`."""
-        timeout = Timeout(self._site("timeout"), body, TIMEOUT, self._cell.clock)
-        return Retry(self._site("retry"), timeout, ATTEMPTS)
-
-    def _site(self, name: str) -> Site:
-        return Site(f"tree/repeat/do/{next(self._number)}:{name}", emit=self._emit)
-
-    def _emit(self, kind: str, **data: Any) -> None:
-        event = Event(kind, 0, round(self._cell.clock.now, 6), data)
-        for observer in self._observers:
+    def emit(kind: str, **data: Any) -> None:
+        event = Event(kind, 0, round(cell.clock.now, 6), data)
+        for observer in observers:
             observer(event)
 
+    def make_site(name: str) -> Site:
+        return Site(f"tree/repeat/do/{next(number)}:{name}", emit=emit)
 
-class Bare:
-    """The same nodes of py_trees."""
-
-    def leaf(self, *, ends: bool) -> Behaviour:
-        """Return a leaf that succeeds at once, or runs forever."""
-        return _Answer(Status.SUCCESS if ends else Status.RUNNING)
-
-    def sequence(self, children: Sequence[Behaviour]) -> Behaviour:
-        """Return a sequence with memory."""
-        return composites.Sequence("sequence", memory=True, children=children)
-
-    def fallback(self, children: Sequence[Behaviour]) -> Behaviour:
-        """Return a fallback with memory."""
-        return composites.Selector("fallback", memory=True, children=children)
-
-    def guard(self, body: Behaviour) -> Behaviour:
-        """Return a retry of a timeout of `body`."""
-        return decorators.Retry("retry", decorators.Timeout("timeout", body, TIMEOUT), ATTEMPTS)
+    skills = [*[_Ends] * (nodes - 4), last]
+    leaves = [SkillNode(make_site(skill.__name__), "leaf", skill, Wiring(), cell, scope) for skill in skills]
+    timeout = Timeout(make_site("timeout"), SequenceNode(make_site("do"), leaves), TIMEOUT, cell.clock)
+    return Retry(make_site("retry"), timeout, 3)
 
 
-Kit = Ours | Bare
-"""Maker of the nodes of a tree."""
-
-
-def build_flat(kit: Kit, nodes: int) -> Behaviour:
-    """Return one sequence of leaves, of which the last runs forever."""
-    return kit.sequence([*[kit.leaf(ends=True) for _ in range(nodes - 2)], kit.leaf(ends=False)])
-
-
-def build_nested(kit: Kit, nodes: int) -> Behaviour:
-    """Return retry, timeout, fallback, retry and timeout around a flat tree, and a second choice."""
-    return kit.guard(kit.fallback([kit.guard(build_flat(kit, nodes - 6)), kit.leaf(ends=True)]))
-
-
-def build_ending(kit: Kit, nodes: int) -> Behaviour:
-    """Return one sequence of leaves that all succeed at once."""
-    return kit.sequence([kit.leaf(ends=True) for _ in range(nodes - 1)])
-
-
-SHAPES: dict[str, Callable[[Kit, int], Behaviour]] = {"flat": build_flat, "nested": build_nested}
-"""Shapes of trees that come to wait for their last leaf; any number of nodes from 8 on."""
+def build_bare(nodes: int, last: Status) -> Behaviour:
+    """Return the same nodes of py_trees."""
+    leaves = [_Answer(status) for status in (*[Status.SUCCESS] * (nodes - 4), last)]
+    body = composites.Sequence("do", memory=True, children=leaves)
+    return decorators.Retry("retry", decorators.Timeout("timeout", body, TIMEOUT), 3)
 
 
 class _Ends(Skill):

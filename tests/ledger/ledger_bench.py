@@ -16,6 +16,23 @@ EYE = Reliability(threshold=0.5, misses=0.03, confused=0.004, invented=0.02, jit
 Thing = tuple[str, float, float]
 
 
+def take_frame(number: int = 1, epoch: int = 0, hidden: slice = slice(0, 0)) -> Frame:
+    """A frame from above; the columns `hidden` of the image are behind the arm."""
+    visible = np.ones((480, 640), bool)
+    visible[:, hidden] = False
+    matrix, image = (
+        np.array([[461.0, 0, 320.0], [0, 461.0, 240.0], [0, 0, 1.0]]),
+        np.zeros((1, 1, 3), np.uint8),
+    )
+    X_WC = looking_down((0.5, 0.0, 1.2))
+    return Frame(number, "camera", image, None, matrix, X_WC, float(number), visible, epoch)
+
+
+def area_of(view: str) -> tuple[float, float, float, float]:
+    """The part of the image that is searched."""
+    return (192.0, 100.0, 448.0, 356.0) if view == "table" else (0.0, 0.0, 640.0, 480.0)
+
+
 class Bench:
     """A ledger with a camera above it that sees exactly what a test says."""
 
@@ -47,23 +64,10 @@ class Bench:
     ) -> Sequence[Target]:
         """Look; the columns `hidden` of the image are behind the arm, and of some things it is `unsure`."""
         self.frames += 1
-        visible = np.ones((480, 640), bool)
-        visible[:, hidden] = False
-        area = (192.0, 100.0, 448.0, 356.0) if view == "table" else (0.0, 0.0, 640.0, 480.0)
-        frame = Frame(
-            self.frames,
-            "camera",
-            np.zeros((1, 1, 3), np.uint8),
-            None,
-            np.array([[461.0, 0, 320.0], [0, 461.0, 240.0], [0, 0, 1.0]]),
-            looking_down((0.5, 0.0, 1.2)),
-            float(self.frames),
-            visible,
-            self.ledger.epoch if epoch is None else epoch,
-        )
+        frame = take_frame(self.frames, self.ledger.epoch if epoch is None else epoch, hidden)
         found = tuple(Detection(label, 0.9, (0, 0, 1, 1)) for label, _, _ in things)
         return self.ledger.observe(
-            Detections(frame, found, "eye", by, view, area),
+            Detections(frame, found, "eye", by, view, area_of(view)),
             [np.array([x, y, 0.025]) for _, x, y in things],
             [Glimpse(Detection(label, 0.4, (0, 0, 1, 1)), np.array([x, y, 0.025])) for label, x, y in unsure],
         )

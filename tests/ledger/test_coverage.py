@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from ledger_bench import area_of, take_frame
 
 from executive.cell_config import TableConfig
-from executive.geometry import looking_down
 from executive.ledger.coverage import ASTRAY, LEAST, STRAYED, Coverage
-from executive.messages import Detections, Frame, Reliability
+from executive.messages import Detections, Reliability
 
 TABLE = TableConfig()
 MIDDLE, CORNER = np.array([0.53, 0.0, 0.025]), np.array([0.43, 0.21, 0.025])
@@ -19,13 +19,7 @@ EYE = Reliability(threshold=0.5, misses=0.2, confused=0.1, invented=0.5, jitter=
 
 def look(*, view: str = "full", epoch: int = 0, hidden: slice = slice(0, 0)) -> Detections:
     """An empty look from above; the columns `hidden` of the image are behind the arm."""
-    visible = np.ones((480, 640), bool)
-    visible[:, hidden] = False
-    matrix = np.array([[461.0, 0, 320.0], [0, 461.0, 240.0], [0, 0, 1.0]])
-    image = np.zeros((480, 640, 3), np.uint8)
-    frame = Frame(1, "eye", image, None, matrix, looking_down((0.5, 0.0, 1.2)), 0.0, visible, epoch)
-    area = (0.0, 0.0, 640.0, 480.0) if view == "full" else (192.0, 100.0, 448.0, 356.0)
-    return Detections(frame, (), "eye", EYE, view, area)
+    return Detections(take_frame(1, epoch, hidden), (), "eye", EYE, view, area_of(view))
 
 
 @pytest.fixture

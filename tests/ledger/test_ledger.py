@@ -82,13 +82,6 @@ def test_objects_that_the_mission_has_no_route_for_are_nothing_left_to_sort(benc
     assert bench.end() == {"duck-1": ("rejected", "the mission has no route for it")}
 
 
-def test_the_same_frame_twice_is_one_look(bench: Bench) -> None:
-    bench.look(CUBE, view="full")
-    bench.frames -= 1
-    bench.look(CUBE, view="full")
-    assert bench.ledger.rows()[0]["looks"] == 1
-
-
 def test_a_frame_from_before_a_pick_brings_nothing_back(bench: Bench) -> None:
     bench.look(CUBE, FAR)
     bench.ledger.held("cube-1")

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 from hypothesis import strategies as st
+from numpy.typing import ArrayLike
 
+from executive.arm import Goal
 from executive.geometry import Array
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
+from executive.motion.postures import find_postures
 from executive.motion.state import Piece, State
 
 LIMITS = JointLimits(
@@ -57,3 +60,10 @@ def tool_velocities(kinematics: Kinematics, states: State) -> Array:
     h = 1e-6
     ahead, behind = (kinematics.tips(states.q + step * states.qd)[0] for step in (h, -h))
     return (ahead - behind) / (2 * h)
+
+
+def reach(kinematics: Kinematics, place: ArrayLike, q: Array) -> Array:
+    """The joint positions `(7,)` nearest to `q` with the tool straight down at a place `(3,)` [m]."""
+    x, y, z = np.asarray(place, dtype=float).tolist()
+    found = find_postures(kinematics, Goal((x, y, z)), 0.0, q).low
+    return found[np.argmin(np.max(np.abs(found - q), axis=1))]

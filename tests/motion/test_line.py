@@ -85,12 +85,3 @@ def test_leaving_it_is_the_same_way_mirrored_in_time(descent: Descent) -> None:
         assert np.allclose(one.q, other.q, atol=1e-6)
         assert np.allclose(one.qd, -other.qd, atol=1e-5)
         assert np.allclose(one.qdd, other.qdd, atol=1e-3)
-
-
-@given(descents())
-@settings(max_examples=10, deadline=None)
-def test_a_slow_line_takes_its_length_over_its_speed_and_more_from_rest(descent: Descent) -> None:
-    slow = 0.02
-    line, from_rest = (Line(descent.chain, descent.length, LIMITS, slow, enters=on) for on in (True, False))
-    assert line.duration == pytest.approx(descent.length / slow, abs=0.05)
-    assert from_rest.duration > line.duration >= descent.length / slow - 1e-9

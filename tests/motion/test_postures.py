@@ -51,16 +51,28 @@ def test_there_is_no_line_up_where_the_tool_does_not_point_down_or_a_joint_leave
     assert upright_line(narrow, START, 0.2, 5) is None
 
 
-def test_what_cannot_be_reached_says_at_which_height_and_why() -> None:
-    with pytest.raises(
-        Unreachable, match=re.escape("(0.900, 0.000, 0.114) m") + ".*farther than the arm is long"
-    ):
-        find_postures(ARM, Goal((0.9, 0.0, 0.114)), 0.0, START)
-    with pytest.raises(Unreachable, match=re.escape("(0.500, 0.000, 0.950) m") + ".*farther"):
-        find_postures(ARM, Goal((0.5, 0.0, 0.05)), 0.9, START)
-    narrow = Kinematics(0.12, np.radians([170, 120, 170, 120, 170, 20, 175]))
-    with pytest.raises(Unreachable, match=r"leaves joint 6 \d+\.\d° outside ±20°"):
-        find_postures(narrow, Goal((0.5, 0.0, 0.1)), 0.0, START)
+@pytest.mark.parametrize(
+    ("place", "length", "text"),
+    [
+        (
+            (0.9, 0.0, 0.114),
+            0.0,
+            r"(0.900, 0.000, 0.114) m: .* 0\.080 m farther than the arm is long",
+        ),
+        (
+            (0.3, 0.0, 0.114),
+            0.0,
+            r"(0.300, 0.000, 0.114) m: .* 0\.110 m nearer than joint 4 can fold",
+        ),
+        ((0.5, 0.0, 0.05), 0.9, r"(0.500, 0.000, 0.950) m: .* farther than the arm"),
+        ((0.5, 0.0, 0.1), 0.0, r"(0.500, 0.000, 0.100) m: .* best one leaves joint 6 14\.1° outside ±20°"),
+    ],
+)
+def test_what_cannot_be_reached_says_at_which_height_and_why(place, length: float, text: str) -> None:
+    narrow = Kinematics(0.12, np.radians([170, 120, 170, 120, 170, 20 if place[2] == 0.1 else 120, 175]))
+    point, reason = text.split(" m: ")
+    with pytest.raises(Unreachable, match=f"{re.escape(point)} m: {reason}"):
+        find_postures(narrow, Goal(place), length, np.zeros(7))
 
 
 def test_heights_that_only_different_postures_reach_are_unreachable_together() -> None:

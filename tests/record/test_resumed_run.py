@@ -23,8 +23,8 @@ from executive.record.result import ledger_agrees
 from executive.record.resumed_run import resumed_run
 from executive.testing.disturbances.hand import Hand
 from executive.testing.fake_cell import FakeCell
-from executive.testing.meanwhile import meanwhile
 from executive.testing.substitutes import raising
+from tests.meanwhile import meanwhile
 
 SEED = 3
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections import deque
 from typing import Any
 
-import numpy as np
-
 from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
 from executive.clock import STEP
@@ -107,20 +105,3 @@ class Rig:
         """Give both worlds back."""
         self.clearance.close()
         self.world.close()
-
-
-def off_path(q: Array, motion: Trajectory) -> float:
-    """Return how far joint positions `(7,)` are from all that a motion passes [rad].
-
-    The nearest place is looked for around the nearest sample, by golden section.
-    """
-    number = int(np.argmin(np.abs(motion.samples.q - q).max(axis=1)))
-    low, high = (number - 1) * STEP, (number + 1) * STEP
-    ratio = (np.sqrt(5) - 1) / 2
-    for _ in range(60):
-        a, b = high - ratio * (high - low), low + ratio * (high - low)
-        if np.linalg.norm(motion.at(a).q - q) < np.linalg.norm(motion.at(b).q - q):
-            high = b
-        else:
-            low = a
-    return float(np.abs(motion.at((low + high) / 2).q - q).max())

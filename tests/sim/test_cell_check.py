@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from executive.cell_config import CellConfig
-from executive.geometry import tool_down
 from executive.mission.parse.cell_file import load_cell
 from executive.motion.kinematics import Kinematics
 from executive.sim.cell import SimCell
 from executive.sim.poses import out_of_reach, unfit_poses
+from tests.motion.joint_states import reach
 from tests.sim.conftest import shipped_cell
 
 
@@ -36,7 +36,7 @@ def reaching(config: CellConfig, *place: float) -> Sequence[float]:
     """Return the pose [degree] with the tool straight down at a place [m]."""
     kinematics = Kinematics(config.tool.length, np.radians(config.arm.limits.position_deg))
     home = np.radians(config.arm.poses_deg["home"])
-    return tuple(np.degrees(kinematics.nearest_solution(tool_down(place), home)))
+    return tuple(np.degrees(reach(kinematics, place, home)))
 
 
 @pytest.mark.parametrize("name", ["overhead", "wrist", "depth"])

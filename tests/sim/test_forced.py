@@ -41,11 +41,8 @@ def test_a_seal_gives_way_and_the_object_falls(rig: Rig, held: int) -> None:
     rig.step(120)
     assert height(rig, held) == pytest.approx(0.025, abs=0.002)
     assert not rig.tool.holding, "the vacuum is on and nothing is near"
-
-
-def test_where_there_is_no_seal_none_gives_way(rig: Rig) -> None:
     rig.tool.part()
-    assert not rig.tool.holding
+    assert not rig.tool.holding, "where there is no seal none gives way"
 
 
 def test_an_arm_that_runs_into_something_brakes_and_says_what(rig: Rig) -> None:

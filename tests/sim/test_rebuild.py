@@ -21,9 +21,9 @@ from executive.runtime.run import Run
 from executive.sim.cell import SimCell
 from executive.testing.disturbances.hand import hand_of
 from executive.testing.fake_cell import SilentOperator
-from executive.testing.meanwhile import meanwhile
 from executive.testing.oracle import oracle_cell
 from executive.workcell import CellOptions, CellPast
+from tests.meanwhile import meanwhile
 
 SEED = 3
 TICKS = (1, 400, 777)

@@ -95,16 +95,6 @@ def test_objects_stand_still_apart_and_inside_the_workspace(
         assert lowest(world, body) == pytest.approx(0.05 if body in pairs else 0.0, abs=2e-3)
 
 
-@pytest.mark.slow
-def test_cubes_are_carried_and_carry_and_balls_do_neither(build: Build, overhead: CellConfig) -> None:
-    classes = set()
-    for seed in range(4):
-        world = build(with_stacks(overhead, 1.0))
-        spawn(world, world.config, seed, count=6)
-        classes |= {(world.bodies[upper], world.bodies[lower]) for upper, lower in carried(world).items()}
-    assert classes == {("cube", "cube"), ("duck", "cube")}
-
-
 def test_too_many_objects_are_refused_with_what_to_change(build: Build, overhead: CellConfig) -> None:
     with pytest.raises(InputError, match=r"100 objects .* found no room .* ask for fewer or widen table\.x"):
         spawn(build(overhead), overhead, seed=1, count=100)

@@ -1,20 +1,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pybullet
 import pytest
-import yaml
 
-from executive.cell_config import CellConfig
-from executive.geometry import Array, Pose, tool_down
+from executive.geometry import Array, Pose
 from executive.motion.kinematics import Kinematics
 from executive.sim.tool import SuctionTool
 from executive.sim.world import World
+from tests.motion.joint_states import reach
+from tests.sim.conftest import shipped_cell
 
-CELL = Path(__file__).parents[2] / "missions" / "cells" / "overhead.yaml"
 X, Y = 0.5, 0.05
 CUBE = 0.05
 GOOD_PLACE = {"cube": 0.0, "sphere": 0.0, "duck": -0.01}
@@ -25,7 +23,7 @@ class Bench:
     """A tool over one object on the table, and an arm that is simply put where it should be."""
 
     def __init__(self, label: str) -> None:
-        config = CellConfig(**yaml.safe_load(CELL.read_text(encoding="utf-8")))
+        config = shipped_cell("overhead")
         self.world = World(config)
         self.config = config.tool
         self.tool = SuctionTool(self.world, config.tool)
@@ -39,7 +37,7 @@ class Bench:
 
     def put(self, height: float, dx: float = 0.0) -> None:
         """Put the lip `height` [m] over the object's top, `dx` [m] beside its good place."""
-        self.q = self.kinematics.nearest_solution(tool_down([X + dx, Y, self.top + height]), self.q)
+        self.q = reach(self.kinematics, (X + dx, Y, self.top + height), self.q)
         self.world.set_arm(self.q)
         self.steps(1)
 
@@ -49,7 +47,7 @@ class Bench:
         for i in range(1, steps + 1):
             s = i / steps
             goal = start + np.array([0, 0, height * s * s * (3 - 2 * s)])
-            self.q = self.kinematics.nearest_solution(tool_down(goal), self.q)
+            self.q = reach(self.kinematics, goal, self.q)
             self.steps(1)
 
     def steps(self, count: int, pull: float = 0.0) -> None:
