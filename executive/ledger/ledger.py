@@ -130,7 +130,7 @@ class ItemLedger:
         record = self._record(item)
         record.attempts += 1
         self._disturb(record.position, math.inf)
-        self._report(record)
+        self._emit("item", **record.row)
 
     def held(self, item: Item) -> None:
         """Record that the tool holds the item; its neighbours may have moved.
@@ -240,7 +240,7 @@ class ItemLedger:
         unsure = [glimpse for glimpse in glimpses if bin_at(glimpse.position) is None]
         for record in self._looks.take(self._records, look, places, unsure):
             record.review(known=self._is_known(record))
-            self._report(record)
+            self._emit("item", **record.row)
         if detections.view == "full":
             for record, bin in self._in_bins.fallen(detections, positions, inside):
                 record.why = ""
@@ -267,7 +267,7 @@ class ItemLedger:
     def _change(self, item: Item, state: State) -> Record:
         record = self._record(item)
         record.state = state
-        self._report(record)
+        self._emit("item", **record.row)
         return record
 
     def _disturb(self, centre: Array, radius: float) -> None:
@@ -284,16 +284,13 @@ class ItemLedger:
             camera=frame.camera,
             detector=detections.detector,
             view=detections.view,
-            found=[_told(*pair) for pair in zip(detections.found, positions, strict=True)],
-            unsure=[_told(glimpse.detection, glimpse.position) for glimpse in glimpses],
+            found=[_describe(*pair) for pair in zip(detections.found, positions, strict=True)],
+            unsure=[_describe(glimpse.detection, glimpse.position) for glimpse in glimpses],
             frame_object=frame,
         )
 
-    def _report(self, record: Record) -> None:
-        self._emit("item", **record.row)
 
-
-def _told(detection: Detection, position: Array) -> dict[str, object]:
+def _describe(detection: Detection, position: Array) -> dict[str, object]:
     return {
         "label": detection.label,
         "confidence": round(detection.confidence, 4),
