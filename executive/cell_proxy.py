@@ -1,4 +1,4 @@
-"""Proxy between a skill and its cell: one interceptor gets every question and every command.
+"""Proxy between a skill and its cell: every attribute read and every call goes through one interceptor.
 
 The tape records and replays through it, the test kit watches through it, and fault scripts change answers
 through it. Proxies can be nested: the cell that `intercept` returns can be intercepted again.
@@ -25,14 +25,14 @@ _PROTOCOLS: Mapping[str, type] = {
     "operator": Operator,
     "localizer": Localizer,
 }
-_RETURNED = {"arm.plan": "plan", "detector.request": "request"}
-"""Roles of the objects that a call returns and that are asked later."""
+_RETURNED_ROLES = {"arm.plan": "plan", "detector.request": "request"}
+"""Role of the object that a call returns, by `Access.name`; this object gets a proxy, too."""
 
-METHODS: Mapping[str, Mapping[str, bool]] = {
+MEMBERS: Mapping[str, Mapping[str, bool]] = {
     role: {name: callable(member) for name, member in vars(protocol).items() if not name.startswith("_")}
     for role, protocol in _PROTOCOLS.items()
 }
-"""Members of every part of a cell by its role: True for a method, False for an attribute."""
+"""For every role, its members by name: True for a method, False for an attribute."""
 
 
 @dataclass(frozen=True)
@@ -41,19 +41,19 @@ class Access:
 
     Attributes:
         role: Role of the part: `arm`, `tool`, `detector`, ..., `plan` or `request`.
-        key: Name of the detector that was asked; "" for every other part.
+        detector: Name of the detector that is accessed, or that returned the request; "" for other parts.
         member: Name of the attribute or method.
         proceed: Asks the part itself and returns its answer.
-        arguments: Arguments of the call by position.
-        named: Arguments of the call by name.
+        arguments: Positional arguments of the call.
+        keywords: Keyword arguments of the call.
     """
 
     role: str
-    key: str
+    detector: str
     member: str
     proceed: Callable[[], Any]
     arguments: tuple[Any, ...] = ()
-    named: Mapping[str, Any] = field(default_factory=dict)
+    keywords: Mapping[str, Any] = field(default_factory=dict)
 
     @cached_property
     def name(self) -> str:
@@ -61,14 +61,14 @@ class Access:
         return f"{self.role}.{self.member}"
 
     @property
-    def values(self) -> tuple[Any, ...]:
-        """All arguments, those by name last."""
-        return (*self.arguments, *self.named.values())
+    def all_arguments(self) -> tuple[Any, ...]:
+        """Positional arguments, followed by the values of the keyword arguments."""
+        return (*self.arguments, *self.keywords.values())
 
     @property
     def is_call(self) -> bool:
         """True for the call of a method, False for the read of an attribute."""
-        return METHODS[self.role][self.member]
+        return MEMBERS[self.role][self.member]
 
 
 Interceptor = Callable[[Access], Any]
@@ -78,7 +78,7 @@ Interceptor = Callable[[Access], Any]
 def intercept(cell: Cell, interceptor: Interceptor, roles: Collection[str]) -> Cell:
     """Return the cell with every access to the parts of these roles going through the interceptor.
 
-    So does every access to the plannings and requests that these parts return.
+    Accesses to the plannings and requests that these parts return go through it, too.
     """
     parts: dict[str, Any] = {
         role: _Proxy(role, "", getattr(cell, role), interceptor) for role in roles if role != "detector"
@@ -96,26 +96,28 @@ class _Proxy:
     The part may be None if the interceptor never proceeds.
     """
 
-    def __init__(self, role: str, key: str, part: Any, interceptor: Interceptor) -> None:
-        self._role, self._key, self._part, self._intercept = role, key, part, interceptor
+    def __init__(self, role: str, detector: str, part: Any, interceptor: Interceptor) -> None:
+        self._role, self._detector, self._part, self._intercept = role, detector, part, interceptor
         self._reads: dict[str, Access] = {}
 
     def __getattr__(self, member: str) -> Any:
-        if member.startswith("_") or member not in METHODS[self._role]:
-            # Underscores first: a copy that is being made has no role yet.
+        if member.startswith("_") or member not in MEMBERS[self._role]:
+            # Names with an underscore first: `copy` looks up such names before `_role` is set.
             raise AttributeError(f"{type(self).__name__} has no attribute {member!r}")
-        if METHODS[self._role][member]:
+        if MEMBERS[self._role][member]:
             return partial(self._call, member)
         if member not in self._reads:
-            self._reads[member] = Access(self._role, self._key, member, partial(getattr, self._part, member))
+            self._reads[member] = Access(
+                self._role, self._detector, member, partial(getattr, self._part, member)
+            )
         return self._intercept(self._reads[member])
 
     def _call(self, member: str, /, *arguments: Any, **named: Any) -> Any:
         def proceed() -> Any:
             return getattr(self._part, member)(*arguments, **named)
 
-        access = Access(self._role, self._key, member, proceed, arguments, named)
+        access = Access(self._role, self._detector, member, proceed, arguments, named)
         answer = self._intercept(access)
-        if returned := _RETURNED.get(access.name):
-            return _Proxy(returned, self._key, answer, self._intercept)
+        if returned := _RETURNED_ROLES.get(access.name):
+            return _Proxy(returned, self._detector, answer, self._intercept)
         return answer

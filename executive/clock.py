@@ -1,4 +1,4 @@
-"""Length of a control step, and a clock that counts such steps."""
+"""Length of a control step, and a clock that returns the time of a function."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ STEP = 1 / 240
 
 
 class StepClock:
-    """Clock that is read from a function; implements `executive.cell.Clock`.
+    """Clock whose time comes from a function; implements `executive.cell.Clock`.
 
     Args:
         read: Returns the time since the run began [s].

@@ -27,8 +27,8 @@ def as_bin(name: str, config: BinConfig) -> Bin:
     return Bin(name, position, size, slots)
 
 
-def as_class(label: str, config: ObjectConfig) -> ObjectClass:
-    """Return what skills know of a class of objects of a cell file; its mass is left at the default."""
+def object_class(label: str, config: ObjectConfig) -> ObjectClass:
+    """Return an object class of a cell file as skills see it, with the default mass."""
     return ObjectClass(label, config.height, config.radius, config.ring)
 
 
@@ -40,7 +40,7 @@ def travel_height(config: CellConfig) -> float:
 
 
 def pile_height(config: CellConfig) -> float:
-    """Return how high [m] things on the table may be: the tallest object, or two where some are stacked."""
+    """Return the greatest height [m] of a pile on the table: the tallest object, doubled if stacked."""
     tallest = max(kind.height for kind in config.objects.values())
     return 2 * tallest if config.table.stacked else tallest
 
@@ -50,13 +50,13 @@ def bins_of(config: CellConfig) -> dict[str, Bin]:
     return {name: as_bin(name, bin) for name, bin in config.bins.items()}
 
 
-def classes_of(config: CellConfig) -> dict[str, ObjectClass]:
+def object_classes(config: CellConfig) -> dict[str, ObjectClass]:
     """Return the classes of a cell file by label, each of the default mass."""
-    return {label: as_class(label, kind) for label, kind in config.objects.items()}
+    return {label: object_class(label, kind) for label, kind in config.objects.items()}
 
 
-def cell_without_parts(config: CellConfig, routes: Routes, ledger: Ledger, emit: Emit) -> Cell:
-    """Return the cell of a cell file with None for every part of hardware, for a cell kind to put in.
+def cell_without_hardware(config: CellConfig, routes: Routes, ledger: Ledger, emit: Emit) -> Cell:
+    """Return the cell of a cell file; every hardware part is None until the cell kind replaces it.
 
     Every decision for a target is emitted as a `decision`.
     """
@@ -74,7 +74,7 @@ def cell_without_parts(config: CellConfig, routes: Routes, ledger: Ledger, emit:
         ledger=ledger,
         operator=missing,
         bins=bins_of(config),
-        classes=classes_of(config),
+        classes=object_classes(config),
         routes=routes,
         localizer=missing,
         safe_place=np.array(config.safe_place),

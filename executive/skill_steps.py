@@ -20,7 +20,7 @@ class SkillRun:
         cell: The cell that it acts on.
 
     Attributes:
-        skill: That instance.
+        skill: The instance that is run.
     """
 
     def __init__(self, skill: Skill, cell: Cell) -> None:
@@ -29,7 +29,7 @@ class SkillRun:
         self._steps: Iterator[Any] | None = None
 
     def step(self) -> bool:
-        """Take one step, the first of which starts the skill; return True once it has succeeded.
+        """Advance the skill by one step, starting it at the first call; return True once it has succeeded.
 
         Raises:
             SkillFailed: It failed with a declared reason.
@@ -39,6 +39,7 @@ class SkillRun:
             if self._steps is None:
                 # A `run` without any yield is a plain function: it has done its work already.
                 self._steps = iter(self.skill.run(self._cell) or ())
+            # `self` marks the end: no skill yields its own run.
             yielded = next(self._steps, self)
         except SkillFailed as failed:
             if failed.reason in self.skill.reasons:

@@ -12,7 +12,7 @@ from pathlib import Path
 from executive.cell import Localizer
 from executive.cell_config import CellConfig, DetectorConfig
 from executive.errors import InputError
-from executive.layout import as_class
+from executive.layout import object_class
 from executive.mission.findings import alternatives
 from executive.sim.datasets import generate, run_frames
 from executive.vision.detectors.registry import wrong_detectors
@@ -186,7 +186,7 @@ def _localizer(config: CellConfig) -> Localizer | None:
     """Return the cell's localizer; None for the ray, which needs the scene itself."""
     if config.localization == "ray":
         return None
-    classes = {label: as_class(label, kind) for label, kind in config.objects.items()}
+    classes = {label: object_class(label, kind) for label, kind in config.objects.items()}
     return build_localizer(config.localization, classes, lambda _origin, _direction: None)
 
 

@@ -1,8 +1,8 @@
-"""`executive doctor`: checks of this installation, each with its cure.
+"""`executive doctor`: checks of this installation, each with a fix for what is wrong.
 
-`python -m executive.cli.doctor tiny|egl` draws a few frames and prints the time of one: a process of its own,
-because an EGL driver that fails may end the whole process. A check imports its packages only when it runs, so
-that a missing package spoils no other check.
+`python -m executive.cli.doctor tiny|egl` draws a few frames and prints the time of one. It runs as a
+separate process, because a failing EGL driver may crash it. A check imports its packages only when it runs,
+so that a missing package spoils no other check.
 """
 
 from __future__ import annotations
@@ -63,10 +63,9 @@ class Finding(NamedTuple):
 @json_option
 @click.pass_context
 def command(ctx: click.Context, as_json: bool) -> None:
-    """Check Python, packages, what is registered, renderer, display and Roboflow's server.
+    """Check Python, packages, registered skills and cells, renderer, display and Roboflow's server.
 
-    Exit code 1 if there is a problem; what is only noted keeps nothing that comes with the project from
-    working.
+    Exit code 1 if there is a problem. A note is about something that no part of the project needs.
     """
     with stdout_kept_clean():
         findings = list(examine())
@@ -77,12 +76,12 @@ def command(ctx: click.Context, as_json: bool) -> None:
         width = max(len(finding.subject) for finding in findings)
         for mark, subject, message, cure in findings:
             click.echo(f"{mark:7}  {subject:{width}}  {message}{cure and f'; {cure}'}")
-        click.echo(f"{problems} problem{'s' if problems > 1 else ''}" if problems else "all is well")
+        click.echo(f"{problems} problem{'s' if problems > 1 else ''}" if problems else "no problems")
     ctx.exit(int(problems > 0))
 
 
 def examine() -> Iterator[Finding]:
-    """Run every check and yield its findings, also if packages are missing that a check needs."""
+    """Run every check and yield its findings, even if a package that a check needs is missing."""
     for check in (check_system, check_packages, check_registered, check_renderer, check_roboflow):
         subject = check.__name__.removeprefix("check_")
         try:
@@ -90,7 +89,7 @@ def examine() -> Iterator[Finding]:
         except InputError as error:
             yield Finding("problem", subject, str(error))
         except ImportError as error:
-            yield Finding("problem", subject, f"cannot be looked at: {error}", "run `uv sync`")
+            yield Finding("problem", subject, f"cannot be checked: {error}", "run `uv sync`")
 
 
 def check_system(version: tuple[int, ...] = sys.version_info[:3]) -> Iterator[Finding]:
@@ -104,12 +103,12 @@ def check_system(version: tuple[int, ...] = sys.version_info[:3]) -> Iterator[Fi
     if name := os.environ.get("DISPLAY"):
         yield Finding("ok", "display", f"DISPLAY is {name}, where --gui opens the simulator's window")
     else:
-        cure = "run without --gui, which needs it: terminal, `--view` and report show a run, too"
+        cure = "run without --gui; the terminal, `--view` and the report also show a run"
         yield Finding("note", "display", "DISPLAY is not set", cure)
 
 
 def check_packages() -> Iterator[Finding]:
-    """Yield required packages that are missing, those that contain a `cv2`, those of extras and films."""
+    """Yield findings on required packages, on packages that provide `cv2`, on extras, and on films."""
     from executive.runtime.versions import ITSELF, installed, required
 
     names = required()
@@ -117,13 +116,15 @@ def check_packages() -> Iterator[Finding]:
     for name in missing:
         yield Finding("problem", "packages", f"{name} is missing", "run `uv sync`")
     if not missing:
-        yield Finding("ok", "packages", f"{ITSELF} {installed(ITSELF)} and the {len(names)} that it needs")
+        yield Finding(
+            "ok", "packages", f"{ITSELF} {installed(ITSELF)} and its {len(names)} required packages"
+        )
     opencv = [f"{name} {installed(name)}" for name in sorted(set(packages_distributions().get("cv2", ())))]
     if len(opencv) == 1:
-        yield Finding("ok", "opencv", f"{opencv[0]} alone brings a `cv2`")
+        yield Finding("ok", "opencv", f"{opencv[0]} is the only package that provides `cv2`")
     elif opencv:
-        message = f"{len(opencv)} packages bring a `cv2` and overwrite each other ({', '.join(opencv)})"
-        cure = "run `uv sync --reinstall`, which leaves opencv-python-headless alone"
+        message = f"{len(opencv)} packages provide `cv2` and overwrite each other ({', '.join(opencv)})"
+        cure = "run `uv sync --reinstall`, which removes all but opencv-python-headless"
         yield Finding("problem", "opencv", message, cure)
     for extra, purpose in EXTRAS.items():
         names = required(extra)
@@ -149,7 +150,7 @@ def check_registered() -> Iterator[Finding]:
     for entry in (*kinds.values(), *detectors.values()):
         entry.load()
     message = f"{len(skills)} skills, {len(kinds)} kinds of cells, {len(detectors)} kinds of detectors"
-    yield Finding("ok", "registered", f"{message}; {project.file} counts" if project else message)
+    yield Finding("ok", "registered", f"{message}; those of {project.file} included" if project else message)
 
 
 def check_renderer() -> Iterator[Finding]:
@@ -159,7 +160,7 @@ def check_renderer() -> Iterator[Finding]:
         cure = "run `uv sync --reinstall-package pybullet`"
         yield Finding("problem", "renderer", f"TinyRenderer draws nothing: {problem}", cure)
     else:
-        message = f"TinyRenderer, on the processor: {time:.0f} ms for 640x480 of the overhead cell"
+        message = f"TinyRenderer, on the CPU: {time:.0f} ms for 640x480 of the overhead cell"
         yield Finding("ok", "renderer", message)
     _, problem = draw_in_process("egl")
     state = f"draws nothing: {problem}" if problem else "can be loaded and draws"
@@ -176,16 +177,16 @@ def check_roboflow() -> Iterator[Finding]:
         yield Finding("ok", "key", f"{VARIABLE} is set")
     else:
         yield Finding("note", "key", f"{VARIABLE} is not set", "set it for models that Roboflow hosts")
-    if has_answer(HOSTED):
+    if is_reachable(HOSTED):
         yield Finding("ok", "roboflow", f"{HOSTED} answers")
     else:
         message = f"{HOSTED} does not answer within {SERVER_TIMEOUT:.0f} s"
-        cure = "see to the network for models that Roboflow hosts; nothing else needs it"
+        cure = "check the network; only models that Roboflow hosts need it"
         yield Finding("note", "roboflow", message, cure)
 
 
 def draw_in_process(renderer: str) -> tuple[float, str]:
-    """Return the time of a frame [ms] drawn by `tiny` or `egl`, and "" or the reason why none came."""
+    """Draw with `tiny` or `egl` in another process; return the time of a frame [ms], and a failure or ""."""
     words = program("executive.cli.doctor", renderer)
     try:
         ended = subprocess.run(words, capture_output=True, text=True, timeout=DRAW_TIMEOUT, check=False)
@@ -194,11 +195,11 @@ def draw_in_process(renderer: str) -> tuple[float, str]:
     # Drivers print what they like around the result, and may crash after it.
     if result := re.search(r"^milliseconds: ([0-9.]+)$", ended.stdout, re.MULTILINE):
         return float(result[1]), ""
-    *_, last = ["it says nothing", *filter(str.strip, ended.stderr.splitlines())]
-    return 0.0, f"its process ended with {ended.returncode}: {last.strip()}"
+    *_, last = ["no error output", *filter(str.strip, ended.stderr.splitlines())]
+    return 0.0, f"its process ended with exit code {ended.returncode}: {last.strip()}"
 
 
-def has_answer(address: str, timeout: float = SERVER_TIMEOUT) -> bool:
+def is_reachable(address: str, timeout: float = SERVER_TIMEOUT) -> bool:
     """Return True if a server gives any answer at all within `timeout` [s]."""
     try:
         urllib.request.urlopen(address, timeout=timeout).close()
@@ -208,7 +209,7 @@ def has_answer(address: str, timeout: float = SERVER_TIMEOUT) -> bool:
 
 
 def prepare_drawing(renderer: str) -> Callable[[], object]:
-    """Return a function that draws a frame: `tiny` one of the overhead cell, `egl` one of an empty scene.
+    """Return a function that draws a frame: of the overhead cell for `tiny`, of an empty scene for `egl`.
 
     Raises:
         SystemExit: There is no EGL plugin, or it cannot be loaded.

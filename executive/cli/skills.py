@@ -64,7 +64,7 @@ def _conform(skills: Mapping[str, type[Skill]], as_json: bool) -> bool:
     verdicts: list[Verdict] = []
     for name, skill in skills.items():
         with stdout_kept_clean():
-            found = [check.verdict() for check in conformance(skill, name=name)]
+            found = [check.run() for check in conformance(skill, name=name)]
         if not as_json:
             click.echo("\n".join(conformance_lines(found)))
         verdicts += found

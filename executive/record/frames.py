@@ -53,9 +53,9 @@ class Frames:
         # Last: a skill that fails now is still what the robot was doing.
         self._progress(event)
 
-    def close(self) -> None:
-        """Return once every picture is drawn; `problem` says if some are not."""
-        self._drawer.close()
+    def close(self, *, wait: bool = True) -> None:
+        """Finish the waiting pictures, without `wait` only the one under way."""
+        self._drawer.close(wait=wait)
 
     @property
     def problem(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
@@ -189,8 +190,9 @@ class Recording:
             ended = run.execute(), run.items(), run.audit()
             completed = True
         finally:
-            for view in reversed(self.views):
-                view.close()
-            # Whoever ends a run by force does not want to wait for its pictures.
-            self.recorder.close(wait=completed)
+            with contextlib.ExitStack() as closing:
+                # A user who ends a run by force does not want to wait for its pictures.
+                closing.callback(self.recorder.close, wait=completed)
+                for view in self.views:
+                    closing.callback(view.close)
         return ended

@@ -66,8 +66,8 @@ class Recorder:
             self._journal.close()
         except Fault as fault:
             self._problem = str(fault)
-        if self._frames is not None and wait:
-            self._frames.close()
+        if self._frames is not None:
+            self._frames.close(wait=wait)
 
     @property
     def trace(self) -> str:

@@ -1,4 +1,4 @@
-"""Service of a run that has the arm plan its next motion while the run still needs the one before."""
+"""Observer of a run that makes the arm plan its next motion while the present one is under way."""
 
 from __future__ import annotations
 
@@ -12,46 +12,50 @@ from executive.moving import carrying
 class PlanningAhead:
     """Asks the arm for the motions that the mission will probably need next.
 
-    These are the way of the selected item into its bin, as soon as the tool holds it, and the approach to the
-    most likely next target, while the arm carries. One target is enough: on 60 runs of `sort_overhead` and
-    `sort_wrist` it was the one that `SelectTarget` then chose for all 222 approaches after a carry.
+    It plans two motions: the transit of the selected item to its bin, as soon as the tool holds the item, and
+    the approach to the most likely next target, during that transit. One target is enough: in 60 runs of
+    `sort_overhead` and `sort_wrist`, `SelectTarget` later chose that target in all 222 approaches that
+    followed a transit.
 
     Planning ahead decides nothing. It acts on the cell below the tape, so it is no part of the record, and a
     replay does without it.
 
     Args:
-        cell: The work cell itself.
+        cell: The cell below the tape.
     """
 
     def __init__(self, cell: Cell) -> None:
         self._cell = cell
         self._selected: tuple[Item, str] | None = None
         self._is_closing = False
-        self._has_news = False
+        self._approach_is_outdated = False
 
-    def take(self, event: Event) -> None:
+    def observe(self, event: Event) -> None:
         """Note an event of the run that changes what comes next."""
         if event.kind == "decision":
-            self._selected = event.data["item"], event.data["bin"]
+            item, bin = event.data["item"], event.data["bin"]
+            # A skill may decide for an item or a bin that the cell does not know: nothing can be planned.
+            known = bin in self._cell.bins and item in {one.item for one in self._cell.ledger.targets()}
+            self._selected = (item, bin) if known else None
         elif event.kind == "intent":
             self._is_closing = event.data["action"] == "close"
         elif event.kind in ("look", "plan"):
-            self._has_news = True
+            self._approach_is_outdated = True
 
     def step(self) -> None:
-        """Plan what became known in this control step; called once after the tree was ticked."""
+        """Plan ahead if this control step showed which motion comes next; called after each tick."""
         cell = self._cell
-        if self._is_closing and self._selected and cell.tool.holding:
+        if self._is_closing and self._selected and cell.ledger.in_tool() is None and cell.tool.holding:
             self._is_closing = False
             item, bin = self._selected
             cell.arm.plan_ahead(into(cell, bin, item), carrying(cell, item))
-        elif self._has_news and self._is_delivering():
-            self._has_news = False
+        elif self._approach_is_outdated and self._is_delivering():
+            self._approach_is_outdated = False
             for target in nearest_first(cell, cell.ledger.targets())[:1]:
                 cell.arm.plan_ahead(*approach(cell, target))
 
     def _is_delivering(self) -> bool:
-        """Return whether the arm will be above a bin with what the tool holds: it is free after that."""
+        """Return True if the present motion takes a held item over a bin: the next approach starts there."""
         if self._cell.ledger.in_tool() is None:
             return False
         end = self._cell.arm.destination

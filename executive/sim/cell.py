@@ -11,7 +11,7 @@ from executive.cell_config import CellConfig
 from executive.clock import STEP
 from executive.errors import InputError
 from executive.events import Emit
-from executive.layout import bins_of, cell_without_parts
+from executive.layout import bins_of, cell_without_hardware
 from executive.ledger.ledger import ItemLedger
 from executive.motion.planner import Planner
 from executive.sim.arm import SimArm
@@ -96,7 +96,7 @@ class SimCell:
             config.detectors, camera=camera_config, clock=clock, base=options.base, seed=seeds.detectors
         )
         self._cell = replace(
-            cell_without_parts(config, self._routes, self._ledger, emit),
+            cell_without_hardware(config, self._routes, self._ledger, emit),
             clock=clock,
             arm=self._arm,
             tool=self._tool,

@@ -19,7 +19,7 @@ from pybullet_utils.bullet_client import BulletClient
 from executive.cell_config import CellConfig, ObjectConfig
 from executive.errors import InputError
 from executive.geometry import Array, Pose
-from executive.layout import as_class
+from executive.layout import object_class
 from executive.messages import ObjectClass
 from executive.workcell import KeyPath
 
@@ -132,7 +132,7 @@ def mass_of(config: ObjectConfig) -> float:
 
 def weighed(label: str, config: ObjectConfig) -> ObjectClass:
     """Return what skills know of a class of objects of a cell file, with what it weighs in simulation."""
-    return replace(as_class(label, config), mass=mass_of(config))
+    return replace(object_class(label, config), mass=mass_of(config))
 
 
 def missing_models(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:

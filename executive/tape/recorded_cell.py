@@ -1,4 +1,4 @@
-"""Cell whose questions and commands go through a tape: the cell that the tree of a run sees."""
+"""Cell behind a tape, which records its answers or plays recorded ones; the tree of a run uses only it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ class Question(NamedTuple):
     """Form of a question and its answer in the record.
 
     Attributes:
-        name: Its name there, with `{key}` for the detector and `{0}` for the first argument.
+        name: Name of the question in the record; `{detector}` stands for the name of the detector, `{0}` for
+            the first argument.
         codec: Codec of the answer.
     """
 
@@ -44,8 +45,8 @@ QUESTIONS: Mapping[str, Question] = {
     "camera.area": Question("camera.area.{0}", BOX),
     "camera.sees_table": Question("camera.sees_table"),
     "camera.capture": Question("camera.frame", FRAME),
-    "request.ready": Question("detector.{key}.ready"),
-    "request.result": Question("detector.{key}", ANSWER),
+    "request.ready": Question("detector.{detector}.ready"),
+    "request.result": Question("detector.{detector}", ANSWER),
     "operator.ask": Question("operator"),
     "localizer.locate": Question("localizer", ARRAY),
 }
@@ -57,23 +58,23 @@ COMMANDS = frozenset(
 """Every access that is not made while a tape plays."""
 
 RECORDED_ROLES = ("arm", "tool", "camera", "detector", "operator", "localizer")
-"""Parts whose answers are recorded; the ledger belongs to the run, bins and classes to the cell file."""
+"""Roles whose answers are recorded; a replay has its own ledger, and reads bins and classes from the file."""
 
 
-def recorded(cell: Cell, tape: Tape, emit: Emit) -> Cell:
-    """Return the cell with the tape between it and whoever asks it, and with the tape's clock.
+def record_answers(cell: Cell, tape: Tape, emit: Emit) -> Cell:
+    """Return the cell with its accesses recorded or answered by the tape, and with the tape's clock.
 
     Every action of the tool is emitted as an `intent` before it is done.
     """
 
-    def ask(access: Access) -> Any:
+    def answer(access: Access) -> Any:
         if access.name in COMMANDS:
             if access.role == "tool":
                 emit("intent", action=access.member)
             return tape.command(access.proceed)
         name, codec = QUESTIONS[access.name]
         if "{" in name:
-            name = name.format(*access.values, key=access.key)
+            name = name.format(*access.all_arguments, detector=access.detector)
         return tape.sense(name, access.proceed, codec)
 
-    return replace(intercept(cell, ask, RECORDED_ROLES), clock=StepClock(tape.clock, tape.step))
+    return replace(intercept(cell, answer, RECORDED_ROLES), clock=StepClock(tape.clock, tape.step))

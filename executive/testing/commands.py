@@ -31,7 +31,7 @@ def written_down(cell: Cell, commands: list[str]) -> Cell:
 
     def ask(access: Access) -> Any:
         if access.name in _NOTED:
-            note(f"{access.key or access.role}.{access.member}", *access.values)
+            note(f"{access.detector or access.role}.{access.member}", *access.all_arguments)
         return access.proceed()
 
     def decided(target: Target, bin: str) -> None:

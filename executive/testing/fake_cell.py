@@ -15,7 +15,7 @@ from executive.clock import StepClock
 from executive.errors import InputError
 from executive.events import Emit, ignore
 from executive.geometry import Pose
-from executive.layout import bins_of, cell_without_parts, classes_of
+from executive.layout import bins_of, cell_without_hardware, object_classes
 from executive.ledger.item import State
 from executive.ledger.ledger import ItemLedger
 from executive.messages import BIN_THICKNESS
@@ -83,7 +83,7 @@ class FakeCell:
         self._config = config
         self._gate = config.ledger.gate
         self.routes = dict(routes)
-        classes = classes_of(config)
+        classes = object_classes(config)
         self.world = FakeWorld(classes)
         scatter(self.world, config, seed)
         clock = StepClock(lambda: self.world.now)
@@ -113,7 +113,7 @@ class FakeCell:
             self.camera.skip(options.past.frames, options.past.turns)
             self.log_to(options.past.log)
         self._cell = replace(
-            cell_without_parts(config, self.routes, self.ledger, emit),
+            cell_without_hardware(config, self.routes, self.ledger, emit),
             clock=clock,
             arm=self.arm,
             tool=self.tool,

@@ -1,4 +1,4 @@
-"""Work cell around another one, with more to do at every control step."""
+"""Decorator of a work cell that adds callbacks before and after every control step."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ def _do_nothing() -> None:
 
 
 class WrappedCell:
-    """A work cell that is another one, but for what a subclass changes; implements `Workcell`.
+    """Forwards everything to another work cell, unless a subclass overrides it; implements `Workcell`.
 
     Args:
-        inner: The other one.
+        inner: The wrapped work cell.
         before: Called before every control step.
         after: Called after every control step.
 
     Attributes:
-        inner: The other one.
+        inner: The wrapped work cell.
     """
 
     def __init__(
@@ -38,12 +38,12 @@ class WrappedCell:
 
     @property
     def cell(self) -> Cell:
-        """What skills see."""
+        """The cell that skills see."""
         return self.inner.cell
 
     @property
     def accounts(self) -> Accounts:
-        """The books of the cell's ledger."""
+        """The counts of the cell's ledger at the end of a run."""
         return self.inner.accounts
 
     @property
@@ -52,7 +52,7 @@ class WrappedCell:
         return self.inner.steps
 
     def log_to(self, path: Path) -> None:
-        """Keep in a file, from now on, what its world can be rebuilt from."""
+        """Log to a file, from now on, all that is needed to rebuild the simulated world."""
         self.inner.log_to(path)
 
     def advance(self) -> None:
@@ -62,20 +62,20 @@ class WrappedCell:
         self._after()
 
     def scenery(self) -> Scenery | None:
-        """Return what there is to be seen."""
+        """Return the scene for viewers, or None if the cell has none."""
         return self.inner.scenery()
 
     def audit(self) -> Mapping[str, int] | None:
-        """Return what really became of the objects, or None where nobody can know."""
+        """Return the true final counts of the objects, or None if they are unknown."""
         return self.inner.audit()
 
     def close(self) -> None:
-        """Give everything back."""
+        """Release all resources."""
         self.inner.close()
 
 
 def innermost(workcell: Workcell) -> Workcell:
-    """Return the cell inside all that is wrapped around it."""
+    """Return the work cell inside all wrappers."""
     while isinstance(workcell, WrappedCell):
         workcell = workcell.inner
     return workcell

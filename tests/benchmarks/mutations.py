@@ -1,4 +1,4 @@
-"""Strength of the default tests: the share of small random faults in the code that they detect.
+"""Mutation score of the default tests: the share of small random faults in the code that they detect.
 
 `python -m tests.benchmarks.mutations --seed 2` draws 60 mutations and runs, for each one, those tests of the
 default tier that execute the changed line. A mutation that no test detects survives and is listed.
@@ -34,7 +34,7 @@ EXCLUDED_FOLDERS = (
 """Code that slow tests cover: projects in processes of their own, whole films, browsers, training."""
 
 MAX_SELECTED_TESTS = 400
-"""Number of tests up to which they are named one by one; beyond it, their files are named."""
+"""Greatest number of tests that pytest is given one by one; if there are more, it is given their files."""
 
 MUTANT_TIMEOUT = 420.0
 """Time after which a run of the tests counts as a detected endless loop [s]."""
@@ -78,13 +78,13 @@ class Mutation:
 
 
 def find_mutations(path: Path, source: str) -> Iterator[Mutation]:
-    """Yield every mutation of one module that the four kinds allow; no docstring, message or import."""
+    """Yield every mutation of the four kinds in one module; text, messages and imports are left unchanged."""
     data = source.encode()
     starts = [0]
     for line in data.splitlines(keepends=True):
         starts.append(starts[-1] + len(line))
 
-    def mutate(kind: str, node: ast.expr | ast.stmt, new: str) -> Mutation:
+    def mutation_of(kind: str, node: ast.expr | ast.stmt, new: str) -> Mutation:
         assert node.end_lineno is not None and node.end_col_offset is not None
         first = starts[node.lineno - 1] + node.col_offset
         last = starts[node.end_lineno - 1] + node.end_col_offset
@@ -97,24 +97,24 @@ def find_mutations(path: Path, source: str) -> Iterator[Mutation]:
             continue
         if isinstance(node, ast.Compare) and len(node.ops) == 1 and type(node.ops[0]) in COMPARISONS:
             left, right = ast.unparse(node.left), ast.unparse(node.comparators[0])
-            yield mutate("operator", node, f"({left} {COMPARISONS[type(node.ops[0])]} {right})")
+            yield mutation_of("operator", node, f"({left} {COMPARISONS[type(node.ops[0])]} {right})")
         elif isinstance(node, ast.BinOp) and type(node.op) in ARITHMETIC:
             left, right = ast.unparse(node.left), ast.unparse(node.right)
-            yield mutate("operator", node, f"(({left}) {ARITHMETIC[type(node.op)]} ({right}))")
+            yield mutation_of("operator", node, f"(({left}) {ARITHMETIC[type(node.op)]} ({right}))")
         elif isinstance(node, ast.BoolOp):
             word = " or " if isinstance(node.op, ast.And) else " and "
             values = word.join(f"({ast.unparse(value)})" for value in node.values)
-            yield mutate("operator", node, f"({values})")
+            yield mutation_of("operator", node, f"({values})")
         elif isinstance(node, ast.Constant) and type(node.value) in (bool, int, float):
-            yield mutate("constant", node, _change_constant(node.value))
+            yield mutation_of("constant", node, _change_constant(node.value))
         elif isinstance(node, ast.FunctionDef):
-            yield from (mutate("deleted line", child, "pass") for child in _deletable(node))
+            yield from (mutation_of("deleted line", child, "pass") for child in _deletable_statements(node))
         if isinstance(node, ast.Call) and len(node.args) >= 2:
             first, second = (ast.unparse(one) for one in node.args[:2])
             if first != second and not any(isinstance(one, ast.Starred) for one in node.args[:2]):
                 rest = [*map(ast.unparse, node.args[2:]), *map(ast.unparse, node.keywords)]
                 arguments = ", ".join([second, first, *rest])
-                yield mutate("swapped arguments", node, f"{ast.unparse(node.func)}({arguments})")
+                yield mutation_of("swapped arguments", node, f"{ast.unparse(node.func)}({arguments})")
 
 
 def _is_skipped(node: ast.AST) -> bool:
@@ -128,7 +128,7 @@ def _change_constant(value: bool | int | float) -> str:
     return str(value + 1) if isinstance(value, int) or value == 0.0 else str(2 * value)
 
 
-def _deletable(function: ast.FunctionDef) -> Iterator[ast.stmt]:
+def _deletable_statements(function: ast.FunctionDef) -> Iterator[ast.stmt]:
     """Yield the simple statements of a function, without its docstring."""
     for node in ast.walk(function):
         if isinstance(node, ast.Assign | ast.AugAssign | ast.Return | ast.Continue | ast.Break) or (
@@ -165,7 +165,7 @@ def _read_coverage(root: Path) -> CoverageData:
 
 
 def select_tests(data: CoverageData, root: Path, mutation: Mutation) -> list[str]:
-    """Return the tests that execute the mutated line; all that execute its module if it runs at import."""
+    """Return the tests that execute the mutated line or, if only imports do, all that execute its module."""
     lines = data.contexts_by_lineno(str(root / mutation.path))
     at_line = {context for context in lines.get(mutation.line, []) if context}
     contexts = at_line or {context for found in lines.values() for context in found if context}

@@ -31,7 +31,7 @@ from executive.record.result import ledger_agrees
 Figures = dict[str, Any]
 """Figures of a benchmark by name; a name ends with the unit."""
 Option = Callable[[Callable[..., Any]], Callable[..., Any]]
-"""Argument or option of a command, as click makes it."""
+"""Decorator of click that adds an argument or an option to a command."""
 TABLE_WIDTH = 160
 """Width of the widest table [characters]."""
 T = TypeVar("T")

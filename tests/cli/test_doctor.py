@@ -60,16 +60,16 @@ def test_display(monkeypatch):
     ]
     monkeypatch.delenv("DISPLAY")
     assert shown(doctor.check_system())[1:] == [
-        "note display: DISPLAY is not set; run without --gui, which needs it: "
-        "terminal, `--view` and report show a run, too"
+        "note display: DISPLAY is not set; run without --gui; "
+        "the terminal, `--view` and the report also show a run"
     ]
 
 
-NEEDED_ARE_THERE = "ok packages: executive 1.0 and the 2 that it needs"
-ONE_CV2 = "ok opencv: opencv-python-headless 4.12 alone brings a `cv2`"
+NEEDED_ARE_THERE = "ok packages: executive 1.0 and its 2 required packages"
+ONE_CV2 = "ok opencv: opencv-python-headless 4.12 is the only package that provides `cv2`"
 TWO_CV2 = (
-    "problem opencv: 2 packages bring a `cv2` and overwrite each other (opencv-python 5.0, "
-    "opencv-python-headless 4.12); run `uv sync --reinstall`, which leaves opencv-python-headless alone"
+    "problem opencv: 2 packages provide `cv2` and overwrite each other (opencv-python 5.0, "
+    "opencv-python-headless 4.12); run `uv sync --reinstall`, which removes all but opencv-python-headless"
 )
 NO_VIEW = "note view: not installed: aiohttp; to watch a run in the browser, run `uv sync --extra view`"
 MISSING = [f"problem packages: {name} is missing; run `uv sync`" for name in ("executive", "pybullet", "av")]
@@ -99,7 +99,9 @@ def test_everything_registered_is_counted_and_loaded(tmp_path: Path, monkeypatch
         "ok registered: 13 skills, 2 kinds of cells, 4 kinds of detectors"
     ]
     Path("pyproject.toml").write_text("[project]\n")
-    assert shown(doctor.check_registered())[0].endswith(f"detectors; {tmp_path}/pyproject.toml counts")
+    assert shown(doctor.check_registered())[0].endswith(
+        f"detectors; those of {tmp_path}/pyproject.toml included"
+    )
     for group in ("cells", "detectors"):
         Path("pyproject.toml").write_text(f'[project.entry-points."executive.{group}"]\nbench = "no:Bench"\n')
         with pytest.raises(InputError, match=r'"bench" \(no:Bench\) cannot be loaded: ModuleNotF'):
@@ -110,7 +112,7 @@ def test_both_renderers_draw(monkeypatch):
     # A driver may print around the result, and crash after it.
     monkeypatch.setattr(subprocess, "run", ended(-11, "GL=Mesa\nmilliseconds: 41.7\nDestroy\n"))
     assert shown(doctor.check_renderer()) == [
-        "ok renderer: TinyRenderer, on the processor: 42 ms for 640x480 of the overhead cell",
+        "ok renderer: TinyRenderer, on the CPU: 42 ms for 640x480 of the overhead cell",
         "ok egl: PyBullet's EGL plugin can be loaded and draws; no cell needs it",
     ]
 
@@ -118,8 +120,8 @@ def test_both_renderers_draw(monkeypatch):
 @pytest.mark.parametrize(
     ("run", "why"),
     [
-        (ended(-11), "its process ended with -11: it says nothing"),
-        (ended(1, "GL=Mesa\n", "starting\nit fails\n\n"), "its process ended with 1: it fails"),
+        (ended(-11), "its process ended with exit code -11: no error output"),
+        (ended(1, "GL=Mesa\n", "starting\nit fails\n\n"), "its process ended with exit code 1: it fails"),
         (None, "no frame came in 30 s"),
     ],
 )  # fmt: skip
@@ -144,7 +146,7 @@ HOSTED = "https://serverless.roboflow.com"
 KEYLESS = "note key: ROBOFLOW_API_KEY is not set; set it for models that Roboflow hosts"
 SILENT = (
     f"note roboflow: {HOSTED} does not answer within 3 s; "
-    "see to the network for models that Roboflow hosts; nothing else needs it"
+    "check the network; only models that Roboflow hosts need it"
 )
 
 
@@ -156,7 +158,7 @@ SILENT = (
     ],
 )
 def test_the_server_of_roboflow_and_the_key(monkeypatch, secret, answers, expected):
-    monkeypatch.setattr(doctor, "has_answer", lambda address: answers and address == HOSTED)
+    monkeypatch.setattr(doctor, "is_reachable", lambda address: answers and address == HOSTED)
     monkeypatch.setenv("ROBOFLOW_API_KEY", secret)
     assert shown(doctor.check_roboflow()) == expected
 
@@ -175,13 +177,13 @@ def test_any_answer_in_time_shows_that_a_server_is_there(monkeypatch):
     monkeypatch.setenv("no_proxy", "127.0.0.1")
     with http.server.HTTPServer(("127.0.0.1", 0), Refusing) as served:
         threading.Thread(target=served.serve_forever, daemon=True).start()
-        assert doctor.has_answer(f"http://127.0.0.1:{served.server_port}", 10.0)
+        assert doctor.is_reachable(f"http://127.0.0.1:{served.server_port}", 10.0)
         served.shutdown()
     with socket.create_server(("127.0.0.1", 0)) as silent:
-        assert not doctor.has_answer(f"http://127.0.0.1:{silent.getsockname()[1]}", 0.05)
+        assert not doctor.is_reachable(f"http://127.0.0.1:{silent.getsockname()[1]}", 0.05)
     with socket.socket() as nobody:
         nobody.bind(("127.0.0.1", 0))
-        assert not doctor.has_answer(f"http://127.0.0.1:{nobody.getsockname()[1]}", 10.0)
+        assert not doctor.is_reachable(f"http://127.0.0.1:{nobody.getsockname()[1]}", 10.0)
 
 
 NOTE = Finding("note", "display", "is not set", "run without")
@@ -190,7 +192,7 @@ PROBLEM = Finding("problem", "packages", "av is missing", "run `uv sync`")
 
 @pytest.mark.parametrize(
     ("findings", "code", "total"),
-    [([], 0, "all is well"), ([PROBLEM], 1, "1 problem"), ([PROBLEM] * 2, 1, "2 problems")],
+    [([], 0, "no problems"), ([PROBLEM], 1, "1 problem"), ([PROBLEM] * 2, 1, "2 problems")],
 )
 def test_marks_and_subjects_are_aligned_and_problems_counted(monkeypatch, findings, code, total):
     monkeypatch.setattr(doctor, "examine", lambda: [Finding("ok", "python", "3.11"), NOTE, *findings])
@@ -222,7 +224,5 @@ def test_everything_is_examined_whatever_fails(monkeypatch):
         "registered", "renderer", "egl", "roboflow",
     ]  # fmt: skip
     assert found[7] == "problem registered: the skill is broken; mend it"
-    assert found[-1].startswith(
-        "problem roboflow: cannot be looked at: import of executive.vision.detectors.r"
-    )
+    assert found[-1].startswith("problem roboflow: cannot be checked: import of executive.vision.detectors.r")
     assert found[-1].endswith("; run `uv sync`")

@@ -37,15 +37,15 @@ def test_a_picture_that_cannot_be_drawn_is_told_and_ends_nothing(directory, monk
 
 def test_the_pictures_are_waited_for_whatever_became_of_the_journal(directory, monkeypatch):
     closed = []
-    monkeypatch.setattr(Frames, "close", lambda self: closed.append("frames"))
+    monkeypatch.setattr(Frames, "close", lambda self, wait: closed.append(wait))
     monkeypatch.setattr(Frames, "problem", "no pictures were drawn: file exists")
     monkeypatch.setattr(os, "fsync", full)
     recorder = Recorder(directory)
     recorder(STATUS)
     recorder.close(wait=False)
-    assert closed == []
+    assert closed == [False]
     recorder.close()
-    assert closed == ["frames"]
+    assert closed == [False, True]
     first, second = recorder.problem.split("; believe what you see in the cell rather than the record; ")
     assert "may lack its last lines" in first
     assert second == "no pictures were drawn: file exists"

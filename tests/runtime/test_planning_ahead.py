@@ -206,3 +206,15 @@ def test_nothing_is_planned_while_a_recorded_run_is_played(bench: Bench) -> None
     bench.fake.ledger.held("cube-1")
     bench.run(Transit(held="cube-1", bin="red_bin"))
     assert bench.ahead == [False, False]
+
+
+@pytest.mark.parametrize(("item", "bin"), [("thing-1", "red_bin"), ("cube-1", "nowhere")])
+def test_a_decision_for_something_unknown_plans_nothing_and_ends_nothing(
+    bench: Bench, item: str, bin: str
+) -> None:
+    targets = bench.look()
+    bench.run(Approach(target=targets[0]))
+    bench.plant.emit("decision", item=item, label="cube", frame=1, bin=bin)
+    bench.run(Grasp(target=targets[0]))
+    bench.run(Transit(held="cube-1", bin="red_bin"))
+    assert bench.ahead[-1] is False

@@ -10,7 +10,7 @@ from rig import Rig
 
 from executive.arm import Goal, Task
 from executive.geometry import Array
-from executive.layout import NECK_LENGTH, TOOL_RADIUS, as_class
+from executive.layout import NECK_LENGTH, TOOL_RADIUS, object_class
 from executive.messages import Load
 from executive.motion.trajectory import Trajectory
 from tests.benchmarks.halts import measure_distance
@@ -86,7 +86,7 @@ def test_what_the_held_object_runs_into_counts_but_neither_the_tool_nor_the_tabl
     rig.touch_down(Goal((0.5, 0.1, 0.045), guarded=0.012, speed=0.035))
     rig.tool.close()
     assert rig.tool.held_body == held
-    task = Task(Load(as_class("cube", rig.config.objects["cube"]), rig.tool.bears))
+    task = Task(Load(object_class("cube", rig.config.objects["cube"]), rig.tool.bears))
     rig.go(LEFT, task)
     assert rig.arm.met is None
     motion = rig.planned(RIGHT, task)

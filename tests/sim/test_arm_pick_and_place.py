@@ -8,7 +8,7 @@ from rig import Rig
 
 from executive.arm import Goal, Task
 from executive.geometry import Pose
-from executive.layout import as_bin, as_class
+from executive.layout import as_bin, object_class
 from executive.messages import Load
 
 AIM = {"cube": 0.0, "sphere": 0.0, "duck": 0.01}
@@ -29,7 +29,7 @@ def test_an_object_is_picked_carried_without_slip_and_placed(
     rig: Rig, label: str, bin: str, x: float, y: float
 ) -> None:
     config, arm, tool = rig.config, rig.arm, rig.tool
-    kind, box = as_class(label, config.objects[label]), as_bin(bin, config.bins[bin])
+    kind, box = object_class(label, config.objects[label]), as_bin(bin, config.bins[bin])
     body = rig.add(label, x + AIM[label], y)
     rig.step(120)
     over = Goal((*box.slots[0], float(box.position[2]) + kind.height + DROP))

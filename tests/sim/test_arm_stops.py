@@ -11,7 +11,7 @@ from rig import Rig
 from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
 from executive.clock import STEP
-from executive.layout import as_class
+from executive.layout import object_class
 from executive.messages import Load
 from executive.motion.trajectory import Trajectory
 from tests.benchmarks.halts import measure_distance
@@ -49,7 +49,7 @@ def test_a_stop_is_short_stays_on_the_path_and_keeps_the_stop_limits(
         motion = rig.planned(PICK)
     else:
         rig.go(ON_A_CUBE)
-        motion = rig.planned(IN_A_BIN, Task(Load(as_class("cube", overhead.objects["cube"]), 7.0)))
+        motion = rig.planned(IN_A_BIN, Task(Load(object_class("cube", overhead.objects["cube"]), 7.0)))
     steps = stopped(rig, motion, share)
     assert steps <= 120
     assert measure_distance(rig.arm._command, motion) < 1e-9

@@ -6,7 +6,7 @@ import pytest
 from rig import Rig
 
 from executive.arm import Goal, Task
-from executive.layout import as_class
+from executive.layout import object_class
 from executive.messages import Load
 
 CUBE = (0.5, 0.1)
@@ -22,7 +22,7 @@ def held(rig: Rig) -> int:
     rig.touch_down(ONTO)
     rig.tool.close()
     assert rig.tool.held_body == body
-    rig.go(OVER, Task(load=Load(as_class("cube", rig.config.objects["cube"]), rig.tool.bears)))
+    rig.go(OVER, Task(load=Load(object_class("cube", rig.config.objects["cube"]), rig.tool.bears)))
     return body
 
 

@@ -8,7 +8,7 @@ import pytest
 from executive.arm import Goal, Task
 from executive.cell_config import CellConfig
 from executive.geometry import Array
-from executive.layout import as_bin, as_class
+from executive.layout import as_bin, object_class
 from executive.messages import Load
 from executive.motion.planner import Planner
 from executive.sim.cell import SimCell
@@ -42,7 +42,7 @@ def test_no_planned_carry_is_faster_than_the_least(overhead: CellConfig, least: 
     for number in range(24):
         bin = list(overhead.bins)[number % 3]
         label = list(overhead.objects)[number // 3 % 3]
-        kind = as_class(label, overhead.objects[label])
+        kind = object_class(label, overhead.objects[label])
         slot = rng.permutation(as_bin(bin, overhead.bins[bin]).slots)[0]
         x, y = rng.uniform(*np.transpose([overhead.table.x, overhead.table.y]))
         drop = 0.015

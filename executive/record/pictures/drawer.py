@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import wait as wait_for
 from pathlib import Path
 
 from executive.errors import ExecutiveError
 from executive.record.pictures.draw import draw
 from executive.record.pictures.scene import Scene
+from executive.record.whole_file import reason_of, replacing
 
 MAX_WAITING = 64
 """Pictures that may wait for the thread [about 1.2 MB each]; beyond that they are dropped."""
+
+CLOSE_TIMEOUT = 30.0
+"""Time after which pictures that are still waiting are given up at the end of a run [s]."""
 
 QUALITY = 80
 """Quality of the JPEG files, 0 to 100: a 640 pixel wide picture takes 40 to 50 kB."""
@@ -30,15 +35,22 @@ class Drawer:
         """Have `scene` drawn to the file `name` of the folder; False if too many wait already."""
         if sum(not picture.done() for picture in self._pictures) >= MAX_WAITING:
             return False
-        self._pictures.append(self._thread.submit(save, self._folder / name, scene))
+        self._pictures.append(self._thread.submit(self._save, self._folder / name, scene))
         return True
 
-    def close(self) -> None:
-        """Return once every picture is drawn; `problem` says if some are not."""
-        self._thread.shutdown()
-        errors = [error for picture in self._pictures if (error := picture.exception()) is not None]
-        if errors:
-            self.problem = f"not every picture was drawn: {errors[0]}"
+    def close(self, *, wait: bool = True) -> None:
+        """Finish the waiting pictures, without `wait` only the one under way; `problem` names a lack."""
+        unfinished = wait_for(self._pictures, CLOSE_TIMEOUT).not_done if wait else set()
+        if unfinished:
+            self.problem = f"{len(unfinished)} pictures were not drawn within {CLOSE_TIMEOUT:.0f} s"
+        self._thread.shutdown(wait=False, cancel_futures=True)
+
+    def _save(self, path: Path, scene: Scene) -> None:
+        """Save a picture; keep the first error only, because a traceback would keep its scene."""
+        try:
+            save(path, scene)
+        except Exception as error:
+            self.problem = self.problem or f"not every picture was drawn: {error}"
 
 
 def save(path: Path, scene: Scene) -> None:
@@ -54,5 +66,9 @@ def save(path: Path, scene: Scene) -> None:
     except OSError as error:
         raise ExecutiveError(f'cannot make the folder "{path.parent}": {error.strerror}') from error
     image = cv2.cvtColor(draw(scene), cv2.COLOR_RGB2BGR)
-    if not cv2.imwrite(str(path), image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY]):
-        raise ExecutiveError(f'cannot write the picture "{path}"')
+    _, data = cv2.imencode(path.suffix, image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    try:
+        with replacing(path) as part:
+            part.write_bytes(data.tobytes())
+    except OSError as error:
+        raise ExecutiveError(f'cannot write the picture "{path}": {reason_of(error)}') from error

@@ -13,11 +13,11 @@ from executive.testing.conformance.rehearsal import Rehearsal
 from executive.testing.conformance.situations import Arrange, NotTried, Situation, situations
 
 MAX_HALTS = 40
-"""Number of halts spread over a run, and of those at its calls."""
+"""Greatest number of halts spread evenly over a run, and of further halts at its calls."""
 
 
 class GotStuck(NotTried):
-    """A tick of a skill did not come back, so that it was not tried any further; the text says where."""
+    """A tick of a skill did not return, so that the skill is not run again; the text says where."""
 
 
 class Case:
@@ -25,8 +25,8 @@ class Case:
 
     Args:
         name: Name of the skill.
-        skill: Its class.
-        arrange: What its author wants to be otherwise on the stage.
+        skill: Class of the skill.
+        arrange: Changes the stage as the author of the skill wants.
     """
 
     def __init__(self, name: str, skill: type[Skill], arrange: Arrange) -> None:
@@ -39,28 +39,28 @@ class Case:
         return list(situations(self.skill, self._arrange))
 
     @cached_property
-    def twice(self) -> list[tuple[Situation, Rehearsal, Rehearsal]]:
-        """Two runs to the end in every situation, nothing going wrong."""
+    def repeated_runs(self) -> list[tuple[Situation, Rehearsal, Rehearsal]]:
+        """Two runs to the end in every situation, without adversity."""
         return [(one, self._run(one), self._run(one)) for one in self.situations]
 
     @cached_property
-    def ended(self) -> list[Rehearsal]:
-        """A run to the end in every situation, with nothing going wrong, and under every adversity."""
-        plain = [first for _, first, _ in self.twice]
+    def complete_runs(self) -> list[Rehearsal]:
+        """Runs to the end: in every situation one without adversity, and one under each adversity."""
+        plain = [first for _, first, _ in self.repeated_runs]
         return plain + [
             self._run(situation, adversity)
-            for situation, first, _ in self.twice
-            # A run that never ends where all is well would not end here, either.
+            for situation, first, _ in self.repeated_runs
+            # A run that does not end without adversity would not end under one, either.
             if first.status != "RUNNING"
             for adversity in adversities(self.skill, first.ticks, holding=first.held)
         ]
 
     @cached_property
-    def halted(self) -> list[Rehearsal]:
-        """A run for every moment of every situation at which the skill may be halted."""
+    def halted_runs(self) -> list[Rehearsal]:
+        """Halted runs: in every situation one for each tick that `_halt_ticks` returns."""
         return [
             self._run(situation, halt_at=tick)
-            for situation, first, _ in self.twice
+            for situation, first, _ in self.repeated_runs
             if first.status != "RUNNING"
             for tick in _halt_ticks(first)
         ]
@@ -71,7 +71,7 @@ class Case:
         """Run the skill once.
 
         Raises:
-            GotStuck: It did not come back, or a run before it: to wait once is enough.
+            GotStuck: A tick did not return, in this run or in an earlier one.
         """
         if self._stuck:
             raise GotStuck(self._stuck)
@@ -89,8 +89,8 @@ class Case:
         return rehearsal
 
 
-def _halt_ticks(first: Rehearsal) -> list[int]:
+def _halt_ticks(rehearsal: Rehearsal) -> list[int]:
     """Return the ticks at which a run is halted: those of its calls, those after them, and some between."""
-    spread = np.linspace(1, first.ticks, min(first.ticks, MAX_HALTS), dtype=int).tolist()
-    around = sorted({call.tick + step for call in first.calls for step in (0, 1)})
-    return sorted(tick for tick in {*spread, *around[:MAX_HALTS]} if 1 <= tick <= first.ticks)
+    spread = np.linspace(1, rehearsal.ticks, min(rehearsal.ticks, MAX_HALTS), dtype=int).tolist()
+    around = sorted({call.tick + step for call in rehearsal.calls for step in (0, 1)})
+    return sorted(tick for tick in {*spread, *around[:MAX_HALTS]} if 1 <= tick <= rehearsal.ticks)

@@ -14,7 +14,7 @@ from executive.testing.conformance.situations import Arrange, NotTried
 from executive.testing.conformance.stage import Stage
 
 Rule = Callable[[Case], Iterator[str]]
-"""Yields what is wrong with a skill: what happened, where, what to do. Its docstring says what is true."""
+"""Yields what is wrong with a skill: what happened, where, what to do. Its docstring states the rule."""
 
 RULES: tuple[Rule, ...] = (
     declarations.documented,
@@ -38,7 +38,7 @@ RULES: tuple[Rule, ...] = (
 
 
 class NotConforming(AssertionError):
-    """A skill does not do what every skill must; the text says what, where, and what to do."""
+    """A skill violates a rule; the text names the rule, the place and the correction."""
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,9 @@ class Verdict:
     Attributes:
         skill: Name of the skill.
         check: Name of the check.
-        doc: What is true where it passes.
-        status: `ok`, `failed`, or `not run` where the skill cannot be tried.
-        problems: What is wrong, a text each.
+        doc: The rule, as a sentence.
+        status: `ok`, `failed`, or `not run` if the skill cannot be tried.
+        problems: One text for each violation.
     """
 
     skill: str
@@ -62,10 +62,10 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Check:
-    """A rule to hold a skill to; called, it returns if the skill keeps it.
+    """One rule applied to one skill; a call raises `NotConforming` if the skill violates the rule.
 
     Attributes:
-        case: The skill.
+        case: The runs of the skill.
         rule: The rule.
     """
 
@@ -82,11 +82,11 @@ class Check:
 
     @property
     def doc(self) -> str:
-        """What is true of a skill that keeps the rule, in one line."""
+        """First line of the rule's docstring."""
         return (inspect.getdoc(self.rule) or "").partition("\n")[0]
 
-    def verdict(self) -> Verdict:
-        """Return what the check finds."""
+    def run(self) -> Verdict:
+        """Apply the rule to the skill and return the result."""
         try:
             problems = tuple(self.rule(self.case))
         except NotTried as problem:
@@ -94,14 +94,14 @@ class Check:
         return Verdict(self.case.name, self.name, self.doc, "failed" if problems else "ok", problems)
 
     def __call__(self) -> None:
-        """Return if the skill keeps the rule.
+        """Run the check.
 
         Raises:
-            NotConforming: It does not, or this cannot be found out.
+            NotConforming: The skill violates the rule, or cannot be tried.
         """
-        verdict = self.verdict()
+        verdict = self.run()
         if verdict.problems:
-            raise NotConforming("\n".join((f"{self.doc} Not so:", *verdict.problems)))
+            raise NotConforming("\n".join((f"{self.doc} Violated:", *verdict.problems)))
 
 
 def nothing_to_add(stage: Stage) -> Mapping[str, Any]:
@@ -111,12 +111,12 @@ def nothing_to_add(stage: Stage) -> Mapping[str, Any]:
 
 
 def conformance(skill: type[Skill], arrange: Arrange = nothing_to_add, name: str = "") -> list[Check]:
-    """Return every check of a skill, to be called one by one; nothing is run before.
+    """Return all checks of a skill; the skill is run only when a check is called.
 
     Args:
-        skill: Its class.
-        arrange: Gets a `Stage` for every situation, may change it, and returns values for those params and
-            inputs that cannot be made up, or should be others.
+        skill: Class of the skill.
+        arrange: Gets a `Stage` for every situation, may change it, and returns values for params and
+            inputs: those that cannot be generated, and those that should have another value.
         name: Name under which the skill is installed; by default that of its class.
     """
     case = Case(name or skill.__name__, skill, arrange)

@@ -35,9 +35,9 @@ def arranged(case: Case) -> Iterator[str]:
     except NotArranged as problem:
         yield f"{case.name} cannot be tried: {problem}"
         return
-    if not any(rehearsal.status == "SUCCESS" for rehearsal in case.ended):
+    if not any(rehearsal.status == "SUCCESS" for rehearsal in case.complete_runs):
         yield (
-            f"{case.name} never succeeded; {case.ended[0].end}. Arrange a stage on which it can: "
+            f"{case.name} never succeeded; {case.complete_runs[0].end}. Arrange a stage on which it can: "
             f"conformance({case.skill.__name__}, lambda stage: ...), as skills/README.md shows."
         )
 
@@ -45,11 +45,11 @@ def arranged(case: Case) -> Iterator[str]:
 def comes_to_an_end(case: Case) -> Iterator[str]:
     """Every tick comes back, and it ends within a minute on the run's clock."""
     try:
-        _ = case.ended, case.halted
+        _ = case.complete_runs, case.halted_runs
     except GotStuck as problem:
         yield str(problem)
         return
-    for rehearsal in case.ended:
+    for rehearsal in case.complete_runs:
         if rehearsal.status == "RUNNING":
             yield (
                 f"{rehearsal.where} {case.name} was not over after {MAX_TIME:g} s. "
@@ -59,7 +59,7 @@ def comes_to_an_end(case: Case) -> Iterator[str]:
 
 def ends_as_declared(case: Case) -> Iterator[str]:
     """Whatever goes wrong, it succeeds with all outputs, or fails with a declared reason and a sentence."""
-    for rehearsal in case.ended:
+    for rehearsal in case.complete_runs:
         where = f"{rehearsal.where} at tick {rehearsal.ticks}"
         if rehearsal.status == "FAULT":
             yield (
@@ -75,7 +75,7 @@ def ends_as_declared(case: Case) -> Iterator[str]:
 
 def outputs_fit(case: Case) -> Iterator[str]:
     """Every output is of the type that it declares."""
-    for rehearsal in case.ended:
+    for rehearsal in case.complete_runs:
         for name, value in rehearsal.outputs.items():
             declared = case.skill.ports[name].type
             if not _is_of(value, declared):
@@ -87,7 +87,7 @@ def outputs_fit(case: Case) -> Iterator[str]:
 
 def inputs_unchanged(case: Case) -> Iterator[str]:
     """Its params and inputs are afterwards what they were."""
-    for rehearsal in case.ended:
+    for rehearsal in case.complete_runs:
         for name in rehearsal.changed:
             yield (
                 f"{rehearsal.where} it changed what self.{name} holds. "
@@ -98,7 +98,7 @@ def inputs_unchanged(case: Case) -> Iterator[str]:
 def uses_only_what_it_declares(case: Case) -> Iterator[str]:
     """It commands only what it says it uses, moves only if it moves, and senses only if it senses."""
     skill = case.skill
-    for name in dict.fromkeys(call.name for rehearsal in case.ended for call in rehearsal.calls):
+    for name in dict.fromkeys(call.name for rehearsal in case.complete_runs for call in rehearsal.calls):
         part = _PARTS.get(name)
         if part is not None and part not in skill.uses:
             yield f'{case.name} calls cell.{name} and does not use the {part}. Add "{part}" to uses.'
@@ -110,13 +110,15 @@ def uses_only_what_it_declares(case: Case) -> Iterator[str]:
 
 def tool_left_as_declared(case: Case) -> Iterator[str]:
     """After success, every failure and a halt at any tick the tool holds what is declared."""
-    for rehearsal in _first_wrong([*case.ended, *case.halted], lambda one: bool(_tool_fault(case, one))):
+    for rehearsal in _first_wrong(
+        [*case.complete_runs, *case.halted_runs], lambda one: bool(_tool_fault(case, one))
+    ):
         yield _tool_fault(case, rehearsal)
 
 
 def arm_left_at_rest(case: Case) -> Iterator[str]:
     """Where it started the arm, the arm is at rest when it ends or is halted."""
-    for rehearsal in _first_wrong([*case.ended, *case.halted], _leaves_arm_moving):
+    for rehearsal in _first_wrong([*case.complete_runs, *case.halted_runs], _leaves_arm_moving):
         yield (
             f"{rehearsal.end}, and the arm still moves. "
             "Call cell.arm.stop() in finally, or use follow of executive.moving."
@@ -125,7 +127,7 @@ def arm_left_at_rest(case: Case) -> Iterator[str]:
 
 def halts_at_once(case: Case) -> Iterator[str]:
     """Halted at any tick, it ends there and then, and raises nothing."""
-    for rehearsal in _first_wrong(case.halted, lambda one: one.status == "FAULT"):
+    for rehearsal in _first_wrong(case.halted_runs, lambda one: one.status == "FAULT"):
         yield (
             f"{rehearsal.where} at tick {rehearsal.ticks} {rehearsal.message}. "
             "What finally does must be done at once and cannot fail."
@@ -134,7 +136,7 @@ def halts_at_once(case: Case) -> Iterator[str]:
 
 def repeats_itself(case: Case) -> Iterator[str]:
     """In the same situation it makes the same calls at the same ticks and ends alike."""
-    for _, first, second in case.twice:
+    for _, first, second in case.repeated_runs:
         if difference := _difference(first, second):
             yield (
                 f"{first.where}, twice the same, {difference}. "
@@ -144,7 +146,7 @@ def repeats_itself(case: Case) -> Iterator[str]:
 
 def ticks_are_quick(case: Case) -> Iterator[str]:
     """No tick computes for longer than 50 ms, the quicker of two runs counted."""
-    for _, first, second in case.twice:
+    for _, first, second in case.repeated_runs:
         least = [min(pair) for pair in zip(first.durations, second.durations, strict=False)]
         longest = max(least, default=0.0)
         if longest > MAX_TICK_TIME:

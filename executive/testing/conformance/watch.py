@@ -45,5 +45,5 @@ class Watch:
 
     def _answer(self, access: Access) -> Any:
         if access.is_call and access.role in _ROLES:
-            self.calls.append(Call(self.tick, access.name, access.values))
+            self.calls.append(Call(self.tick, access.name, access.all_arguments))
         return access.proceed()

@@ -92,7 +92,7 @@ class DisturbedCell(WrappedCell):
                 return self._schedule.through(access.member, access.proceed)
             answer = access.proceed()
             if access.name == "arm.start":
-                self._scene.started(*access.values)
+                self._scene.started(*access.all_arguments)
             elif access.name == "arm.stop":
                 self._scene.stopped()
             return answer

@@ -39,7 +39,8 @@ def test_a_picture_that_cannot_be_written_is_a_problem_and_the_others_are_drawn(
     for name in ("b.jpg", "a.jpg"):
         drawer.draw(name, SCENE)
     drawer.close()
-    assert drawer.problem == f'not every picture was drawn: cannot write the picture "{tmp_path}/b.jpg"'
+    reason = f'cannot write the picture "{tmp_path}/b.jpg": is a directory'
+    assert drawer.problem == f"not every picture was drawn: {reason}"
     assert (tmp_path / "a.jpg").exists()
 
 
@@ -50,3 +51,25 @@ def test_no_more_pictures_wait_than_the_memory_holds(tmp_path, monkeypatch):
     assert [drawer.draw("a.jpg", SCENE) for _ in range(MAX_WAITING + 1)] == [True] * MAX_WAITING + [False]
     release.set()
     drawer.close()
+
+
+def test_a_run_that_is_ended_by_force_waits_for_no_picture(tmp_path, monkeypatch):
+    release, drawn = threading.Event(), []
+    monkeypatch.setattr(module, "save", lambda path, scene: drawn.append(path.name) or release.wait())
+    drawer = Drawer(tmp_path)
+    for name in ("a.jpg", "b.jpg"):
+        drawer.draw(name, SCENE)
+    drawer.close(wait=False)
+    release.set()
+    assert drawn in ([], ["a.jpg"])
+
+
+def test_pictures_that_do_not_end_are_given_up(tmp_path, monkeypatch):
+    release = threading.Event()
+    monkeypatch.setattr(module, "save", lambda path, scene: release.wait())
+    monkeypatch.setattr(module, "CLOSE_TIMEOUT", 0.0)
+    drawer = Drawer(tmp_path)
+    drawer.draw("a.jpg", SCENE)
+    drawer.close()
+    release.set()
+    assert drawer.problem == "1 pictures were not drawn within 0 s"

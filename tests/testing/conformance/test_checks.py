@@ -157,7 +157,7 @@ def check_of(skill: type[Skill], name: str) -> Check:
 def told(check: Check) -> list[str]:
     """Return the problems without what depends on the machine, or on a line in a file."""
     patterns = ((r"\.py:\d+", ".py:N"), (r"\d+ ms", "N ms"))
-    problems = list(check.verdict().problems)
+    problems = list(check.run().problems)
     for pattern, word in patterns:
         problems = [re.sub(pattern, word, problem) for problem in problems]
     return problems
@@ -212,7 +212,7 @@ def test_a_file_that_imports_another_clock_or_threads_is_found(statement: str, t
     finally:
         del sys.modules[path.stem]
     package = statement.split()[1].partition(".")[0]
-    assert check_of(module.Wave, "imports_allowed").verdict().problems == (
+    assert check_of(module.Wave, "imports_allowed").run().problems == (
         f"waving.py:2 imports {package}. A skill waits on cell.clock and acts through cell alone; "
         "find there what it needs.",
     )
@@ -222,10 +222,10 @@ def test_a_problem_is_raised_with_the_rule_and_without_a_stage_nothing_succeeds(
     with pytest.raises(NotConforming) as raised:
         check_of(faulty.AlwaysFails, "arranged")()
     assert str(raised.value).splitlines()[0] == (
-        "It can be tried, and it succeeds in one situation at least. Not so:"
+        "It can be tried, and it succeeds in one situation at least. Violated:"
     )
     check = check_of(faulty.NeedsUnknown, "arm_left_at_rest")
-    assert check.verdict().status == "not run"
+    assert check.run().status == "not run"
     with pytest.raises(NotConforming, match='no value can be made up for "plan"'):
         check()
 
@@ -240,7 +240,7 @@ def test_a_tick_that_does_not_come_back_is_broken_off_once(monkeypatch: pytest.M
         "The arm waits for every tick: yield in each loop that waits, or leave work to a detector."
     )
     assert told(checks["comes_to_an_end"]) == told(checks["halts_at_once"]) == [problem]
-    assert [checks[name].verdict().status for name in ("halts_at_once", "defaults_allowed")] == [
+    assert [checks[name].run().status for name in ("halts_at_once", "defaults_allowed")] == [
         "not run",
         "ok",
     ]

@@ -132,7 +132,7 @@ class Patient(faulty.Pause):
 
 def test_a_skill_is_halted_at_its_calls_and_now_and_then() -> None:
     short = Case("Pause", faulty.Pause, nothing_to_add)
-    assert [rehearsal.ticks for rehearsal in short.halted] == [1, 2, 1, 2]
-    ticks = [rehearsal.ticks for rehearsal in Case("Patient", Patient, nothing_to_add).halted]
+    assert [rehearsal.ticks for rehearsal in short.halted_runs] == [1, 2, 1, 2]
+    ticks = [rehearsal.ticks for rehearsal in Case("Patient", Patient, nothing_to_add).halted_runs]
     assert {1, 201, 202, 400} <= set(ticks)
     assert MAX_HALTS <= len(set(ticks)) <= MAX_HALTS + 2

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import signal
 import subprocess
 import tempfile
 import threading
@@ -120,7 +121,7 @@ class Helper:
         with self._guard:
             self._is_stopped = True
             if self._process is not None:
-                self._process.kill()
+                _kill(self._process)
 
     def close(self) -> None:
         """Give everything back; no call may be under way."""
@@ -136,17 +137,19 @@ class Helper:
 
         def give_up() -> None:
             is_late.set()
-            process.kill()
+            _kill(process)
 
         # A killed process takes no data and says nothing more, so that neither call below waits for ever.
         timer = threading.Timer(max(until - time.monotonic(), 0.0), give_up)
         timer.start()
-        with contextlib.suppress(BrokenPipeError):
-            process.stdin.write(data)
-            process.stdin.flush()
-        line = process.stdout.readline()
-        timer.cancel()
-        timer.join()
+        try:
+            with contextlib.suppress(BrokenPipeError):
+                process.stdin.write(data)
+                process.stdin.flush()
+            line = process.stdout.readline()
+        finally:
+            timer.cancel()
+            timer.join()
         if is_late.is_set():
             self._restart()
             raise TimeoutError
@@ -164,7 +167,7 @@ class Helper:
         try:
             status = process.wait(EXIT_TIMEOUT)
         except subprocess.TimeoutExpired:
-            process.kill()
+            _kill(process)
             status = process.wait()
         self._stderr.seek(max(self._stderr.seek(0, os.SEEK_END) - MAX_STDERR, 0))
         lines = self._stderr.read().decode(errors="replace").strip().splitlines()
@@ -205,9 +208,15 @@ class Helper:
             process, self._process = self._process, None
         if process is None:
             return
-        process.kill()
+        _kill(process)
         process.wait()
         for pipe in (process.stdin, process.stdout):
             with contextlib.suppress(OSError):  # Data that the process did not take.
                 assert pipe is not None
                 pipe.close()
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    """Kill a helper process and all processes that it started, which might hold its output open."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
