@@ -70,7 +70,6 @@ def sigint():
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("sigint")
 def test_every_run_leaves_its_record_and_its_report(tmp_path):
     few = {"cell.kind": "fake", "cell.table.objects": "[1, 1]"}
     result = run_job(Job("sort_fruit", 3, few, tmp_path, frames=False))
@@ -78,6 +77,7 @@ def test_every_run_leaves_its_record_and_its_report(tmp_path):
     assert (Path(result["run"]) / "report.html").is_file()
 
 
+@pytest.mark.usefixtures("sigint")
 def test_after_ctrl_c_no_further_run_begins_and_the_results_so_far_are_kept():
     told = []
     results = swept(range(9), interrupt, workers=1, halting=lambda: told.append("halting"))

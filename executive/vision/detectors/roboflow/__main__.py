@@ -37,7 +37,8 @@ def main() -> None:
         infer = _client(json.loads(sys.argv[1]))
     except Exception as error:
         say(unusable=f"{type(error).__name__}: {error}")
-        return
+        # The thread that reads the input holds its lock: a regular exit would abort the interpreter.
+        os._exit(0)
     logging.getLogger("backoff").addHandler(_Repeats(say))
     logging.getLogger("backoff").setLevel(logging.DEBUG)
     say(ready=True)
