@@ -27,12 +27,12 @@ OFFSET = 0.004
 NUDGE = 0.1
 """Speed at which it is pushed aside to see whether it stays [m/s]; friction stops that within 1 mm."""
 MOVED = 0.005
-"""What moves further than this did not stay [m]."""
+"""Distance beyond which an object counts as moved [m]."""
 
 
 @dataclass(frozen=True)
 class PartSeeds:
-    """What each part of a simulated cell draws its chance from.
+    """Random seeds of the parts of a simulated cell.
 
     Attributes:
         objects: Decides which objects lie where.

@@ -7,13 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from executive.errors import InputError
+from executive.runtime.plant import LONGEST_BRAKING
 from executive.skill import Skill, SkillFailed
 from executive.skill_steps import SkillRun
 from executive.testing.commands import written_down
 from executive.workcell import Workcell
-
-LONGEST_BRAKING = 2.0
-"""Time after which the arm must be at rest when a skill was taken away [s]."""
 
 
 @dataclass(frozen=True)

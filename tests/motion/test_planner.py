@@ -78,7 +78,7 @@ ANSWERS = {
 
 @pytest.mark.parametrize("name", ANSWERS)
 def test_a_fixed_question_gets_a_fixed_answer(planner, config, home, name: str) -> None:
-    """Whoever changes what the planner decides changes this table and says why."""
+    """A change of the planner's decisions must change this table and state its reason."""
     motion, (duration, guarded, mean) = question(name, planner, config, home), ANSWERS[name]
     assert (motion.duration, motion.guarded) == pytest.approx((duration, guarded), rel=1e-5)
     assert motion.samples.q.mean(axis=0) == pytest.approx(mean, abs=2e-5)

@@ -76,7 +76,7 @@ class Bench:
 
     @property
     def ahead(self) -> list[bool]:
-        """Whether each motion so far was planned ahead."""
+        """For each motion so far, True if it was planned ahead."""
         return [plan["ahead"] for plan in self.plans]
 
 

@@ -41,7 +41,7 @@ class Case:
 
     @cached_property
     def flow(self) -> Analysis:
-        """What can happen in the tree that runs."""
+        """Faults that can happen in the tree of this run."""
         return Analysis(self.tree, self.skills)
 
     @cached_property

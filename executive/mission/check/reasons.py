@@ -17,7 +17,7 @@ _OWN = {nodes.TimeoutNode: ("timeout", "timeout"), nodes.InvertNode: ("invert", 
 """Control nodes that fail for a reason of their own: their word, and the reason."""
 
 _SLOTS = ("do", "recover", "condition", "catch", "finally")
-"""What nodes are to their parents; paths are made of these words too."""
+"""Names of the slots of a parent node; paths contain these words, too."""
 
 
 def labels(case: Case) -> Iterator[Finding]:

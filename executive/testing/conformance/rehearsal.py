@@ -84,7 +84,7 @@ class Rehearsal:
 
     @property
     def end(self) -> str:
-        """Where and how it ended, for a sentence."""
+        """Place and kind of its end, as a part of a sentence."""
         words = {
             "SUCCESS": "it succeeded",
             "FAILURE": f'it failed with "{self.reason}" ({self.message})',

@@ -12,7 +12,7 @@ from executive.view.live.telling import News
 QUALITY = 80
 """JPEG quality of the camera's image, 0 to 100."""
 SHADE = 0.45
-"""How far pixels that the arm hides go towards black: 0 not at all, 1 entirely."""
+"""Darkening of the pixels that the arm hides: 0 none, 1 black."""
 
 
 class Board:
