@@ -72,7 +72,7 @@ def test_velocity_and_acceleration_are_the_derivatives_of_the_way(descent: Desce
 
 
 @given(descents())
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20, deadline=None, derandomize=True)
 def test_leaving_it_is_the_same_way_mirrored_in_time(descent: Descent) -> None:
     down = Line(descent.chain, descent.length, LIMITS, descent.speed, enters=True)
     up = Line(descent.chain[::-1], descent.length, LIMITS, descent.speed, leaves=True)
