@@ -2,7 +2,7 @@
 
 `python -m executive.cli.doctor tiny|egl` draws a few frames and prints the time of one. It runs as a
 separate process, because a failing EGL driver may crash it. A check imports its packages only when it runs,
-so that a missing package spoils no other check.
+so that a missing package spoils no other check and no other command waits for an import.
 """
 
 from __future__ import annotations
@@ -10,14 +10,9 @@ from __future__ import annotations
 import os
 import platform
 import re
-import statistics
 import subprocess
 import sys
-import timeit
-import urllib.error
-import urllib.request
 from collections.abc import Callable, Iterator
-from importlib.metadata import packages_distributions
 from importlib.util import find_spec
 from typing import NamedTuple
 
@@ -109,6 +104,8 @@ def check_system(version: tuple[int, ...] = sys.version_info[:3]) -> Iterator[Fi
 
 def check_packages() -> Iterator[Finding]:
     """Yield findings on required packages, on packages that provide `cv2`, on extras, and on films."""
+    from importlib.metadata import packages_distributions
+
     from executive.runtime.versions import ITSELF, installed, required
 
     names = required()
@@ -201,6 +198,9 @@ def draw_in_process(renderer: str) -> tuple[float, str]:
 
 def is_reachable(address: str, timeout: float = SERVER_TIMEOUT) -> bool:
     """Return True if a server gives any answer at all within `timeout` [s]."""
+    import urllib.error
+    import urllib.request
+
     try:
         urllib.request.urlopen(address, timeout=timeout).close()
     except OSError as error:
@@ -235,6 +235,9 @@ def prepare_drawing(renderer: str) -> Callable[[], object]:
 
 
 if __name__ == "__main__":
+    import statistics
+    import timeit
+
     with stdout_kept_clean():
         times = timeit.repeat(prepare_drawing(sys.argv[1]), number=1, repeat=1 + FRAMES)
     click.echo(f"milliseconds: {1000 * statistics.median(times[1:]):.2f}")

@@ -88,7 +88,9 @@ def test_packages(monkeypatch, missing, opencv, expected):
         versions, "installed", lambda name: "" if name in missing else INSTALLED.get(name, "")
     )
     monkeypatch.setattr(versions, "required", lambda extra="": NEEDED[extra])
-    monkeypatch.setattr(doctor, "packages_distributions", lambda: {"cv2": opencv} if opencv else {})
+    monkeypatch.setattr(
+        "importlib.metadata.packages_distributions", lambda: {"cv2": opencv} if opencv else {}
+    )
     assert shown(doctor.check_packages()) == expected
 
 
