@@ -13,7 +13,7 @@ MOST = 12
 """Number of ticks of a tree's life that are looked at."""
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(plan=PLANS)
 def test_running_nodes_end_once_from_the_leaves_up_and_no_other_is_touched(plan: Plan) -> None:
     for root, world in lives(plan, MOST):
@@ -36,7 +36,7 @@ def test_running_nodes_end_once_from_the_leaves_up_and_no_other_is_touched(plan:
                 assert [word == "starts" for word in turns] == [True, False] * (len(turns) // 2)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(plan=PLANS)
 def test_a_halted_tree_runs_again_as_a_fresh_one(plan: Plan) -> None:
     fresh = World()

@@ -16,11 +16,12 @@ from executive.errors import Fault
 from executive.messages import Target
 from executive.skill import In, Out, Skill, param, port
 
-CLEANED: list[str] = []
-
 
 class Worker(Skill):
     """Does what `way` says."""
+
+    cleaned: ClassVar[list[str]] = []
+    """Values of `way` of the workers of one test that were cleaned up."""
 
     given: In[str]
     extra: In[str | None] = port(default=None)
@@ -30,6 +31,8 @@ class Worker(Skill):
 
     def run(self, cell: Any) -> Iterator[None]:
         assert not hasattr(self, "made"), "a used instance"
+        # The garbage collector may end a worker during a later test.
+        cleaned = self.cleaned
         try:
             self.made = f"{self.given} {self.extra}"
             yield
@@ -45,7 +48,7 @@ class Worker(Skill):
                 yield iter(())  # type: ignore[misc]
             self.given = "changed inside"
         finally:
-            CLEANED.append(self.way)
+            cleaned.append(self.way)
             if self.way == "linger":
                 yield
             if self.way == "break late":
@@ -60,8 +63,8 @@ def scope() -> Scope:
 
 
 @pytest.fixture
-def make(site: Any, scope: Scope) -> Any:
-    CLEANED.clear()
+def make(site: Any, scope: Scope, monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.setattr(Worker, "cleaned", [])
 
     def make(way: str = "ok", skill: type[Skill] = Worker) -> SkillNode:
         inputs, outputs = {"given": "input", "extra": "extra"}, {"made": "result"}
@@ -130,11 +133,11 @@ def test_halting_runs_the_finally_of_the_skill_unless_it_ended(make: Any, ticks:
     node = make()
     node.tick_once()
     assert halt(node) == []
-    assert (CLEANED, node.status, events[-1]["status"]) == (["ok"], Status.INVALID, "INVALID")
+    assert (Worker.cleaned, node.status, events[-1]["status"]) == (["ok"], Status.INVALID, "INVALID")
     assert ticks(node) == "RS"
     before = len(events)
     node.stop(Status.INVALID)
-    assert (CLEANED, len(events)) == (["ok", "ok"], before)
+    assert (Worker.cleaned, len(events)) == (["ok", "ok"], before)
 
 
 @pytest.mark.parametrize(
@@ -156,10 +159,10 @@ def test_a_skill_without_a_yield_is_done_at_once(make: Any, ticks: Any) -> None:
         """Nothing to wait for."""
 
         def run(self, cell: Any) -> Iterator[None]:
-            CLEANED.append("done")
+            Worker.cleaned.append("done")
             return None  # type: ignore[return-value]
 
-    assert (ticks(make(skill=AtOnce)), CLEANED) == ("S", ["done"])
+    assert (ticks(make(skill=AtOnce)), Worker.cleaned) == ("S", ["done"])
 
 
 def test_events_say_what_happened_to_which_item(site: Any, events: Any) -> None:

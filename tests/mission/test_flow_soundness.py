@@ -215,14 +215,14 @@ def run(case: Case, seed: int) -> tuple[World, Any]:
     return world, root
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(tree=trees, seed=st.integers(0, 2**31))
 def test_what_happens_was_foreseen(tree: Tree, seed: int) -> None:
     hold_against_runs(tree, seed)
 
 
 @pytest.mark.slow
-@settings(max_examples=1000, deadline=None)
+@settings(max_examples=1000)
 @given(tree=trees, seed=st.integers(0, 2**31))
 def test_what_happens_was_foreseen_in_a_thousand_trees(tree: Tree, seed: int) -> None:
     hold_against_runs(tree, seed)
@@ -254,7 +254,7 @@ def hold_against_runs(tree: Tree, seed: int) -> None:
 def test_a_good_part_of_the_random_trees_can_run() -> None:
     found = 0
 
-    @settings(max_examples=200, deadline=None, database=None, derandomize=True)
+    @settings(max_examples=200)
     @given(tree=trees)
     def count(tree: Tree) -> None:
         nonlocal found

@@ -77,7 +77,7 @@ def test_no_detour_follows_a_way_in_no_time(over_the_post) -> None:
 
 
 @given(positions, st.floats(0, 1))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_slopes_are_the_derivatives_of_slack_by_the_joints(over_the_post, q: Array, share: float) -> None:
     gap, _ = over_the_post()
     qs = (gap.start.q + share * (q - gap.start.q))[None]

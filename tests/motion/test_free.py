@@ -17,7 +17,7 @@ STILL = State.rest(np.zeros(7))
 
 
 @given(states(), states())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_it_joins_two_states_inside_the_limits(start: State, end: State) -> None:
     motion = CONNECTOR.connect(start, end)
     for state, wanted in ((motion.at(0.0), start), (motion.at(motion.duration), end)):
@@ -30,7 +30,7 @@ def test_it_joins_two_states_inside_the_limits(start: State, end: State) -> None
 
 
 @given(states(), states(), st.floats(0, 8))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_it_takes_as_long_as_it_is_told_to(start: State, end: State, least: float) -> None:
     fastest = CONNECTOR.connect(start, end).duration
     slower = CONNECTOR.connect(start, end, least).duration

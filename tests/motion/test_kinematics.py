@@ -23,7 +23,7 @@ def assert_same(one: Pose, other: Pose, tolerance: float = 1e-7) -> None:
 
 
 @given(postures)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_every_solution_of_a_reachable_pose_reaches_it(q) -> None:
     goal = ARM.forward(q)
     found = ARM.grid(goal, np.array([ARM.swivel(q), 0.7])).reshape(-1, 7)
@@ -32,7 +32,7 @@ def test_every_solution_of_a_reachable_pose_reaches_it(q) -> None:
 
 
 @given(postures)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_branch_and_swivel_of_a_posture_lead_back_to_it(q) -> None:
     if min(abs(math.sin(q[i])) for i in (1, 3, 5)) < 1e-3:
         return  # straight joints: the posture is not one of a few

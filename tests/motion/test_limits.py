@@ -23,7 +23,7 @@ def test_limits_are_the_cell_files_in_radians(config, limits: JointLimits) -> No
 
 
 @given(shares, st.floats(-4, 0.5))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_the_closed_form_is_ruckigs_duration(share, power: float) -> None:
     change = share * 10**power
     found = CONNECTOR.connect(State.rest(np.zeros(7)), State.rest(change)).duration

@@ -39,7 +39,7 @@ def descents(draw: st.DrawFn) -> Descent:
 
 
 @given(descents(), st.booleans())
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_the_tool_goes_straight_down_inside_all_limits(descent: Descent, enters: bool) -> None:
     line = Line(descent.chain, descent.length, LIMITS, descent.speed, enters=enters)
     states = passed(line)
@@ -61,7 +61,7 @@ def test_the_tool_goes_straight_down_inside_all_limits(descent: Descent, enters:
 
 
 @given(descents())
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_velocity_and_acceleration_are_the_derivatives_of_the_way(descent: Descent) -> None:
     states = passed(Line(descent.chain, descent.length, LIMITS, descent.speed, enters=True))
     middle = slice(1, -2)  # the last sample is not a whole step after the one before
@@ -72,14 +72,16 @@ def test_velocity_and_acceleration_are_the_derivatives_of_the_way(descent: Desce
 
 
 @given(descents())
-@settings(max_examples=20, deadline=None, derandomize=True)
+@settings(max_examples=20)
 def test_leaving_it_is_the_same_way_mirrored_in_time(descent: Descent) -> None:
     down = Line(descent.chain, descent.length, LIMITS, descent.speed, enters=True)
     up = Line(descent.chain[::-1], descent.length, LIMITS, descent.speed, leaves=True)
     assert up.duration == pytest.approx(down.duration, abs=1e-6)
     gentle = Line(descent.chain[::-1], descent.length, LIMITS, acceleration=0.5, leaves=True)
     assert gentle.acceleration == 0.5 < up.acceleration
-    assert np.diff(ARM.tips(passed(gentle).q)[0][:-1, 2], n=2).max() / SOONER**2 <= 0.52
+    heights = ARM.tips(passed(gentle).q)[0][:-1, 2]
+    # The spline through four places advances up to 5 % faster than its parameter.
+    assert np.diff(heights, n=2).max() / SOONER**2 <= 0.5 * 1.06
     for s in np.linspace(0, down.duration, 7):
         one, other = down.at(s), up.at(max(0.0, up.duration - s))
         assert np.allclose(one.q, other.q, atol=1e-6)

@@ -85,7 +85,7 @@ def test_a_fixed_question_gets_a_fixed_answer(planner, config, home, name: str) 
 
 
 @given(on_the_table, st.floats(0.008, 0.03), st.floats(0.02, 0.08))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_the_guarded_part_is_straight_even_and_no_faster_than_asked(
     planner, home, place, guarded, speed
 ) -> None:

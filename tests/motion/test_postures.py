@@ -21,7 +21,7 @@ yaws = st.none() | st.floats(-math.pi, math.pi)
 
 
 @given(places, yaws, st.floats(0.0, 0.15))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_every_posture_points_down_over_the_goal_inside_the_limits(place, yaw, length: float) -> None:
     found = find_postures(ARM, Goal(place, yaw), length, START)
     for qs, height in ((found.low, 0.0), (found.high, length)):

@@ -34,7 +34,7 @@ def assert_short_and_inside(trajectory: Trajectory, s: float, limits) -> None:
 
 
 @given(positions, positions, st.floats(-1.5, 0), st.floats(0, 1))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_halt_at_any_tick_is_short_and_inside_the_stop_limits(
     connector, limits, start, end, power: float, share: float
 ) -> None:

@@ -58,7 +58,7 @@ near_the_post = st.tuples(st.floats(-0.15, 0.15), st.floats(-0.15, 0.15), st.flo
 
 
 @given(near_the_post, st.booleans())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_distances_from_a_cylinder_are_what_geometry_says(config: CellConfig, tip, loaded: bool) -> None:
     discs = hanging(config, CUBE if loaded else None)
     without = slack(Surroundings(config, (), AWAY), tip, discs=discs)
@@ -73,7 +73,7 @@ def test_distances_from_a_cylinder_are_what_geometry_says(config: CellConfig, ti
 
 
 @given(st.tuples(st.floats(0.08, 0.38), st.floats(-0.66, -0.32), st.floats(0.01, 0.2)).map(np.array))
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 def test_distances_from_a_bin_are_what_geometry_says(config: CellConfig, tip) -> None:
     discs = hanging(config, None)
     bin, t = config.bins["red_bin"], BIN_THICKNESS
@@ -110,7 +110,7 @@ def test_a_load_hangs_below_the_tool_and_is_as_wide_as_its_ring_puts_it(config: 
 
 
 @given(st.floats(0.42, 0.64), st.floats(-0.22, 0.22), st.floats(0.01, 0.06))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_the_workspace_is_not_entered_low_but_where_it_was_looked_at(config, x, y, z) -> None:
     end = np.array([[0.53, 0.0]])
     tip, discs = (x, y, min(z, pile_height(config))), hanging(config, None)
@@ -171,7 +171,7 @@ def test_an_error_names_the_thing_the_lack_and_the_place(config: CellConfig) -> 
 
 
 @given(near_the_post, st.floats(-0.4, 0.4), st.floats(-0.4, 0.4), st.booleans())
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 def test_slopes_are_the_differences_of_slack(config, tip, tilt, turn, loaded: bool) -> None:
     axis = np.array([math.sin(tilt), math.cos(tilt) * math.sin(turn), -math.cos(tilt) * math.cos(turn)])
     discs, surroundings = hanging(config, CUBE if loaded else None), Surroundings(config, (POST,), AWAY)

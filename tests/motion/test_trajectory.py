@@ -53,7 +53,7 @@ def test_a_time_that_would_crash_ruckig_is_a_fault(s: float) -> None:
 
 
 @given(states(), st.floats(0.2, 1.0))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_slowed_it_takes_the_same_path_in_more_time(between: State, rate: float) -> None:
     """The chain rule: velocities are multiplied by the rate, accelerations by its square."""
     trajectory = by_way_of(between)
@@ -86,7 +86,7 @@ def test_a_motion_to_where_the_arm_is_takes_no_time() -> None:
 
 
 @given(st.integers(0, 6), st.floats(0.3, 0.9))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_leaving_a_joints_range_between_two_states_inside_it_is_seen(joint: int, share: float) -> None:
     """Where a joint turns back, ruckig's own extremes are too small."""
     edge = State.rest(np.zeros(7))
@@ -112,7 +112,7 @@ def test_a_motion_outside_a_limit_cannot_be_flown_and_the_text_names_the_joint(l
 
 
 @given(positions, st.floats(0.01, 0.2))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_a_thinned_path_has_no_gaps_and_no_more_points_than_it_needs(end, spacing: float) -> None:
     qs = Trajectory([CONNECTOR.connect(State.rest(A), State.rest(end))]).samples.q
     kept = thinned(qs, spacing)

@@ -82,7 +82,7 @@ def flown(start: State, course: Course, fine: int = FINE) -> State:
 
 
 @given(moves() | moves(passing=0.15))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_a_course_begins_and_ends_in_the_given_states(move) -> None:
     program, course = fitted(*move)
     last = program.shorten(course, NOTHING, WIDE)
@@ -100,7 +100,7 @@ def test_a_course_begins_and_ends_in_the_given_states(move) -> None:
 
 
 @given(moves(passing=0.15))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_a_course_keeps_the_limits(move) -> None:
     program, course = fitted(*move)
     for found in (course, shortened(program, course, 6)):
@@ -115,7 +115,7 @@ def test_a_course_keeps_the_limits(move) -> None:
 
 
 @given(moves())
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_with_nothing_in_the_way_it_becomes_nearly_as_fast_as_can_be(move) -> None:
     program, course = fitted(*move)
     duration, _ = direct(*move)
@@ -125,7 +125,7 @@ def test_with_nothing_in_the_way_it_becomes_nearly_as_fast_as_can_be(move) -> No
 
 
 @given(moves(passing=0.15), shares, st.floats(0.6, 2.0))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_a_step_meets_what_is_demanded_of_three_positions_together_and_of_its_length(
     move, share: Array, growth: float
 ) -> None:

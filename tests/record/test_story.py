@@ -186,7 +186,7 @@ def test_the_memory_of_a_run_does_not_grow_with_its_length() -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     breaks=st.randoms(use_true_random=False),
     slips=st.integers(0, 40),

@@ -15,7 +15,7 @@ from executive.messages import Answer, Detection, Frame, Reliability
 from executive.tape.codec import ANSWER, ARRAY, BOX, FRAME, MOTION, POSE, Codec, PlayedMotion
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
-few = settings(max_examples=25, deadline=None)
+few = settings(max_examples=25)
 
 
 def back(codec: Codec, answer: Any) -> Any:

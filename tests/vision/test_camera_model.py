@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from executive.cell_config import CameraConfig
@@ -83,7 +83,6 @@ def test_what_determines_no_ray_or_pose_is_refused():
         looking_at([0, 0, 1], [0, 0, 0], [0, 0, 1])
 
 
-@settings(deadline=None)  # The first example loads scipy.
 @given(matrices, cameras, points)
 def test_opencv_projects_where_we_do_half_a_pixel_aside_and_its_camera_is_ours(matrix, X_WC, point):
     opencv = Frame.opencv(SimpleNamespace(matrix=matrix, X_WC=X_WC))

@@ -43,7 +43,7 @@ def showing_cube(centre, X_WC=ABOVE):
     return Detection("cube", 0.9, (left, up, right, down)), frame
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.floats(0.42, 0.64), st.floats(-0.22, 0.22), st.floats(0.0, 0.15), st.sampled_from([ABOVE, ASKEW]))
 def test_depth_finds_an_object_at_any_height(x, y, below, X_WC):
     centre = np.array([x, y, below + SIDE / 2])
