@@ -28,11 +28,11 @@ _PROTOCOLS: Mapping[str, type] = {
 _RETURNED_ROLES = {"arm.plan": "plan", "detector.request": "request"}
 """Role of the object that a call returns, by `Access.name`; this object gets a proxy, too."""
 
-MEMBERS: Mapping[str, Mapping[str, bool]] = {
+IS_METHOD: Mapping[str, Mapping[str, bool]] = {
     role: {name: callable(member) for name, member in vars(protocol).items() if not name.startswith("_")}
     for role, protocol in _PROTOCOLS.items()
 }
-"""For every role, its members by name: True for a method, False for an attribute."""
+"""For every role and member: True for a method, False for an attribute."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Access:
         role: Role of the part: `arm`, `tool`, `detector`, ..., `plan` or `request`.
         detector: Name of the detector that is accessed, or that returned the request; "" for other parts.
         member: Name of the attribute or method.
-        proceed: Asks the part itself and returns its answer.
+        proceed: Performs the access on the part itself and returns the result.
         arguments: Positional arguments of the call.
         keywords: Keyword arguments of the call.
     """
@@ -68,24 +68,24 @@ class Access:
     @property
     def is_call(self) -> bool:
         """True for the call of a method, False for the read of an attribute."""
-        return MEMBERS[self.role][self.member]
+        return IS_METHOD[self.role][self.member]
 
 
 Interceptor = Callable[[Access], Any]
-"""Returns the answer to an access: that of `proceed`, or another one."""
+"""Handles an access and returns its result: the result of `access.proceed()`, or a substitute."""
 
 
 def intercept(cell: Cell, interceptor: Interceptor, roles: Collection[str]) -> Cell:
-    """Return the cell with every access to the parts of these roles going through the interceptor.
+    """Return a copy of the cell in which each access to the parts in `roles` goes through the interceptor.
 
-    Accesses to the plannings and requests that these parts return go through it, too.
+    So does each access to the `Planning` and `Request` objects that these parts return.
     """
     parts: dict[str, Any] = {
         role: _Proxy(role, "", getattr(cell, role), interceptor) for role in roles if role != "detector"
     }
     if "detector" in roles:
         parts["detectors"] = {
-            key: _Proxy("detector", key, one, interceptor) for key, one in cell.detectors.items()
+            name: _Proxy("detector", name, detector, interceptor) for name, detector in cell.detectors.items()
         }
     return replace(cell, **parts)
 
@@ -98,25 +98,25 @@ class _Proxy:
 
     def __init__(self, role: str, detector: str, part: Any, interceptor: Interceptor) -> None:
         self._role, self._detector, self._part, self._intercept = role, detector, part, interceptor
-        self._reads: dict[str, Access] = {}
+        self._attribute_accesses: dict[str, Access] = {}
 
     def __getattr__(self, member: str) -> Any:
-        if member.startswith("_") or member not in MEMBERS[self._role]:
-            # Names with an underscore first: `copy` looks up such names before `_role` is set.
+        if member.startswith("_") or member not in IS_METHOD[self._role]:
+            # Names with an underscore are tested first: `copy` looks them up before `_role` is set.
             raise AttributeError(f"{type(self).__name__} has no attribute {member!r}")
-        if MEMBERS[self._role][member]:
+        if IS_METHOD[self._role][member]:
             return partial(self._call, member)
-        if member not in self._reads:
-            self._reads[member] = Access(
+        if member not in self._attribute_accesses:
+            self._attribute_accesses[member] = Access(
                 self._role, self._detector, member, partial(getattr, self._part, member)
             )
-        return self._intercept(self._reads[member])
+        return self._intercept(self._attribute_accesses[member])
 
-    def _call(self, member: str, /, *arguments: Any, **named: Any) -> Any:
+    def _call(self, member: str, /, *arguments: Any, **keywords: Any) -> Any:
         def proceed() -> Any:
-            return getattr(self._part, member)(*arguments, **named)
+            return getattr(self._part, member)(*arguments, **keywords)
 
-        access = Access(self._role, self._detector, member, proceed, arguments, named)
+        access = Access(self._role, self._detector, member, proceed, arguments, keywords)
         answer = self._intercept(access)
         if returned := _RETURNED_ROLES.get(access.name):
             return _Proxy(returned, self._detector, answer, self._intercept)

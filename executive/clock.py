@@ -1,4 +1,4 @@
-"""Length of a control step, and a clock that returns the time of a function."""
+"""Length of a control step, and a clock that gets its time from a function."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ STEP = 1 / 240
 
 
 class StepClock:
-    """Clock whose time comes from a function; implements `executive.cell.Clock`.
+    """Clock that gets its time from a function; implements `executive.cell.Clock`.
 
     Args:
         read: Returns the time since the run began [s].

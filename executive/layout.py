@@ -1,4 +1,4 @@
-"""Layout of a cell file: bins with their drop slots, classes of objects, height of travel, and the cell."""
+"""Parts of a cell file as skills use them: bins, object classes, and a cell without hardware."""
 
 from __future__ import annotations
 
@@ -58,11 +58,11 @@ def object_classes(config: CellConfig) -> dict[str, ObjectClass]:
 def cell_without_hardware(config: CellConfig, routes: Routes, ledger: Ledger, emit: Emit) -> Cell:
     """Return the cell of a cell file; every hardware part is None until the cell kind replaces it.
 
-    Every decision for a target is emitted as a `decision`.
+    Each target that a skill selects is emitted as a `decision` event.
     """
     missing: Any = None
 
-    def decided(target: Target, bin: str) -> None:
+    def emit_decision(target: Target, bin: str) -> None:
         emit("decision", item=target.item, label=target.label, frame=target.frame, bin=bin)
 
     return Cell(
@@ -80,5 +80,5 @@ def cell_without_hardware(config: CellConfig, routes: Routes, ledger: Ledger, em
         safe_place=np.array(config.safe_place),
         descent=config.motion.descent,
         descent_speed=config.motion.descent_speed,
-        decided=decided,
+        decided=emit_decision,
     )

@@ -1,8 +1,8 @@
 """`executive doctor`: checks of this installation, each with a fix for what is wrong.
 
-`python -m executive.cli.doctor tiny|egl` draws a few frames and prints the time of one. It runs as a
-separate process, because a failing EGL driver may crash it. A check imports its packages only when it runs,
-so that a missing package spoils no other check and no other command waits for an import.
+`python -m executive.cli.doctor tiny|egl` draws a few frames and prints the median time per frame. It
+runs as a separate process, because a failing EGL driver may crash it. Each check imports its packages only
+when it runs: a missing package then affects only this check, and other commands start without these imports.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ MIN_PYTHON, MAX_PYTHON = (3, 10), (3, 11)
 EXTRAS = {"view": "watch a run in the browser", "train": "train a detector of your own"}
 """Purpose of each extra."""
 FRAMES = 5
-"""Number of frames that are timed, after a first one that is not."""
+"""Number of timed frames, after one frame for warming up."""
 FRAME_SIZE = (640, 480)
 """Width and height of a frame [pixel]."""
 DRAW_TIMEOUT = 30.0
@@ -41,17 +41,16 @@ class Finding(NamedTuple):
     """Result of one check.
 
     Attributes:
-        mark: `ok`; `note`: something cannot be used, and nothing that comes with the project needs it;
-            `problem`: the project cannot work.
+        status: `ok`; `note`: an optional feature cannot be used; `problem`: the project cannot work.
         subject: Name of the checked thing.
         message: State of the checked thing.
-        cure: Next step for the user, or "".
+        fix: Command or other action that helps, or "".
     """
 
-    mark: str
+    status: str
     subject: str
     message: str
-    cure: str = ""
+    fix: str = ""
 
 
 @click.command(name="doctor")
@@ -64,20 +63,20 @@ def command(ctx: click.Context, as_json: bool) -> None:
     """
     with stdout_kept_clean():
         findings = list(examine())
-    problems = sum(finding.mark == "problem" for finding in findings)
+    problems = sum(finding.status == "problem" for finding in findings)
     if as_json:
         print_json([finding._asdict() for finding in findings])
     else:
         width = max(len(finding.subject) for finding in findings)
-        for mark, subject, message, cure in findings:
-            click.echo(f"{mark:7}  {subject:{width}}  {message}{cure and f'; {cure}'}")
+        for status, subject, message, fix in findings:
+            click.echo(f"{status:7}  {subject:{width}}  {message}{fix and f'; {fix}'}")
         click.echo(f"{problems} problem{'s' if problems > 1 else ''}" if problems else "no problems")
     ctx.exit(int(problems > 0))
 
 
 def examine() -> Iterator[Finding]:
     """Run every check and yield its findings, even if a package that a check needs is missing."""
-    for check in (check_system, check_packages, check_registered, check_renderer, check_roboflow):
+    for check in (check_system, check_packages, check_plugins, check_renderer, check_roboflow):
         subject = check.__name__.removeprefix("check_")
         try:
             yield from check()
@@ -93,17 +92,17 @@ def check_system(version: tuple[int, ...] = sys.version_info[:3]) -> Iterator[Fi
     if MIN_PYTHON <= version[:2] <= MAX_PYTHON:
         yield Finding("ok", "python", python)
     else:
-        cure = "use 3.10 or 3.11 (uv takes 3.11 by itself)"
-        yield Finding("problem", "python", f"{python} has no pybullet wheel", cure)
+        fix = "use 3.10 or 3.11 (uv takes 3.11 by itself)"
+        yield Finding("problem", "python", f"{python} has no pybullet wheel", fix)
     if name := os.environ.get("DISPLAY"):
         yield Finding("ok", "display", f"DISPLAY is {name}, where --gui opens the simulator's window")
     else:
-        cure = "run without --gui; the terminal, `--view` and the report also show a run"
-        yield Finding("note", "display", "DISPLAY is not set", cure)
+        fix = "run without --gui; the terminal, `--view` and the report also show a run"
+        yield Finding("note", "display", "DISPLAY is not set", fix)
 
 
 def check_packages() -> Iterator[Finding]:
-    """Yield findings on required packages, on packages that provide `cv2`, on extras, and on films."""
+    """Yield findings on required packages, packages that provide `cv2`, extras, and the video encoder."""
     from importlib.metadata import packages_distributions
 
     from executive.runtime.versions import ITSELF, installed, required
@@ -121,21 +120,21 @@ def check_packages() -> Iterator[Finding]:
         yield Finding("ok", "opencv", f"{opencv[0]} is the only package that provides `cv2`")
     elif opencv:
         message = f"{len(opencv)} packages provide `cv2` and overwrite each other ({', '.join(opencv)})"
-        cure = "run `uv sync --reinstall`, which removes all but opencv-python-headless"
-        yield Finding("problem", "opencv", message, cure)
+        fix = "run `uv sync --reinstall`, which removes all but opencv-python-headless"
+        yield Finding("problem", "opencv", message, fix)
     for extra, purpose in EXTRAS.items():
         names = required(extra)
         if missing := [name for name in names if not installed(name)]:
-            cure = f"to {purpose}, run `uv sync --extra {extra}`"
-            yield Finding("note", extra, f"not installed: {', '.join(missing)}", cure)
+            fix = f"to {purpose}, run `uv sync --extra {extra}`"
+            yield Finding("note", extra, f"not installed: {', '.join(missing)}", fix)
         else:
             yield Finding("ok", extra, ", ".join(f"{name} {installed(name)}" for name in names))
-    if film := installed("av"):
-        yield Finding("ok", "film", f"av {film} writes films; the program ffmpeg is not needed")
+    if version := installed("av"):
+        yield Finding("ok", "film", f"av {version} encodes videos; the program ffmpeg is not needed")
 
 
-def check_registered() -> Iterator[Finding]:
-    """Yield the number of skills, kinds of cells and kinds of detectors; each of them is loaded."""
+def check_plugins() -> Iterator[Finding]:
+    """Load every installed skill, kind of cell and kind of detector, and yield their numbers."""
     from executive.discovery import discover
     from executive.entry_points import registered
     from executive.project import project_here
@@ -147,22 +146,22 @@ def check_registered() -> Iterator[Finding]:
     for entry in (*kinds.values(), *detectors.values()):
         entry.load()
     message = f"{len(skills)} skills, {len(kinds)} kinds of cells, {len(detectors)} kinds of detectors"
-    yield Finding("ok", "registered", f"{message}; those of {project.file} included" if project else message)
+    yield Finding("ok", "plugins", f"{message}; those of {project.file} included" if project else message)
 
 
 def check_renderer() -> Iterator[Finding]:
     """Yield the time TinyRenderer needs for a frame, and whether PyBullet's EGL plugin draws."""
-    time, problem = draw_in_process("tiny")
+    time, problem = time_in_subprocess("tiny")
     if problem:
-        cure = "run `uv sync --reinstall-package pybullet`"
-        yield Finding("problem", "renderer", f"TinyRenderer draws nothing: {problem}", cure)
+        fix = "run `uv sync --reinstall-package pybullet`"
+        yield Finding("problem", "renderer", f"TinyRenderer draws nothing: {problem}", fix)
     else:
         message = f"TinyRenderer, on the CPU: {time:.0f} ms for 640x480 of the overhead cell"
         yield Finding("ok", "renderer", message)
-    _, problem = draw_in_process("egl")
+    _, problem = time_in_subprocess("egl")
     state = f"draws nothing: {problem}" if problem else "can be loaded and draws"
-    mark = "note" if problem else "ok"
-    yield Finding(mark, "egl", f"PyBullet's EGL plugin {state}; no cell needs it")
+    status = "note" if problem else "ok"
+    yield Finding(status, "egl", f"PyBullet's EGL plugin {state}; no cell needs it")
 
 
 def check_roboflow() -> Iterator[Finding]:
@@ -178,22 +177,24 @@ def check_roboflow() -> Iterator[Finding]:
         yield Finding("ok", "roboflow", f"{HOSTED} answers")
     else:
         message = f"{HOSTED} does not answer within {SERVER_TIMEOUT:.0f} s"
-        cure = "check the network; only models that Roboflow hosts need it"
-        yield Finding("note", "roboflow", message, cure)
+        fix = "check the network; only models that Roboflow hosts need it"
+        yield Finding("note", "roboflow", message, fix)
 
 
-def draw_in_process(renderer: str) -> tuple[float, str]:
-    """Draw with `tiny` or `egl` in another process; return the time of a frame [ms], and a failure or ""."""
-    words = program("executive.cli.doctor", renderer)
+def time_in_subprocess(renderer: str) -> tuple[float, str]:
+    """Draw with `tiny` or `egl` in a subprocess; return milliseconds per frame, and an error message or ""."""
+    command_line = program("executive.cli.doctor", renderer)
     try:
-        ended = subprocess.run(words, capture_output=True, text=True, timeout=DRAW_TIMEOUT, check=False)
+        completed = subprocess.run(
+            command_line, capture_output=True, text=True, timeout=DRAW_TIMEOUT, check=False
+        )
     except subprocess.TimeoutExpired:
         return 0.0, f"no frame came in {DRAW_TIMEOUT:.0f} s"
     # Drivers print what they like around the result, and may crash after it.
-    if result := re.search(r"^milliseconds: ([0-9.]+)$", ended.stdout, re.MULTILINE):
+    if result := re.search(r"^milliseconds: ([0-9.]+)$", completed.stdout, re.MULTILINE):
         return float(result[1]), ""
-    *_, last = ["no error output", *filter(str.strip, ended.stderr.splitlines())]
-    return 0.0, f"its process ended with exit code {ended.returncode}: {last.strip()}"
+    *_, last = ["no error output", *filter(str.strip, completed.stderr.splitlines())]
+    return 0.0, f"its process ended with exit code {completed.returncode}: {last.strip()}"
 
 
 def is_reachable(address: str, timeout: float = SERVER_TIMEOUT) -> bool:
@@ -225,7 +226,7 @@ def prepare_drawing(renderer: str) -> Callable[[], object]:
         pybullet.connect(pybullet.DIRECT)
         spec = find_spec("eglRenderer")
         if spec is None or pybullet.loadPlugin(spec.origin, "_eglRendererPlugin") < 0:
-            sys.exit("it cannot be loaded")
+            sys.exit("the EGL plugin cannot be loaded")
         return lambda: pybullet.getCameraImage(*FRAME_SIZE, renderer=pybullet.ER_BULLET_HARDWARE_OPENGL)
     config = load_cells(("overhead",))["overhead"]
     camera = next(iter(config.cameras.values()))

@@ -16,7 +16,7 @@ from executive.control.scope import Scope
 from executive.errors import Fault
 from executive.messages import Target
 from executive.skill import Skill, SkillFailed
-from executive.skill_steps import SkillRun
+from executive.skill_run import SkillRun
 
 
 @dataclass(frozen=True)

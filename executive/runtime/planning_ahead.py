@@ -1,4 +1,4 @@
-"""Observer of a run that makes the arm plan its next motion while the present one is under way."""
+"""Run observer that lets the arm plan its next motion during the current motion."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ class PlanningAhead:
     `sort_overhead` and `sort_wrist`, `SelectTarget` later chose that target in all 222 approaches that
     followed a transit.
 
-    Planning ahead decides nothing. It acts on the cell below the tape, so it is no part of the record, and a
-    replay does without it.
+    Planning ahead never changes a decision of the run. It uses the real cell instead of the recorded one, so
+    nothing of it is recorded and a replay does not need it.
 
     Args:
-        cell: The cell below the tape.
+        cell: The real cell, whose answers are not recorded.
     """
 
     def __init__(self, cell: Cell) -> None:
@@ -31,11 +31,11 @@ class PlanningAhead:
         self._approach_is_outdated = False
 
     def observe(self, event: Event) -> None:
-        """Note an event of the run that changes what comes next."""
+        """Update the expected next motions from an event of the run."""
         if event.kind == "decision":
             item, bin = event.data["item"], event.data["bin"]
-            # A skill may decide for an item or a bin that the cell does not know: nothing can be planned.
-            known = bin in self._cell.bins and item in {one.item for one in self._cell.ledger.targets()}
+            # A skill may choose an item or a bin that the cell does not know; then no motion can be planned.
+            known = bin in self._cell.bins and item in {target.item for target in self._cell.ledger.targets()}
             self._selected = (item, bin) if known else None
         elif event.kind == "intent":
             self._is_closing = event.data["action"] == "close"

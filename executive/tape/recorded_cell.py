@@ -1,4 +1,4 @@
-"""Cell behind a tape, which records its answers or plays recorded ones; the tree of a run uses only it."""
+"""Cell that the tree of a run uses: its tape records each input from the real cell, or replays inputs."""
 
 from __future__ import annotations
 
@@ -14,57 +14,57 @@ from executive.tape.codec import ANSWER, ARRAY, BOX, FRAME, MOTION, PLAIN, POSE,
 from executive.tape.tape import Tape
 
 
-class Question(NamedTuple):
-    """Form of a question and its answer in the record.
+class RecordedInput(NamedTuple):
+    """Form of one kind of input in the record.
 
     Attributes:
-        name: Name of the question in the record; `{detector}` stands for the name of the detector, `{0}` for
+        name: Name of the input in the record; `{detector}` stands for the name of the detector, `{0}` for
             the first argument.
-        codec: Codec of the answer.
+        codec: Codec of the value.
     """
 
     name: str
     codec: Codec = PLAIN
 
 
-QUESTIONS: Mapping[str, Question] = {
-    "arm.q": Question("arm.q", ARRAY),
-    "arm.tool_pose": Question("arm.tool_pose", POSE),
-    "arm.tool_velocity": Question("arm.tool_velocity", ARRAY),
-    "arm.destination": Question("arm.destination", ARRAY),
-    "arm.at_rest": Question("arm.at_rest"),
-    "arm.met": Question("arm.met"),
-    "plan.ready": Question("plan.ready"),
-    "plan.result": Question("plan", MOTION),
-    "tool.touching": Question("tool.touching"),
-    "tool.holding": Question("tool.holding"),
-    "tool.bears": Question("tool.bears"),
-    "camera.name": Question("camera.name"),
-    "camera.scan_poses": Question("camera.scan_poses", TEXTS),
-    "camera.next_pose": Question("camera.next_pose"),
-    "camera.area": Question("camera.area.{0}", BOX),
-    "camera.sees_table": Question("camera.sees_table"),
-    "camera.capture": Question("camera.frame", FRAME),
-    "request.ready": Question("detector.{detector}.ready"),
-    "request.result": Question("detector.{detector}", ANSWER),
-    "operator.ask": Question("operator"),
-    "localizer.locate": Question("localizer", ARRAY),
+RECORDED_INPUTS: Mapping[str, RecordedInput] = {
+    "arm.q": RecordedInput("arm.q", ARRAY),
+    "arm.tool_pose": RecordedInput("arm.tool_pose", POSE),
+    "arm.tool_velocity": RecordedInput("arm.tool_velocity", ARRAY),
+    "arm.destination": RecordedInput("arm.destination", ARRAY),
+    "arm.at_rest": RecordedInput("arm.at_rest"),
+    "arm.met": RecordedInput("arm.met"),
+    "plan.ready": RecordedInput("plan.ready"),
+    "plan.result": RecordedInput("plan", MOTION),
+    "tool.touching": RecordedInput("tool.touching"),
+    "tool.holding": RecordedInput("tool.holding"),
+    "tool.bears": RecordedInput("tool.bears"),
+    "camera.name": RecordedInput("camera.name"),
+    "camera.scan_poses": RecordedInput("camera.scan_poses", TEXTS),
+    "camera.next_pose": RecordedInput("camera.next_pose"),
+    "camera.area": RecordedInput("camera.area.{0}", BOX),
+    "camera.sees_table": RecordedInput("camera.sees_table"),
+    "camera.capture": RecordedInput("camera.frame", FRAME),
+    "request.ready": RecordedInput("detector.{detector}.ready"),
+    "request.result": RecordedInput("detector.{detector}", ANSWER),
+    "operator.ask": RecordedInput("operator"),
+    "localizer.locate": RecordedInput("localizer", ARRAY),
 }
-"""Every access that is recorded with its answer."""
+"""Form of the recorded input of every access that has one."""
 
 COMMANDS = frozenset(
     {"arm.plan", "arm.plan_ahead", "arm.start", "arm.stop", "tool.close", "tool.open", "detector.request"}
 )
-"""Every access that is not made while a tape plays."""
+"""Accesses that command the cell; a replay skips them."""
 
 RECORDED_ROLES = ("arm", "tool", "camera", "detector", "operator", "localizer")
-"""Roles whose answers are recorded; a replay has its own ledger, and reads bins and classes from the file."""
+"""Roles whose answers are recorded. A replay builds its own ledger, and reads the cell file for the rest."""
 
 
-def record_answers(cell: Cell, tape: Tape, emit: Emit) -> Cell:
-    """Return the cell with its accesses recorded or answered by the tape, and with the tape's clock.
+def connect_tape(cell: Cell, tape: Tape, emit: Emit) -> Cell:
+    """Return a copy of the cell that uses the tape's clock, and whose answers the tape records or replays.
 
-    Every action of the tool is emitted as an `intent` before it is done.
+    Each action of the tool is emitted as an `intent` before the action.
     """
 
     def answer(access: Access) -> Any:
@@ -72,7 +72,7 @@ def record_answers(cell: Cell, tape: Tape, emit: Emit) -> Cell:
             if access.role == "tool":
                 emit("intent", action=access.member)
             return tape.command(access.proceed)
-        name, codec = QUESTIONS[access.name]
+        name, codec = RECORDED_INPUTS[access.name]
         if "{" in name:
             name = name.format(*access.all_arguments, detector=access.detector)
         return tape.sense(name, access.proceed, codec)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from executive.errors import Fault
-from executive.testing.wrapped_cell import WrappedCell
+from executive.testing.cell_wrapper import CellWrapper
 from executive.workcell import Workcell
 
 
-class BoundedCell(WrappedCell):
+class BoundedCell(CellWrapper):
     """A work cell in which a run ends as a fault once it has lasted too long.
 
     The fault is raised once, so that the arm can be braked afterwards.

@@ -18,10 +18,10 @@ from executive.runtime.outcome import Outcome
 from executive.runtime.run import Run
 from executive.skill import Skill
 from executive.testing.bounded_cell import BoundedCell
+from executive.testing.cell_wrapper import innermost
 from executive.testing.disturbances.disturbed_cell import DisturbedCell, disturbed
 from executive.testing.disturbances.script import Disturbance
 from executive.testing.fake_cell import FakeCell
-from executive.testing.wrapped_cell import innermost
 from executive.workcell import Workcell
 
 LONGEST = 600.0

@@ -9,7 +9,7 @@ from typing import Any
 from executive.errors import InputError
 from executive.runtime.plant import LONGEST_BRAKING
 from executive.skill import Skill, SkillFailed
-from executive.skill_steps import SkillRun
+from executive.skill_run import SkillRun
 from executive.testing.commands import written_down
 from executive.workcell import Workcell
 

@@ -33,7 +33,7 @@ from executive.runtime.cells import cell_kind
 from executive.runtime.outcome import Outcome
 from executive.runtime.run import Run
 from executive.sim.arm import SimArm
-from executive.testing.wrapped_cell import WrappedCell
+from executive.testing.cell_wrapper import CellWrapper
 from tests.benchmarks.forks import Forks
 from tests.benchmarks.report import Figures, describe, record_run, run_mission_command
 
@@ -161,8 +161,8 @@ class _HaltedRun:
         self._limits = JointLimits.of(config.arm.limits)
         kind = subject.kind or cell_kind(config.kind)
 
-        def make_cell(*args: Any, **options: Any) -> WrappedCell:
-            return WrappedCell(kind(*args, **options), before=self._try_halt, after=self._keep_command)
+        def make_cell(*args: Any, **options: Any) -> CellWrapper:
+            return CellWrapper(kind(*args, **options), before=self._try_halt, after=self._keep_command)
 
         self._run = Run(
             subject.loaded, subject.skills, seed=subject.seed, requests=subject.requests, kind=make_cell,

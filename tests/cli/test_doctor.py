@@ -26,7 +26,7 @@ INSTALLED = {
 NEEDED = {"": ("pybullet", "av"), "view": ("viser", "aiohttp"), "train": ("torch", "onnx")}
 TORCH = "note train: not installed: torch, onnx; to train a detector of your own, run `uv sync --extra train`"
 VIEW = "ok view: viser 1.1, aiohttp 3.11"
-FILM = "ok film: av 14.0 writes films; the program ffmpeg is not needed"
+FILM = "ok film: av 14.0 encodes videos; the program ffmpeg is not needed"
 
 
 def shown(findings) -> list[str]:
@@ -97,17 +97,15 @@ def test_packages(monkeypatch, missing, opencv, expected):
 def test_everything_registered_is_counted_and_loaded(tmp_path: Path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", list(sys.path))
-    assert shown(doctor.check_registered()) == [
-        "ok registered: 13 skills, 2 kinds of cells, 4 kinds of detectors"
-    ]
+    assert shown(doctor.check_plugins()) == ["ok plugins: 13 skills, 2 kinds of cells, 4 kinds of detectors"]
     Path("pyproject.toml").write_text("[project]\n")
-    assert shown(doctor.check_registered())[0].endswith(
+    assert shown(doctor.check_plugins())[0].endswith(
         f"detectors; those of {tmp_path}/pyproject.toml included"
     )
     for group in ("cells", "detectors"):
         Path("pyproject.toml").write_text(f'[project.entry-points."executive.{group}"]\nbench = "no:Bench"\n')
         with pytest.raises(InputError, match=r'"bench" \(no:Bench\) cannot be loaded: ModuleNotF'):
-            list(doctor.check_registered())
+            list(doctor.check_plugins())
 
 
 def test_both_renderers_draw(monkeypatch):
@@ -140,7 +138,7 @@ def test_no_renderer_draws(monkeypatch, run, why):
 
 @pytest.mark.slow
 def test_a_frame_is_really_drawn_in_a_process_of_its_own():
-    milliseconds, problem = doctor.draw_in_process("tiny")
+    milliseconds, problem = doctor.time_in_subprocess("tiny")
     assert (milliseconds > 1, problem) == (True, "")
 
 
@@ -209,7 +207,7 @@ def test_marks_and_subjects_are_aligned_and_problems_counted(monkeypatch, findin
     as_json = CliRunner().invoke(main, ["doctor", "--json"])
     assert result.exit_code == as_json.exit_code == code
     assert json.loads(as_json.stdout)[1] == {
-        "mark": "note", "subject": "display", "message": "is not set", "cure": "run without"
+        "status": "note", "subject": "display", "message": "is not set", "fix": "run without"
     }  # fmt: skip
 
 
@@ -219,12 +217,12 @@ def test_everything_is_examined_whatever_fails(monkeypatch):
 
     monkeypatch.setattr("executive.discovery.discover", fail)
     monkeypatch.setitem(sys.modules, "executive.vision.detectors.roboflow.key", None)
-    monkeypatch.setattr(doctor, "draw_in_process", lambda renderer: (9.0, ""))
+    monkeypatch.setattr(doctor, "time_in_subprocess", lambda renderer: (9.0, ""))
     found = shown(doctor.examine())
     assert [line.split(": ")[0].split(" ")[1] for line in found] == [
         "python", "display", "packages", "opencv", "view", "train", "film",
-        "registered", "renderer", "egl", "roboflow",
+        "plugins", "renderer", "egl", "roboflow",
     ]  # fmt: skip
-    assert found[7] == "problem registered: the skill is broken; mend it"
+    assert found[7] == "problem plugins: the skill is broken; mend it"
     assert found[-1].startswith("problem roboflow: cannot be checked: import of executive.vision.detectors.r")
     assert found[-1].endswith("; run `uv sync`")

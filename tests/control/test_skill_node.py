@@ -107,7 +107,10 @@ def test_every_start_gets_a_fresh_instance_and_fresh_inputs(make: Any, scope: Sc
         ("break", "Worker: ValueError: a bug"),
         ("undeclared", 'Worker: Worker raised the undeclared reason "worse"; it declares: bad'),
         ("forget", "Worker: it succeeded without setting its output made"),
-        ("yield", 'Worker: it yielded a tuple_iterator; to run steps of others write "yield from"'),
+        (
+            "yield",
+            'Worker: it yielded a tuple_iterator; to run the steps of another generator, write "yield from"',
+        ),
     ],
 )
 def test_a_bug_in_a_skill_is_a_fault(make: Any, way: str, sentence: str, events: Any) -> None:

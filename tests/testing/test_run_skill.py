@@ -101,7 +101,7 @@ class Sly(Worker):
         (Worker, {}, InputError, 'Worker needs a value for "given"'),
         (Worker, {"given": "", "way": "forget"}, Fault, "it succeeded without setting its output made"),
         (Worker, {"given": "", "way": "yield"}, Fault,
-         'it yielded a tuple_iterator; to run steps of others write "yield from"'),
+         'it yielded a tuple_iterator; to run the steps of another generator, write "yield from"'),
         (Worker, {"given": "", "way": "break"}, ValueError, "a bug"),
         (Sly, {"given": ""}, Fault, 'it failed with the undeclared reason "bad"; it declares: none'),
     ],

@@ -23,9 +23,9 @@ from executive.runtime.cells import cell_kind
 from executive.runtime.outcome import Outcome
 from executive.runtime.run import Run
 from executive.testing.bounded_cell import BoundedCell
+from executive.testing.cell_wrapper import CellWrapper
 from executive.testing.disturbances import DisturbedCell, disturbed
 from executive.testing.disturbances.objects import ObjectRemoved
-from executive.testing.wrapped_cell import WrappedCell
 from executive.view.figures.fault_trials import Trial
 from executive.view.report.page import leave_report
 from executive.workcell import Workcell
@@ -131,7 +131,7 @@ class _Trying:
     def _kind(self, *args: Any, **options: Any) -> Workcell:
         kind = self._subject.kind or cell_kind(self._subject.loaded.cell_config.kind)
         bounded = BoundedCell(kind(*args, **options), self._rehearsal.longest)
-        return WrappedCell(bounded, after=self._stop_if_due)
+        return CellWrapper(bounded, after=self._stop_if_due)
 
     def _see(self, event: Event) -> None:
         if event.kind != "sense":

@@ -9,11 +9,11 @@ from typing import Any
 
 from executive.skill import Skill
 from executive.testing.conformance import conduct, declarations
-from executive.testing.conformance.case import Case
 from executive.testing.conformance.situations import Arrange, NotTried
+from executive.testing.conformance.skill_runs import SkillRuns
 from executive.testing.conformance.stage import Stage
 
-Rule = Callable[[Case], Iterator[str]]
+Rule = Callable[[SkillRuns], Iterator[str]]
 """Yields what is wrong with a skill: what happened, where, what to do. Its docstring states the rule."""
 
 RULES: tuple[Rule, ...] = (
@@ -65,15 +65,15 @@ class Check:
     """One rule applied to one skill; a call raises `NotConforming` if the skill violates the rule.
 
     Attributes:
-        case: The runs of the skill.
+        runs: The runs of the skill.
         rule: The rule.
     """
 
-    case: Case
+    runs: SkillRuns
     rule: Rule
 
     def __str__(self) -> str:
-        return f"{self.case.name}.{self.name}"
+        return f"{self.runs.name}.{self.name}"
 
     @property
     def name(self) -> str:
@@ -88,10 +88,10 @@ class Check:
     def run(self) -> Verdict:
         """Apply the rule to the skill and return the result."""
         try:
-            problems = tuple(self.rule(self.case))
+            problems = tuple(self.rule(self.runs))
         except NotTried as problem:
-            return Verdict(self.case.name, self.name, self.doc, "not run", (str(problem),))
-        return Verdict(self.case.name, self.name, self.doc, "failed" if problems else "ok", problems)
+            return Verdict(self.runs.name, self.name, self.doc, "not run", (str(problem),))
+        return Verdict(self.runs.name, self.name, self.doc, "failed" if problems else "ok", problems)
 
     def __call__(self) -> None:
         """Run the check.
@@ -104,20 +104,20 @@ class Check:
             raise NotConforming("\n".join((f"{self.doc} Violated:", *verdict.problems)))
 
 
-def nothing_to_add(stage: Stage) -> Mapping[str, Any]:
-    """Leave the stage as it is."""
+def leave_as_is(stage: Stage) -> Mapping[str, Any]:
+    """Leave the stage as it is, and give no values."""
     del stage
     return {}
 
 
-def conformance(skill: type[Skill], arrange: Arrange = nothing_to_add, name: str = "") -> list[Check]:
+def conformance(skill: type[Skill], arrange: Arrange = leave_as_is, name: str = "") -> list[Check]:
     """Return all checks of a skill; the skill is run only when a check is called.
 
     Args:
         skill: Class of the skill.
-        arrange: Gets a `Stage` for every situation, may change it, and returns values for params and
-            inputs: those that cannot be generated, and those that should have another value.
+        arrange: Called with the `Stage` of each situation. It may change the stage, and returns values for
+            the params and inputs that cannot be generated, or should differ from the generated ones.
         name: Name under which the skill is installed; by default that of its class.
     """
-    case = Case(name or skill.__name__, skill, arrange)
-    return [Check(case, rule) for rule in RULES]
+    runs = SkillRuns(name or skill.__name__, skill, arrange)
+    return [Check(runs, rule) for rule in RULES]

@@ -8,10 +8,10 @@ from typing import Any, Union, get_args, get_origin
 
 from executive.mission.model.port_types import called, element_of
 from executive.skill import ANY, EMPTY, HOLDING, ToolState
-from executive.testing.conformance.case import Case, GotStuck
 from executive.testing.conformance.declarations import HALT
 from executive.testing.conformance.rehearsal import MAX_TIME, Rehearsal, is_same
 from executive.testing.conformance.situations import NotArranged
+from executive.testing.conformance.skill_runs import GotStuck, SkillRuns
 
 MAX_TICK_TIME = 0.05
 """Computing time that a tick may take [s]; a control step is 1/240 s of the run's time."""
@@ -28,38 +28,38 @@ _SENSES = ("camera.capture", "operator.ask")
 """Calls by which a skill takes in something new."""
 
 
-def arranged(case: Case) -> Iterator[str]:
+def arranged(runs: SkillRuns) -> Iterator[str]:
     """It can be tried, and it succeeds in one situation at least."""
     try:
-        _ = case.situations
+        _ = runs.situations
     except NotArranged as problem:
-        yield f"{case.name} cannot be tried: {problem}"
+        yield f"{runs.name} cannot be tried: {problem}"
         return
-    if not any(rehearsal.status == "SUCCESS" for rehearsal in case.complete_runs):
+    if not any(rehearsal.status == "SUCCESS" for rehearsal in runs.complete_runs):
         yield (
-            f"{case.name} never succeeded; {case.complete_runs[0].end}. Arrange a stage on which it can: "
-            f"conformance({case.skill.__name__}, lambda stage: ...), as skills/README.md shows."
+            f"{runs.name} never succeeded; {runs.complete_runs[0].end}. Arrange a stage on which it can: "
+            f"conformance({runs.skill.__name__}, lambda stage: ...), as skills/README.md shows."
         )
 
 
-def comes_to_an_end(case: Case) -> Iterator[str]:
+def comes_to_an_end(runs: SkillRuns) -> Iterator[str]:
     """Every tick comes back, and it ends within a minute on the run's clock."""
     try:
-        _ = case.complete_runs, case.halted_runs
+        _ = runs.complete_runs, runs.halted_runs
     except GotStuck as problem:
         yield str(problem)
         return
-    for rehearsal in case.complete_runs:
+    for rehearsal in runs.complete_runs:
         if rehearsal.status == "RUNNING":
             yield (
-                f"{rehearsal.where} {case.name} was not over after {MAX_TIME:g} s. "
+                f"{rehearsal.where} {runs.name} was not over after {MAX_TIME:g} s. "
                 "Whatever it waits for may never come: wait for so long at most, then fail with a reason."
             )
 
 
-def ends_as_declared(case: Case) -> Iterator[str]:
+def ends_as_declared(runs: SkillRuns) -> Iterator[str]:
     """Whatever goes wrong, it succeeds with all outputs, or fails with a declared reason and a sentence."""
-    for rehearsal in case.complete_runs:
+    for rehearsal in runs.complete_runs:
         where = f"{rehearsal.where} at tick {rehearsal.ticks}"
         if rehearsal.status == "FAULT":
             yield (
@@ -73,21 +73,21 @@ def ends_as_declared(case: Case) -> Iterator[str]:
             )
 
 
-def outputs_fit(case: Case) -> Iterator[str]:
+def outputs_fit(runs: SkillRuns) -> Iterator[str]:
     """Every output is of the type that it declares."""
-    for rehearsal in case.complete_runs:
+    for rehearsal in runs.complete_runs:
         for name, value in rehearsal.outputs.items():
-            declared = case.skill.ports[name].type
+            declared = runs.skill.ports[name].type
             if not _is_of(value, declared):
                 yield (
-                    f"{rehearsal.where} {case.name}.{name} is of the type {type(value).__name__}, not "
+                    f"{rehearsal.where} {runs.name}.{name} is of the type {type(value).__name__}, not "
                     f"{called(declared)}. Set what it declares, or declare what it is."
                 )
 
 
-def inputs_unchanged(case: Case) -> Iterator[str]:
+def inputs_unchanged(runs: SkillRuns) -> Iterator[str]:
     """Its params and inputs are afterwards what they were."""
-    for rehearsal in case.complete_runs:
+    for rehearsal in runs.complete_runs:
         for name in rehearsal.changed:
             yield (
                 f"{rehearsal.where} it changed what self.{name} holds. "
@@ -95,48 +95,48 @@ def inputs_unchanged(case: Case) -> Iterator[str]:
             )
 
 
-def uses_only_what_it_declares(case: Case) -> Iterator[str]:
+def uses_only_what_it_declares(runs: SkillRuns) -> Iterator[str]:
     """It commands only what it says it uses, moves only if it moves, and senses only if it senses."""
-    skill = case.skill
-    for name in dict.fromkeys(call.name for rehearsal in case.complete_runs for call in rehearsal.calls):
+    skill = runs.skill
+    for name in dict.fromkeys(call.name for rehearsal in runs.complete_runs for call in rehearsal.calls):
         part = _PARTS.get(name)
         if part is not None and part not in skill.uses:
-            yield f'{case.name} calls cell.{name} and does not use the {part}. Add "{part}" to uses.'
+            yield f'{runs.name} calls cell.{name} and does not use the {part}. Add "{part}" to uses.'
         if name == "arm.start" and not skill.moves:
-            yield f"{case.name} calls cell.{name} and does not say that it moves. Add moves = True."
+            yield f"{runs.name} calls cell.{name} and does not say that it moves. Add moves = True."
         if name in _SENSES and not skill.senses:
-            yield f"{case.name} calls cell.{name} and does not say that it senses. Add senses = True."
+            yield f"{runs.name} calls cell.{name} and does not say that it senses. Add senses = True."
 
 
-def tool_left_as_declared(case: Case) -> Iterator[str]:
+def tool_left_as_declared(runs: SkillRuns) -> Iterator[str]:
     """After success, every failure and a halt at any tick the tool holds what is declared."""
     for rehearsal in _first_wrong(
-        [*case.complete_runs, *case.halted_runs], lambda one: bool(_tool_fault(case, one))
+        [*runs.complete_runs, *runs.halted_runs], lambda one: bool(_tool_fault(runs, one))
     ):
-        yield _tool_fault(case, rehearsal)
+        yield _tool_fault(runs, rehearsal)
 
 
-def arm_left_at_rest(case: Case) -> Iterator[str]:
+def arm_left_at_rest(runs: SkillRuns) -> Iterator[str]:
     """Where it started the arm, the arm is at rest when it ends or is halted."""
-    for rehearsal in _first_wrong([*case.complete_runs, *case.halted_runs], _leaves_arm_moving):
+    for rehearsal in _first_wrong([*runs.complete_runs, *runs.halted_runs], _leaves_arm_moving):
         yield (
             f"{rehearsal.end}, and the arm still moves. "
             "Call cell.arm.stop() in finally, or use follow of executive.moving."
         )
 
 
-def halts_at_once(case: Case) -> Iterator[str]:
+def halts_at_once(runs: SkillRuns) -> Iterator[str]:
     """Halted at any tick, it ends there and then, and raises nothing."""
-    for rehearsal in _first_wrong(case.halted_runs, lambda one: one.status == "FAULT"):
+    for rehearsal in _first_wrong(runs.halted_runs, lambda one: one.status == "FAULT"):
         yield (
             f"{rehearsal.where} at tick {rehearsal.ticks} {rehearsal.message}. "
             "What finally does must be done at once and cannot fail."
         )
 
 
-def repeats_itself(case: Case) -> Iterator[str]:
+def repeats_itself(runs: SkillRuns) -> Iterator[str]:
     """In the same situation it makes the same calls at the same ticks and ends alike."""
-    for _, first, second in case.repeated_runs:
+    for _, first, second in runs.repeated_runs:
         if difference := _difference(first, second):
             yield (
                 f"{first.where}, twice the same, {difference}. "
@@ -144,9 +144,9 @@ def repeats_itself(case: Case) -> Iterator[str]:
             )
 
 
-def ticks_are_quick(case: Case) -> Iterator[str]:
+def ticks_are_quick(runs: SkillRuns) -> Iterator[str]:
     """No tick computes for longer than 50 ms, the quicker of two runs counted."""
-    for _, first, second in case.repeated_runs:
+    for _, first, second in runs.repeated_runs:
         least = [min(pair) for pair in zip(first.durations, second.durations, strict=False)]
         longest = max(least, default=0.0)
         if longest > MAX_TICK_TIME:
@@ -185,11 +185,11 @@ def _leaves_arm_moving(rehearsal: Rehearsal) -> bool:
     return has_ended and rehearsal.has_moved and not rehearsal.at_rest
 
 
-def _tool_fault(case: Case, rehearsal: Rehearsal) -> str:
+def _tool_fault(runs: SkillRuns, rehearsal: Rehearsal) -> str:
     """Return what is wrong with the tool at the end of a run, or ""."""
     if rehearsal.status not in ("SUCCESS", "FAILURE", "HALTED"):
         return ""
-    wanted, why = _wanted_tool(case, rehearsal)
+    wanted, why = _wanted_tool(runs, rehearsal)
     if wanted is not ANY and (wanted is HOLDING) != rehearsal.holds:
         holds = "holds something" if rehearsal.holds else "is empty"
         should = "hold something" if wanted is HOLDING else "be empty"
@@ -205,15 +205,15 @@ def _tool_fault(case: Case, rehearsal: Rehearsal) -> str:
     return ""
 
 
-def _wanted_tool(case: Case, rehearsal: Rehearsal) -> tuple[ToolState, str]:
+def _wanted_tool(runs: SkillRuns, rehearsal: Rehearsal) -> tuple[ToolState, str]:
     """Return what the tool must hold at the end of a run, and why."""
     before = HOLDING if rehearsal.held else EMPTY
     if rehearsal.status == "SUCCESS":
-        after = case.skill.tool_state[1]
+        after = runs.skill.tool_state[1]
         return (before, "tool_state says as before") if after is ANY else (after, "tool_state says so")
     name = HALT if rehearsal.status == "HALTED" else rehearsal.reason
-    if name in case.skill.tool_left:
-        return case.skill.tool_left[name], f'tool_left says so of "{name}"'
+    if name in runs.skill.tool_left:
+        return runs.skill.tool_left[name], f'tool_left says so of "{name}"'
     return before, f'as before, for tool_left says nothing of "{name}"'
 
 

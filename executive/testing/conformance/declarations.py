@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 from executive.mission.model.typed import WrongType, convert
 from executive.skill import Param, Port
-from executive.testing.conformance.case import Case
+from executive.testing.conformance.skill_runs import SkillRuns
 from executive.testing.conformance.source import (
     Written,
     files_of,
@@ -26,50 +26,50 @@ FOREIGN = (
 HALT = "halt"
 
 
-def documented(case: Case) -> Iterator[str]:
+def documented(runs: SkillRuns) -> Iterator[str]:
     """The docstring of the class begins with a sentence, and every param and port says what it is."""
-    doc = vars(case.skill).get("__doc__") or ""
+    doc = vars(runs.skill).get("__doc__") or ""
     summary = inspect.cleandoc(doc).partition("\n")[0]
     if not summary.endswith("."):
         yield (
-            f'the docstring of {case.name} begins with "{summary}", which is no sentence. '
+            f'the docstring of {runs.name} begins with "{summary}", which is no sentence. '
             "Say in its first line what is true when the skill has succeeded."
         )
-    declarations: dict[str, Param | Port] = {**case.skill.params, **case.skill.ports}
+    declarations: dict[str, Param | Port] = {**runs.skill.params, **runs.skill.ports}
     for name, declared in declarations.items():
         if not declared.doc.strip():
             declare = "param" if isinstance(declared, Param) else "port"
-            yield f'{case.name}.{name} has no doc. Write {declare}(..., doc="what it is").'
+            yield f'{runs.name}.{name} has no doc. Write {declare}(..., doc="what it is").'
 
 
-def defaults_allowed(case: Case) -> Iterator[str]:
+def defaults_allowed(runs: SkillRuns) -> Iterator[str]:
     """Every default is one that a mission could give: of the type, inside the bounds, among the choices."""
-    for param in case.skill.params.values():
+    for param in runs.skill.params.values():
         if not param.required and (problem := _default_fault(param)):
             yield (
-                f"{case.name}.{param.name} has the default {param.default!r}{problem}. "
+                f"{runs.name}.{param.name} has the default {param.default!r}{problem}. "
                 "Mend the default, or its limits."
             )
 
 
-def reasons_declared(case: Case) -> Iterator[str]:
+def reasons_declared(runs: SkillRuns) -> Iterator[str]:
     """Its reasons are a tuple, and none is raised that is not declared."""
-    reasons = case.skill.reasons
+    reasons = runs.skill.reasons
     if isinstance(reasons, str):
-        yield f'{case.name}.reasons is the text "{reasons}". Write a tuple: ("{reasons}",).'
+        yield f'{runs.name}.reasons is the text "{reasons}". Write a tuple: ("{reasons}",).'
         return
-    for written in functions_reached(case.skill):
+    for written in functions_reached(runs.skill):
         for reason, node in _raised(written.tree):
             if reason not in reasons:
                 yield (
-                    f'{written.place(node)} fails with "{reason}", which {case.name} does not declare. '
+                    f'{written.place(node)} fails with "{reason}", which {runs.name} does not declare. '
                     f"Add it to reasons; there are: {', '.join(reasons) or 'none'}."
                 )
 
 
-def resources_declared(case: Case) -> Iterator[str]:
+def resources_declared(runs: SkillRuns) -> Iterator[str]:
     """It uses arm, tool and camera, the arm if it moves, and says how the tool is left by its own reasons."""
-    skill, name = case.skill, case.name
+    skill, name = runs.skill, runs.name
     unknown = [repr(skill.uses)] if isinstance(skill.uses, str) else sorted(set(skill.uses) - set(RESOURCES))
     if unknown:
         yield f"{name} uses {', '.join(unknown)}. Write a tuple of {', '.join(RESOURCES)}."
@@ -81,9 +81,9 @@ def resources_declared(case: Case) -> Iterator[str]:
             yield f'{name}.tool_left has "{ending}", which is no ending of it. There are: {", ".join(known)}.'
 
 
-def imports_allowed(case: Case) -> Iterator[str]:
+def imports_allowed(runs: SkillRuns) -> Iterator[str]:
     """Its file imports nothing that has another clock, other threads, or one sort of cell only."""
-    for path in filter(lambda path: path.is_file(), files_of(case.skill)):
+    for path in filter(lambda path: path.is_file(), files_of(runs.skill)):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             for package in FOREIGN:
                 if package in _imported(node):
@@ -93,9 +93,9 @@ def imports_allowed(case: Case) -> Iterator[str]:
                     )
 
 
-def calls_take_effect(case: Case) -> Iterator[str]:
+def calls_take_effect(runs: SkillRuns) -> Iterator[str]:
     """No call is without effect: steps are yielded from, and failures are raised."""
-    for written in functions_reached(case.skill):
+    for written in functions_reached(runs.skill):
         for call in _dropped(written):
             callee, text = written.called(call), f"{ast.unparse(call.func)}(...)"
             where = written.place(call)

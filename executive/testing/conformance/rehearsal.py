@@ -13,7 +13,7 @@ from executive.clock import STEP
 from executive.errors import Fault
 from executive.events import Event
 from executive.skill import Skill, SkillFailed
-from executive.skill_steps import SkillRun
+from executive.skill_run import SkillRun
 from executive.testing.conformance.adversities import Adversity
 from executive.testing.conformance.patience import Stuck, patience
 from executive.testing.conformance.situations import Arrange, Situation, begin

@@ -10,11 +10,11 @@ from executive.cell import Cell
 from executive.cell_proxy import Access, intercept
 from executive.errors import InputError
 from executive.events import Emit, Event, ignore
+from executive.testing.cell_wrapper import CellWrapper
 from executive.testing.disturbances.hand import Hand, hand_of
 from executive.testing.disturbances.scene import Scene
 from executive.testing.disturbances.schedule import Schedule
 from executive.testing.disturbances.script import Disturbance, DuringNode
-from executive.testing.wrapped_cell import WrappedCell
 from executive.workcell import Workcell
 
 _DISTURBED = frozenset(
@@ -26,7 +26,7 @@ _DISTURBED = frozenset(
 """Accesses that go through the schedule; the method of an effect has the name of the member."""
 
 
-class DisturbedCell(WrappedCell):
+class DisturbedCell(CellWrapper):
     """A work cell to which things happen, physically; implements `Workcell`.
 
     Whoever runs a mission in it lets it `hear` the run's events: it knows by them which node runs. Whenever

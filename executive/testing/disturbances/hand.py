@@ -10,9 +10,9 @@ import numpy as np
 
 from executive.errors import InputError
 from executive.geometry import Array
+from executive.testing.cell_wrapper import innermost
 from executive.testing.fake_cell import FakeCell
 from executive.testing.fake_world import FakeObject
-from executive.testing.wrapped_cell import innermost
 from executive.workcell import Workcell
 
 

@@ -12,9 +12,9 @@ from executive.discovery import discover
 from executive.messages import Detections, Item, Target
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, param, port
 from executive.testing.conformance import Stage
-from executive.testing.conformance.case import MAX_HALTS, Case
-from executive.testing.conformance.check import nothing_to_add
+from executive.testing.conformance.check import leave_as_is
 from executive.testing.conformance.situations import Arrange, NotArranged, Situation, begin, situations
+from executive.testing.conformance.skill_runs import MAX_HALTS, SkillRuns
 
 
 class Everything(Skill):
@@ -43,16 +43,16 @@ class Everything(Skill):
         yield
 
 
-def names(skill: type[Skill], arrange: Arrange = nothing_to_add) -> list[str]:
+def names(skill: type[Skill], arrange: Arrange = leave_as_is) -> list[str]:
     return [situation.name for situation in situations(skill, arrange)]
 
 
 def values_of(skill: type[Skill], situation: Situation) -> dict[str, Any]:
-    return begin(skill, situation, nothing_to_add)[1]
+    return begin(skill, situation, leave_as_is)[1]
 
 
 def test_what_a_skill_needs_is_made_up() -> None:
-    stage, values = begin(Everything, Situation("", False), nothing_to_add)
+    stage, values = begin(Everything, Situation("", False), leave_as_is)
     assert [target.label for target in stage.targets] == ["cube", "sphere", "duck"]
     assert values["targets"] == stage.targets and values["targets"] is not stage.targets
     assert (values.pop("target"), values.pop("targets")[0]) == (stage.targets[0], stage.targets[0])
@@ -85,10 +85,10 @@ def test_a_skill_is_tried_in_every_situation_that_it_may_begin_in() -> None:
 @pytest.mark.parametrize(("needs", "held"), [(EMPTY, [False]), (HOLDING, [True]), (ANY, [False, True])])
 def test_the_tool_holds_what_the_skill_needs(needs: Any, held: list[bool]) -> None:
     skill = type("Needy", (faulty.Pause,), {"tool_state": (needs, ANY), "__annotations__": {}})
-    found = list(situations(skill, nothing_to_add))
+    found = list(situations(skill, leave_as_is))
     assert [situation.holding for situation in found] == held
     for situation in found:
-        stage, _ = begin(skill, situation, nothing_to_add)
+        stage, _ = begin(skill, situation, leave_as_is)
         assert stage.cell.tool.holding is situation.holding
         assert (stage.cell.ledger.in_tool() is not None) is situation.holding
         assert (stage.item == stage.cell.ledger.in_tool()) is (needs is HOLDING)
@@ -96,7 +96,7 @@ def test_the_tool_holds_what_the_skill_needs(needs: Any, held: list[bool]) -> No
 
 def test_a_skill_without_arm_finds_the_cup_on_its_target() -> None:
     for name, touches in (("Grasp", True), ("Approach", False)):
-        stage, _ = begin(discover()[name], Situation("", False), nothing_to_add)
+        stage, _ = begin(discover()[name], Situation("", False), leave_as_is)
         assert stage.cell.tool.touching is touches
 
 
@@ -107,8 +107,8 @@ def broken(stage: Stage) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("state", "arrange", "text"),
     [
-        ("empty", nothing_to_add, "its tool_state is 'empty'; it must begin with ANY, EMPTY or HOLDING"),
-        ((), nothing_to_add, "its tool_state is (); it must begin with ANY, EMPTY or HOLDING"),
+        ("empty", leave_as_is, "its tool_state is 'empty'; it must begin with ANY, EMPTY or HOLDING"),
+        ((), leave_as_is, "its tool_state is (); it must begin with ANY, EMPTY or HOLDING"),
         ((EMPTY, EMPTY), broken, "what arranges it raised KeyError: 'cube'"),
     ],
 )
@@ -131,8 +131,8 @@ class Patient(faulty.Pause):
 
 
 def test_a_skill_is_halted_at_its_calls_and_now_and_then() -> None:
-    short = Case("Pause", faulty.Pause, nothing_to_add)
+    short = SkillRuns("Pause", faulty.Pause, leave_as_is)
     assert [rehearsal.ticks for rehearsal in short.halted_runs] == [1, 2, 1, 2]
-    ticks = [rehearsal.ticks for rehearsal in Case("Patient", Patient, nothing_to_add).halted_runs]
+    ticks = [rehearsal.ticks for rehearsal in SkillRuns("Patient", Patient, leave_as_is).halted_runs]
     assert {1, 201, 202, 400} <= set(ticks)
     assert MAX_HALTS <= len(set(ticks)) <= MAX_HALTS + 2

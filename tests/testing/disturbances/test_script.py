@@ -14,6 +14,7 @@ import pytest
 from executive.errors import InputError
 from executive.events import ignore
 from executive.testing import disturbances as effects
+from executive.testing.cell_wrapper import CellWrapper
 from executive.testing.disturbances import (
     Disturbance,
     DisturbedCell,
@@ -27,7 +28,6 @@ from executive.testing.disturbances.hand import hand_of
 from executive.testing.disturbances.script import DuringNode
 from executive.testing.fake_cell import FakeCell, SilentOperator, bare_table
 from executive.testing.run_mission import MissionResult, run_mission
-from executive.testing.wrapped_cell import WrappedCell
 from executive.workcell import CellOptions
 
 SLIPS = effects.seal_fails()
@@ -154,7 +154,7 @@ def test_a_kind_of_cell_is_disturbed_in_one_run_after_the_other() -> None:
 def test_a_hand_reaches_through_wrapped_cells_and_into_no_unknown_one() -> None:
     fake = FakeCell()
     fake.world.put("cube", 0.5, 0.0)
-    assert [thing.label for thing in hand_of(WrappedCell(WrappedCell(fake))).things] == ["cube"]
+    assert [thing.label for thing in hand_of(CellWrapper(CellWrapper(fake))).things] == ["cube"]
     gone = [after(0.0, effects.object_removed(1))]
     strange: Any = SimpleNamespace(cell=FakeCell().cell, advance=lambda: None)
     with pytest.raises(InputError, match="nobody knows how to reach into a SimpleNamespace; give `disturb"):

@@ -1,4 +1,4 @@
-"""All runs of one skill that its checks look at, each made once."""
+"""The runs of one skill that its conformance checks share; each run is made only once."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from executive.testing.conformance.rehearsal import Rehearsal
 from executive.testing.conformance.situations import Arrange, NotTried, Situation, situations
 
 MAX_HALTS = 40
-"""Greatest number of halts spread evenly over a run, and of further halts at its calls."""
+"""Maximum number of halts at evenly spaced ticks of a run, and of further halts at its first calls."""
 
 
 class GotStuck(NotTried):
     """A tick of a skill did not return, so that the skill is not run again; the text says where."""
 
 
-class Case:
+class SkillRuns:
     """The runs that the checks of one skill share.
 
     Args:
         name: Name of the skill.
         skill: Class of the skill.
-        arrange: Changes the stage as the author of the skill wants.
+        arrange: Prepares the `Stage` of each run; written by the author of the skill.
     """
 
     def __init__(self, name: str, skill: type[Skill], arrange: Arrange) -> None:
@@ -41,7 +41,7 @@ class Case:
     @cached_property
     def repeated_runs(self) -> list[tuple[Situation, Rehearsal, Rehearsal]]:
         """Two runs to the end in every situation, without adversity."""
-        return [(one, self._run(one), self._run(one)) for one in self.situations]
+        return [(situation, self._run(situation), self._run(situation)) for situation in self.situations]
 
     @cached_property
     def complete_runs(self) -> list[Rehearsal]:
@@ -50,7 +50,7 @@ class Case:
         return plain + [
             self._run(situation, adversity)
             for situation, first, _ in self.repeated_runs
-            # A run that does not end without adversity would not end under one, either.
+            # If the undisturbed run does not end, a run under an adversity will not end either.
             if first.status != "RUNNING"
             for adversity in adversities(self.skill, first.ticks, holding=first.held)
         ]
@@ -80,7 +80,7 @@ class Case:
             halted = ", halted there," if rehearsal.ticks == halt_at else ""
             self._stuck = (
                 f"{rehearsal.where} at tick {rehearsal.ticks}{halted} {self.name} {rehearsal.message}. "
-                "The arm waits for every tick: yield in each loop that waits, or leave work to a detector."
+                "The arm waits for every tick: yield in each loop that waits, or compute in a detector."
             )
             raise GotStuck(self._stuck)
         if adversity is not None or halt_at is not None:
@@ -90,7 +90,7 @@ class Case:
 
 
 def _halt_ticks(rehearsal: Rehearsal) -> list[int]:
-    """Return the ticks at which a run is halted: those of its calls, those after them, and some between."""
-    spread = np.linspace(1, rehearsal.ticks, min(rehearsal.ticks, MAX_HALTS), dtype=int).tolist()
-    around = sorted({call.tick + step for call in rehearsal.calls for step in (0, 1)})
-    return sorted(tick for tick in {*spread, *around[:MAX_HALTS]} if 1 <= tick <= rehearsal.ticks)
+    """Return the ticks at which to halt a run: evenly spaced ones, and those of calls and after calls."""
+    evenly_spaced = np.linspace(1, rehearsal.ticks, min(rehearsal.ticks, MAX_HALTS), dtype=int).tolist()
+    call_ticks = sorted({call.tick + offset for call in rehearsal.calls for offset in (0, 1)})
+    return sorted(tick for tick in {*evenly_spaced, *call_ticks[:MAX_HALTS]} if 1 <= tick <= rehearsal.ticks)

@@ -17,7 +17,7 @@ class SkillRun:
 
     Args:
         skill: A fresh instance with its params and inputs.
-        cell: The cell that it acts on.
+        cell: Cell that the skill acts on.
 
     Attributes:
         skill: The instance that is run.
@@ -39,7 +39,7 @@ class SkillRun:
             if self._steps is None:
                 # A `run` without any yield is a plain function: it has done its work already.
                 self._steps = iter(self.skill.run(self._cell) or ())
-            # `self` marks the end: no skill yields its own run.
+            # `self` stands for the end of the generator: a skill cannot yield its own `SkillRun`.
             yielded = next(self._steps, self)
         except SkillFailed as failed:
             if failed.reason in self.skill.reasons:
@@ -51,14 +51,14 @@ class SkillRun:
             return False
         if yielded is not self:
             kind = type(yielded).__name__
-            raise Fault(f'it yielded a {kind}; to run steps of others write "yield from"')
-        if unset := [name for name in self._outputs if not hasattr(self.skill, name)]:
+            raise Fault(f'it yielded a {kind}; to run the steps of another generator, write "yield from"')
+        if unset := [name for name in self._output_names if not hasattr(self.skill, name)]:
             raise Fault(f"it succeeded without setting its output {', '.join(unset)}")
         return True
 
     def outputs(self) -> dict[str, Any]:
         """Return the outputs by name; all are set once the skill has succeeded."""
-        return {name: getattr(self.skill, name) for name in self._outputs}
+        return {name: getattr(self.skill, name) for name in self._output_names}
 
     def halt(self) -> None:
         """Close the generator, so that its `finally` runs.
@@ -77,7 +77,7 @@ class SkillRun:
             raise _fault(message, error) from error
 
     @property
-    def _outputs(self) -> list[str]:
+    def _output_names(self) -> list[str]:
         return [name for name, port in self.skill.ports.items() if port.direction is Direction.OUT]
 
 

@@ -14,16 +14,16 @@ def _do_nothing() -> None:
     """Do nothing."""
 
 
-class WrappedCell:
+class CellWrapper:
     """Forwards everything to another work cell, unless a subclass overrides it; implements `Workcell`.
 
     Args:
-        inner: The wrapped work cell.
+        inner: The work cell inside this wrapper.
         before: Called before every control step.
         after: Called after every control step.
 
     Attributes:
-        inner: The wrapped work cell.
+        inner: The work cell inside this wrapper.
     """
 
     def __init__(
@@ -43,16 +43,16 @@ class WrappedCell:
 
     @property
     def accounts(self) -> Accounts:
-        """The counts of the cell's ledger at the end of a run."""
+        """The ledger, which the run closes at its end and whose counts and rows it then reads."""
         return self.inner.accounts
 
     @property
     def steps(self) -> int:
-        """Control steps that its world has made since the run began."""
+        """Number of control steps since the run began."""
         return self.inner.steps
 
     def log_to(self, path: Path) -> None:
-        """Log to a file, from now on, all that is needed to rebuild the simulated world."""
+        """Start to log to a file all data that rebuild the simulated world."""
         self.inner.log_to(path)
 
     def advance(self) -> None:
@@ -76,6 +76,6 @@ class WrappedCell:
 
 def innermost(workcell: Workcell) -> Workcell:
     """Return the work cell inside all wrappers."""
-    while isinstance(workcell, WrappedCell):
+    while isinstance(workcell, CellWrapper):
         workcell = workcell.inner
     return workcell
