@@ -182,7 +182,7 @@ def check_roboflow() -> Iterator[Finding]:
 
 
 def time_in_subprocess(renderer: str) -> tuple[float, str]:
-    """Draw with `tiny` or `egl` in a subprocess; return milliseconds per frame, and an error message or ""."""
+    """Draw with `tiny` or `egl` in a subprocess; return milliseconds per frame and an error message or ""."""
     command_line = program("executive.cli.doctor", renderer)
     try:
         completed = subprocess.run(
