@@ -10,7 +10,7 @@ from multiprocessing.connection import Connection
 from typing import Any, NoReturn
 
 
-class Forks:
+class ForkRunner:
     """Continues this process in one child after the other and receives the result of each.
 
     A child has everything that its parent has, a simulated world included. Only the thread that forked
@@ -29,10 +29,10 @@ class Forks:
         """True in a child."""
         return self._pipe is not None
 
-    def fork(self) -> tuple[Any, str] | None:
-        """Return None in a new child; in the parent the child's result and, if there is none, the reason.
+    def fork_and_wait(self) -> tuple[Any, str] | None:
+        """Return None in a new child; in the parent wait for the child, and return its result or the reason.
 
-        A child must call `send` in any case, or it continues as if it were its parent.
+        A child must call `send_and_exit` in any case, or it continues as if it were its parent.
         """
         reading, writing = Pipe(duplex=False)
         child = os.fork()
@@ -53,7 +53,7 @@ class Forks:
                 code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
                 return None, f"the child ended with exit code {code} and sent nothing"
 
-    def send(self, result: Any) -> NoReturn:
+    def send_and_exit(self, result: Any) -> NoReturn:
         """Send `result` to the parent and end this child at once, without any clean-up."""
         assert self._pipe is not None, "only a child can send a result"
         try:
@@ -63,13 +63,13 @@ class Forks:
             os._exit(1)
 
     def call(self, function: Callable[[], Any]) -> tuple[Any, str]:
-        """Return what `function` returns in a child and, if it returns nothing, the reason."""
-        answer = self.fork()
+        """Call `function` in a child; return its result, or None and the reason why there is none."""
+        answer = self.fork_and_wait()
         if answer is None:
             try:
                 result = function(), ""
             except BaseException as error:
                 result = None, f"{type(error).__name__}: {error}"
-            self.send(result)
+            self.send_and_exit(result)
         sent, problem = answer
         return sent or (None, problem)

@@ -1,8 +1,8 @@
 """A mission halted at many moments of one run, each time as Ctrl-C would halt it.
 
 The mission is run once. At each of the moments this process forks. The child requests a stop, halts as any
-run does, is checked and ends; its parent continues to the next moment. A detector that works in a process
-of its own serves both, so use detections from the truth (`--oracle`) for a simulated cell.
+run does, is checked and ends; its parent continues to the next moment. Parent and child would share
+a detector in another process, so use ground-truth detections (`--oracle`) for a simulated cell.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ from executive.runtime.outcome import Outcome
 from executive.runtime.run import Run
 from executive.sim.arm import SimArm
 from executive.testing.cell_wrapper import CellWrapper
-from tests.benchmarks.forks import Forks
+from tests.benchmarks.forks import ForkRunner
 from tests.benchmarks.report import Figures, describe, record_run, run_mission_command
 
-LIMITS = {"rest_s": 0.5, "deviation_rad": 1e-6, "acceleration_share": 1.0, "jerk_share": 1.02}
-"""Limits of a halt: time to rest, distance of a joint's command from the path it was on, and acceleration and
-jerk over the stop limits; differences over steps see a little more than the profile's constant jerk."""
-COMMANDS_BEFORE = 5
-"""Number of commands from before the stop that are checked too, so that no edge is missed."""
+LIMITS = {"rest_s": 0.5, "deviation_rad": 1e-6, "acceleration_ratio": 1.0, "jerk_ratio": 1.02}
+"""Limits of a halt: time to rest, distance of a joint's command from the planned trajectory, and acceleration
+and jerk relative to the braking limits. Finite differences exceed the jerk of the profile a little."""
+COMMANDS_BEFORE_STOP = 5
+"""Number of checked commands from before the stop, so that the finite differences cover the stop."""
 CHILD_TIMEOUT = 120.0
 """Time that a child may take to halt and be checked [s]."""
 
@@ -53,7 +53,7 @@ def measure(subject: Subject, every: int | None = None) -> Figures:
         undisturbed, problem = record_run(subject, subject.seed, Path(folder))
         if problem:
             raise ExecutiveError(f"{subject.name} with {problem}; choose a seed with which it succeeds")
-        halts = _HaltedRun(subject, every, Path(folder)).run(undisturbed)
+        halts = _RunWithHalts(subject, every, Path(folder)).run(undisturbed)
     return {
         **describe(subject),
         "ticks": undisturbed["ticks"],
@@ -70,7 +70,7 @@ def find_worst(halts: Sequence[Figures]) -> list[Figures]:
     """Return for each limited figure its largest value, the tick of the halt, and the limit."""
     worst = []
     for name, allowed in LIMITS.items():
-        measured = [(halt[name], halt["at"]) for halt in halts if halt[name] is not None]
+        measured = [(halt[name], halt["tick"]) for halt in halts if halt[name] is not None]
         if measured:
             value, tick = max(measured)
             worst.append({"largest": name, "value": value, "tick": tick, "allowed": allowed})
@@ -87,7 +87,7 @@ def check_limits(halt: Figures) -> Iterator[str]:
 def check_ledger(items: Mapping[str, Any], audit: Mapping[str, int] | None) -> Iterator[str]:
     """Yield a sentence if the ledger does not balance, or disagrees with the audit.
 
-    An object that no look had shown before the halt is in no ledger and lies where it lay.
+    An object that was not detected before the halt is not in the ledger; the audit counts it as unseen.
     """
     balanced = items["seen"] == items["placed"] + items["rejected"] + items["lost"]
     agrees = audit is None or (
@@ -101,32 +101,34 @@ def check_ledger(items: Mapping[str, Any], audit: Mapping[str, int] | None) -> I
 
 
 def measure_braking(
-    commands: Sequence[Array], before: int, path: Trajectory, limits: JointLimits
+    commands: Sequence[Array], commands_before_stop: int, trajectory: Trajectory, limits: JointLimits
 ) -> dict[str, float]:
-    """Return how the arm came to rest: distance from its path, acceleration and jerk over the stop limits.
+    """Return the distance from the trajectory, and acceleration and jerk relative to the limits of braking.
 
     Args:
         commands: Joint positions of consecutive control steps [rad].
-        before: Number of commands from before the stop.
-        path: The motion under way at the stop.
-        limits: The arm's.
+        commands_before_stop: Number of commands from before the stop.
+        trajectory: The motion under way at the stop.
+        limits: Joint limits of the arm.
     """
     accelerations = np.diff(commands, 2, axis=0) / STEP**2
     jerks = np.diff(accelerations, axis=0) / STEP
     return {
-        "deviation_rad": max(measure_distance(command, path) for command in commands[before:]),
-        "acceleration_share": float(np.max(np.abs(accelerations) / limits.stop_acceleration, initial=0.0)),
-        "jerk_share": float(np.max(np.abs(jerks) / limits.stop_jerk, initial=0.0)),
+        "deviation_rad": max(
+            measure_distance(command, trajectory) for command in commands[commands_before_stop:]
+        ),
+        "acceleration_ratio": float(np.max(np.abs(accelerations) / limits.stop_acceleration, initial=0.0)),
+        "jerk_ratio": float(np.max(np.abs(jerks) / limits.stop_jerk, initial=0.0)),
     }
 
 
-def measure_distance(q: Array, path: Trajectory) -> float:
-    """Return the distance of joint positions `(7,)` from the nearest place of a motion [rad].
+def measure_distance(q: Array, trajectory: Trajectory) -> float:
+    """Return the largest joint distance [rad] of positions `(7,)` from the closest point of a trajectory.
 
-    The place is searched around the nearest of the straight lines between the motion's samples. The nearest
-    sample may belong to another part of a path that returns to where it was.
+    Golden-section search around the closest segment between two samples finds this point. The closest sample
+    would be a bad start: it may belong to another part of a trajectory that passes the same point twice.
     """
-    corners = path.samples.q
+    corners = trajectory.samples.q
     lines = np.diff(corners, axis=0)
     squares = np.maximum(np.sum(lines**2, axis=1), np.finfo(float).tiny)
     along = np.clip(np.sum((q - corners[:-1]) * lines, axis=1) / squares, 0.0, 1.0)
@@ -136,24 +138,24 @@ def measure_distance(q: Array, path: Trajectory) -> float:
     ratio = (math.sqrt(5) - 1) / 2
     for _ in range(60):
         a, b = high - ratio * (high - low), low + ratio * (high - low)
-        if np.linalg.norm(path.at(a).q - q) < np.linalg.norm(path.at(b).q - q):
+        if np.linalg.norm(trajectory.at(a).q - q) < np.linalg.norm(trajectory.at(b).q - q):
             high = b
         else:
             low = a
-    return float(np.abs(path.at((low + high) / 2).q - q).max())
+    return float(np.abs(trajectory.at((low + high) / 2).q - q).max())
 
 
-class _HaltedRun:
+class _RunWithHalts:
     """The run, and the results of its children so far."""
 
     def __init__(self, subject: Subject, every: int, folder: Path) -> None:
         self._every = every
-        self._forks = Forks(CHILD_TIMEOUT)
-        self._path = folder / "journal.jsonl"
-        self._journal = Journal(self._path)
+        self._forks = ForkRunner(CHILD_TIMEOUT)
+        self._journal_path = folder / "journal.jsonl"
+        self._journal = Journal(self._journal_path)
         self._trace = Trace()
-        self._commands: deque[Array] | list[Array] = deque(maxlen=COMMANDS_BEFORE)
-        self._before = 0
+        self._commands: deque[Array] | list[Array] = deque(maxlen=COMMANDS_BEFORE_STOP)
+        self._commands_before_stop = 0
         self._motion: Trajectory | None = None
         self._halts: list[Figures] = []
         self._halt: Figures = {}
@@ -162,7 +164,9 @@ class _HaltedRun:
         kind = subject.kind or cell_kind(config.kind)
 
         def make_cell(*args: Any, **options: Any) -> CellWrapper:
-            return CellWrapper(kind(*args, **options), before=self._try_halt, after=self._keep_command)
+            return CellWrapper(
+                kind(*args, **options), before=self._fork_and_halt_if_due, after=self._keep_command
+            )
 
         self._run = Run(
             subject.loaded, subject.skills, seed=subject.seed, requests=subject.requests, kind=make_cell,
@@ -174,7 +178,7 @@ class _HaltedRun:
         """Run the mission and return what its children sent.
 
         Raises:
-            ExecutiveError: It went otherwise than the run without halts.
+            ExecutiveError: The run differed from the run without halts.
         """
         try:
             outcome = self._run.execute()
@@ -187,7 +191,7 @@ class _HaltedRun:
         finally:
             # In every case: a child must not run beyond this line.
             if self._forks.is_child:
-                self._forks.send(self._halt)
+                self._forks.send_and_exit(self._halt)
             self._run.close()
             self._journal.close()
         if outcome.status == "HALTED":
@@ -203,20 +207,22 @@ class _HaltedRun:
         if isinstance(self._arm, SimArm):
             self._commands.append(self._arm._command)
 
-    def _try_halt(self) -> None:
-        """Let a child halt here if it is time to, and keep what it sends."""
+    def _fork_and_halt_if_due(self) -> None:
+        """Fork if a halt is due: the child requests a stop and goes on; the parent keeps the result."""
         if self._forks.is_child or self._run.tick % self._every:
             return
         unknown = dict.fromkeys(LIMITS)
-        self._halt = {"at": self._run.tick, "moving": not self._arm.at_rest, "holds": "", **unknown}
-        answer = self._forks.fork()
+        self._halt = {"tick": self._run.tick, "moving": not self._arm.at_rest, "holds": "", **unknown}
+        answer = self._forks.fork_and_wait()
         if answer is not None:
             result, problem = answer
             self._halts.append(result or {**self._halt, "problems": [problem]})
             return
-        self._path = Path(shutil.copyfile(self._path, self._path.with_name("child.jsonl")))
-        self._journal = Journal(self._path, again=True)
-        self._commands, self._before = [*self._commands], len(self._commands)
+        self._journal_path = Path(
+            shutil.copyfile(self._journal_path, self._journal_path.with_name("child.jsonl"))
+        )
+        self._journal = Journal(self._journal_path, again=True)
+        self._commands, self._commands_before_stop = [*self._commands], len(self._commands)
         self._motion = self._arm._motion if isinstance(self._arm, SimArm) else None
         self._run.control.stop()
 
@@ -225,21 +231,23 @@ class _HaltedRun:
         run, workcell = self._run, self._run.workcell
         self._journal.close()
         halt = {**self._halt, "holds": outcome.holds}
-        halt["rest_s"] = (outcome.ticks - halt["at"]) * workcell.cell.clock.step
+        halt["rest_s"] = (outcome.ticks - halt["tick"]) * workcell.cell.clock.step
         problems = [
-            *check_journal(read_journal(self._path), outcome),
+            *check_journal(read_journal(self._journal_path), outcome),
             *check_ledger(run.items(), run.audit()),
             *check_tool(outcome, workcell),
             *check_rest(workcell),
         ]
-        self._path.unlink()
+        self._journal_path.unlink()
         if (outcome.status, outcome.reason) != ("HALTED", "halted"):
             problems.append(f"the run ended as {outcome.status} {outcome.reason}: {outcome.message}")
         running = [node.name for node in run.root.iterate() if node.status is Status.RUNNING]
         if running:
             problems.append(f"still running: {', '.join(running)}")
         if self._motion is not None:
-            halt.update(measure_braking(self._commands, self._before, self._motion, self._limits))
+            halt.update(
+                measure_braking(self._commands, self._commands_before_stop, self._motion, self._limits)
+            )
         problems += check_limits(halt)
         return {**halt, "problems": problems}
 

@@ -1,8 +1,8 @@
 """A mission killed at random moments and resumed, with a changed world or an unchanged one.
 
-Each run continues in a forked child that is killed as `kill -9` does, at a random moment of the wall clock:
-within a control step, a line of the journal or a picture. Another child resumes the run from the disk. This
-process never builds a cell, because a fork would copy the locks of the threads of its detector.
+Each run takes place in a forked child that gets SIGKILL after a random time, possibly in the middle of a
+control step or while a journal line or a picture is written. Another child resumes the run from the disk.
+This process never builds a cell, because a fork would copy the locks of the threads of its detector.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ from executive.record.resumed_run import resumed_run
 from executive.runtime.cells import cell_kind
 from executive.tape.past import Past
 from executive.testing.disturbances.hand import Hand, Thing
-from tests.benchmarks.forks import Forks
+from tests.benchmarks.forks import ForkRunner
 from tests.benchmarks.report import Figures, describe, record_run, run_mission_command, show_progress
 from tests.meanwhile import meanwhile
 
 RESUME_TIMEOUT = 300.0
 """Time that a child may take to resume a run [s]."""
 SHIFTS = 0.06 * np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)])
-"""Shifts of an object before a run is resumed, of which one to a free place is made [m]."""
+"""Candidate displacements of a moved object; one that leads to a free position is chosen at random [m]."""
 CHANGES = ("moved", "removed", "dropped")
 """Changes of the world: an object on the table is moved or taken away, or the tool lets go."""
 
@@ -56,7 +56,7 @@ def measure(subject: Subject, runs: Path, kills: int = 20, changed: int | None =
         is_changed = number * changed // kills < (number + 1) * changed // kills
         change = str(random.choice(CHANGES)) if is_changed else ""
         folder = runs / str(number)
-        while not kill_run(subject, subject.seed + number, folder, float(random.uniform(0.0, duration))):
+        while not run_and_kill(subject, subject.seed + number, folder, float(random.uniform(0.0, duration))):
             pass
         done.append(resume_run(subject, subject.seed + number, folder, change))
         if not done[-1]["problems"]:
@@ -87,10 +87,10 @@ def begin_run(subject: Subject, seed: int, runs: Path) -> int:
     return child
 
 
-def kill_run(subject: Subject, seed: int, runs: Path, after: float) -> bool:
-    """Begin a run, kill it after a time [s], and return True if the run had begun and not ended."""
+def run_and_kill(subject: Subject, seed: int, runs: Path, delay: float) -> bool:
+    """Begin a run, kill it after `delay` [s], and return True if it had begun and not yet ended."""
     child = begin_run(subject, seed, runs)
-    time.sleep(after)
+    time.sleep(delay)
     os.kill(child, signal.SIGKILL)
     _, status = os.waitpid(child, 0)
     if not os.WIFSIGNALED(status):
@@ -126,7 +126,7 @@ def resume_run(subject: Subject, seed: int, runs: Path, change: str) -> Figures:
         ending = f"{result['status']} {result['reason']}".strip()
         return {**kill, "change": done, "status": ending, "problems": problems}
 
-    figures, problem = Forks(RESUME_TIMEOUT).call(resume)
+    figures, problem = ForkRunner(RESUME_TIMEOUT).call(resume)
     return figures or {**kill, "problems": [problem]}
 
 
@@ -139,14 +139,14 @@ def change_world(subject: Subject, seed: int, path: Path, past: Past, change: st
 
     def act(hand: Hand) -> None:
         held = hand.held
-        standing = [thing for thing in hand.things if held is None or thing.body != held.body]
-        on_table = [thing for thing in standing if is_on_table(thing.position[:2], config.table)]
+        unheld_objects = [thing for thing in hand.things if held is None or thing.body != held.body]
+        on_table = [thing for thing in unheld_objects if is_on_table(thing.position[:2], config.table)]
         if change == "dropped" and held is not None:
             hand.part()
             done.append(f"dropped {held.label}")
         elif on_table:
             thing = on_table[int(random.integers(len(on_table)))]
-            shifts = find_free_shifts(thing, standing, distance, config.table)
+            shifts = find_free_shifts(thing, unheld_objects, distance, config.table)
             if change == "removed" or not shifts:
                 hand.remove(thing)
                 done.append(f"removed {thing.label}")
@@ -161,20 +161,20 @@ def change_world(subject: Subject, seed: int, path: Path, past: Past, change: st
 
 
 def find_free_shifts(
-    thing: Thing, standing: Sequence[Thing], distance: float, table: TableConfig
+    moved_object: Thing, unheld_objects: Sequence[Thing], distance: float, table: TableConfig
 ) -> Sequence[Array]:
-    """Return the shifts `(2,)` [m] of a thing to places with no object within `distance` [m]."""
-    others = [other.position[:2] for other in standing if other.body != thing.body]
+    """Return the shifts `(2,)` [m] of an object to positions with no object within `distance` [m]."""
+    others = [other.position[:2] for other in unheld_objects if other.body != moved_object.body]
 
     def is_free(place: Array) -> bool:
         return is_on_table(place, table) and all(np.linalg.norm(one - place) > distance for one in others)
 
-    return [shift for shift in SHIFTS if is_free(thing.position[:2] + shift)]
+    return [shift for shift in SHIFTS if is_free(moved_object.position[:2] + shift)]
 
 
-def is_on_table(place: Array, table: TableConfig) -> bool:
-    """Return True if a place `(2,)` [m] is in the workspace of the table."""
-    return all(low <= x <= high for x, (low, high) in zip(place, (table.x, table.y), strict=True))
+def is_on_table(position: Array, table: TableConfig) -> bool:
+    """Return True if a position `(2,)` [m] is within the bounds of the table."""
+    return all(low <= x <= high for x, (low, high) in zip(position, (table.x, table.y), strict=True))
 
 
 def check_result(result: Mapping[str, Any], *, change: str) -> list[str]:

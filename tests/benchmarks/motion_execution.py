@@ -18,23 +18,22 @@ from executive.sim.clearance import FIRST_MOVING, SELF_PAIRS, WRIST
 from executive.sim.clock import SimClock
 from executive.sim.tool import SuctionTool
 from executive.sim.world import World, held_part
-from tests.benchmarks.motion_scenes import Scene, Scenes, open_world
+from tests.benchmarks.motion_scenes import Scene, SceneGenerator, open_world
 from tests.benchmarks.report import Figures, show_progress
 
-RANGE = 0.03
+MAX_MEASURED_DISTANCE = 0.03
 """Largest distance that is measured [m]."""
-GAUGE_STEPS = 4
+CLEARANCE_PERIOD_STEPS = 4
 """Control steps between two measurements of the distances."""
 SETTLE_STEPS = 24
 """Steps in which a seal forms, as in the skill that grasps."""
 
 
 def execute_pairs(cell: CellConfig, pairs: int, seed: int) -> Figures:
-    """Return the figures of `pairs` random pairs in the live world; an object is removed after its drop.
+    """Execute random pairs in the simulated world and return their figures; a released object is removed.
 
     Raises:
-        InputError: The cell has no pairs to move between.
-        Unreachable, Blocked: The arm has no way to where it begins.
+        InputError: No random scene of the cell has an object that can be picked and placed.
         Fault: The arm left its path.
     """
     with open_world(cell) as (world, planner):
@@ -44,69 +43,73 @@ def execute_pairs(cell: CellConfig, pairs: int, seed: int) -> Figures:
         return execution.collect_figures()
 
 
-class Gauge:
-    """Keeps the least distance of all moments that it measures.
+class ClearanceMonitor:
+    """Tracks the smallest clearance of the arm and its load over all measurements.
 
     Two things that were nearer than the margin when a motion began (two objects side by side, one of them
     now in the tool, or the load and the table) do not count in that motion.
 
     Args:
-        world: The live world.
+        world: The simulated world.
         margin: Distance to be kept [m].
 
     Attributes:
-        least: The least distance so far [m].
+        min_distance: The smallest distance so far [m].
         nearest: The two things with that distance.
     """
 
     def __init__(self, world: World, margin: float) -> None:
         self._world = world
         self._margin = margin
-        self._spared: set[str] = set()
-        self._touched: int | None = None
-        self.least = math.inf
+        self._ignored_pairs: set[str] = set()
+        self._contact_allowed: int | None = None
+        self.min_distance = math.inf
         self.nearest = "nothing"
 
-    def begin(self, held: int | None, touched: int | None = None) -> None:
-        """Begin a motion with the body `held` in the tool; `touched` is the body that the tool may touch."""
-        self._touched = touched
-        self._spared = {pair for distance, pair in self._measure_pairs(held) if distance < self._margin}
+    def begin(self, held: int | None, contact_allowed: int | None = None) -> None:
+        """Begin a motion with the body `held` in the tool, which may touch the body `contact_allowed`."""
+        self._contact_allowed = contact_allowed
+        self._ignored_pairs = {
+            pair for distance, pair in self._measure_pairs(held) if distance < self._margin
+        }
 
     def measure(self, held: int | None) -> None:
         """Measure the distances of this moment; `held` is the body in the tool."""
         for distance, pair in self._measure_pairs(held):
-            if pair not in self._spared and distance < self.least:
-                self.least, self.nearest = distance, pair
+            if pair not in self._ignored_pairs and distance < self.min_distance:
+                self.min_distance, self.nearest = distance, pair
 
     def _measure_pairs(self, held: int | None) -> Iterator[tuple[float, str]]:
         world, near = self._world, self._world.client.getClosestPoints
         bins = (body for bodies in world.bins.values() for body in bodies)
-        things = [body for body in (world.table, *bins, *world.bodies) if body not in (held, self._touched)]
+        things = [
+            body for body in (world.table, *bins, *world.bodies) if body not in (held, self._contact_allowed)
+        ]
         load = "" if held is None else held_part(world.bodies[held])
         for body in things:
-            for point in near(world.arm, body, RANGE):
+            for point in near(world.arm, body, MAX_MEASURED_DISTANCE):
                 if point[3] >= FIRST_MOVING:
                     yield point[8], f"{world.part_of(point[3])} - {world.name_of(body)}"
-            for point in near(held, body, RANGE) if load else ():
+            for point in near(held, body, MAX_MEASURED_DISTANCE) if load else ():
                 yield point[8], f"{load} - {world.name_of(body)}"
         for one, other in SELF_PAIRS:
-            for point in near(world.arm, world.arm, RANGE, linkIndexA=one, linkIndexB=other):
+            for point in near(world.arm, world.arm, MAX_MEASURED_DISTANCE, linkIndexA=one, linkIndexB=other):
                 yield point[8], f"{world.part_of(one)} - {world.part_of(other)}"
-        for point in near(held, world.arm, RANGE) if load else ():
+        for point in near(held, world.arm, MAX_MEASURED_DISTANCE) if load else ():
             if FIRST_MOVING <= point[4] < WRIST:
                 yield point[8], f"{load} - {world.part_of(point[4])}"
 
 
 class _Execution:
-    """An arm and its tool in a live world, and the figures so far."""
+    """An arm and its tool in a simulated world, and the figures so far."""
 
     def __init__(self, cell: CellConfig, world: World, planner: Planner, seed: int) -> None:
         self._world = world
         self._tool = SuctionTool(world, cell.tool)
         self._arm = SimArm(world, planner, cell, SimClock(world, STEP), lambda: self._tool.held_body)
-        self._scenes = Scenes(cell, planner, world, seed)
+        self._scenes = SceneGenerator(cell, planner, world, seed)
         self._margin = cell.motion.margin
-        self._gauge = Gauge(world, self._margin)
+        self._clearance_monitor = ClearanceMonitor(world, self._margin)
         self._slip = 0.0
         self._missed = self._dropped = 0
         self._steps: list[int] = []
@@ -127,8 +130,10 @@ class _Execution:
             "executed_pairs": len(self._steps),
             "executed_time_s": float(np.mean(self._steps)) * STEP if self._steps else None,
             "margin_mm": 1e3 * self._margin,
-            "clearance_mm": 1e3 * self._gauge.least if math.isfinite(self._gauge.least) else None,
-            "nearest": self._gauge.nearest,
+            "clearance_mm": 1e3 * self._clearance_monitor.min_distance
+            if math.isfinite(self._clearance_monitor.min_distance)
+            else None,
+            "nearest": self._clearance_monitor.nearest,
             "slip_mm": 1e3 * self._slip,
             "missed": self._missed,
             "dropped": self._dropped,
@@ -136,7 +141,7 @@ class _Execution:
         }
 
     def _fetch_and_carry(self, scene: Scene) -> None:
-        fetching = self._move(scene.approach, scene.fetching, scene, lambda: self._tool.touching)
+        fetching = self._move(scene.approach, scene.fetch_task, scene, lambda: self._tool.touching)
         self._tool.close()
         for _ in range(SETTLE_STEPS):
             self._step()
@@ -144,7 +149,7 @@ class _Execution:
             self._missed += 1
             return
         carrying = self._move(
-            scene.drop, scene.carrying(self._tool.bears), scene, lambda: not self._tool.holding
+            scene.drop, scene.make_carry_task(self._tool.bears), scene, lambda: not self._tool.holding
         )
         if self._tool.holding:
             self._steps.append(fetching + carrying)
@@ -161,7 +166,7 @@ class _Execution:
         arm = self._arm
         motion = arm.plan(goal, task).result()
         grasp, steps, is_braking = self._locate_in_tool(), 0, False
-        self._gauge.begin(self._tool.held_body, scene.body)
+        self._clearance_monitor.begin(self._tool.held_body, scene.body)
         arm.start(motion)
         while not arm.at_rest:
             if not is_braking and until():
@@ -169,14 +174,14 @@ class _Execution:
                 is_braking = True
             self._step()
             steps += 1
-            if steps % GAUGE_STEPS == 0:
+            if steps % CLEARANCE_PERIOD_STEPS == 0:
                 self._measure(grasp)
         if arm.met is not None:
             self._failures.append(f"contact: {arm.met}")
         return steps
 
     def _measure(self, grasp: Pose | None) -> None:
-        self._gauge.measure(self._tool.held_body)
+        self._clearance_monitor.measure(self._tool.held_body)
         now = self._locate_in_tool()
         if grasp is not None and now is not None:
             self._slip = max(self._slip, float(np.linalg.norm(now.position - grasp.position)))

@@ -1,4 +1,4 @@
-"""Random scenes of the benchmark of motion: objects on the table, one to pick, and a place in a bin."""
+"""Random scenes of the benchmark of motion: objects on the table, one to pick, and a slot in a bin."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from executive.sim.tool import TOUCH
 from executive.sim.world import World
 
 MAX_TRIES = 50
-"""Scenes drawn until one has an object that can be held and reached."""
+"""Maximum number of scenes drawn to find one whose object can be held and reached."""
 
 
 @contextmanager
@@ -40,23 +40,23 @@ def open_world(cell: CellConfig) -> Iterator[tuple[World, Planner]]:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """One pair of places: where to pick and where to drop.
+    """Objects on the table, one of them to pick, and a slot in a bin.
 
     Attributes:
         body: Body of the object to pick.
-        kind: Its class.
-        surface: Height of the tool centre point at which the cup feels it [m].
-        bears: Pull that a seal there bears [N].
-        target: The object to pick, where it really is.
-        others: The other objects on the table, where they really are.
-        approach: Goal of the motion onto it, as `executive.goals.approach` makes it.
-        drop: Goal of the motion into the bin, as `executive.goals.into` makes it for an empty bin.
+        kind: Object class of `body`.
+        contact_height: Height of the tool centre point at which contact with the object is detected [m].
+        breakaway_force: Breakaway force of a seal on the object [N].
+        target: The object to pick, at its true position.
+        others: The other objects on the table, at their true positions.
+        approach: Goal of the motion onto the object, equal to that of `executive.goals.approach`.
+        drop: Goal of the motion into the bin, equal to that of `executive.goals.into` for an empty bin.
     """
 
     body: int
     kind: ObjectClass
-    surface: float
-    bears: float
+    contact_height: float
+    breakaway_force: float
     target: Obstacle
     others: tuple[Obstacle, ...]
     approach: Goal
@@ -64,29 +64,29 @@ class Scene:
 
     @property
     def touch(self) -> Goal:
-        """The tool where it feels the object, without a guarded descent."""
-        return Goal((*self.approach.position[:2], self.surface))
+        """Goal at which contact with the object is detected, without a guarded descent."""
+        return Goal((*self.approach.position[:2], self.contact_height))
 
     @property
-    def fetching(self) -> Task:
+    def fetch_task(self) -> Task:
         """Task of the motion onto the object."""
         return Task(around=self.others, target=self.target)
 
-    def carrying(self, bears: float) -> Task:
-        """Return the task of the motion into the bin with a seal that bears so much [N]."""
-        return Task(Load(self.kind, bears), self.others)
+    def make_carry_task(self, breakaway_force: float) -> Task:
+        """Return the task of the motion into the bin with a seal of this breakaway force [N]."""
+        return Task(Load(self.kind, breakaway_force), self.others)
 
 
-class Scenes:
-    """Draws one scene after another into a live world.
+class SceneGenerator:
+    """Generates random scenes and places their objects in a simulated world.
 
     The objects are those with which a run of the cell could begin; the first one is picked. The bins are
     empty. A scene is not used if no cup can hold its object in the middle, or a goal is out of reach.
 
     Args:
         cell: The cell file.
-        planner: Knows the reach of the arm.
-        world: Where the objects are put; the arm must keep out of their way.
+        planner: Planner of the arm; it tells which goals can be reached.
+        world: World in which the objects are placed; the arm must keep out of their way.
         seed: Decides everything random.
     """
 
@@ -111,7 +111,7 @@ class Scenes:
             if not bodies:
                 continue
             try:
-                scene = self._describe(bodies)
+                scene = self._make_scene(bodies)
                 self._planner.require_reachable(scene.approach)
                 self._planner.require_reachable(scene.drop)
             except Unreachable:
@@ -122,20 +122,20 @@ class Scenes:
             "and placed; move its bins or its table nearer to the arm"
         )
 
-    def _describe(self, bodies: tuple[int, ...]) -> Scene:
+    def _make_scene(self, bodies: tuple[int, ...]) -> Scene:
         bin = self._bins[int(self._random.integers(len(self._bins)))]
         slot = int(self._random.integers(len(bin.slots)))
         first, motion = bodies[0], self._cell.motion
         kind = self._kind(first)
-        target, *others = (self._obstacle(body, number) for number, body in enumerate(bodies, start=1))
+        target, *others = (self._make_obstacle(body, number) for number, body in enumerate(bodies, start=1))
         centre = np.array([target.x, target.y, target.top - kind.height / 2])
         approach = onto(kind, centre, motion.descent, motion.descent_speed)
-        surface, bears = self._measure_seal(first, approach.position[:2], target.top)
+        surface, force = self._measure_seal(first, approach.position[:2], target.top)
         drop = over(bin, slot, kind.height, self._tallest)
-        return Scene(first, kind, surface + TOUCH, bears, target, tuple(others), approach, drop)
+        return Scene(first, kind, surface + TOUCH, force, target, tuple(others), approach, drop)
 
-    def _obstacle(self, body: int, number: int) -> Obstacle:
-        """Return an object as it stands, at the middle of its outline seen from above."""
+    def _make_obstacle(self, body: int, number: int) -> Obstacle:
+        """Return an object as an obstacle at the centre of the bounding box of its outline from above."""
         kind = self._kind(body)
         mesh = load_mesh(self._cell.objects[kind.label])
         corners = self._world.object_pose(body).apply(mesh.vertices)
@@ -148,19 +148,19 @@ class Scenes:
         return weighed(label, self._cell.objects[label])
 
     def _measure_seal(self, body: int, place: tuple[float, float], top: float) -> tuple[float, float]:
-        """Return the height of the object under a cup at `place` [m], and the pull a seal bears there [N].
+        """Return the surface height under a cup at `place` [m], and the breakaway force of a seal there [N].
 
         Raises:
             Unreachable: No seal forms there.
         """
         tool = self._cell.tool
-        surface, bears = top + tool.reach, 0.0
+        surface, force = top + tool.reach, 0.0
         # Twice: the distance found by the rays depends a little on where they start.
         for _ in range(2):
             X_WT = tool_down((*place, surface))
             seal = measure(self._world.client, X_WT, {body}, tool.cup_radius, tool.reach)
-            bears = breakaway(seal, tool)
+            force = breakaway(seal, tool)
             surface -= seal.distance if seal else 0.0
-        if bears < tool.least_force:
+        if force < tool.least_force:
             raise Unreachable(f"no seal holds the {self._world.bodies[body]} at its middle")
-        return surface, bears
+        return surface, force

@@ -176,19 +176,19 @@ def select_tests(data: CoverageData, root: Path, mutation: Mutation) -> list[str
     return sorted(tests, key=lambda test: package not in test)
 
 
-def detect(tree: Path, mutation: Mutation, tests: Sequence[str]) -> bool:
-    """Return True if the tests fail, or do not end, with the mutation applied to a copy of the repository."""
+def run_tests_on_mutant(working_copy: Path, mutation: Mutation, tests: Sequence[str]) -> bool:
+    """Apply the mutation to a copy of the repository, run the tests, and return True if they fail or hang."""
     if not tests:
         return False
-    path = tree / mutation.path
+    path = working_copy / mutation.path
     original = path.read_bytes()
     first, last = mutation.span
     path.write_bytes(original[:first] + mutation.new.encode() + original[last:])
     try:
         done = subprocess.run(
             [*PYTEST, "-x", *tests],
-            cwd=tree,
-            env={**os.environ, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"},
+            cwd=working_copy,
+            env={**os.environ, "PYTHONPATH": str(working_copy), "PYTHONDONTWRITEBYTECODE": "1"},
             capture_output=True,
             timeout=MUTANT_TIMEOUT,
         )
@@ -211,19 +211,19 @@ def main() -> None:
     data = _read_coverage(ROOT) if options.keep_coverage else measure_coverage(ROOT)
     mutations = draw_mutations(ROOT, options.seed, options.count)
     with tempfile.TemporaryDirectory() as folder:
-        trees: Queue[Path] = Queue()
+        working_copies: Queue[Path] = Queue()
         for number in range(options.workers):
-            tree = Path(folder) / str(number)
+            working_copy = Path(folder) / str(number)
             ignored = shutil.ignore_patterns(".git", ".venv", "runs", "__pycache__", ".*_cache", ".coverage")
-            shutil.copytree(ROOT, tree, ignore=ignored)
-            trees.put(tree)
+            shutil.copytree(ROOT, working_copy, ignore=ignored)
+            working_copies.put(working_copy)
 
         def is_detected(mutation: Mutation) -> bool:
-            tree = trees.get()
+            working_copy = working_copies.get()
             try:
-                return detect(tree, mutation, select_tests(data, ROOT, mutation))
+                return run_tests_on_mutant(working_copy, mutation, select_tests(data, ROOT, mutation))
             finally:
-                trees.put(tree)
+                working_copies.put(working_copy)
 
         with ThreadPoolExecutor(options.workers) as pool:
             detected = list(pool.map(is_detected, mutations))

@@ -1,4 +1,4 @@
-"""Command line, statistics and printing of all benchmarks.
+"""Command line and printed output of all benchmarks.
 
 A benchmark returns its figures as one plain dictionary. Values are printed one a line, lists of dictionaries
 as tables, and lists of sentences with their counts. The exit code is 1 if the list `problems` is not empty.
@@ -65,7 +65,10 @@ def run_command(measure: Callable[..., Figures], *options: Option) -> None:
 
 
 def run_mission_command(measure: Callable[..., Figures], *options: Option) -> None:
-    """Do the same as `run_command`; `measure` gets the mission as a `Subject` and then the other options."""
+    """Parse the command line of a benchmark of a mission, print its figures, and exit.
+
+    `measure` gets the mission as a `Subject`, then the other options.
+    """
 
     def measure_mission(
         mission: str, overrides: dict[str, str], oracle: bool, seed: int, **values: Any
@@ -98,7 +101,7 @@ def describe(subject: Subject) -> Figures:
 
 
 def show_progress(items: Iterable[T], description: str) -> Iterable[T]:
-    """Yield `items`, with a bar on stderr if a person can see it."""
+    """Yield `items`, with a progress bar if stderr is a terminal."""
     console = Console(stderr=True)
     return track(items, description, console=console, disable=not console.is_interactive)
 

@@ -18,16 +18,16 @@ from tests.benchmarks.report import Figures, describe, record_run, run_mission_c
 
 PROCESS = Path("/proc/self")
 """Folder in which Linux lists the resources of this process."""
-WARM_RUNS = 5
-"""Number of runs after which everything is loaded that a run loads."""
+WARM_UP_RUNS = 5
+"""Number of warm-up runs, after which a run loads nothing more."""
 MAX_GROWTH = 20.0
 """Limit of the growth of the memory over all runs [MB]; a thousand simulated runs may add 0.02 MB each."""
 MAX_OBJECTS_PER_RUN = 2.0
-"""Limit of the Python objects that a run leaves behind; its sample is one."""
+"""Limit of the Python objects that a run leaves behind, including its sample."""
 
 
 def measure(subject: Subject, runs: int = 100) -> Figures:
-    """Run MISSION many times in one process, each run with the next seed and recorded, and compare."""
+    """Record many runs of MISSION with consecutive seeds in one process, and compare its resources."""
     if not PROCESS.is_dir():
         raise InputError(f"resources of a process are read from {PROCESS}, which only Linux has; use Linux")
     samples: list[Figures] = []
@@ -55,7 +55,7 @@ def take_sample() -> Figures:
 
 def compare_samples(samples: Sequence[Figures], failed: Sequence[str] = ()) -> Figures:
     """Return how much the resources grew over the samples, and every limit that was exceeded."""
-    warm, last = samples[min(WARM_RUNS, len(samples)) - 1], samples[-1]
+    warm, last = samples[min(WARM_UP_RUNS, len(samples)) - 1], samples[-1]
     figures = {
         "growth_mb": len(samples) * _slope(samples, "memory_mb"),
         "objects_per_run": _slope(samples, "objects"),

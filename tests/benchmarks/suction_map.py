@@ -1,7 +1,7 @@
 """Map of the suction of cups of several sizes on each class of objects, at several offsets.
 
-The map justifies the constants in the `tool` section of a cell file. It is measured on the shapes with which
-the simulation collides. `suction_map.csv` is the map of the cell `overhead`.
+The map justifies the constants in the `tool` section of a cell file. It is measured on the collision shapes
+of the simulation. `suction_map.csv` is the map of the cell `overhead`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from executive.sim.seal import measure as measure_seal
 from executive.sim.world import World
 from tests.benchmarks.report import CELL_OPTIONS, Figures, run_command
 
-SHIPPED = Path(__file__).with_name("suction_map.csv")
+SHIPPED_MAP = Path(__file__).with_name("suction_map.csv")
 """File with the map of the cell `overhead`."""
 CUP_RADII = (0.004, 0.005, 0.006, 0.008, 0.010, 0.012)
 """Measured lip radii [m]."""
@@ -31,7 +31,7 @@ OFFSETS = (0.0, 0.002, 0.004, 0.006, 0.008, 0.010, 0.012)
 DIRECTIONS = 8
 """Number of directions of every offset."""
 YAWS = 12
-"""Number of yaws of every object; the box of the outline, at which a detection aims, turns with it."""
+"""Number of yaw angles of every object; the bounding box whose centre is the aim changes with the yaw."""
 SETTLE_STEPS = 120
 """Physics steps in which an object comes to rest."""
 
@@ -51,14 +51,14 @@ def measure_map(
 ) -> list[Figures]:
     """Return a row for every object class, cup radius and offset.
 
-    Cups of other sizes than that of the cell's tool have its vacuum (force over lip area) and its tolerances.
+    Cups of all sizes have the vacuum (force per lip area) and the tolerances of the cell's tool.
     """
     rows = []
     world = World(cell)
     try:
         for label in cell.objects:
             places = {offset: list(_find_places(cell, label, offset)) for offset in offsets}
-            body = world.add_object(label, _place_on_table(cell, label), (1.0, 1.0, 1.0))
+            body = world.add_object(label, _pose_on_table(cell, label), (1.0, 1.0, 1.0))
             for _ in range(SETTLE_STEPS):
                 world.step()
             for radius in cup_radii:
@@ -81,7 +81,7 @@ def write_map(rows: Sequence[Figures], path: Path) -> None:
         writer.writerows(rows)
 
 
-def read_map(path: Path = SHIPPED) -> list[Figures]:
+def read_map(path: Path = SHIPPED_MAP) -> list[Figures]:
     """Return the rows of a file that `write_map` wrote."""
     with path.open(newline="") as file:
         return [
@@ -90,14 +90,14 @@ def read_map(path: Path = SHIPPED) -> list[Figures]:
         ]
 
 
-def _place_on_table(cell: CellConfig, label: str) -> Pose:
+def _pose_on_table(cell: CellConfig, label: str) -> Pose:
     """Return `X_WO` of an object standing in the middle of the table."""
     x, y = (sum(side) / 2 for side in (cell.table.x, cell.table.y))
     return Pose(np.eye(3), np.array([x, y, -load_mesh(cell.objects[label]).bottom]))
 
 
 def _find_places(cell: CellConfig, label: str, offset: float) -> Iterator[Array]:
-    """Yield cup positions `(2,)` [m] in the object's frame: turning the object is turning the aim.
+    """Yield cup positions `(2,)` [m] in the object's frame, for every yaw and direction.
 
     An object with a ring is touched on the ring, in the direction of the offset.
     """
@@ -139,7 +139,7 @@ def _measure_places(world: World, body: int, tool: ToolConfig, places: Iterable[
 
 
 def _quantiles(name: str, values: Sequence[float], digits: int) -> Figures:
-    """Return quantiles that are themselves values: infinity has no mean."""
+    """Return quantiles without interpolation, which fails next to infinite values."""
     low, median, high = np.quantile(values, [0.1, 0.5, 0.9], method="lower").tolist()
     return {
         f"{name}_p10": round(low, digits),

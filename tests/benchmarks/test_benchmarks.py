@@ -26,7 +26,7 @@ from executive.motion.stop import brake
 from executive.motion.trajectory import Trajectory
 from executive.testing.fake_cell import FakeCell
 from tests.benchmarks import halts, journal, kills, report, soak, suction_map, tick
-from tests.benchmarks.forks import Forks
+from tests.benchmarks.forks import ForkRunner
 
 FAKE = {"cell.kind": "fake", "cell.table.objects": "[2, 2]"}
 CHILD = os.getpid()
@@ -60,7 +60,7 @@ def limits(cell: CellConfig) -> JointLimits:
     ],
 )
 def test_every_end_of_a_child_is_reported(function: Any, answer: tuple[Any, str]) -> None:
-    assert Forks(1.0).call(function) == answer
+    assert ForkRunner(1.0).call(function) == answer
 
 
 def test_figures_are_a_table_or_json_and_problems_an_exit_code(
@@ -117,7 +117,7 @@ class TestHalts:
         assert figures["moving"] >= 20
         worst = {row["largest"]: row["value"] for row in figures["worst"]}
         # A figure of zero would not be measured.
-        assert worst["rest_s"] > 0.1 and worst["jerk_share"] > 0.5 and worst["deviation_rad"] > 0.0
+        assert worst["rest_s"] > 0.1 and worst["jerk_ratio"] > 0.5 and worst["deviation_rad"] > 0.0
 
     def test_braking_is_measured(self, limits: JointLimits) -> None:
         path = Trajectory([Connector(limits).connect(State.rest(START), State.rest(START + 0.8))])
@@ -127,12 +127,12 @@ class TestHalts:
         commands = [path.at(time).q for time in (*times, *[times[-1]] * 4)]
         good = halts.measure_braking(commands, stopped, path, limits)
         assert good["deviation_rad"] < 1e-7
-        assert 0.5 < good["acceleration_share"] <= 1.0 and 0.5 < good["jerk_share"] <= 1.02
+        assert 0.5 < good["acceleration_ratio"] <= 1.0 and 0.5 < good["jerk_ratio"] <= 1.02
         astray = [*commands]
         astray[stopped + 5] = commands[stopped + 5] + np.eye(7)[2] * 1e-3
         assert halts.measure_braking(astray, stopped, path, limits)["deviation_rad"] > 8e-4
         dead = [*commands[: stopped + 1], *[commands[stopped]] * 10]
-        assert halts.measure_braking(dead, stopped, path, limits)["jerk_share"] > 50.0
+        assert halts.measure_braking(dead, stopped, path, limits)["jerk_ratio"] > 50.0
 
     @pytest.mark.parametrize(
         ("wrong", "count"),
@@ -220,7 +220,7 @@ def test_every_event_of_the_journal_is_measured(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("status", [Status.RUNNING, Status.SUCCESS])
 def test_both_sides_tick_equal_trees(status: Status) -> None:
-    skill = tick._Waits if status is Status.RUNNING else tick._Ends
+    skill = tick._WaitForever if status is Status.RUNNING else tick._SucceedAtOnce
     trees = tick.build_ours(31, skill), tick.build_bare(31, status)
     for _ in range(2):
         for tree in trees:

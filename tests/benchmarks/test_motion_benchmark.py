@@ -1,4 +1,4 @@
-"""The benchmark of motion: its scenes, its gauge, its rivals, and a pair of each kind."""
+"""The benchmark of motion: its scenes, its monitor, its baselines, and a pair of each kind."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from executive.motion.postures import find_postures
 from executive.motion.trajectory import peaks
 from executive.sim.world import World
 from tests.benchmarks import motion
-from tests.benchmarks import motion_rivals as rivals
-from tests.benchmarks.motion_execution import Gauge
+from tests.benchmarks import motion_baselines as baselines
+from tests.benchmarks.motion_execution import ClearanceMonitor
 from tests.motion.joint_states import reach
 
 PLACE = (0.5, 0.0)
@@ -37,15 +37,15 @@ def kinematics(cell: CellConfig) -> Kinematics:
 def test_only_what_must_not_be_touched_counts(cell: CellConfig, kinematics: Kinematics) -> None:
     world = World(cell, visuals=False)
     cube, _ = (world.add_object("cube", Pose.of([x, 0.0, 0.025]), (1, 1, 1)) for x in (0.5, 0.62))
-    gauge = Gauge(world, cell.motion.margin)
+    monitor = ClearanceMonitor(world, cell.motion.margin)
 
     def move(held: int | None, touched: int | None, start: float, x: float, z: float) -> tuple[str, float]:
-        for place, act in (((0.5, 0.0, start), gauge.begin), ((x, 0.0, z), gauge.measure)):
+        for place, act in (((0.5, 0.0, start), monitor.begin), ((x, 0.0, z), monitor.measure)):
             world.set_arm(reach(kinematics, place, np.zeros(7)))
             if held is not None:
                 world.place_object(held, Pose.of([place[0], 0.0, place[2] - 0.025]))
-            act(*((held, touched) if act == gauge.begin else (held,)))
-        return gauge.nearest, gauge.least
+            act(*((held, touched) if act == monitor.begin else (held,)))
+        return monitor.nearest, monitor.min_distance
 
     assert move(None, cube, 0.2, 0.5, 0.054)[0] != "the tool - a cube"
     assert move(None, None, 0.054, 0.5, 0.054)[0] != "the tool - a cube"
@@ -54,23 +54,23 @@ def test_only_what_must_not_be_touched_counts(cell: CellConfig, kinematics: Kine
     world.close()
 
 
-def test_the_rivals_are_in_order_and_pass_the_corners(cell: CellConfig) -> None:
+def test_the_methods_are_in_order_and_pass_the_waypoints(cell: CellConfig) -> None:
     planner = Planner(cell)
     arm, limits = planner.kinematics, planner.limits
     touch, drop = Goal((0.5, 0.1, 0.051)), Goal((0.24, -0.48, 0.065))
     start = find_postures(arm, Goal((0.24, 0.48, 0.065)), 0.1, np.zeros(7)).low[0]
     height = travel_height(cell)
-    chains = rivals.find_chains(arm, limits, start, touch, drop, height)
+    chains = baselines.find_waypoints(arm, limits, start, touch, drop, height)
     tips, _ = arm.tips(np.concatenate(chains))
     high_object, high_bin = (0.5, 0.1, height), (0.24, -0.48, height)
     fetch = [(0.24, 0.48, 0.065), (0.24, 0.48, height), high_object, touch.position]
     assert tips == pytest.approx(np.array([*fetch, touch.position, high_object, high_bin, drop.position]))
     stopping, passing = (
         [follow(chain, limits) for chain in chains]
-        for follow in (rivals.stop_at_corners, rivals.follow_with_toppra)
+        for follow in (baselines.plan_with_stops, baselines.plan_with_toppra)
     )
-    floor, states = rivals.find_floor(arm, limits, start, touch, drop)
-    assert 0.5 < floor < passing[0][0] + passing[1][0] < stopping[0][0] + stopping[1][0] < 6.5
+    bound, states = baselines.find_lower_bound(arm, limits, start, touch, drop)
+    assert 0.5 < bound < passing[0][0] + passing[1][0] < stopping[0][0] + stopping[1][0] < 6.5
     assert arm.forward(states[1].q[-1]).position == pytest.approx(drop.position, abs=1e-6)
     assert peaks(stopping[0][1], limits).max() == pytest.approx(1.0, abs=1e-3)
     assert peaks(passing[0][1], limits)[2].max() > 5.0
@@ -83,7 +83,7 @@ def test_planned_and_executed_pairs_have_plausible_figures(cell: CellConfig) -> 
     figures = motion.measure(cell, seed=5, pairs=2)
     assert (figures["planned_pairs"], figures["problems"]) == (2, [])
     times = {row["method"]: row["time_s"] for row in figures["methods"]}
-    assert times["floor"] < times["ours"] < times["stops at corners"]
+    assert times["lower bound"] < times["ours"] < times["stops at waypoints"]
     figures = motion.measure(cell, seed=5, pairs=2, execute=True)
     assert (figures["executed_pairs"], figures["problems"]) == (2, [])
     assert figures["clearance_mm"] > 4.9 and 0 < figures["slip_mm"] < 1

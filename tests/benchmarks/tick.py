@@ -2,8 +2,8 @@
 
 Both trees are ticked in turns, in short blocks without garbage collection, and the best block of each counts.
 Other load can only make a block slower, so the best block is the cost of the code itself; the turns keep a
-change of the processor's frequency from favouring either. Times are those of the thread, which stand still
-while another process has the processor.
+change of the processor's frequency from favouring either. Times are the CPU times of the thread, which do
+not count other processes.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from tests.benchmarks.report import Figures, run_command
 SIZES = (10, 100, 1000)
 """Numbers of nodes of the measured trees, control nodes and leaves together."""
 MAX_RATIO = 1.3
-"""Limit of the cost of a steady tick over that of bare py_trees."""
+"""Limit of the cost of a steady tick, divided by that of bare py_trees."""
 MAX_EXTRA = 20.0
 """Limit of the cost of a recorded status change above that of bare py_trees [µs]."""
 STEADY_TICKS = 300
@@ -52,7 +52,7 @@ TIMEOUT = 1e9
 
 
 def measure(blocks: int = 50, sizes: Sequence[int] = SIZES) -> Figures:
-    """Measure ticks and status changes; each figure is the best of so many blocks."""
+    """Measure ticks and status changes; each figure is that of the fastest of `--blocks` blocks."""
     ticks = [measure_ticks(nodes, blocks) for nodes in sizes]
     with tempfile.TemporaryDirectory() as folder:
         changes = [measure_changes(nodes, blocks, Path(folder, str(nodes))) for nodes in sizes]
@@ -68,7 +68,7 @@ def measure(blocks: int = 50, sizes: Sequence[int] = SIZES) -> Figures:
 
 def measure_ticks(nodes: int, blocks: int) -> Figures:
     """Return the cost of a tick of a tree that waits for its last leaf."""
-    ours, bare = build_ours(nodes, _Waits), build_bare(nodes, Status.RUNNING)
+    ours, bare = build_ours(nodes, _WaitForever), build_bare(nodes, Status.RUNNING)
     # The first tick runs the leaves that end.
     ours.tick_once()
     bare.tick_once()
@@ -79,17 +79,17 @@ def measure_ticks(nodes: int, blocks: int) -> Figures:
 def measure_changes(nodes: int, blocks: int, folder: Path) -> Figures:
     """Return the cost of a tick in which every node begins and succeeds, recorded as a run is."""
     events: list[Event] = []
-    build_ours(nodes, _Ends, events.append).tick_once()
+    build_ours(nodes, _SucceedAtOnce, events.append).tick_once()
     folder.mkdir()
     with closing(Recorder(RunDirectory(folder), frames=False)) as recorder:
-        ours, bare = build_ours(nodes, _Ends, recorder), build_bare(nodes, Status.SUCCESS)
+        ours, bare = build_ours(nodes, _SucceedAtOnce, recorder), build_bare(nodes, Status.SUCCESS)
         ours_us, bare_us = find_best_costs(ours, bare, blocks, max(1, ENDING_NODES // nodes))
     row = {"changes": len(events), "nodes": nodes, "ours_us": ours_us, "py_trees_us": bare_us}
     return {**row, "extra_us": (ours_us - bare_us) / len(events)}
 
 
 def find_best_costs(ours: Behaviour, bare: Behaviour, blocks: int, ticks: int) -> tuple[float, float]:
-    """Return the cost of a tick of each tree in its best block of so many ticks [µs]."""
+    """Return for each tree the cost of a tick in its fastest block [µs]; a block has `ticks` ticks."""
     best_ours = best_bare = math.inf
     gc.collect()
     gc.disable()
@@ -109,8 +109,8 @@ def _measure_cost(root: Behaviour, ticks: int) -> float:
     return (time.thread_time() - began) / ticks * 1e6
 
 
-def build_ours(nodes: int, last: type[Skill], *observers: Observer) -> Behaviour:
-    """Return a retry of a timeout of a sequence on a fake cell, whose last leaf runs the skill `last`.
+def build_ours(nodes: int, last_skill: type[Skill], *observers: Observer) -> Behaviour:
+    """Return a retry of a timeout of a sequence on a fake cell, whose last leaf runs `last_skill`.
 
     All other leaves succeed at once. Events are stamped and passed on as a run does it.
     """
@@ -124,45 +124,49 @@ def build_ours(nodes: int, last: type[Skill], *observers: Observer) -> Behaviour
     def make_site(name: str) -> Site:
         return Site(f"tree/repeat/do/{next(number)}:{name}", emit=emit)
 
-    skills = [*[_Ends] * (nodes - 4), last]
+    skills = [*[_SucceedAtOnce] * (nodes - 4), last_skill]
     leaves = [SkillNode(make_site(skill.__name__), "leaf", skill, Wiring(), cell, scope) for skill in skills]
     timeout = Timeout(make_site("timeout"), SequenceNode(make_site("do"), leaves), TIMEOUT, cell.clock)
     return Retry(make_site("retry"), timeout, 3)
 
 
-def build_bare(nodes: int, last: Status) -> Behaviour:
-    """Return the same nodes of py_trees."""
-    leaves = [_Answer(status) for status in (*[Status.SUCCESS] * (nodes - 4), last)]
+def build_bare(nodes: int, last_status: Status) -> Behaviour:
+    """Return a py_trees tree with the structure of `build_ours`; its last leaf returns `last_status`."""
+    leaves = [_ConstantStatus(status) for status in (*[Status.SUCCESS] * (nodes - 4), last_status)]
     body = composites.Sequence("do", memory=True, children=leaves)
     return decorators.Retry("retry", decorators.Timeout("timeout", body, TIMEOUT), 3)
 
 
-class _Ends(Skill):
+class _SucceedAtOnce(Skill):
     def run(self, cell: Cell) -> Iterator[None]:
         del cell
         yield from ()
 
 
-class _Waits(Skill):
+class _WaitForever(Skill):
     def run(self, cell: Cell) -> Iterator[None]:
         del cell
         while True:
             yield
 
 
-class _Answer(Behaviour):
-    def __init__(self, answer: Status) -> None:
-        super().__init__(answer.value)
-        self._answer = answer
+class _ConstantStatus(Behaviour):
+    def __init__(self, status: Status) -> None:
+        super().__init__(status.value)
+        self._status = status
 
     def update(self) -> Status:
-        return self._answer
+        return self._status
 
 
 if __name__ == "__main__":
     run_command(
         measure,
         click.option(
-            "--blocks", type=click.IntRange(min=1), default=50, show_default=True, help="Blocks of a figure."
+            "--blocks",
+            type=click.IntRange(min=1),
+            default=50,
+            show_default=True,
+            help="Number of blocks per figure; the fastest counts.",
         ),
     )

@@ -1,7 +1,8 @@
-"""Other ways to move between the same places as the planner.
+"""Other methods to move between the same positions as the planner, and a lower bound of the duration.
 
-Two are from the textbook: over every place first, at the cell's travel height, and straight down. One stops
-at every corner, the other passes with TOPP-RA. The floor is faster than any way: straight through everything.
+Two methods follow the path of textbooks: up to the cell's travel height, across, and straight down. One stops
+at every waypoint; the other follows a spline through the waypoints, timed by TOPP-RA. The lower bound ignores
+all obstacles, so that no motion without collisions is faster.
 """
 
 from __future__ import annotations
@@ -25,30 +26,30 @@ from executive.motion.state import State
 from executive.motion.trajectory import Trajectory
 from tests.motion.joint_states import reach
 
-Ride = tuple[float, list[State]]
-"""Time of the two motions of a pair [s], without a dwell, and the joints' states every 1/240 s of each."""
+PairMotion = tuple[float, list[State]]
+"""Total duration of the two motions of a pair [s], and the joint states of each motion every 1/240 s."""
 
 
-Chains = tuple[Array, Array]
-"""Corners of the textbook's way, joint positions `(4, 7)` [rad]: where the arm stands, above that, above the
-object, on it; then on the object, above it, above the place in the bin, there."""
+WaypointPair = tuple[Array, Array]
+"""Waypoints of the textbook path, joint positions `(4, 7)` [rad]: at the start, above the start, above the
+object and at the object; then at the object, above the object, above the bin slot and at the bin slot."""
 
 
-def find_chains(
+def find_waypoints(
     kinematics: Kinematics, limits: JointLimits, start: Array, touch: Goal, drop: Goal, height: float
-) -> Chains:
-    """Return the chains through `height` [m] whose stops at every corner take the least time.
+) -> WaypointPair:
+    """Return the waypoints at travel height `height` [m] with which motions with stops take the least time.
 
     Args:
-        kinematics: The arm's.
-        limits: The limits of its joints.
-        start: Joint positions where it stands `(7,)` [rad].
-        touch: The tool on the object.
-        drop: The tool where it lets go.
-        height: Height of the tool above every place [m].
+        kinematics: Kinematics of the arm.
+        limits: Joint limits of the arm.
+        start: Joint positions of the arm at the start `(7,)` [rad].
+        touch: Goal at which the tool touches the object.
+        drop: Goal at which the tool releases the object.
+        height: Travel height of the tool in the world frame [m].
 
     Raises:
-        Unreachable: A corner is out of reach.
+        Unreachable: A waypoint is out of reach.
     """
     x, y, z = kinematics.forward(start).position.tolist()
     line = upright_line(kinematics, start, max(0.0, height - z), 2)
@@ -65,24 +66,24 @@ def find_chains(
     )
 
 
-def stop_at_corners(chain: Array, limits: JointLimits) -> tuple[float, State]:
-    """Return the time [s] and the states of the motion that rests at every corner of a chain (ruckig)."""
+def plan_with_stops(waypoints: Array, limits: JointLimits) -> tuple[float, State]:
+    """Return the time [s] and the states of the motion that rests at every waypoint (ruckig)."""
     connector = Connector(limits)
-    motion = Trajectory([connector.connect(State.rest(a), State.rest(b)) for a, b in pairwise(chain)])
+    motion = Trajectory([connector.connect(State.rest(a), State.rest(b)) for a, b in pairwise(waypoints)])
     return motion.duration, motion.samples
 
 
-def follow_with_toppra(chain: Array, limits: JointLimits) -> tuple[float, State]:
-    """Return the fastest time [s] along a spline through a chain, and the states.
+def plan_with_toppra(waypoints: Array, limits: JointLimits) -> tuple[float, State]:
+    """Return the least time [s] along a spline through waypoints, and the states.
 
-    The path is a natural cubic spline by its length in joint space, which of the usual parameters gives the
-    shortest times. TOPP-RA (Pham & Pham, IEEE T-RO 34 (2018), 645-659) follows it at the limits of velocity
+    The parameter of the natural cubic spline is the chord length in joint space, the usual parameter with the
+    least times. TOPP-RA (Pham & Pham, IEEE T-RO 34 (2018), 645-659) follows it at the limits of velocity
     and acceleration; without a limit of jerk, no arm can follow it exactly.
     """
-    lengths = np.linalg.norm(np.diff(chain, axis=0), axis=1)
-    # A spline cannot take two equal corners at the same length.
+    lengths = np.linalg.norm(np.diff(waypoints, axis=0), axis=1)
+    # The parameter must increase strictly, even between two equal waypoints.
     path = SplineInterpolator(
-        np.concatenate([[0.0], np.cumsum(np.maximum(lengths, 1e-6))]), chain, bc_type="natural"
+        np.concatenate([[0.0], np.cumsum(np.maximum(lengths, 1e-6))]), waypoints, bc_type="natural"
     )
     bounds = [
         JointVelocityConstraint(np.stack([-limits.velocity, limits.velocity], axis=1)),
@@ -93,17 +94,19 @@ def follow_with_toppra(chain: Array, limits: JointLimits) -> tuple[float, State]
     return float(motion.duration), State(motion(times), motion(times, 1), motion(times, 2))
 
 
-def find_floor(kinematics: Kinematics, limits: JointLimits, start: Array, touch: Goal, drop: Goal) -> Ride:
-    """Return the fastest ride through everything.
+def find_lower_bound(
+    kinematics: Kinematics, limits: JointLimits, start: Array, touch: Goal, drop: Goal
+) -> PairMotion:
+    """Return the fastest motions if all obstacles are ignored.
 
-    Each of the two motions is from rest to rest, without a corner. Joint 7 is free at both ends; branch and
-    swivel are those of the shortest sum.
+    Each of the two motions is from rest to rest, without a waypoint. Joint 7 is free at both ends; IK branch
+    and swivel are those with the least total time.
     """
     touching, dropping = (find_postures(kinematics, goal, 0.0, start).low for goal in (touch, drop))
     there = rest_to_rest(touching - start, limits)
     back = rest_to_rest(touching[:, None] - dropping, limits)
     i, j = np.unravel_index(np.argmin(there[:, None] + back), back.shape)
     motions = [
-        stop_at_corners(np.array(ends), limits) for ends in pairwise((start, touching[i], dropping[j]))
+        plan_with_stops(np.array(ends), limits) for ends in pairwise((start, touching[i], dropping[j]))
     ]
     return sum(duration for duration, _ in motions), [states for _, states in motions]
