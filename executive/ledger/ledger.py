@@ -174,11 +174,11 @@ class ItemLedger:
     def rejected(self, item: Item, why: str) -> None:
         """Record that the item is given up; it is reported and not tried again.
 
-        One that was dropped is sought on, so that the books end with where it is.
+        A held item stays in the tool until it is released, and a dropped item is sought until the run ends.
         """
         record = self._record(item)
         record.why = why
-        self._change(item, State.DROPPED if record.state is State.DROPPED else State.REJECTED)
+        self._change(item, record.state if record.state in (State.HELD, State.DROPPED) else State.REJECTED)
 
     def label(self, item: Item) -> str:
         """Return the class the item is believed to be of."""

@@ -91,13 +91,19 @@ class FakeWorld:
         self.removed.append(thing)
 
     def roll_off(self, thing: FakeObject) -> None:
-        """Move what fell on another object off it, so that they touch at most: one after another, once.
+        """Move a fallen object off the wall of a bin, into this bin, or off other objects on the table.
 
-        What fell into a bin stays there.
+        It is moved off each of the other objects once. An object inside a bin stays where it is.
         """
-        if any(bin.contains(thing.position, BIN_THICKNESS) for bin in self.bins):
-            return
         radius = self.classes[thing.label].radius
+        if any(bin.contains(thing.position) for bin in self.bins):
+            return
+        for bin in self.bins:
+            if bin.contains(thing.position, BIN_THICKNESS + radius / 2):
+                inside = bin.size[:2] / 2 - radius
+                offset = thing.position[:2] - bin.position[:2]
+                thing.position[:2] = bin.position[:2] + np.clip(offset, -inside, inside)
+                return
         for other in self.objects:
             apart = radius + self.classes[other.label].radius
             way = thing.position[:2] - other.position[:2]

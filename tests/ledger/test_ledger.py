@@ -113,6 +113,15 @@ def test_what_looks_agree_on_decides_what_becomes_of_an_item(
     assert bench.ledger.balance() == {"seen": int(final != PHANTOM), **counts}
 
 
+def test_an_item_that_is_given_up_in_the_tool_stays_there_until_it_is_released(bench: Bench) -> None:
+    bench.look(CUBE)
+    bench.ledger.held("cube-1")
+    bench.ledger.rejected("cube-1", "slippery")
+    assert bench.ledger.in_tool() == "cube-1"
+    bench.ledger.placed("cube-1", "red_bin")
+    assert bench.end() == {"cube-1": ("placed", "red_bin")}
+
+
 def test_every_change_is_reported_and_the_accounts_balance(bench: Bench) -> None:
     for _ in range(2):
         bench.look(CUBE, ("cube", 0.6, 0.1), ("duck", 0.45, -0.2))

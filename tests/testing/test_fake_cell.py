@@ -173,3 +173,14 @@ def test_what_fell_between_two_bins_is_in_the_nearer(load: Load, x: float, what:
     cell = FakeCell(load("fruit", table__objects="[0, 0]"), routes={"banana": ("premium_crate",)})
     cell.world.put("banana", x, 0.4).fell = True
     assert {count: n for count, n in cell.audit().items() if count != "unseen" and n} == {what: 1}
+
+
+def test_what_falls_on_the_wall_of_a_bin_falls_into_the_bin(load: Load) -> None:
+    cell = FakeCell(load(table__objects="[0, 0]"))
+    bin = cell.cell.bins["red_bin"]
+    wall = bin.position[1] + bin.size[1] / 2 + 0.01
+    cube = cell.world.put("cube", float(bin.position[0]), float(wall))
+    cell.world.held = cube
+    cell.tool.part()
+    radius = cell.cell.classes["cube"].radius
+    assert np.allclose(cube.position[:2], (bin.position[0], wall - 0.01 - radius))
