@@ -33,13 +33,13 @@ class SkillRun:
 
         Raises:
             SkillFailed: It failed with a declared reason.
-            Fault: It failed with an undeclared reason, yielded something, or left an output unset.
+            Fault: It failed with an undeclared reason, yielded a value, or left an output unset.
         """
         try:
             if self._steps is None:
                 # A `run` without any yield is a plain function: it has done its work already.
                 self._steps = iter(self.skill.run(self._cell) or ())
-            # `self` stands for the end of the generator: a skill cannot yield its own `SkillRun`.
+            # `self` is the sentinel for the end of the generator: a skill cannot yield its own `SkillRun`.
             yielded = next(self._steps, self)
         except SkillFailed as failed:
             if failed.reason in self.skill.reasons:

@@ -59,7 +59,7 @@ class Finding(NamedTuple):
 def command(ctx: click.Context, as_json: bool) -> None:
     """Check Python, packages, registered skills and cells, renderer, display and Roboflow's server.
 
-    Exit code 1 if there is a problem. A note is about something that no part of the project needs.
+    Exit code 1 if there is a problem. A note is about an optional feature that cannot be used.
     """
     with stdout_kept_clean():
         findings = list(examine())
@@ -134,7 +134,7 @@ def check_packages() -> Iterator[Finding]:
 
 
 def check_plugins() -> Iterator[Finding]:
-    """Load every installed skill, kind of cell and kind of detector, and yield their numbers."""
+    """Load every installed skill, kind of cell and kind of detector, and yield how many there are."""
     from executive.discovery import discover
     from executive.entry_points import registered
     from executive.project import project_here
@@ -151,14 +151,14 @@ def check_plugins() -> Iterator[Finding]:
 
 def check_renderer() -> Iterator[Finding]:
     """Yield the time TinyRenderer needs for a frame, and whether PyBullet's EGL plugin draws."""
-    time, problem = time_in_subprocess("tiny")
+    time, problem = measure_frame_time("tiny")
     if problem:
         fix = "run `uv sync --reinstall-package pybullet`"
         yield Finding("problem", "renderer", f"TinyRenderer draws nothing: {problem}", fix)
     else:
         message = f"TinyRenderer, on the CPU: {time:.0f} ms for 640x480 of the overhead cell"
         yield Finding("ok", "renderer", message)
-    _, problem = time_in_subprocess("egl")
+    _, problem = measure_frame_time("egl")
     state = f"draws nothing: {problem}" if problem else "can be loaded and draws"
     status = "note" if problem else "ok"
     yield Finding(status, "egl", f"PyBullet's EGL plugin {state}; no cell needs it")
@@ -181,7 +181,7 @@ def check_roboflow() -> Iterator[Finding]:
         yield Finding("note", "roboflow", message, fix)
 
 
-def time_in_subprocess(renderer: str) -> tuple[float, str]:
+def measure_frame_time(renderer: str) -> tuple[float, str]:
     """Draw with `tiny` or `egl` in a subprocess; return milliseconds per frame and an error message or ""."""
     command_line = program("executive.cli.doctor", renderer)
     try:

@@ -9,7 +9,7 @@ from executive.cell import Cell
 from executive.events import Event, Observer
 from executive.runtime.planning_ahead import PlanningAhead
 from executive.tape.past import Past
-from executive.tape.recorded_cell import connect_tape
+from executive.tape.recorded_cell import cell_on_tape
 from executive.tape.tape import Tape
 from executive.workcell import Workcell
 
@@ -46,7 +46,7 @@ class Plant:
         self.workcell = workcell
         step = clock.step if past is None else past.step
         self.tape = Tape(self.emit, step, lambda: clock.now, past)
-        self.cell = connect_tape(workcell.cell, self.tape, self.emit)
+        self.cell = cell_on_tape(workcell.cell, self.tape, self.emit)
         self._planning_ahead = PlanningAhead(workcell.cell)
         self.observe(self._planning_ahead.observe)
         self._connected = True

@@ -1,4 +1,4 @@
-"""Cell that the tree of a run uses: its tape records each input from the real cell, or replays inputs."""
+"""Cell that the tree of a run uses: the answers of the real cell are recorded, or replayed from a record."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from executive.tape.codec import ANSWER, ARRAY, BOX, FRAME, MOTION, PLAIN, POSE,
 from executive.tape.tape import Tape
 
 
-class RecordedInput(NamedTuple):
-    """Form of one kind of input in the record.
+class InputFormat(NamedTuple):
+    """Name and codec of one kind of recorded input.
 
     Attributes:
         name: Name of the input in the record; `{detector}` stands for the name of the detector, `{0}` for
@@ -27,30 +27,30 @@ class RecordedInput(NamedTuple):
     codec: Codec = PLAIN
 
 
-RECORDED_INPUTS: Mapping[str, RecordedInput] = {
-    "arm.q": RecordedInput("arm.q", ARRAY),
-    "arm.tool_pose": RecordedInput("arm.tool_pose", POSE),
-    "arm.tool_velocity": RecordedInput("arm.tool_velocity", ARRAY),
-    "arm.destination": RecordedInput("arm.destination", ARRAY),
-    "arm.at_rest": RecordedInput("arm.at_rest"),
-    "arm.met": RecordedInput("arm.met"),
-    "plan.ready": RecordedInput("plan.ready"),
-    "plan.result": RecordedInput("plan", MOTION),
-    "tool.touching": RecordedInput("tool.touching"),
-    "tool.holding": RecordedInput("tool.holding"),
-    "tool.bears": RecordedInput("tool.bears"),
-    "camera.name": RecordedInput("camera.name"),
-    "camera.scan_poses": RecordedInput("camera.scan_poses", TEXTS),
-    "camera.next_pose": RecordedInput("camera.next_pose"),
-    "camera.area": RecordedInput("camera.area.{0}", BOX),
-    "camera.sees_table": RecordedInput("camera.sees_table"),
-    "camera.capture": RecordedInput("camera.frame", FRAME),
-    "request.ready": RecordedInput("detector.{detector}.ready"),
-    "request.result": RecordedInput("detector.{detector}", ANSWER),
-    "operator.ask": RecordedInput("operator"),
-    "localizer.locate": RecordedInput("localizer", ARRAY),
+INPUT_FORMATS: Mapping[str, InputFormat] = {
+    "arm.q": InputFormat("arm.q", ARRAY),
+    "arm.tool_pose": InputFormat("arm.tool_pose", POSE),
+    "arm.tool_velocity": InputFormat("arm.tool_velocity", ARRAY),
+    "arm.destination": InputFormat("arm.destination", ARRAY),
+    "arm.at_rest": InputFormat("arm.at_rest"),
+    "arm.met": InputFormat("arm.met"),
+    "plan.ready": InputFormat("plan.ready"),
+    "plan.result": InputFormat("plan", MOTION),
+    "tool.touching": InputFormat("tool.touching"),
+    "tool.holding": InputFormat("tool.holding"),
+    "tool.bears": InputFormat("tool.bears"),
+    "camera.name": InputFormat("camera.name"),
+    "camera.scan_poses": InputFormat("camera.scan_poses", TEXTS),
+    "camera.next_pose": InputFormat("camera.next_pose"),
+    "camera.area": InputFormat("camera.area.{0}", BOX),
+    "camera.sees_table": InputFormat("camera.sees_table"),
+    "camera.capture": InputFormat("camera.frame", FRAME),
+    "request.ready": InputFormat("detector.{detector}.ready"),
+    "request.result": InputFormat("detector.{detector}", ANSWER),
+    "operator.ask": InputFormat("operator"),
+    "localizer.locate": InputFormat("localizer", ARRAY),
 }
-"""Form of the recorded input of every access that has one."""
+"""Name and codec of the recorded input of each access that is not a command, by `Access.name`."""
 
 COMMANDS = frozenset(
     {"arm.plan", "arm.plan_ahead", "arm.start", "arm.stop", "tool.close", "tool.open", "detector.request"}
@@ -61,7 +61,7 @@ RECORDED_ROLES = ("arm", "tool", "camera", "detector", "operator", "localizer")
 """Roles whose answers are recorded. A replay builds its own ledger, and reads the cell file for the rest."""
 
 
-def connect_tape(cell: Cell, tape: Tape, emit: Emit) -> Cell:
+def cell_on_tape(cell: Cell, tape: Tape, emit: Emit) -> Cell:
     """Return a copy of the cell that uses the tape's clock, and whose answers the tape records or replays.
 
     Each action of the tool is emitted as an `intent` before the action.
@@ -72,7 +72,7 @@ def connect_tape(cell: Cell, tape: Tape, emit: Emit) -> Cell:
             if access.role == "tool":
                 emit("intent", action=access.member)
             return tape.command(access.proceed)
-        name, codec = RECORDED_INPUTS[access.name]
+        name, codec = INPUT_FORMATS[access.name]
         if "{" in name:
             name = name.format(*access.all_arguments, detector=access.detector)
         return tape.sense(name, access.proceed, codec)

@@ -43,7 +43,7 @@ class CellWrapper:
 
     @property
     def accounts(self) -> Accounts:
-        """The ledger, which the run closes at its end and whose counts and rows it then reads."""
+        """The ledger; at its end, the run closes the ledger and reads its counts and rows."""
         return self.inner.accounts
 
     @property

@@ -30,7 +30,7 @@ class ForkRunner:
         return self._pipe is not None
 
     def fork_and_wait(self) -> tuple[Any, str] | None:
-        """Return None in a new child; in the parent wait for the child, and return its result or the reason.
+        """Return None in a new child; in the parent, wait and return the child's result and a problem or "".
 
         A child must call `send_and_exit` in any case, or it continues as if it were its parent.
         """

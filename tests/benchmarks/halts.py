@@ -46,14 +46,14 @@ CHILD_TIMEOUT = 120.0
 """Time that a child may take to halt and be checked [s]."""
 
 
-def measure(subject: Subject, every: int | None = None) -> Figures:
+def measure(subject: Subject, period_steps: int | None = None) -> Figures:
     """Halt MISSION at moments all over one run, each time as Ctrl-C would."""
-    every = every or (10 if subject.loaded.cell_config.kind == "sim" else 1)
+    period_steps = period_steps or (10 if subject.loaded.cell_config.kind == "sim" else 1)
     with tempfile.TemporaryDirectory() as folder:
         undisturbed, problem = record_run(subject, subject.seed, Path(folder))
         if problem:
             raise ExecutiveError(f"{subject.name} with {problem}; choose a seed with which it succeeds")
-        halts = _RunWithHalts(subject, every, Path(folder)).run(undisturbed)
+        halts = _RunWithHalts(subject, period_steps, Path(folder)).run(undisturbed)
     return {
         **describe(subject),
         "ticks": undisturbed["ticks"],
@@ -62,7 +62,7 @@ def measure(subject: Subject, every: int | None = None) -> Figures:
         "holding": sum(bool(halt["holds"]) for halt in halts),
         "failed": sum(bool(halt["problems"]) for halt in halts),
         "worst": find_worst(halts),
-        "problems": [f"{text} (tick {halt['at']})" for halt in halts for text in halt["problems"]],
+        "problems": [f"{text} (tick {halt['tick']})" for halt in halts for text in halt["problems"]],
     }
 
 
@@ -73,7 +73,7 @@ def find_worst(halts: Sequence[Figures]) -> list[Figures]:
         measured = [(halt[name], halt["tick"]) for halt in halts if halt[name] is not None]
         if measured:
             value, tick = max(measured)
-            worst.append({"largest": name, "value": value, "tick": tick, "allowed": allowed})
+            worst.append({"figure": name, "value": value, "tick": tick, "allowed": allowed})
     return worst
 
 
@@ -148,8 +148,8 @@ def measure_distance(q: Array, trajectory: Trajectory) -> float:
 class _RunWithHalts:
     """The run, and the results of its children so far."""
 
-    def __init__(self, subject: Subject, every: int, folder: Path) -> None:
-        self._every = every
+    def __init__(self, subject: Subject, period_steps: int, folder: Path) -> None:
+        self._period_steps = period_steps
         self._forks = ForkRunner(CHILD_TIMEOUT)
         self._journal_path = folder / "journal.jsonl"
         self._journal = Journal(self._journal_path)
@@ -209,7 +209,7 @@ class _RunWithHalts:
 
     def _fork_and_halt_if_due(self) -> None:
         """Fork if a halt is due: the child requests a stop and goes on; the parent keeps the result."""
-        if self._forks.is_child or self._run.tick % self._every:
+        if self._forks.is_child or self._run.tick % self._period_steps:
             return
         unknown = dict.fromkeys(LIMITS)
         self._halt = {"tick": self._run.tick, "moving": not self._arm.at_rest, "holds": "", **unknown}
@@ -255,5 +255,10 @@ class _RunWithHalts:
 if __name__ == "__main__":
     run_mission_command(
         measure,
-        click.option("--every", type=click.IntRange(min=1), help="Control steps from one halt to the next."),
+        click.option(
+            "--every",
+            "period_steps",
+            type=click.IntRange(min=1),
+            help="Control steps from one halt to the next.",
+        ),
     )

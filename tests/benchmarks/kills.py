@@ -119,7 +119,7 @@ def resume_run(subject: Subject, seed: int, runs: Path, change: str) -> Figures:
         done = change_world(subject, seed, path, past, change) if change else ""
         result = resumed_run(path, subject.skills, frames=False, kind=subject.kind)
         after = Past.of(read_journal(path / "journal.jsonl"))
-        problems = [*check_result(result, change=done), *find_handled_twice(after.entries)]
+        problems = [*check_result(result, change_made=done), *find_handled_twice(after.entries)]
         difference = compare(subject.loaded, subject.skills, after, seed).difference
         if difference:
             problems.append(f"the replay differs: {difference}")
@@ -177,12 +177,12 @@ def is_on_table(position: Array, table: TableConfig) -> bool:
     return all(low <= x <= high for x, (low, high) in zip(position, (table.x, table.y), strict=True))
 
 
-def check_result(result: Mapping[str, Any], *, change: str) -> list[str]:
+def check_result(result: Mapping[str, Any], *, change_made: str) -> list[str]:
     """Return what is wrong with the end of a resumed run; only a removed or dropped object may be lost."""
     problems = []
     if not ledger_agrees(result):
         problems.append(f"the ledger says {result['items']}; the audit {result['audit']}")
-    may_lose = change.startswith(("removed", "dropped"))
+    may_lose = change_made.startswith(("removed", "dropped"))
     if result["status"] != "SUCCESS" and not (may_lose and result["reason"] == "lost"):
         problems.append(f"it ended with {result['status']} {result['reason']}: {result['message']}")
     if result["holds"]:

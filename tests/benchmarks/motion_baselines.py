@@ -38,7 +38,7 @@ object and at the object; then at the object, above the object, above the bin sl
 def find_waypoints(
     kinematics: Kinematics, limits: JointLimits, start: Array, touch: Goal, drop: Goal, height: float
 ) -> WaypointPair:
-    """Return the waypoints at travel height `height` [m] with which motions with stops take the least time.
+    """Return the waypoints at travel height `height` [m] that can be passed, with stops, in the least time.
 
     Args:
         kinematics: Kinematics of the arm.
@@ -76,9 +76,9 @@ def plan_with_stops(waypoints: Array, limits: JointLimits) -> tuple[float, State
 def plan_with_toppra(waypoints: Array, limits: JointLimits) -> tuple[float, State]:
     """Return the least time [s] along a spline through waypoints, and the states.
 
-    The parameter of the natural cubic spline is the chord length in joint space, the usual parameter with the
-    least times. TOPP-RA (Pham & Pham, IEEE T-RO 34 (2018), 645-659) follows it at the limits of velocity
-    and acceleration; without a limit of jerk, no arm can follow it exactly.
+    The natural cubic spline is parametrized by chord length in joint space; of the usual parametrizations, it
+    takes the least time. TOPP-RA (Pham & Pham, IEEE T-RO 34 (2018), 645-659) follows it at the limits of
+    velocity and acceleration; without a limit of jerk, no arm can follow it exactly.
     """
     lengths = np.linalg.norm(np.diff(waypoints, axis=0), axis=1)
     # The parameter must increase strictly, even between two equal waypoints.

@@ -62,13 +62,13 @@ class ClearanceMonitor:
         self._world = world
         self._margin = margin
         self._ignored_pairs: set[str] = set()
-        self._contact_allowed: int | None = None
+        self._target_body: int | None = None
         self.min_distance = math.inf
         self.nearest = "nothing"
 
-    def begin(self, held: int | None, contact_allowed: int | None = None) -> None:
-        """Begin a motion with the body `held` in the tool, which may touch the body `contact_allowed`."""
-        self._contact_allowed = contact_allowed
+    def begin(self, held: int | None, target_body: int | None = None) -> None:
+        """Begin a motion with the body `held` in the tool; contact with the body `target_body` is allowed."""
+        self._target_body = target_body
         self._ignored_pairs = {
             pair for distance, pair in self._measure_pairs(held) if distance < self._margin
         }
@@ -83,7 +83,7 @@ class ClearanceMonitor:
         world, near = self._world, self._world.client.getClosestPoints
         bins = (body for bodies in world.bins.values() for body in bodies)
         things = [
-            body for body in (world.table, *bins, *world.bodies) if body not in (held, self._contact_allowed)
+            body for body in (world.table, *bins, *world.bodies) if body not in (held, self._target_body)
         ]
         load = "" if held is None else held_part(world.bodies[held])
         for body in things:
@@ -112,7 +112,7 @@ class _Execution:
         self._clearance_monitor = ClearanceMonitor(world, self._margin)
         self._slip = 0.0
         self._missed = self._dropped = 0
-        self._steps: list[int] = []
+        self._steps_per_pair: list[int] = []
         self._failures: list[str] = []
 
     def execute_pair(self) -> None:
@@ -127,8 +127,8 @@ class _Execution:
     def collect_figures(self) -> Figures:
         """Return the figures of all pairs."""
         return {
-            "executed_pairs": len(self._steps),
-            "executed_time_s": float(np.mean(self._steps)) * STEP if self._steps else None,
+            "executed_pairs": len(self._steps_per_pair),
+            "executed_time_s": float(np.mean(self._steps_per_pair)) * STEP if self._steps_per_pair else None,
             "margin_mm": 1e3 * self._margin,
             "clearance_mm": 1e3 * self._clearance_monitor.min_distance
             if math.isfinite(self._clearance_monitor.min_distance)
@@ -152,7 +152,7 @@ class _Execution:
             scene.drop, scene.make_carry_task(self._tool.bears), scene, lambda: not self._tool.holding
         )
         if self._tool.holding:
-            self._steps.append(fetching + carrying)
+            self._steps_per_pair.append(fetching + carrying)
         else:
             self._dropped += 1
 

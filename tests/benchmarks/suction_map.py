@@ -31,7 +31,7 @@ OFFSETS = (0.0, 0.002, 0.004, 0.006, 0.008, 0.010, 0.012)
 DIRECTIONS = 8
 """Number of directions of every offset."""
 YAWS = 12
-"""Number of yaw angles of every object; the bounding box whose centre is the aim changes with the yaw."""
+"""Number of yaw angles of every object; the aim, the centre of its bounding box, depends on the yaw."""
 SETTLE_STEPS = 120
 """Physics steps in which an object comes to rest."""
 

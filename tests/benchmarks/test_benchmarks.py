@@ -99,23 +99,23 @@ class TestHalts:
         ],
     )
     def test_a_halted_fake_cell_is_in_order(self, mission: str) -> None:
-        figures = halts.measure(load(mission), every=50)
+        figures = halts.measure(load(mission), period_steps=50)
         assert (figures["problems"], figures["failed"]) == ([], 0)
         assert figures["halts"] == -(-figures["ticks"] // 50)
         assert figures["moving"] >= 8 and figures["holding"] >= 2
 
     @pytest.mark.slow
     def test_an_arm_that_does_not_brake_is_found(self) -> None:
-        figures = halts.measure(load(kind=Coasting), every=80)
+        figures = halts.measure(load(kind=Coasting), period_steps=80)
         assert figures["problems"]
         assert all("rest_s is " in problem for problem in figures["problems"])
 
     @pytest.mark.slow
     def test_the_simulated_arm_brakes_within_its_limits(self) -> None:
-        figures = halts.measure(load_subject("sort_overhead", {}, oracle=True, seed=1), every=60)
+        figures = halts.measure(load_subject("sort_overhead", {}, oracle=True, seed=1), period_steps=60)
         assert figures["problems"] == []
         assert figures["moving"] >= 20
-        worst = {row["largest"]: row["value"] for row in figures["worst"]}
+        worst = {row["figure"]: row["value"] for row in figures["worst"]}
         # A figure of zero would not be measured.
         assert worst["rest_s"] > 0.1 and worst["jerk_ratio"] > 0.5 and worst["deviation_rad"] > 0.0
 
@@ -173,9 +173,9 @@ class TestKills:
             "audit": None,
             "holds": "",
         }
-        assert kills.check_result(result, change="removed cube") == []
-        assert len(kills.check_result(result, change="moved cube")) == 1
-        assert len(kills.check_result({**result, "holds": "cube-1"}, change="dropped cube")) == 1
+        assert kills.check_result(result, change_made="removed cube") == []
+        assert len(kills.check_result(result, change_made="moved cube")) == 1
+        assert len(kills.check_result({**result, "holds": "cube-1"}, change_made="dropped cube")) == 1
 
 
 class TestSoak:

@@ -1,9 +1,9 @@
 """Cost of a tick and of a status change, compared with the same trees in bare py_trees.
 
-Both trees are ticked in turns, in short blocks without garbage collection, and the best block of each counts.
-Other load can only make a block slower, so the best block is the cost of the code itself; the turns keep a
-change of the processor's frequency from favouring either. Times are the CPU times of the thread, which do
-not count other processes.
+Short blocks of ticks of both trees alternate, without garbage collection; the best block of each counts.
+Other load can only make a block slower, so the best block is the cost of the code itself. Because the blocks
+alternate, a change of the processor's frequency favours neither tree. Times are the CPU times of the thread,
+which do not count other processes.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ MAX_RATIO = 1.3
 MAX_EXTRA = 20.0
 """Limit of the cost of a recorded status change above that of bare py_trees [µs]."""
 STEADY_TICKS = 300
-"""Ticks in a block of a tree that waits."""
-ENDING_NODES = 1000
-"""Nodes that begin and end in a block, in one tick or several."""
+"""Number of ticks per block of a tree whose last leaf never ends."""
+NODE_RUNS_PER_BLOCK = 1000
+"""Number of nodes that begin and end in one block; a tree with fewer nodes is ticked more often."""
 TIMEOUT = 1e9
 """Limit of every timeout, longer than any measurement [s]."""
 
@@ -83,7 +83,7 @@ def measure_changes(nodes: int, blocks: int, folder: Path) -> Figures:
     folder.mkdir()
     with closing(Recorder(RunDirectory(folder), frames=False)) as recorder:
         ours, bare = build_ours(nodes, _SucceedAtOnce, recorder), build_bare(nodes, Status.SUCCESS)
-        ours_us, bare_us = find_best_costs(ours, bare, blocks, max(1, ENDING_NODES // nodes))
+        ours_us, bare_us = find_best_costs(ours, bare, blocks, max(1, NODE_RUNS_PER_BLOCK // nodes))
     row = {"changes": len(events), "nodes": nodes, "ours_us": ours_us, "py_trees_us": bare_us}
     return {**row, "extra_us": (ours_us - bare_us) / len(events)}
 
@@ -110,7 +110,7 @@ def _measure_cost(root: Behaviour, ticks: int) -> float:
 
 
 def build_ours(nodes: int, last_skill: type[Skill], *observers: Observer) -> Behaviour:
-    """Return a retry of a timeout of a sequence on a fake cell, whose last leaf runs `last_skill`.
+    """Return a retry of a timeout of a sequence, on a fake cell; the last leaf runs `last_skill`.
 
     All other leaves succeed at once. Events are stamped and passed on as a run does it.
     """

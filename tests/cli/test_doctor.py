@@ -138,7 +138,7 @@ def test_no_renderer_draws(monkeypatch, run, why):
 
 @pytest.mark.slow
 def test_a_frame_is_really_drawn_in_a_process_of_its_own():
-    milliseconds, problem = doctor.time_in_subprocess("tiny")
+    milliseconds, problem = doctor.measure_frame_time("tiny")
     assert (milliseconds > 1, problem) == (True, "")
 
 
@@ -217,7 +217,7 @@ def test_everything_is_examined_whatever_fails(monkeypatch):
 
     monkeypatch.setattr("executive.discovery.discover", fail)
     monkeypatch.setitem(sys.modules, "executive.vision.detectors.roboflow.key", None)
-    monkeypatch.setattr(doctor, "time_in_subprocess", lambda renderer: (9.0, ""))
+    monkeypatch.setattr(doctor, "measure_frame_time", lambda renderer: (9.0, ""))
     found = shown(doctor.examine())
     assert [line.split(": ")[0].split(" ")[1] for line in found] == [
         "python", "display", "packages", "opencv", "view", "train", "film",

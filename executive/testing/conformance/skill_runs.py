@@ -13,7 +13,7 @@ from executive.testing.conformance.rehearsal import Rehearsal
 from executive.testing.conformance.situations import Arrange, NotTried, Situation, situations
 
 MAX_HALTS = 40
-"""Maximum number of halts at evenly spaced ticks of a run, and of further halts at its first calls."""
+"""Maximum number of evenly spaced halts of a run, and, counted separately, of halts around its calls."""
 
 
 class GotStuck(NotTried):
@@ -80,7 +80,8 @@ class SkillRuns:
             halted = ", halted there," if rehearsal.ticks == halt_at else ""
             self._stuck = (
                 f"{rehearsal.where} at tick {rehearsal.ticks}{halted} {self.name} {rehearsal.message}. "
-                "The arm waits for every tick: yield in each loop that waits, or compute in a detector."
+                "A tick blocks the arm: yield in each loop that waits, "
+                "and leave long computations to a detector."
             )
             raise GotStuck(self._stuck)
         if adversity is not None or halt_at is not None:

@@ -237,7 +237,7 @@ def test_a_tick_that_does_not_come_back_is_broken_off_once(monkeypatch: pytest.M
     problem = (
         f"{EMPTY} while the table has changed since the look at tick 1 LoopsWithoutYield did not come back "
         "for 0.3 s, at faulty_skills.py:N. "
-        "The arm waits for every tick: yield in each loop that waits, or compute in a detector."
+        "A tick blocks the arm: yield in each loop that waits, and leave long computations to a detector."
     )
     assert told(checks["comes_to_an_end"]) == told(checks["halts_at_once"]) == [problem]
     assert [checks[name].run().status for name in ("halts_at_once", "defaults_allowed")] == [
