@@ -25,7 +25,7 @@ class UnderWay:
     """What the arm was doing when nobody commanded it any more.
 
     Attributes:
-        command: Joint positions that it was sent last `(7,)` [rad].
+        command: Joint positions of the last command before the last physics step `(7,)` [rad].
         motion: The motion it followed, or None.
         time: How far on that path it was [s].
         idle: Physics steps that were none of the run.
@@ -53,11 +53,18 @@ class Rebuilding:
         self._motion: Trajectory | None = None
         self._time = 0.0
         self._idle = 0
+        self._stepped: tuple[Array, float] | None = None
+        """Command and time at the last physics step, if a command has followed it."""
 
     @property
     def under_way(self) -> UnderWay:
-        """What the arm was following: as a controller that lost its master, it is to brake on its path."""
-        return UnderWay(self._command, self._motion, self._time, self._idle)
+        """What the arm was following: as a controller that lost its master, it is to brake on its path.
+
+        A command that no physics step has followed does not count: the arm must not skip it, because a jump
+        by two steps may tear a load off the cup.
+        """
+        command, time = self._stepped or (self._command, self._time)
+        return UnderWay(command, self._motion, time, self._idle)
 
     def do(self, command: Command) -> None:
         """Do the next command."""
@@ -65,9 +72,12 @@ class Rebuilding:
         world, tool = self._world, self._tool
         if kind in (log.STEP, log.IDLE):
             self._idle += kind == log.IDLE
+            self._stepped = None
             world.step()
             tool.advance()
         elif kind == log.JOINTS_TO:
+            if self._command.size:
+                self._stepped = self._stepped or (self._command, self._time)
             self._time, self._command = numbers[0], np.array(numbers[1:])
             world.command_arm(self._command, self._time)
         elif kind == log.MOTION:

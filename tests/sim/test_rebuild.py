@@ -19,6 +19,7 @@ from executive.motion.limits import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.runtime.run import Run
 from executive.sim.cell import SimCell
+from executive.sim.command_log import JOINTS_TO, CommandLog
 from executive.testing.disturbances.hand import hand_of
 from executive.testing.fake_cell import SilentOperator
 from executive.testing.oracle import oracle_cell
@@ -127,6 +128,20 @@ def test_the_arm_brakes_on_the_path_it_was_on(cells: list[tuple[Left, SimCell]],
         if len(commands) > 3:
             accelerations = np.diff(commands, 2, axis=0) / STEP**2
             assert np.max(np.abs(accelerations) / limits.stop_acceleration) <= 1.001, one.tick
+
+
+def test_a_command_that_no_physics_step_has_followed_is_not_skipped(
+    mission, left: list[Left], tmp_path: Path
+) -> None:
+    one = next(one for one in left if one.motion is not None)
+    log = tmp_path / "log"
+    log.write_bytes(one.log.read_bytes())
+    time = one.time + STEP
+    CommandLog(log, again=True).note(JOINTS_TO, time, *one.motion.at(time).q)
+    cell = rebuilt(mission, log)
+    cell.advance()
+    assert cell._arm._time == pytest.approx(time, abs=STEP / 10)
+    cell.close()
 
 
 def test_what_happened_meanwhile_is_there_and_took_none_of_the_runs_time(
