@@ -18,15 +18,15 @@ _SECRET = re.compile(
 """A key, or a user's name, and the rest of its line."""
 CODES = frozenset({
     "alias", "ambiguous", "bad-key", "bad-label", "bad-match", "bad-name", "bad-reference", "duplicate-key",
-    "duplicate-label", "duplicate-tree", "empty", "empty-list", "endless", "impossible-reason", "merge-key",
-    "missing-argument", "missing-key", "missing-node", "missing-param", "no-base", "no-cell", "no-library",
-    "not-finite", "out-of-range", "outside", "port-type", "recursive-use", "robot", "shadowed-param",
-    "shadowed-variable", "shared-resource", "shared-variable", "short-timeout", "tag", "too-deep",
-    "too-large", "tool-state", "two-documents", "two-nodes", "unchanging-retry", "unknown-argument",
-    "unknown-bin", "unknown-class", "unknown-detector", "unknown-key", "unknown-kind", "unknown-node",
-    "unknown-param", "unknown-pose", "unknown-reason", "unknown-return", "unknown-skill", "unknown-tree",
-    "unreachable", "unread", "unseen-class", "unused-argument", "unused-param", "unused-tree", "unwritten",
-    "wrong-length", "wrong-type", "wrong-value", "yaml",
+    "duplicate-label", "duplicate-tree", "empty", "empty-list", "endless", "impossible-reason", "layout",
+    "merge-key", "missing-argument", "missing-key", "missing-node", "missing-param", "no-base", "no-cell",
+    "no-library", "not-finite", "out-of-range", "outside", "port-type", "recursive-use", "robot",
+    "shadowed-param", "shadowed-variable", "shared-resource", "shared-variable", "short-timeout", "tag",
+    "too-deep", "too-large", "tool-state", "two-documents", "two-nodes", "unchanging-retry",
+    "unknown-argument", "unknown-bin", "unknown-class", "unknown-detector", "unknown-key", "unknown-kind",
+    "unknown-node", "unknown-param", "unknown-pose", "unknown-reason", "unknown-return", "unknown-skill",
+    "unknown-tree", "unreachable", "unread", "unseen-class", "unused-argument", "unused-param",
+    "unused-tree", "unwritten", "wrong-length", "wrong-type", "wrong-value", "yaml",
 })  # fmt: skip
 """Every code of a finding."""
 _OF_A_VALUE = frozenset({

@@ -25,7 +25,7 @@ from executive.sim.models import missing_models, weighed
 from executive.sim.poses import out_of_reach, unfit_poses
 from executive.sim.rebuild import UnderWay, rebuild
 from executive.sim.scenery import SimScenery
-from executive.sim.spawn import PartSeeds, first_world
+from executive.sim.spawn import PartSeeds, find_lack_of_room, first_world
 from executive.sim.tool import SuctionTool
 from executive.sim.view import ArmShadow
 from executive.vision.detectors.registry import build_detectors, known_labels, wrong_detectors
@@ -111,7 +111,8 @@ class SimCell:
     def check(config: CellConfig, base: Path) -> Iterable[tuple[KeyPath, str]]:
         """Return what this kind of cell cannot do of a cell file, with the key it is about.
 
-        Models and detectors it lacks, places out of reach, poses in collision or without a view.
+        Models and detectors it lacks, places out of reach, more objects than fit, poses in collision or
+        without a view.
         """
         missing = tuple(missing_models(config))
         return (
@@ -119,6 +120,7 @@ class SimCell:
             *_lacking_depth(config),
             *wrong_detectors(config.detectors, base),
             *out_of_reach(config),
+            *find_lack_of_room(config),
             # A world cannot be made without its models.
             *(() if missing else unfit_poses(config)),
         )

@@ -24,6 +24,9 @@ from executive.sim.world import World
 from executive.vision.camera_model import calibrated
 from executive.workcell import KeyPath
 
+RAYS = 9
+"""Number of rays along each side of the workspace that test whether a bin hides it."""
+
 
 def out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield a key of the cell file and a sentence for every place the tool has to go to and cannot.
@@ -100,3 +103,17 @@ def _blind_poses(config: CellConfig, world: World) -> Iterator[tuple[KeyPath, st
                     f'from the pose "{pose}" the camera {name} does not see the whole workspace: a part '
                     "of it is outside of the image or behind the arm",
                 )
+            elif bin := _find_hiding_bin(config, world, camera_pose(world, camera).position):
+                yield (
+                    ("bins", bin, "position"),
+                    f'the bin "{bin}" hides a part of the workspace from the camera {name} in the pose '
+                    f'"{pose}"; move or lower the bin',
+                )
+
+
+def _find_hiding_bin(config: CellConfig, world: World, camera: Array) -> str | None:
+    """Return the name of a bin between the table of the workspace and a camera, or None."""
+    xs, ys = (np.linspace(*side, RAYS) for side in (config.table.x, config.table.y))
+    points = [(x, y, 0.001) for x in xs for y in ys]
+    hit = {ray[0] for ray in world.client.rayTestBatch(points, [tuple(camera)] * len(points))}
+    return next((name for name, bodies in world.bins.items() if hit.intersection(bodies)), None)

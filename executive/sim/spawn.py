@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,9 +13,12 @@ from executive.errors import InputError
 from executive.geometry import Array, Pose, about_z
 from executive.sim.models import Mesh, load_mesh
 from executive.sim.world import World
+from executive.workcell import KeyPath
 
 TRIES = 2000
 """Places tried for one set of objects before the workspace counts as too small for it."""
+LAYOUTS = 5
+"""Number of random sets of objects that are tried before a cell file counts as impossible."""
 DROP = 0.002
 """Height over what carries it at which an object is let go [m]."""
 STILL = 0.002
@@ -94,6 +97,21 @@ def spawn(world: World, config: CellConfig, seed: int, count: int | None = None)
     return tuple(bodies)
 
 
+def find_lack_of_room(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Yield a sentence if the workspace has no room for any of `LAYOUTS` random sets of the most objects."""
+    problem = ""
+    for seed in range(LAYOUTS):
+        rng = np.random.default_rng(seed)
+        labels = [str(label) for label in rng.choice(list(config.objects), config.table.objects[1])]
+        try:
+            _places(config, labels, rng)
+        except InputError as error:
+            problem = str(error)
+        else:
+            return
+    yield ("table", "objects"), problem
+
+
 def _places(config: CellConfig, labels: list[str], rng: np.random.Generator) -> list[Array]:
     """Return places `(2,)` [m] whose outlines keep the gap, the whole set drawn anew when one gets stuck."""
     low, high = np.array([config.table.x, config.table.y]).T
@@ -109,7 +127,7 @@ def _places(config: CellConfig, labels: list[str], rng: np.random.Generator) -> 
         elif rng.random() < 0.02:
             places = []
     raise InputError(
-        f"{len(labels)} objects ({', '.join(labels)}) found no room on the workspace of cell {config.cell}, "
+        f"{len(labels)} objects found no room on the workspace of cell {config.cell}, "
         f"{high[0] - low[0]:.2f} m by {high[1] - low[1]:.2f} m, {config.table.gap * 1000:.0f} mm apart; "
         "ask for fewer or widen table.x and table.y"
     )

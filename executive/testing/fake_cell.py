@@ -125,9 +125,11 @@ class FakeCell:
 
     @staticmethod
     def check(config: CellConfig, base: Path) -> Iterable[tuple[KeyPath, str]]:
-        """Return what this kind of cell cannot do of a cell file: places out of the fake arm's reach."""
+        """Return the places that the fake arm cannot reach, and whether there are more objects than fit."""
         del base
-        return tuple(out_of_reach(config))
+        places, problem = _grid(config)
+        crowded = len(places) < config.table.objects[1]
+        return (*out_of_reach(config), *([(("table", "objects"), problem)] if crowded else []))
 
     @staticmethod
     def labels(config: CellConfig, base: Path) -> Mapping[str, tuple[str, ...] | None]:
@@ -227,15 +229,21 @@ def scatter(world: FakeWorld, config: CellConfig, seed: int) -> None:
         InputError: The workspace has no room for so many.
     """
     random = np.random.default_rng(seed)
+    places, problem = _grid(config)
+    count = int(random.integers(*config.table.objects, endpoint=True))
+    if count > len(places):
+        raise InputError(problem)
+    for index in random.permutation(len(places))[:count]:
+        world.put(str(random.choice(list(config.objects))), *places[index])
+
+
+def _grid(config: CellConfig) -> tuple[list[tuple[float, float]], str]:
+    """Return the places for objects on the table [m], and the sentence for a table with too few of them."""
     table = config.table
     pitch = 2 * max(kind.radius for kind in config.objects.values()) + table.gap
     xs, ys = (np.linspace(*side, 1 + int((side[1] - side[0]) / pitch)) for side in (table.x, table.y))
     places = [(float(x), float(y)) for x in xs for y in ys]
-    count = int(random.integers(*table.objects, endpoint=True))
-    if count > len(places):
-        raise InputError(
-            f"{count} objects find no room on the workspace of cell {config.cell}, which has "
-            f"{len(places)} places {pitch:.3f} m apart; ask for fewer or widen table.x and table.y"
-        )
-    for index in random.permutation(len(places))[:count]:
-        world.put(str(random.choice(list(config.objects))), *places[index])
+    return places, (
+        f"{table.objects[1]} objects find no room on the workspace of cell {config.cell}, which has "
+        f"{len(places)} places {pitch:.3f} m apart; ask for fewer or widen table.x and table.y"
+    )

@@ -96,7 +96,7 @@ def test_objects_stand_still_apart_and_inside_the_workspace(
 
 
 def test_too_many_objects_are_refused_with_what_to_change(build: Build, overhead: CellConfig) -> None:
-    with pytest.raises(InputError, match=r"100 objects .* found no room .* ask for fewer or widen table\.x"):
+    with pytest.raises(InputError, match=r"100 objects found no room .* ask for fewer or widen table\.x"):
         spawn(build(overhead), overhead, seed=1, count=100)
 
 

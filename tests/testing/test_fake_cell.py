@@ -116,16 +116,25 @@ def test_a_camera_on_the_wrist_sees_the_table_from_its_scan_poses_and_locates_tr
 
 def test_each_bin_and_a_safe_place_beyond_the_arm_are_reported(load: Load) -> None:
     assert FakeCell.check(load(), Path()) == ()
-    far = load(bins__blue_bin__position="[0.6, 0.6, 0.0]", safe_place="[0.9, 0.0, 0.0]")
+    far = load(bins__blue_bin__position="[0.2, 0.85, 0.0]", safe_place="[0.9, 0.0, 0.0]")
     assert FakeCell.check(far, Path()) == (
         (
             ("bins", "blue_bin", "position"),
-            'the bin "blue_bin" is out of reach: 0.90 m from the base is more than the arm\'s 0.85 m',
+            'the bin "blue_bin" is out of reach: 0.88 m from the base is more than the arm\'s 0.85 m',
         ),
         (
             ("safe_place",),
             "the safe place is out of reach: 0.91 m from the base is more than the arm's 0.85 m",
         ),
+    )
+
+
+def test_more_objects_than_places_are_reported(load: Load) -> None:
+    ((key, text),) = FakeCell.check(load(table__objects="[0, 19]"), Path())
+    assert key == ("table", "objects")
+    assert text == (
+        "19 objects find no room on the workspace of cell overhead, which has 18 places 0.083 m apart; "
+        "ask for fewer or widen table.x and table.y"
     )
 
 

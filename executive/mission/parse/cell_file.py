@@ -11,6 +11,7 @@ from pathlib import Path, PurePosixPath
 from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.mission.findings import Finding, MissionError, error, in_file_order
+from executive.mission.parse.cell_layout import find_overlaps
 from executive.mission.parse.overrides import CELL, override_cell, override_source
 from executive.mission.parse.validate import KeyPath, mark_of, validate
 from executive.mission.source import Source
@@ -76,7 +77,8 @@ def read_cell(path: Path, overrides: Mapped[str, str]) -> CellFile:
     file = CellFile(validated.model, source, root, (*parts.findings, *wrong, *validated.findings))
     if validated.model is None:
         return file
-    later = (*_links(file, validated.model), *_assets(file, validated.model))
+    overlaps = (file.finding(keys, "layout", text) for keys, text in find_overlaps(validated.model))
+    later = (*_links(file, validated.model), *_assets(file, validated.model), *overlaps)
     found = _models_found(file, validated.model, parts.folders)
     return CellFile(found, source, root, (*file.findings, *later))
 

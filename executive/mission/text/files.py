@@ -67,7 +67,8 @@ def below(folder: Path, reference: str, shipped: Sequence[str] = ("",)) -> Path:
     folders = [(base, base / written.parent) for base in bases if os.path.isdir(base / written.parent)]
     known = {p.relative_to(base).as_posix() for base, folder in folders for p in folder.glob("*.yaml")}
     hint = alternatives(reference, sorted(known), "There are")
-    raise InputError(f'there is no file "{reference}" beside this one, and none is shipped. {hint}')
+    searched = " or ".join(_shown(base / written.parent) for base in bases)
+    raise InputError(f'there is no file "{reference}" in {searched}. {hint}')
 
 
 def read_source(path: Path) -> Source:
