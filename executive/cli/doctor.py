@@ -57,7 +57,7 @@ class Finding(NamedTuple):
 @json_option
 @click.pass_context
 def command(ctx: click.Context, as_json: bool) -> None:
-    """Check Python, packages, registered skills and cells, renderer, display and Roboflow's server.
+    """Check Python, packages, plugins, renderer, display and Roboflow's server.
 
     Exit code 1 if there is a problem. A note is about an optional feature that cannot be used.
     """

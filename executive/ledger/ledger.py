@@ -160,7 +160,8 @@ class ItemLedger:
 
     def placed(self, item: Item, bin: str) -> None:
         """Record that the item was let go in a bin."""
-        self._record(item).bin = bin
+        record = self._record(item)
+        record.bin, record.why = bin, "" if record.state is State.HELD else record.why
         self._change(item, State.PLACED)
 
     def returned(self, item: Item, position: Array) -> None:
@@ -168,13 +169,13 @@ class ItemLedger:
         record = self._record(item)
         record.locate(position, self._config.gate, settled=False)
         record.epoch = self.epoch
-        self._change(item, State.SEEN)
+        self._change(item, State.REJECTED if record.why else State.SEEN)
         self._disturb(record.position, math.inf)
 
     def rejected(self, item: Item, why: str) -> None:
         """Record that the item is given up; it is reported and not tried again.
 
-        A held item stays in the tool until it is released, and a dropped item is sought until the run ends.
+        A held item stays HELD until it is released; looks continue to search for a dropped item.
         """
         record = self._record(item)
         record.why = why

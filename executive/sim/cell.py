@@ -111,8 +111,8 @@ class SimCell:
     def check(config: CellConfig, base: Path) -> Iterable[tuple[KeyPath, str]]:
         """Return what this kind of cell cannot do of a cell file, with the key it is about.
 
-        Models and detectors it lacks, places out of reach, more objects than fit, poses in collision or
-        without a view.
+        Missing models and detectors, places out of reach, more objects than fit, poses in collision, and
+        cameras that do not see the whole workspace.
         """
         missing = tuple(missing_models(config))
         return (

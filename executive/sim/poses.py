@@ -24,8 +24,8 @@ from executive.sim.world import World
 from executive.vision.camera_model import calibrated
 from executive.workcell import KeyPath
 
-RAYS = 9
-"""Number of rays along each side of the workspace that test whether a bin hides it."""
+POINTS_PER_SIDE = 9
+"""Number of places along each side of the workspace where every camera must see an object."""
 
 
 def out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
@@ -88,7 +88,7 @@ def unfit_poses(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
 
 
 def _blind_poses(config: CellConfig, world: World) -> Iterator[tuple[KeyPath, str]]:
-    """Yield the scan poses from which a camera does not see the whole workspace."""
+    """Yield the scan poses and the bins that keep a camera from seeing the whole workspace."""
     planner = Planner(config)
     shadow = ArmShadow(SimArm(world, planner, config, SimClock(world, STEP)), planner.kinematics, config)
     for name, camera in config.cameras.items():
@@ -112,8 +112,9 @@ def _blind_poses(config: CellConfig, world: World) -> Iterator[tuple[KeyPath, st
 
 
 def _find_hiding_bin(config: CellConfig, world: World, camera: Array) -> str | None:
-    """Return the name of a bin between the table of the workspace and a camera, or None."""
-    xs, ys = (np.linspace(*side, RAYS) for side in (config.table.x, config.table.y))
-    points = [(x, y, 0.001) for x in xs for y in ys]
+    """Return the name of a bin that hides the centre of the flattest object in the workspace, or None."""
+    xs, ys = (np.linspace(*side, POINTS_PER_SIDE) for side in (config.table.x, config.table.y))
+    height = min(kind.height for kind in config.objects.values()) / 2
+    points = [(x, y, height) for x in xs for y in ys]
     hit = {ray[0] for ray in world.client.rayTestBatch(points, [tuple(camera)] * len(points))}
     return next((name for name, bodies in world.bins.items() if hit.intersection(bodies)), None)

@@ -54,16 +54,18 @@ class Rebuilding:
         self._time = 0.0
         self._idle = 0
         self._stepped: tuple[Array, float] | None = None
-        """Command and time at the last physics step, if a command has followed it."""
+        """Command before the last physics step, and its time; None if no command has followed the step."""
 
     @property
     def under_way(self) -> UnderWay:
         """What the arm was following: as a controller that lost its master, it is to brake on its path.
 
-        A command that no physics step has followed does not count: the arm must not skip it, because a jump
-        by two steps may tear a load off the cup.
+        If no physics step has followed the last command, the command before it counts: the arm would
+        otherwise move by two steps at once, which may tear a load off the cup.
         """
-        command, time = self._stepped or (self._command, self._time)
+        command, time = self._command, self._time
+        if self._stepped and self._motion is not None:
+            command, time = self._stepped
         return UnderWay(command, self._motion, time, self._idle)
 
     def do(self, command: Command) -> None:

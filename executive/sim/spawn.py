@@ -18,7 +18,7 @@ from executive.workcell import KeyPath
 TRIES = 2000
 """Places tried for one set of objects before the workspace counts as too small for it."""
 LAYOUTS = 5
-"""Number of random sets of objects that are tried before a cell file counts as impossible."""
+"""Number of random sets of objects tried before `find_lack_of_room` reports a lack of room."""
 DROP = 0.002
 """Height over what carries it at which an object is let go [m]."""
 STILL = 0.002
@@ -98,7 +98,7 @@ def spawn(world: World, config: CellConfig, seed: int, count: int | None = None)
 
 
 def find_lack_of_room(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield a sentence if the workspace has no room for any of `LAYOUTS` random sets of the most objects."""
+    """Yield a finding if none of `LAYOUTS` random sets of the maximum size fits the workspace."""
     problem = ""
     for seed in range(LAYOUTS):
         rng = np.random.default_rng(seed)

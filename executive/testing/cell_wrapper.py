@@ -52,7 +52,7 @@ class CellWrapper:
         return self.inner.steps
 
     def log_to(self, path: Path) -> None:
-        """Start to log to a file all data that rebuild the simulated world."""
+        """Start a log file from which the simulated world can be rebuilt."""
         self.inner.log_to(path)
 
     def advance(self) -> None:

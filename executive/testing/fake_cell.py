@@ -125,11 +125,10 @@ class FakeCell:
 
     @staticmethod
     def check(config: CellConfig, base: Path) -> Iterable[tuple[KeyPath, str]]:
-        """Return the places that the fake arm cannot reach, and whether there are more objects than fit."""
+        """Return findings for places that the fake arm cannot reach, and for more objects than fit."""
         del base
-        places, problem = _grid(config)
-        crowded = len(places) < config.table.objects[1]
-        return (*out_of_reach(config), *([(("table", "objects"), problem)] if crowded else []))
+        problem = _find_lack_of_room(config, config.table.objects[1])
+        return (*out_of_reach(config), *([(("table", "objects"), problem)] if problem else []))
 
     @staticmethod
     def labels(config: CellConfig, base: Path) -> Mapping[str, tuple[str, ...] | None]:
@@ -229,21 +228,27 @@ def scatter(world: FakeWorld, config: CellConfig, seed: int) -> None:
         InputError: The workspace has no room for so many.
     """
     random = np.random.default_rng(seed)
-    places, problem = _grid(config)
     count = int(random.integers(*config.table.objects, endpoint=True))
-    if count > len(places):
+    if problem := _find_lack_of_room(config, count):
         raise InputError(problem)
+    places, _ = _grid(config)
     for index in random.permutation(len(places))[:count]:
         world.put(str(random.choice(list(config.objects))), *places[index])
 
 
-def _grid(config: CellConfig) -> tuple[list[tuple[float, float]], str]:
-    """Return the places for objects on the table [m], and the sentence for a table with too few of them."""
-    table = config.table
-    pitch = 2 * max(kind.radius for kind in config.objects.values()) + table.gap
-    xs, ys = (np.linspace(*side, 1 + int((side[1] - side[0]) / pitch)) for side in (table.x, table.y))
-    places = [(float(x), float(y)) for x in xs for y in ys]
-    return places, (
-        f"{table.objects[1]} objects find no room on the workspace of cell {config.cell}, which has "
-        f"{len(places)} places {pitch:.3f} m apart; ask for fewer or widen table.x and table.y"
+def _grid(config: CellConfig) -> tuple[list[tuple[float, float]], float]:
+    """Return the places for objects on the table and their distance [m]."""
+    pitch = 2 * max(kind.radius for kind in config.objects.values()) + config.table.gap
+    sides = config.table.x, config.table.y
+    xs, ys = (np.linspace(low, high, 1 + int((high - low) / pitch)) for low, high in sides)
+    return [(float(x), float(y)) for x in xs for y in ys], pitch
+
+
+def _find_lack_of_room(config: CellConfig, count: int) -> str:
+    """Return a message if the table has not enough places for `count` objects, or ""."""
+    places, pitch = _grid(config)
+    message = (
+        f"{count} objects find no room on the workspace of cell {config.cell}, which has {len(places)} "
+        f"places {pitch:.3f} m apart; ask for fewer or widen table.x and table.y"
     )
+    return message if count > len(places) else ""

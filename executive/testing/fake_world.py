@@ -91,19 +91,13 @@ class FakeWorld:
         self.removed.append(thing)
 
     def roll_off(self, thing: FakeObject) -> None:
-        """Move a fallen object off the wall of a bin, into this bin, or off other objects on the table.
+        """Move a fallen object from the wall of a bin into that bin, or off other objects on the table.
 
         It is moved off each of the other objects once. An object inside a bin stays where it is.
         """
-        radius = self.classes[thing.label].radius
-        if any(bin.contains(thing.position) for bin in self.bins):
+        if self._fall_into_bin(thing):
             return
-        for bin in self.bins:
-            if bin.contains(thing.position, BIN_THICKNESS + radius / 2):
-                inside = bin.size[:2] / 2 - radius
-                offset = thing.position[:2] - bin.position[:2]
-                thing.position[:2] = bin.position[:2] + np.clip(offset, -inside, inside)
-                return
+        radius = self.classes[thing.label].radius
         for other in self.objects:
             apart = radius + self.classes[other.label].radius
             way = thing.position[:2] - other.position[:2]
@@ -111,6 +105,20 @@ class FakeWorld:
             if other is not thing and distance < apart:
                 way = way / distance if distance else np.array((1.0, 0.0))
                 thing.position[:2] = other.position[:2] + apart * way
+        self._fall_into_bin(thing)
+
+    def _fall_into_bin(self, thing: FakeObject) -> bool:
+        """Move an object from the wall of a bin into the bin; return True if it is in a bin then."""
+        radius = self.classes[thing.label].radius
+        if any(bin.contains(thing.position) for bin in self.bins):
+            return True
+        for bin in self.bins:
+            if bin.contains(thing.position, BIN_THICKNESS + radius / 2):
+                inside = np.maximum(bin.size[:2] / 2 - radius, 0.0)
+                offset = thing.position[:2] - bin.position[:2]
+                thing.position[:2] = bin.position[:2] + np.clip(offset, -inside, inside)
+                return True
+        return False
 
     def top(self, thing: FakeObject) -> float:
         """Return the height of an object's upper side [m]."""

@@ -119,7 +119,16 @@ def test_an_item_that_is_given_up_in_the_tool_stays_there_until_it_is_released(b
     bench.ledger.rejected("cube-1", "slippery")
     assert bench.ledger.in_tool() == "cube-1"
     bench.ledger.placed("cube-1", "red_bin")
-    assert bench.end() == {"cube-1": ("placed", "red_bin")}
+    (row,) = bench.ledger.rows()
+    assert (row["state"], row["bin"], row["why"]) == ("placed", "red_bin", "")
+
+
+def test_an_item_that_is_given_up_in_the_tool_and_put_back_is_rejected(bench: Bench) -> None:
+    bench.look(CUBE)
+    bench.ledger.held("cube-1")
+    bench.ledger.rejected("cube-1", "slippery")
+    bench.ledger.returned("cube-1", np.array([0.5, 0.0, 0.025]))
+    assert bench.end() == {"cube-1": ("rejected", "slippery")}
 
 
 def test_every_change_is_reported_and_the_accounts_balance(bench: Bench) -> None:

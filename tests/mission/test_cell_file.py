@@ -9,7 +9,8 @@ import pytest
 
 from executive.errors import InputError
 from executive.mission.findings import MissionError
-from executive.mission.parse.cell_file import load_cell
+from executive.mission.parse.cell_file import load_cell, read_cell
+from executive.mission.parse.cell_layout import find_overlaps
 
 
 @pytest.fixture(autouse=True)
@@ -200,3 +201,11 @@ def test_five_files_may_stand_below_a_cell_file_and_the_nearest_counts(small_cel
     assert (cell.cell, cell.description, cell.table.objects) == ("small", "five", (1, 1))
     Path("c.yaml").write_text("base: cells/overhead.yaml\ncell: mine\n")
     assert list(load_cell(Path("c.yaml")).bins) == ["red_bin", "blue_bin", "yellow_bin"], "a shipped one"
+
+
+@pytest.mark.parametrize(("x", "findings"), [(0.26, 0), (0.29, 1)])
+def test_a_bin_may_stand_diagonally_beside_the_workspace(missions: Path, x: float, findings: int) -> None:
+    overrides = {"cell.bins.red_bin.position": f"[{x}, -0.408, 0]", "cell.safe_place": "[0.5, 0.3, 0]"}
+    config = read_cell(missions / "cells" / "overhead.yaml", overrides).config
+    assert config is not None
+    assert [key for key, _ in find_overlaps(config)].count(("bins", "red_bin", "position")) == findings

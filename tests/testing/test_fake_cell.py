@@ -184,12 +184,15 @@ def test_what_fell_between_two_bins_is_in_the_nearer(load: Load, x: float, what:
     assert {count: n for count, n in cell.audit().items() if count != "unseen" and n} == {what: 1}
 
 
-def test_what_falls_on_the_wall_of_a_bin_falls_into_the_bin(load: Load) -> None:
+@pytest.mark.parametrize("beside", [None, 0.04], ids=["alone", "beside a cube"])
+def test_what_falls_on_the_wall_of_a_bin_falls_into_the_bin(load: Load, beside: float | None) -> None:
     cell = FakeCell(load(table__objects="[0, 0]"))
-    bin = cell.cell.bins["red_bin"]
-    wall = bin.position[1] + bin.size[1] / 2 + 0.01
-    cube = cell.world.put("cube", float(bin.position[0]), float(wall))
+    bin, radius = cell.cell.bins["red_bin"], cell.cell.classes["cube"].radius
+    x, edge = float(bin.position[0]), float(bin.position[1] + bin.size[1] / 2)
+    if beside is not None:
+        cell.world.put("cube", x, edge + beside)
+    cube = cell.world.put("cube", x, edge + 0.01)
     cell.world.held = cube
     cell.tool.part()
-    radius = cell.cell.classes["cube"].radius
-    assert np.allclose(cube.position[:2], (bin.position[0], wall - 0.01 - radius))
+    assert bin.contains(cube.position)
+    assert beside is not None or np.allclose(cube.position[:2], (x, edge - radius))

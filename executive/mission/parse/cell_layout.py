@@ -1,4 +1,4 @@
-"""Bins of a cell file that are in the way of each other, of the objects, or of the safe place."""
+"""Checks that no bin of a cell file overlaps another bin, the workspace or the safe place."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from executive.geometry import Array
 from executive.messages import BIN_THICKNESS
 from executive.mission.parse.validate import KeyPath
 
-ROUNDING = 1e-6
-"""Overlap of two bins that share a wall, by rounding [m]."""
+TOLERANCE = 0.0005
+"""Largest overlap that is accepted [m]: the outer walls of two bins may touch."""
 
 
 def find_overlaps(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield a key and a sentence for each pair of bins that overlap, and for each bin near the objects.
+    """Yield a key and a message for each bin that overlaps a bin, the workspace or the safe place from above.
 
     The centre of an object may be anywhere in the workspace and at the safe place, so the largest radius of
     an object must stay free around both.
@@ -26,25 +26,24 @@ def find_overlaps(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     outlines = {name: _outline(bin) for name, bin in config.bins.items()}
     safe_place = np.array([config.safe_place[:2], config.safe_place[:2]])
     workspace = np.array([config.table.x, config.table.y]).T
-    margin = np.array([[-radius], [radius]])
     for (name, outline), (other, other_outline) in combinations(outlines.items(), 2):
-        if (overlap := _overlap(outline, other_outline)) > ROUNDING:
+        if (shift := _find_shift(outline, other_outline)) > TOLERANCE:
             yield (
                 ("bins", other, "position"),
-                f'the bins "{name}" and "{other}" overlap by {overlap:.3f} m with their walls; move one',
+                f'the bins "{name}" and "{other}" overlap; move one of them by {shift:.3f} m',
             )
     for name, outline in outlines.items():
-        if (overlap := _overlap(outline, workspace + margin)) > ROUNDING:
+        if (shift := _find_shift(outline, workspace, radius)) > TOLERANCE:
             yield (
                 ("bins", name, "position"),
-                f'the bin "{name}" reaches {overlap:.3f} m into the workspace (table.x, table.y) and the '
-                f"{radius:.3f} m that objects need around it; move the bin or the workspace",
+                f'the bin "{name}" is too near to the workspace (table.x, table.y), around which objects '
+                f"need {radius:.3f} m; move the bin or the workspace by {shift:.3f} m",
             )
-        if (overlap := _overlap(outline, safe_place + margin)) > ROUNDING:
+        if (shift := _find_shift(outline, safe_place, radius)) > TOLERANCE:
             yield (
                 ("safe_place",),
-                f'the bin "{name}" reaches {overlap:.3f} m into the {radius:.3f} m that an object needs '
-                "around the safe place; move the safe place",
+                f'the bin "{name}" is too near to the safe place, around which an object needs {radius:.3f} '
+                f"m; move the safe place by {shift:.3f} m",
             )
 
 
@@ -54,6 +53,8 @@ def _outline(bin: BinConfig) -> Array:
     return np.array([centre - half, centre + half])
 
 
-def _overlap(one: Array, other: Array) -> float:
-    """Return the overlap of two rectangles along x or y, whichever is smaller [m]; at most 0 for none."""
-    return float(np.min(np.minimum(one[1], other[1]) - np.maximum(one[0], other[0])))
+def _find_shift(one: Array, other: Array, required: float = 0.0) -> float:
+    """Return the shift along x or y that brings two rectangles to a distance [m]; 0 for none."""
+    gaps = np.maximum(one[0] - other[1], other[0] - one[1])
+    is_apart = gaps.max() >= 0 and np.linalg.norm(np.maximum(gaps, 0.0)) >= required
+    return 0.0 if is_apart else float(required - gaps.max())

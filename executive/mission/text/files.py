@@ -67,7 +67,7 @@ def below(folder: Path, reference: str, shipped: Sequence[str] = ("",)) -> Path:
     folders = [(base, base / written.parent) for base in bases if os.path.isdir(base / written.parent)]
     known = {p.relative_to(base).as_posix() for base, folder in folders for p in folder.glob("*.yaml")}
     hint = alternatives(reference, sorted(known), "There are")
-    searched = " or ".join(_shown(base / written.parent) for base in bases)
+    searched = " or ".join(dict.fromkeys(map(_shown, bases)))
     raise InputError(f'there is no file "{reference}" in {searched}. {hint}')
 
 

@@ -65,15 +65,15 @@ class Check:
     """One rule applied to one skill; a call raises `NotConforming` if the skill violates the rule.
 
     Attributes:
-        runs: The runs of the skill.
+        skill_runs: The runs of the skill.
         rule: The rule.
     """
 
-    runs: SkillRuns
+    skill_runs: SkillRuns
     rule: Rule
 
     def __str__(self) -> str:
-        return f"{self.runs.name}.{self.name}"
+        return f"{self.skill_runs.name}.{self.name}"
 
     @property
     def name(self) -> str:
@@ -88,10 +88,10 @@ class Check:
     def run(self) -> Verdict:
         """Apply the rule to the skill and return the result."""
         try:
-            problems = tuple(self.rule(self.runs))
+            problems = tuple(self.rule(self.skill_runs))
         except NotTried as problem:
-            return Verdict(self.runs.name, self.name, self.doc, "not run", (str(problem),))
-        return Verdict(self.runs.name, self.name, self.doc, "failed" if problems else "ok", problems)
+            return Verdict(self.skill_runs.name, self.name, self.doc, "not run", (str(problem),))
+        return Verdict(self.skill_runs.name, self.name, self.doc, "failed" if problems else "ok", problems)
 
     def __call__(self) -> None:
         """Run the check.
