@@ -144,7 +144,7 @@ def test_a_folded_tree_shows_every_subtree_once():
     assert text.count("view: table, doubtful: pass") == 1, "the only one of its kind is in look"
     assert [line.strip("│├└─ ") for line in text.splitlines() if "as above" in line] == [
         "recover look: try  (as above)",
-        "look: try  (as above, other params)", "look: try  (as above, other params)",
+        "1:look: try  (as above, other params)", "2:look: try  (as above, other params)",
         "look: try  (as above)",
     ]  # fmt: skip
     picture = ElementTree.fromstring(shown("sort_overhead", "--fold", "--svg").stdout)
