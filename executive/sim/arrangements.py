@@ -1,29 +1,34 @@
-"""What is random in a labelled scene: arm, view, objects, colours and light.
-
-The spread is wider than what a mission meets, so that a mission lies well inside it.
-"""
+"""Random arm, view and objects of a labelled scene."""
 
 from __future__ import annotations
 
-import colorsys
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
-from executive.cell_config import BinConfig, CameraConfig, CellConfig, Colour
+from executive.cell_config import BinConfig, CameraConfig, CellConfig, Colour, ObjectConfig
 from executive.clock import STEP
 from executive.geometry import Array, Pose, about_z, rotation_from_quaternion, tool_down
 from executive.messages import BIN_THICKNESS
 from executive.motion.kinematics import FLANGE_OFFSET
-from executive.sim.camera import CELL_LIGHT, Light
-from executive.sim.models import Mesh, add_body, upright
+from executive.sim.models import add_body, load_mesh, upright
+from executive.sim.variations import random_object_colour
 from executive.sim.world import World, add_bin
 
-COUNTS = (0.08, 0.14, 0.17, 0.17, 0.15, 0.13, 0.10, 0.06)
-"""Probability of 0, 1, … 7 objects."""
+FEW, MANY = 7, 20
+"""Largest number of objects in a scene with few of them, and in one with many."""
+SCALES = (0.75, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.2, 1.3)
+"""Factors on the size of an object that is not as large as its class."""
+UNKNOWN = "unknown"
+"""Label of an object of no class."""
+UNKNOWN_MODELS = tuple(number for number in range(800) if number != 168)
+"""Numbers of pybullet_data's `random_urdfs` that stand for unknown objects; the others are left for tests.
+The mesh of number 168 is damaged."""
 TABLE_X, TABLE_Y = (-0.05, 0.86), (-0.71, 0.71)
 """Part of the table top where objects may lie [m]."""
 FOOT = 0.16
@@ -31,8 +36,22 @@ FOOT = 0.16
 SETTLING = 360
 """Physics steps after which a pile is taken as it is."""
 
-Item = tuple[str, Pose, Colour]
-"""Label, `X_WO` and colour of an object."""
+
+@dataclass(frozen=True, eq=False)
+class Item:
+    """An object of a scene.
+
+    Attributes:
+        label: Its class, or `UNKNOWN`.
+        model: Its model, of its own size.
+        X_WO: Its pose.
+        colour: Its colour.
+    """
+
+    label: str
+    model: ObjectConfig
+    X_WO: Pose
+    colour: Colour
 
 
 def reach(world: World, camera: CameraConfig, rng: np.random.Generator) -> bool:
@@ -71,93 +90,86 @@ def random_part(camera: CameraConfig, rng: np.random.Generator) -> tuple[int, in
     return x, y, x + right - left, y + bottom - top
 
 
-def random_light(rng: np.random.Generator) -> Light:
-    """Return the cell's lamp, or another one; three in ten throw shadows."""
-    shadow = bool(rng.random() < 0.3)
-    if rng.random() < 0.3:
-        return Light(shadow=shadow) if shadow else CELL_LIGHT
-    azimuth, elevation = rng.uniform(0, math.tau), rng.uniform(math.radians(30), math.pi / 2)
-    across = math.cos(elevation)
-    red, green, blue = rng.uniform(0.82, 1.0, 3)
-    return Light(
-        direction=(across * math.cos(azimuth), across * math.sin(azimuth), math.sin(elevation)),
-        colour=(red, green, blue),
-        ambient=rng.uniform(0.40, 0.70),
-        diffuse=rng.uniform(0.20, 0.50),
-        specular=rng.uniform(0.0, 0.30),
-        shadow=shadow,
-    )
+def random_kinds(config: CellConfig, count: int, table: Colour, rng: np.random.Generator) -> list[Item]:
+    """Return `count` random objects, nowhere yet; in some scenes a few are unknown or have another size."""
+    share_unknown = rng.uniform(0.05, 0.4) if rng.random() < 0.35 else 0.0
+    share_resized = rng.uniform(0.2, 1.0) if rng.random() < 0.35 else 0.0
+    items = []
+    for label in rng.choice(list(config.objects), count):
+        label, model = str(label), config.objects[str(label)]
+        colour = random_object_colour(model.colours, table, rng)
+        if rng.random() < share_unknown:
+            label, model = UNKNOWN, unknown_model(int(rng.choice(UNKNOWN_MODELS)))
+            model = resized(model, rng.uniform(0.4, 1.0))
+        elif rng.random() < share_resized:
+            model = resized(model, float(rng.choice(SCALES)))
+        items.append(Item(label, model, Pose.identity(), colour))
+    return items
 
 
-def random_tint(rng: np.random.Generator) -> Colour:
-    """Return the table's tint: none in half of the scenes."""
-    if rng.random() < 0.5:
-        return 1.0, 1.0, 1.0
-    red, green, blue = rng.uniform(0.75, 1.0) * rng.uniform(0.88, 1.0, 3)
-    return red, green, blue
+def resized(model: ObjectConfig, factor: float) -> ObjectConfig:
+    """Return a model `factor` times as large."""
+    names = ("scale", "height", "radius", "ring")
+    return model.model_copy(update={name: getattr(model, name) * factor for name in names})
 
 
-def random_colour(config: CellConfig, label: str, rng: np.random.Generator) -> Colour:
-    """Return a colour of an object: of its class' palette, any hue, or a grey from black to white."""
-    kind = rng.random()
-    if kind < 0.45:
-        colours = config.objects[label].colours
-        return colours[int(rng.integers(len(colours)))]
-    if kind < 0.85:
-        return colorsys.hsv_to_rgb(rng.random(), rng.uniform(0.3, 1.0), rng.uniform(0.25, 1.0))
-    grey = rng.uniform(0.05, 1.0)
-    return grey, grey, grey
+@cache
+def unknown_model(number: int) -> ObjectConfig:
+    """Return one of pybullet_data's 1,000 random shapes, most of them 12 cm long; `number` is 0 to 999."""
+    name = f"random_urdfs/{number:03d}/{number:03d}.urdf"
+    mesh = load_mesh(ObjectConfig(urdf=name, height=1.0, radius=1.0))
+    return ObjectConfig(urdf=name, height=mesh.top - mesh.bottom, radius=mesh.radius)
 
 
 def arrange(
-    config: CellConfig,
-    meshes: Mapping[str, Mesh],
-    footprint: Array,
-    plain_view: bool,
-    rng: np.random.Generator,
+    config: CellConfig, footprint: Array, plain_view: bool, table: Colour, rng: np.random.Generator
 ) -> list[Item]:
-    """Return a random arrangement of 0 to 7 objects.
+    """Return a random arrangement of 0 to 20 objects, unknown ones and stacks among them.
 
     Args:
         config: The cell.
-        meshes: Shape of each class.
-        footprint: Corners `(N, 2)` [m] of what the image shows of the table.
-        plain_view: True where the image shows the workspace: then most objects lie there.
+        footprint: Corners `(N, 2)` [m] of the part of the table in the image.
+        plain_view: True if the image shows the workspace: then most objects lie there.
+        table: Mean colour of the table.
         rng: Source of everything random.
     """
-    labels = [str(label) for label in rng.choice(list(meshes), rng.choice(len(COUNTS), p=COUNTS))]
+    count = int(rng.integers(0, (FEW if rng.random() < 0.45 else MANY) + 1))
+    items = random_kinds(config, count, table, rng)
     low = np.maximum(footprint.min(axis=0), (TABLE_X[0], TABLE_Y[0]))
     high = np.minimum(footprint.max(axis=0), (TABLE_X[1], TABLE_Y[1]))
     if (high - low < 0.05).any():
         return []
     if plain_view and rng.random() < 0.75:
-        margin = rng.uniform(0.0, 0.06)
-        low = np.array([config.table.x[0], config.table.y[0]]) - margin
-        high = np.array([config.table.x[1], config.table.y[1]]) + margin
+        # The more objects, the more room around the workspace they get.
+        margin = rng.uniform(0.0, 0.02 + 0.006 * count)
+        low = np.maximum(low, np.array([config.table.x[0], config.table.y[0]]) - margin)
+        high = np.minimum(high, np.array([config.table.x[1], config.table.y[1]]) + margin)
     in_view = [bin for bin in config.bins.values() if _overlaps(bin, low, high)]
     style = rng.random()
-    if style < 0.20:
-        starts = _heap(labels, low, high, in_view, rng)
-        poses = settle(config, list(zip(labels, starts, strict=True)))
-    else:
-        labels, poses = _spread(config, meshes, labels, low, high, in_view, rng)
-        if style < 0.28:
-            tumbling = [Pose(_any_rotation(rng), pose.position + np.array([0, 0, 0.04])) for pose in poses]
-            poses = settle(config, list(zip(labels, tumbling, strict=True)))
-    items = zip(labels, poses, strict=True)
-    return [(label, pose, random_colour(config, label, rng)) for label, pose in items]
+    if style < 0.15:
+        return settle(config, _heap(items[:FEW], low, high, in_view, rng))
+    items = _spread(config, items, low, high, in_view, rng)
+    if style < 0.23:
+        return settle(config, [_tumbling(item, rng) for item in items])
+    if style < 0.40:
+        _stack(items, rng)
+    return items
 
 
-def hanging(X_WT: Pose, meshes: Mapping[str, Mesh], config: CellConfig, rng: np.random.Generator) -> Item:
+def _tumbling(item: Item, rng: np.random.Generator) -> Item:
+    """Return an object 4 cm above its place, turned in any way."""
+    return replace(item, X_WO=Pose(_any_rotation(rng), item.X_WO.position + np.array([0, 0, 0.04])))
+
+
+def hanging(X_WT: Pose, config: CellConfig, rng: np.random.Generator) -> Item:
     """Return a random object that hangs upright at the tool's tip."""
-    label = str(rng.choice(list(meshes)))
-    place = X_WT.position - [0, 0, meshes[label].top]
-    pose = Pose(about_z(rng.uniform(0, math.tau)), place)
-    return label, pose, random_colour(config, label, rng)
+    (item,) = random_kinds(config, 1, (0.5, 0.5, 0.5), rng)
+    place = X_WT.position - [0, 0, load_mesh(item.model).top]
+    return replace(item, X_WO=Pose(about_z(rng.uniform(0, math.tau)), place))
 
 
-def settle(config: CellConfig, objects: Sequence[tuple[str, Pose]]) -> list[Pose]:
-    """Return where objects (label, `X_WO`) come to lie 1.5 s after they are let go.
+def settle(config: CellConfig, items: Sequence[Item]) -> list[Item]:
+    """Return objects where they come to lie 1.5 s after they are let go.
 
     A fresh world every time makes the outcome a function of the starting poses alone.
     """
@@ -170,16 +182,19 @@ def settle(config: CellConfig, objects: Sequence[tuple[str, Pose]]) -> list[Pose
         client.createMultiBody(0, table, basePosition=[0, 0, -0.5])
         for bin in config.bins.values():
             add_bin(client, bin)
-        poses = []
-        for label, X_WO in objects:
-            body = add_body(client, config.objects[label], X_WO)
-            X_LI = Pose.of(*client.getDynamicsInfo(body, -1)[3:5])
-            poses.append((body, (upright(config.objects[label]) @ X_LI).inverse()))
+        bodies = [add_body(client, item.model, item.X_WO) for item in items]
         for _ in range(SETTLING):
             client.stepSimulation()
-        return [Pose.of(*client.getBasePositionAndOrientation(body)) @ X_IO for body, X_IO in poses]
+        settled = zip(bodies, items, strict=True)
+        return [replace(item, X_WO=_pose_of(client, body, item)) for body, item in settled]
     finally:
         client.disconnect()
+
+
+def _pose_of(client: BulletClient, body: int, item: Item) -> Pose:
+    X_LI = Pose.of(*client.getDynamicsInfo(body, -1)[3:5])
+    X_WI = Pose.of(*client.getBasePositionAndOrientation(body))
+    return X_WI @ (upright(item.model) @ X_LI).inverse()
 
 
 def _solve(world: World, X_WT: Pose) -> None:
@@ -212,54 +227,68 @@ def _inside(bin: BinConfig, point: Array, margin: float) -> bool:
 
 
 def _heap(
-    labels: list[str], low: Array, high: Array, bins: list[BinConfig], rng: np.random.Generator
-) -> list[Pose]:
-    """Return starting poses one above the other, over a point of the table or over a bin."""
+    items: Sequence[Item], low: Array, high: Array, bins: list[BinConfig], rng: np.random.Generator
+) -> list[Item]:
+    """Return objects one above the other, over a point of the table or over a bin."""
     if bins and rng.random() < 0.6:
         centre = np.array(bins[int(rng.integers(len(bins)))].position[:2])
     else:
         centre = rng.uniform(low + 0.03, np.maximum(high - 0.03, low + 0.031))
     spread = rng.uniform(0.01, 0.06)
+    places = [[*(centre + rng.normal(0, spread, 2)), 0.05 + 0.055 * i] for i in range(len(items))]
     return [
-        Pose(_any_rotation(rng), np.array([*(centre + rng.normal(0, spread, 2)), 0.05 + 0.055 * i]))
-        for i in range(len(labels))
+        replace(item, X_WO=Pose(_any_rotation(rng), np.array(place)))
+        for item, place in zip(items, places, strict=True)
     ]
+
+
+def _stack(items: list[Item], rng: np.random.Generator) -> None:
+    """Put some objects on others, nearly over their middles: balanced or not, nothing is simulated."""
+    for _ in range(int(rng.integers(1, 1 + max(1, len(items) // 3)))):
+        if len(items) < 2:
+            return
+        upper, lower = (int(index) for index in rng.choice(len(items), 2, replace=False))
+        below = items[lower]
+        place = below.X_WO.position[:2]
+        if any(math.dist(item.X_WO.position[:2], place) < 0.01 for item in items if item is not below):
+            continue
+        height = load_mesh(below.model).top - load_mesh(items[upper].model).bottom
+        offset = np.array([*rng.normal(0, 0.003, 2), height])
+        items[upper] = replace(
+            items[upper], X_WO=Pose(about_z(rng.uniform(0, math.tau)), below.X_WO.position + offset)
+        )
 
 
 def _spread(
     config: CellConfig,
-    meshes: Mapping[str, Mesh],
-    labels: list[str],
+    items: Sequence[Item],
     low: Array,
     high: Array,
     bins: list[BinConfig],
     rng: np.random.Generator,
-) -> tuple[list[str], list[Pose]]:
+) -> list[Item]:
     """Return those objects that find a place side by side, standing on the table or in a bin."""
-    gap = rng.uniform(0.001, 0.02)
-    chosen: list[str] = []
-    poses: list[Pose] = []
-    for label in labels:
-        radius = config.objects[label].radius
+    gap = rng.uniform(0.0, 0.02)
+    placed: list[Item] = []
+    for item in items:
+        radius = item.model.radius
         for _ in range(30):
             point, floor = rng.uniform(low, high), 0.0
             if bins and rng.random() < 0.35:
                 bin = bins[int(rng.integers(len(bins)))]
-                half = np.array(bin.size[:2]) / 2 - radius
+                half = np.maximum(np.array(bin.size[:2]) / 2 - radius, 0.0)
                 point = np.array(bin.position[:2]) + rng.uniform(-half, half)
             inside = [bin for bin in config.bins.values() if _inside(bin, point, -radius)]
             if inside:
                 floor = inside[0].position[2] + BIN_THICKNESS
             elif any(_inside(bin, point, radius + BIN_THICKNESS) for bin in config.bins.values()):
                 continue
-            others = zip(chosen, poses, strict=True)
             free = all(
-                np.linalg.norm(pose.position[:2] - point) > radius + config.objects[other].radius + gap
-                for other, pose in others
+                np.linalg.norm(other.X_WO.position[:2] - point) > radius + other.model.radius + gap
+                for other in placed
             )
             if free and np.linalg.norm(point) > FOOT:
-                turn = about_z(rng.uniform(0, math.tau))
-                chosen.append(label)
-                poses.append(Pose(turn, np.array([*point, floor - meshes[label].bottom])))
+                place = np.array([*point, floor - load_mesh(item.model).bottom])
+                placed.append(replace(item, X_WO=Pose(about_z(rng.uniform(0, math.tau)), place)))
                 break
-    return chosen, poses
+    return placed

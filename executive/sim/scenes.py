@@ -13,14 +13,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell_config import CellConfig
+from executive.cell_config import CellConfig, NoiseConfig
 from executive.geometry import Array, Pose
 from executive.messages import Box
-from executive.sim.arrangements import Item, arrange, hanging, random_light, random_part, random_tint, reach
+from executive.sim.arrangements import UNKNOWN, Item, arrange, hanging, random_part, reach
 from executive.sim.camera import CELL_LIGHT, Image, add_noise, camera_pose, render, sense
 from executive.sim.models import load_mesh
 from executive.sim.silhouette import outline_box, visible_share
 from executive.sim.spawn import spawn
+from executive.sim.table_top import WOOD
+from executive.sim.variations import WOOD_COLOUR, random_camera, random_light, random_noise, random_table
 from executive.sim.world import World
 from executive.vision.camera_model import calibrated, on_plane, project
 
@@ -30,8 +32,12 @@ LABELLED = 0.5
 """Share of its silhouette that must be visible for an object to be labelled."""
 UNNOTICED = 0.15
 """Share under which an object counts as hidden; in between it is neither labelled nor background."""
-MOST_IGNORED = 1
-"""Objects between the two that a scene may have: more would confuse training."""
+IGNORED_SHARE = 1 / 6
+"""Share of the objects that may lie between the two, but always one: more would confuse training."""
+DECLARED_SHARE = 0.2
+"""Share of the scenes with table, lamp, camera and noise as in the cell file."""
+VISIBLE_CONTRAST = 5
+"""Contrast to its surroundings under which an object is ignored [standard deviation of the noise]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +74,27 @@ class Sample:
     depth: Array | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class View:
+    """A part of a camera's image, free of noise.
+
+    Attributes:
+        image: `(h, w, 3)` uint8, RGB.
+        bodies: `(h, w)` body at each pixel.
+        part: Left, top, right and bottom [pixel] in the whole image.
+        matrix: Camera matrix of the whole image.
+        X_WC: Pose of the camera.
+        noise: The noise that it is going to have.
+    """
+
+    image: Image
+    bodies: NDArray[np.int32]
+    part: tuple[int, int, int, int]
+    matrix: Array
+    X_WC: Pose
+    noise: NoiseConfig
+
+
 class SceneRenderer:
     """Makes samples of one camera of a cell, reusing one world for all of them.
 
@@ -79,7 +106,6 @@ class SceneRenderer:
         self._config = config
         self._randomized = randomized
         self._camera = config.cameras[camera]
-        self._meshes = {label: load_mesh(model) for label, model in config.objects.items()}
         self._world = World(config)
         self._matrix, _ = calibrated(self._camera)
 
@@ -100,23 +126,29 @@ class SceneRenderer:
     def _draw(self, rng: np.random.Generator) -> Sample | None:
         world = self._world
         holds = reach(world, self._camera, rng)
-        X_WC = camera_pose(world, self._camera)
+        matrix, X_WC = self._matrix, camera_pose(world, self._camera)
+        (colour, texture), light, noise = ((1.0, 1.0, 1.0), WOOD), CELL_LIGHT, self._camera.noise
+        if rng.random() >= DECLARED_SHARE:
+            matrix, X_WC = random_camera(self._camera, matrix, X_WC, rng)
+            (colour, texture), light = random_table(rng), random_light(rng)
+            noise = random_noise(noise, rng)
         part = random_part(self._camera, rng)
+        shown = colour if texture != WOOD else tuple(np.multiply(colour, WOOD_COLOUR).tolist())
         corners = [(x, y) for x in part[::2] for y in part[1::2]]
-        footprint = np.array([on_plane(self._matrix, X_WC, corner, 0.0)[:2] for corner in corners])
-        plain_view = part == self._camera.table_view
-        items = arrange(self._config, self._meshes, footprint, plain_view, rng)
+        footprint = np.array([on_plane(matrix, X_WC, corner, 0.0)[:2] for corner in corners])
+        items = arrange(self._config, footprint, part == self._camera.table_view, shown, rng)
         if holds:
-            items.append(hanging(world.tool_pose(), self._meshes, self._config, rng))
-        bodies = [world.add_object(*item) for item in items]
+            items.append(hanging(world.tool_pose(), self._config, rng))
+        bodies = [world.add_object(item.label, item.X_WO, item.colour, item.model) for item in items]
         try:
-            world.client.changeVisualShape(world.table, -1, rgbaColor=[*random_tint(rng), 1])
-            shot = render(world, self._matrix, X_WC, part, random_light(rng))
+            world.table_top.paint(colour, texture)
+            shot = render(world, matrix, X_WC, part, light)
         finally:
             for body in bodies:
                 world.remove_object(body)
-        image = add_noise(shot.image, self._camera.noise, rng)
-        return self._label(image, shot.bodies, bodies, items, X_WC, part)
+        view = View(shot.image, shot.bodies, part, matrix, X_WC, noise)
+        sample = self._label(view, bodies, items)
+        return None if sample is None else replace(sample, image=_resized(add_noise(shot.image, noise, rng)))
 
     def _draw_as_run(self, rng: np.random.Generator) -> Sample | None:
         world, camera = self._world, self._camera
@@ -126,7 +158,10 @@ class SceneRenderer:
         world.set_arm(pose)  # settling may have let it sag
         try:
             X_WC = camera_pose(world, camera)
-            items = [(world.bodies[body], world.object_pose(body), (0.0, 0.0, 0.0)) for body in bodies]
+            items = [
+                Item(world.bodies[body], world.models[body], world.object_pose(body), (0.0, 0.0, 0.0))
+                for body in bodies
+            ]
             shot = render(world, self._matrix, X_WC, (0, 0, camera.width, camera.height), CELL_LIGHT)
         finally:
             for body in bodies:
@@ -134,58 +169,69 @@ class SceneRenderer:
         frame = add_noise(shot.image, camera.noise, rng)
         depth = None if camera.depth is None else sense(shot.depth, camera.depth, rng)
         left, top, right, bottom = part = camera.table_view
-        image, seen = frame[top:bottom, left:right], shot.bodies[top:bottom, left:right]
-        sample = self._label(image, seen, bodies, items, X_WC, part)
-        return None if sample is None else replace(sample, frame=frame, depth=depth)
+        clean, seen = shot.image[top:bottom, left:right], shot.bodies[top:bottom, left:right]
+        sample = self._label(View(clean, seen, part, self._matrix, X_WC, camera.noise), bodies, items)
+        if sample is None:
+            return None
+        return replace(sample, image=_resized(frame[top:bottom, left:right]), frame=frame, depth=depth)
 
-    def _label(
-        self,
-        image: Image,
-        seen: NDArray[np.int32],
-        bodies: Sequence[int],
-        items: Sequence[Item],
-        X_WC: Pose,
-        part: tuple[int, int, int, int],
-    ) -> Sample | None:
-        """Label a render, or return None where too many objects are half hidden."""
-        labels, boxes, shares, positions, centres, ignored = [], [], [], [], [], []
-        corner, scale = np.array(part[:2], dtype=float), SIZE / (part[2] - part[0])
-        for body, (label, X_WO, _) in zip(bodies, items, strict=True):
-            mine = seen == body
-            if not mine.any():
+    def _label(self, view: View, bodies: Sequence[int], items: Sequence[Item]) -> Sample | None:
+        """Label a render, or return None if too many objects are half hidden."""
+        labels, boxes, shares, positions, centres, ignored, half_hidden = [], [], [], [], [], [], 0
+        corner, scale = np.array(view.part[:2], dtype=float), SIZE / (view.part[2] - view.part[0])
+        for body, item in zip(bodies, items, strict=True):
+            mine = view.bodies == body
+            if item.label == UNKNOWN or not mine.any():
                 continue
-            mesh = self._meshes[label]
-            vertices = X_WO.apply(mesh.vertices)
-            pixels = project(self._matrix, X_WC, vertices)
+            mesh = load_mesh(item.model)
+            vertices = item.X_WO.apply(mesh.vertices)
+            pixels = project(view.matrix, view.X_WC, vertices)
             share = visible_share(mesh, pixels, mine)
             whole = outline_box(pixels)
             box = _clipped(whole, corner, scale)
             if share < UNNOTICED:
                 continue
-            if share < LABELLED:
+            half_hidden += share < LABELLED
+            if share < LABELLED or contrast(view.image, mine) < VISIBLE_CONTRAST * view.noise.read:
                 ignored.append(box)
                 continue
             centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
             middle = ((whole[0] + whole[2]) / 2, (whole[1] + whole[3]) / 2)
-            labels.append(label)
+            labels.append(item.label)
             boxes.append(box)
             shares.append(share)
-            positions.append(on_plane(self._matrix, X_WC, middle, float(centre[2])))
+            positions.append(on_plane(view.matrix, view.X_WC, middle, float(centre[2])))
             centres.append(centre)
-        if len(ignored) > MOST_IGNORED:
+        if half_hidden > max(1, len(items) * IGNORED_SHARE):
             return None
         return Sample(
-            image=_resized(image),
+            image=view.image,
             labels=tuple(labels),
             boxes=np.array(boxes).reshape(-1, 4),
             visible_fraction=np.array(shares),
             positions=np.array(positions).reshape(-1, 3),
             centres=np.array(centres).reshape(-1, 3),
             ignored=np.array(ignored).reshape(-1, 4),
-            part=part,
-            matrix=self._matrix,
-            X_WC=X_WC,
+            part=view.part,
+            matrix=view.matrix,
+            X_WC=view.X_WC,
         )
+
+
+def contrast(image: Image, mask: NDArray[np.bool_]) -> float:
+    """Return the difference between an object and a ring of two pixels around it [grey level].
+
+    It is the largest of the three colours, and the median over the pixels of the object.
+
+    Args:
+        image: `(H, W, 3)`.
+        mask: The pixels `(H, W)` that show the object.
+    """
+    ring = cv2.dilate(mask.astype(np.uint8), np.ones((5, 5), np.uint8)).astype(bool) & ~mask
+    if not ring.any():
+        return 0.0
+    around = np.median(image[ring], axis=0)
+    return float(np.median(np.abs(image[mask] - around).max(axis=1)))
 
 
 def _clipped(box: Box, corner: Array, scale: float) -> list[float]:

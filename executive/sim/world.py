@@ -14,7 +14,7 @@ import numpy as np
 import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
-from executive.cell_config import BinConfig, CellConfig
+from executive.cell_config import BinConfig, CellConfig, ObjectConfig
 from executive.clock import STEP
 from executive.geometry import Array, Pose
 from executive.layout import NECK_LENGTH, TOOL_RADIUS
@@ -24,6 +24,7 @@ from executive.motion.state import JOINTS
 from executive.sim import command_log
 from executive.sim.command_log import CommandLog
 from executive.sim.models import add_body, find_model, upright
+from executive.sim.table_top import TableTop
 
 TABLE_HEIGHT = 0.625
 """Height of the top of pybullet_data's table over its feet [m]."""
@@ -53,8 +54,10 @@ class World:
         flange: Index of the arm's link 7; the flange is `FLANGE_OFFSET` along its z axis.
         tool: Index of the tool's link, whose frame is the flange's.
         table, plane: Bodies of the table and of the floor under it.
+        table_top: The surface of the table.
         bins: Bodies of each bin.
         bodies: Label of every loose object, by body.
+        models: Model of every loose object, by body.
         steps: Physics steps made so far.
         log: Where all that is done to it is noted, before it is done.
         idle: True while it is stepped for nobody's run.
@@ -79,26 +82,34 @@ class World:
             useFixedBase=True,
             flags=flags,
         )
+        self.table_top = TableTop(self.client, self.table)
         self.arm = self._load_arm(flags)
         self.bins = {name: (add_bin(self.client, bin),) for name, bin in config.bins.items()}
         self.bodies: dict[int, str] = {}
+        self.models: dict[int, ObjectConfig] = {}
         self.steps = 0
         self.log = CommandLog()
         self.idle = False
         self.stood: dict[int, list[Array]] = {}
         self.set_arm(np.radians(config.arm.poses_deg["home"]))
 
-    def add_object(self, label: str, X_WO: Pose, colour: Sequence[float]) -> int:
-        """Put an object of class `label` at `X_WO` (z up as it stands) and return its body."""
-        body = add_body(self.client, self.config.objects[label], X_WO)
+    def add_object(
+        self, label: str, X_WO: Pose, colour: Sequence[float], model: ObjectConfig | None = None
+    ) -> int:
+        """Put an object of class `label` at `X_WO` (z up as it stands) and return its body.
+
+        By default its model is that of the cell file.
+        """
+        model = model or self.config.objects[label]
+        body = add_body(self.client, model, X_WO)
         self.client.changeVisualShape(body, -1, rgbaColor=[*colour, 1])
-        self.bodies[body] = label
+        self.bodies[body], self.models[body] = label, model
         return body
 
     def remove_object(self, body: int) -> None:
         """Take a loose object out of the world."""
         self.log.note(command_log.REMOVE, body)
-        del self.bodies[body]
+        del self.bodies[body], self.models[body]
         self.client.removeBody(body)
 
     def name_of(self, body: int) -> str:
@@ -116,14 +127,14 @@ class World:
         """Return `X_WO` of a loose object, the frame that `add_object` takes."""
         X_WI = Pose.of(*self.client.getBasePositionAndOrientation(body))
         X_LI = Pose.of(*self.client.getDynamicsInfo(body, -1)[3:5])
-        return X_WI @ X_LI.inverse() @ upright(self.config.objects[self.bodies[body]]).inverse()
+        return X_WI @ X_LI.inverse() @ upright(self.models[body]).inverse()
 
     def place_object(self, body: int, X_WO: Pose) -> None:
         """Move a loose object to `X_WO`, at rest."""
         self.stood.setdefault(body, []).append(X_WO.position)
         self.log.note(command_log.PLACE, body, *X_WO.position, *X_WO.quaternion)
         X_LI = Pose.of(*self.client.getDynamicsInfo(body, -1)[3:5])
-        X_WI = X_WO @ upright(self.config.objects[self.bodies[body]]) @ X_LI
+        X_WI = X_WO @ upright(self.models[body]) @ X_LI
         self.client.resetBasePositionAndOrientation(body, X_WI.position, X_WI.quaternion)
 
     def set_arm(self, q: Sequence[float] | Array) -> None:

@@ -1,4 +1,4 @@
-"""Train the small RF-DETR on a COCO or YOLO folder, from random weights or from a checkpoint."""
+"""Train the small RF-DETR on a COCO or YOLO folder, from random weights or from a trained model."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ def train(
     out: Path,
     *,
     start: Path | None = None,
+    rate: float | None = None,
     epochs: int = 20,
     seed: int = 0,
     progress: Progress = lambda _epoch, _metrics: None,
@@ -37,8 +38,9 @@ def train(
         dataset: Folder as Roboflow exports it: `train/` and `valid/`, each with `_annotations.coco.json`, or
             a `data.yaml` for YOLO.
         out: Folder to fill; made if missing.
-        start: Checkpoint (`.pth`) of this architecture to fine-tune, whatever its classes; a `labels.txt`
-            beside it names them. None trains from random weights.
+        start: Checkpoint (`.pth`) or exported model (`.onnx`) of this architecture to fine-tune, whatever its
+            classes; a `labels.txt` beside it names them. None trains from random weights.
+        rate: Learning rate; by default 1e-4 if `start` has the same classes, else 3e-4.
         epochs: Number of passes over the data.
         seed: Seed of weights, order and augmentation.
         progress: Called after every epoch with its number, from 1, and its figures.
@@ -61,7 +63,7 @@ def train(
             f'training needs the package "{error.name}"; install the extra: uv sync --extra train'
         ) from error
     out.mkdir(parents=True, exist_ok=True)
-    fit(dataset, out, start=start, epochs=epochs, seed=seed, progress=progress, batches=batches)
+    fit(dataset, out, start=start, rate=rate, epochs=epochs, seed=seed, progress=progress, batches=batches)
     model, labels = out / "model.onnx", out / "labels.txt"
     export_onnx(out / "checkpoint_best_total.pth", len(read_labels(labels)), model)
     card = ModelCard(
@@ -70,6 +72,7 @@ def train(
         settings={
             **describe(),
             "start": "random weights" if start is None else start.name,
+            **({} if rate is None else {"learning rate": f"{rate:g}"}),
             "epochs": str(epochs),
             "seed": str(seed),
             "weights stored as": "int8",
@@ -83,11 +86,6 @@ def train(
 def _check(dataset: Path, start: Path | None) -> None:
     if start is not None and not start.is_file():
         raise InputError(f"there is no checkpoint {start} to start from; train one first, or leave it out")
-    if start is not None and start.suffix == ".onnx":
-        raise InputError(
-            f"{start} is an exported model, which is no checkpoint; start from the checkpoint_best_total.pth "
-            "of its training, which the commands on the model's card make again"
-        )
     coco = [dataset / part / "_annotations.coco.json" for part in ("train", "valid")]
     yolo = [dataset / name for name in ("data.yaml", "data.yml")]
     if not (all(path.is_file() for path in coco) or any(path.is_file() for path in yolo)):

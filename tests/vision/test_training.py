@@ -21,11 +21,9 @@ from executive.vision.training.start import learning_rate
     [
         (None, r"not a data set: it needs train/_annotations\.coco\.json"),
         ("old.pth", r"no checkpoint .*old\.pth to start from"),
-        ("model.onnx", r"model\.onnx is an exported model, .* checkpoint_best_total\.pth"),
     ],
 )
 def test_a_training_that_cannot_start_is_refused(tmp_path, start, text):
-    (tmp_path / "model.onnx").touch()
     with pytest.raises(InputError, match=text):
         train(tmp_path, tmp_path / "out", start=start and tmp_path / start)
 
@@ -63,6 +61,28 @@ def test_a_training_tells_of_every_batch_and_of_every_epoch(monkeypatch):
         report.on_train_epoch_end(trainer, None)
     one, two = (1, {"loss": 1.0}), (2, {"loss": 1.0})
     assert told == [(1, 6), (2, 6), (3, 6), one, (4, 6), (5, 6), (6, 6), two]
+
+
+def test_the_labels_of_an_exported_model_lie_beside_it_under_its_name(tmp_path):
+    (tmp_path / "embedded.labels.txt").write_text("bolt\n")
+    assert learning_rate(tmp_path / "embedded.onnx", ["bolt"]) == 1e-4
+
+
+def test_a_model_restored_from_its_export_gives_the_same_answers(tmp_path):
+    pytest.importorskip("torch")
+    onnx = pytest.importorskip("onnx")
+    import onnxruntime
+
+    from executive.vision.detectors.embedded import MODEL
+    from executive.vision.training.export import export
+    from executive.vision.training.restore import restore
+
+    onnx.save(export(restore(MODEL), tmp_path), str(tmp_path / "again.onnx"))
+    image = np.random.default_rng(0).normal(size=(1, 3, 256, 256)).astype(np.float32)
+    first, again = (onnxruntime.InferenceSession(str(path)) for path in (MODEL, tmp_path / "again.onnx"))
+    (name,) = (one.name for one in first.get_inputs())
+    for ours, theirs in zip(first.run(None, {name: image}), again.run(None, {name: image}), strict=True):
+        assert ours == pytest.approx(theirs, abs=1e-5)
 
 
 @pytest.mark.parametrize("element", range(8))

@@ -11,6 +11,7 @@ from rfdetr.training import build_trainer
 from executive.vision.training.architecture import create
 from executive.vision.training.lightning import Model, SymmetricData
 from executive.vision.training.report import Batches, Progress, Report
+from executive.vision.training.restore import restore
 from executive.vision.training.start import learning_rate
 
 BATCH = 16
@@ -22,6 +23,7 @@ def fit(
     out: Path,
     *,
     start: Path | None,
+    rate: float | None,
     epochs: int,
     seed: int,
     progress: Progress,
@@ -33,7 +35,9 @@ def fit(
         torch.set_num_threads(THREADS)
     pytorch_lightning.seed_everything(seed, workers=True, verbose=False)
     labels = class_names(dataset)
-    rate = learning_rate(start, labels)
+    rate = rate or learning_rate(start, labels)
+    if start is not None and start.suffix == ".onnx":
+        start = _as_checkpoint(start, out)
     detector = create(len(labels), start, "cuda" if cuda else "cpu")
     config = detector.get_train_config(
         dataset_dir=str(dataset),
@@ -66,6 +70,13 @@ def fit(
     trainer.callbacks.append(Report(progress, batches))
     trainer.fit(model, data)
     (out / "labels.txt").write_text("".join(f"{label}\n" for label in labels), encoding="utf-8")
+
+
+def _as_checkpoint(model: Path, out: Path) -> Path:
+    """Write the weights of an exported model as a checkpoint into `out` and return its path."""
+    path = out / "start.pth"
+    torch.save({"model": restore(model).model.model.state_dict()}, path)
+    return path
 
 
 def class_names(dataset: Path) -> list[str]:

@@ -1,4 +1,4 @@
-"""Learning rate of a training, by the weights that it starts from."""
+"""Learning rate of a training, which depends on the weights that it starts from."""
 
 from __future__ import annotations
 
@@ -13,7 +13,13 @@ FINE_TUNING_RATE = 1e-4
 
 
 def learning_rate(start: Path | None, labels: list[str]) -> float:
-    """Return the rate for learning `labels` from a checkpoint, whose own `labels.txt` lies beside it."""
-    if start is None or not (beside := start.with_name("labels.txt")).is_file():
+    """Return the rate for learning `labels` from a model, whose own labels lie beside it.
+
+    The file is called `labels.txt`, or `NAME.labels.txt` beside a model `NAME.onnx`.
+    """
+    if start is None:
         return LEARNING_RATE
-    return FINE_TUNING_RATE if list(read_labels(beside)) == labels else LEARNING_RATE
+    files = (start.with_suffix(".labels.txt"), start.with_name("labels.txt"))
+    beside = next((file for file in files if file.is_file()), None)
+    is_known = beside is not None and list(read_labels(beside)) == labels
+    return FINE_TUNING_RATE if is_known else LEARNING_RATE
