@@ -164,8 +164,15 @@ class Ledger(Protocol):
     def believes_empty(self) -> bool:
         """Tell whether it is as good as certain that nothing with a route is left where one can look."""
 
+    @property
+    def unknown(self) -> Mapping[str, int]:
+        """Largest number of boxes in one look for each label that the cell does not know."""
+
     def touched(self, item: Item) -> None:
         """Record that the tool met the item, which proves that it exists."""
+
+    def contradicted(self, item: Item, why: str) -> None:
+        """Record evidence against the class of the item, which a rejection will report."""
 
     def missed(self, item: Item) -> None:
         """Record a grasp that did not hold; where things lie nearby is in doubt now."""

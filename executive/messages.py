@@ -102,11 +102,13 @@ class Detection:
         label: Class name.
         confidence: 0 to 1.
         box: Bounding box of the whole object [pixel] in the frame's image.
+        rival: Confidence of the second class for this box, 0 to 1; 0 if the detector does not say.
     """
 
     label: str
     confidence: float
     box: Box
+    rival: float = 0.0
 
     @property
     def centre(self) -> tuple[float, float]:
@@ -160,7 +162,8 @@ class Detections:
         reliability: How that detector errs.
         view: Name of the part of the frame that was searched: `table` or `full`.
         area: That part [pixel].
-        doubtful: Detections below the threshold, most confident first: something may be there.
+        doubtful: Detections that are below the threshold or hardly more likely than another class.
+        unknown: Detections at or above the threshold with labels that the cell does not know.
     """
 
     frame: Frame
@@ -170,6 +173,7 @@ class Detections:
     view: str
     area: Box
     doubtful: tuple[Detection, ...] = ()
+    unknown: tuple[Detection, ...] = ()
 
     def shows(self, points: Array, inset: float = 0.0) -> NDArray[np.bool_]:
         """Tell `(N,)` which points `(N, 3)` [m] of the world lie in the searched part of the image.
@@ -185,10 +189,14 @@ class Detections:
 
 @dataclass(frozen=True, eq=False)
 class Glimpse:
-    """A detection below the threshold, and where `(3,)` [m] its object would be."""
+    """A detection that does not count as one.
+
+    It is below the threshold, or `contradiction` is evidence against its class. `position` is `(3,)` [m].
+    """
 
     detection: Detection
     position: Array
+    contradiction: str = ""
 
 
 Item = str

@@ -11,15 +11,25 @@ from executive.cell import Cell, LeastTimes, Operator, Routes
 from executive.events import Emit
 from executive.scenery import Scenery
 
+PLACES = ("right", "wrong_bin", "left", "elsewhere", "fell_in_wrong_bin", "unseen")
+"""Counts of an audit; the last two count objects that the others count, too."""
+
 
 class Accounts(Protocol):
     """What the runtime asks of a ledger when a run is over."""
 
-    def close(self) -> None:
-        """Decide what became of everything still open."""
+    def close(self, *, completed: bool) -> None:
+        """Decide the final state of each item; `completed` is True if the tree succeeded."""
 
     def balance(self) -> dict[str, int]:
-        """Return the counts `seen, placed, rejected, lost, phantom`."""
+        """Return the counts `seen, placed, rejected, skipped, lost, phantom`.
+
+        `seen` is the sum of the next four.
+        """
+
+    @property
+    def unknown(self) -> Mapping[str, int]:
+        """Largest number of boxes in one look for each label that the cell does not know."""
 
     def rows(self) -> list[dict[str, object]]:
         """Return a plain row per item, in the order of first sight."""

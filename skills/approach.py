@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 from executive.arm import Goal, Task
 from executive.cell import Cell, LeastTimes, Steps, Tool
+from executive.evidence import describe_wrong_height
 from executive.goals import OVERTRAVEL, SPACING, approach
 from executive.messages import Target
 from executive.moving import follow, planned
@@ -22,13 +24,13 @@ class Approach(Skill):
     One motion: over the target and down, fast, then feeling its way through the last part, since the surface
     may be higher or lower than a camera can tell. Succeeds on contact near the expected height. Every attempt
     after a failed one comes down a little beside the last: on a spiral, or further round the ring of a part
-    with a hole.
+    with a hole. A touch at a height that the target's class does not have is a contradiction.
     """
 
     target: In[Target] = port(doc="where to go")
     overtravel: Metres = param(OVERTRAVEL, ge=0, le=0.03, doc="how far below the expected surface to feel")
     offset: Metres = param(SPACING, ge=0, le=0.02, doc="spacing of the spiral of further attempts")
-    reasons: ClassVar = ("stale", "unreachable", "blocked", "no_contact")
+    reasons: ClassVar = ("stale", "unreachable", "blocked", "contradicted", "no_contact")
     uses: ClassVar = ("arm", "tool")
     moves: ClassVar = True
     tool_state: ClassVar = (EMPTY, EMPTY)
@@ -62,6 +64,10 @@ class Approach(Skill):
             cell.ledger.bumped()
             met = f"the tool met something at {height * 1000:.0f} mm"
             raise self.failed("blocked", f"{met}, on its way to {item}, which was {expected}")
+        offset = self.offset * math.sqrt(cell.ledger.attempts(item))
+        if doubt := describe_wrong_height(self.target.label, height, cell.classes, offset):
+            cell.ledger.contradicted(item, doubt)
+            raise self.failed("contradicted", f"{item} may be no {self.target.label}: {doubt}")
         cell.ledger.touched(item)
 
 

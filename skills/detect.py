@@ -15,6 +15,10 @@ IN_VIEW = 0.7
 """Share of a box that the arm must leave in view for the box to be believed."""
 
 
+MAX_RIVAL = 0.5
+"""Largest ratio between the confidences of the second and the first class of a box."""
+
+
 class Detect(Skill):
     """Know which objects a fresh image shows, beside the running tick loop.
 
@@ -67,15 +71,16 @@ class Detect(Skill):
                 f"detector {answer.detector} gave a box that cannot be: {wrong.label} {wrong.confidence:g} "
                 f"at {wrong.box}",
             )
-        # A model may know more classes than the cell: what the cell does not handle is no object of its.
-        known = [
-            detection
-            for detection in answer.found
-            if detection.label in cell.classes and frame.shown(detection.box) >= IN_VIEW
-        ]
+        shown = [detection for detection in answer.found if frame.shown(detection.box) >= IN_VIEW]
+        known = [detection for detection in shown if detection.label in cell.classes]
         threshold = answer.reliability.threshold
-        found = tuple(detection for detection in known if detection.confidence >= threshold)
-        doubtful = tuple(detection for detection in known if detection.confidence < threshold)
+        unknown = tuple(
+            detection
+            for detection in shown
+            if detection.label not in cell.classes and detection.confidence >= threshold
+        )
+        found = tuple(detection for detection in known if _is_clear(detection, threshold))
+        doubtful = tuple(detection for detection in known if not _is_clear(detection, threshold))
         if not found and doubtful and self.doubtful == "fail":
             best = doubtful[0]
             raise self.failed(
@@ -91,7 +96,14 @@ class Detect(Skill):
             self.view,
             cell.camera.area(self.view),
             doubtful,
+            unknown,
         )
+
+
+def _is_clear(detection: Detection, threshold: float) -> bool:
+    """Return True if a detection is confident enough, and its second class is not nearly as likely."""
+    confidence = detection.confidence
+    return confidence >= threshold and detection.rival <= MAX_RIVAL * confidence
 
 
 def _can_be(detection: Detection) -> bool:

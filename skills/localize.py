@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import ClassVar
 
 from executive.cell import Cell
 from executive.errors import NoDepth
+from executive.evidence import describe_wrong_size
 from executive.messages import Detections, Glimpse, Target
 from executive.skill import In, Out, Skill, port
 
@@ -15,7 +17,7 @@ class Localize(Skill):
     """Know where every detected object is and which item it is.
 
     Uses the camera pose stored with the frame, so it holds wherever the camera is by now. The ledger
-    binds each detection to an item.
+    binds each detection to an item. A detection whose box has not the size of its class is in doubt.
     """
 
     detections: In[Detections] = port(doc="what was found, with its frame")
@@ -32,11 +34,20 @@ class Localize(Skill):
                 "stale", f"frame {frame.id} shows the table before change {cell.ledger.epoch}; look again"
             )
         try:
-            positions = [cell.localizer.locate(detection, frame) for detection in self.detections.found]
+            places = [cell.localizer.locate(detection, frame) for detection in self.detections.found]
             glimpses = list(self._glimpses(cell))
         except NoDepth as error:
             raise self.failed("no_depth", str(error)) from error
-        self.targets = list(cell.ledger.observe(self.detections, positions, glimpses))
+        found, positions = [], []
+        for detection, place in zip(self.detections.found, places, strict=True):
+            kind = cell.classes[detection.label]
+            if doubt := describe_wrong_size(detection, place, frame, self.detections.area, kind):
+                glimpses.append(Glimpse(detection, place, doubt))
+            else:
+                found.append(detection)
+                positions.append(place)
+        look = replace(self.detections, found=tuple(found))
+        self.targets = list(cell.ledger.observe(look, positions, glimpses))
 
     def _glimpses(self, cell: Cell) -> Iterator[Glimpse]:
         """Yield where what is in doubt seems to be.

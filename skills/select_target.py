@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from executive.cell import Cell
+from executive.evidence import describe_unknown
 from executive.goals import nearest_first
 from executive.messages import Item, Target
 from executive.skill import In, Out, Skill, SkillFailed, param, port
@@ -61,5 +62,7 @@ class SelectTarget(Skill):
             return self.failed("doubtful", f"not enough looks agree on {names} yet; look again")
         sought = self.same or self.wanted or "object to sort"
         if self.same is None and cell.ledger.believes_empty():
-            return self.failed("no_candidate", f"no {sought} is left on the table but what was rejected")
+            left = f"no {sought} is left on the table but what was rejected"
+            told = "; ".join(filter(None, (left, describe_unknown(cell.ledger.unknown))))
+            return self.failed("no_candidate", told)
         return self.failed("unseen", f"no {sought} is in sight, and the table is not known to be empty")

@@ -10,7 +10,8 @@ from typing import Any
 from executive.campaign.pool import do_all
 from executive.campaign.statistics import spread, wilson
 from executive.errors import ExecutiveError
-from executive.record.result import FATES, PLACES, ledger_agrees
+from executive.record.result import FATES
+from executive.workcell import PLACES
 
 Result = Mapping[str, Any]
 
@@ -99,7 +100,7 @@ def summarize(results: Sequence[Result], asked: int) -> dict[str, Any]:
         "disagreements": [
             {key: result[key] for key in ("seed", "items", "audit", "run")}
             for result in results
-            if not ledger_agrees(result)
+            if result["audit"] is not None and not result["audit"]["agrees"]
         ],
         "robot_time_s": spread([result["robot_time_s"] for result in results]),
         "robot_time_per_object_s": (
@@ -128,7 +129,7 @@ def _broken(job: Job, error: BaseException) -> Result:
         "node": "",
         "seed": job.seed,
         "items": dict.fromkeys(FATES, 0),
-        "audit": dict.fromkeys(PLACES, 0),
+        "audit": {**dict.fromkeys(PLACES, 0), "agrees": True},
         "planning": {"motions": 0, "ahead": 0, "waited_s": 0.0},
         "ticks": 0,
         "robot_time_s": 0.0,

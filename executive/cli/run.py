@@ -65,7 +65,7 @@ def command(
         raise click.UsageError("--gui needs a display, and DISPLAY names none; leave it out")
     with stdout_kept_clean():
         from executive.discovery import discover
-        from executive.record.result import EXIT_CODES
+        from executive.record.result import exit_code
         from executive.view.report.page import leave_report
         from executive.view.terminal.summary import repeat_command, story_lines, summary
 
@@ -102,7 +102,7 @@ def command(
             click.echo("\n".join(story_lines(result["story"], result["run"], repeat, report)), err=True)
     if as_json:
         print_json(result)
-    ctx.exit(EXIT_CODES[result["status"]])
+    ctx.exit(exit_code(result))
 
 
 def _require_sense(ctx: click.Context, mission: str | None, resume: str | None) -> None:

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from executive.ledger.item import NOTHING, ON_TABLE, UNSURE, Record, State
 
+FATES = (State.PLACED, State.REJECTED, State.SKIPPED, State.LOST)
+"""Final states of an object; each item that was no phantom has one of them."""
 
-def fate_of(record: Record, *, gone: bool, routed: bool) -> tuple[State, str] | None:
-    """Return what became of an item and why, now that the run is over; None where it is settled already.
 
-    An item seen where it was left is rejected, one that is known to exist and was not found again is lost,
-    given up or not, and one that is likelier an invention than an object is a phantom. What looks were unsure
-    of, and none has missed, may be an object: it is rejected.
+def fate_of(record: Record, *, gone: bool, routed: bool, completed: bool) -> tuple[State, str] | None:
+    """Return the final state of an item and its reason, or None if the item has its final state already.
+
+    An item that is known to exist and was not found again is lost. An item that is likelier a false
+    detection than an object is a phantom. An item that looks were unsure of, and none has missed, may be an
+    object: it is rejected. Any other item on the table is skipped if the mission did not have to sort it:
+    it has no route, or the mission was completed without an attempt at it, because a quota was reached or
+    the operator quit. Else the item is rejected.
 
     Args:
         record: The item.
-        gone: Whether its place was searched in vain, as far as one can be sure.
-        routed: Whether the mission has a bin for its class.
+        gone: True if its place was searched in vain, as far as one can be sure.
+        routed: True if the mission has a bin for its class.
+        completed: True if the tree succeeded.
     """
     if record.state is State.HELD:
         return State.REJECTED, "still in the tool when the run ended"
@@ -32,16 +38,22 @@ def fate_of(record: Record, *, gone: bool, routed: bool) -> tuple[State, str] | 
         return State.LOST, "known to exist, not found again"
     if record.state is State.REJECTED:
         return None
-    return State.REJECTED, "the run ended before its turn" if routed else "the mission has no route for it"
+    if not routed:
+        return State.SKIPPED, "the mission has no route for it"
+    if completed and not record.attempts:
+        return State.SKIPPED, "the mission was completed without it"
+    return State.REJECTED, "the run ended before its turn"
 
 
 def balance(records: Iterable[Record]) -> dict[str, int]:
-    """Return the counts `seen, placed, rejected, lost, phantom`; without the phantoms they are `seen`."""
+    """Return the counts `seen, placed, rejected, skipped, lost, phantom`; phantoms are not among the seen."""
     states = Counter(record.state for record in records)
     return {
         "seen": sum(states.values()) - states[State.PHANTOM],
-        "placed": states[State.PLACED],
-        "rejected": states[State.REJECTED],
-        "lost": states[State.LOST],
-        "phantom": states[State.PHANTOM],
+        **{state.value: states[state] for state in (*FATES, State.PHANTOM)},
     }
+
+
+def is_balanced(counts: Mapping[str, int]) -> bool:
+    """Return True if each item that was seen is placed, rejected, skipped or lost."""
+    return counts["seen"] == sum(counts[state.value] for state in FATES)

@@ -37,6 +37,8 @@ PRESENT = 0.1
 """Chance of having been overlooked by the looks that missed it, down to which it is taken to be there."""
 ENOUGH = 40
 """Looks after which an item whose class they contradict each other about is given up."""
+MAX_CONTRADICTIONS = 3
+"""Looks that contradict its class after which an item is given up."""
 GLIMPSES = 20
 """Looks with a detector unsure of it, since one was sure, after which an item not known well is given up."""
 
@@ -53,7 +55,9 @@ class State(Enum):
     PLACED = "placed"
     """Let go in a bin."""
     REJECTED = "rejected"
-    """Given up and left where it is."""
+    """Left where it is because the mission had to sort it and could not."""
+    SKIPPED = "skipped"
+    """Left where it is because the mission did not have to sort it."""
     LOST = "lost"
     """Known to exist, and nowhere to be found."""
     PHANTOM = "phantom"
@@ -92,6 +96,8 @@ class Record:
         attempts: Failed grasps so far.
         bin: Where it was placed, or "".
         why: Why it was rejected, is lost, a phantom or believed to be in its bin, or "".
+        contradictions: Number of looks that showed something which its class cannot be.
+        contradiction: Evidence against its class besides the detector's score, or "".
         votes: Log likelihood of each class, up to a constant.
         tally: In how many looks it was taken for each class.
         expected: Share of them in which a detector as it says of itself is wrong.
@@ -120,6 +126,8 @@ class Record:
     attempts: int = 0
     bin: str = ""
     why: str = ""
+    contradictions: int = 0
+    contradiction: str = ""
     votes: dict[str, float] = field(default_factory=lambda: defaultdict(float))
     tally: Counter[str] = field(default_factory=Counter)
     fallen: dict[str, float] = field(default_factory=lambda: defaultdict(float))
@@ -190,6 +198,7 @@ class Record:
         """
         return (
             self.probability >= LIKELY
+            and self.contradictions <= self.looks
             and self.overlooked >= PRESENT
             and self.misjudged <= config.misjudged
             and self.consistency >= CREDIBLE
@@ -245,9 +254,22 @@ class Record:
             self.state, self.why = State.REJECTED, f"its class is in doubt: {votes}"
         if known:
             self.glimpses = 0
-        elif self.state is State.SEEN and self.glimpses >= GLIMPSES:
-            self.state, self.why = State.REJECTED, UNSURE
+        elif self.state is State.SEEN and (self.glimpses >= GLIMPSES or self.is_contradicted):
+            self.state = State.REJECTED
+            self.why = f"{UNSURE}: {self.contradiction}" if self.contradiction else UNSURE
             self.existence = max(self.existence, 0.0)
+
+    def glimpsed(self, contradiction: str) -> None:
+        """Count a look that was unsure of it, because of a contradiction or for a low confidence ("")."""
+        self.glimpses += 1
+        if contradiction:
+            self.contradictions += 1
+            self.contradiction = contradiction
+
+    @property
+    def is_contradicted(self) -> bool:
+        """True if enough looks contradict its class, and more than have seen it without a contradiction."""
+        return self.contradictions >= MAX_CONTRADICTIONS and self.contradictions > self.looks
 
     def miss(self, by: Reliability) -> None:
         """Count one look that searched its place without seeing it."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -18,8 +19,9 @@ from executive.ledger.bins import Bins
 from executive.ledger.coverage import Coverage
 from executive.ledger.freshness import Freshness
 from executive.ledger.item import LYING, OPEN, Record, State
+from executive.ledger.look_event import describe_look
 from executive.ledger.looks import Looks, spread_of
-from executive.messages import Bin, Detection, Detections, Frame, Glimpse, Item, Target
+from executive.messages import Bin, Detections, Frame, Glimpse, Item, Target
 
 
 class ItemLedger:
@@ -45,6 +47,12 @@ class ItemLedger:
         self._coverage = Coverage(table)
         self._looks = Looks(config, self._coverage, self._freshness)
         self._frame = 0
+        self._unknown: Counter[str] = Counter()
+
+    @property
+    def unknown(self) -> Mapping[str, int]:
+        """Largest number of boxes in one look for each label that the cell does not know."""
+        return dict(self._unknown)
 
     @property
     def records(self) -> Sequence[Record]:
@@ -70,10 +78,11 @@ class ItemLedger:
         second look.
         """
         frame = detections.frame
+        self._unknown |= Counter(detection.label for detection in detections.unknown)
         if frame.id != self._frame:
             self._frame = frame.id
             self._take(detections, positions, glimpses)
-        self._emit_look(detections, positions, glimpses)
+        self._emit("look", **describe_look(detections, positions, glimpses), frame_object=frame)
         return self.targets()
 
     def targets(self) -> Sequence[Target]:
@@ -124,6 +133,13 @@ class ItemLedger:
     def touched(self, item: Item) -> None:
         """Record that the tool met the item, which proves that it exists."""
         self._record(item).exists = True
+
+    def contradicted(self, item: Item, why: str) -> None:
+        """Record evidence against the class of an item that the tool touched; its place is in doubt now."""
+        record = self._record(item)
+        record.exists, record.contradiction = True, why
+        self._disturb(record.position, self._config.neighbourhood)
+        self._emit("item", **record.row)
 
     def missed(self, item: Item) -> None:
         """Record a grasp that did not hold: the cup may have pushed anything, so all is in doubt."""
@@ -178,7 +194,7 @@ class ItemLedger:
         A held item stays HELD until it is released; looks continue to search for a dropped item.
         """
         record = self._record(item)
-        record.why = why
+        record.why = f"{why}: {record.contradiction}" if record.contradiction else why
         self._change(item, record.state if record.state in (State.HELD, State.DROPPED) else State.REJECTED)
 
     def label(self, item: Item) -> str:
@@ -209,19 +225,20 @@ class ItemLedger:
         """Return the item that the tool is believed to hold, or None."""
         return next((r.item for r in self._records.values() if r.state is State.HELD), None)
 
-    def close(self) -> None:
-        """Decide what became of everything still open (`fate_of`): the run is over."""
+    def close(self, *, completed: bool) -> None:
+        """Decide the final state of each item (`fate_of`); `completed` is True if the tree succeeded."""
         for record in self._records.values():
             if bin := self._in_bins.believed(record):
                 record.why = "it fell there"
                 self.placed(record.item, bin)
-            fate = fate_of(record, gone=self._is_gone(record), routed=record.label in self._routes)
+            routed = record.label in self._routes
+            fate = fate_of(record, gone=self._is_gone(record), routed=routed, completed=completed)
             if fate is not None:
                 state, record.why = fate
                 self._change(record.item, state)
 
     def balance(self) -> dict[str, int]:
-        """Return the counts `seen, placed, rejected, lost, phantom`; seen is the sum of the next three."""
+        """Return the counts `seen, placed, rejected, skipped, lost, phantom`."""
         return balance(self._records.values())
 
     def rows(self) -> list[dict[str, object]]:
@@ -274,27 +291,3 @@ class ItemLedger:
     def _disturb(self, centre: Array, radius: float) -> None:
         self._freshness.disturb(np.asarray(centre, dtype=float), radius)
         self._coverage.disturb(centre, radius, self.epoch)
-
-    def _emit_look(
-        self, detections: Detections, positions: Sequence[Array], glimpses: Sequence[Glimpse]
-    ) -> None:
-        frame = detections.frame
-        self._emit(
-            "look",
-            frame=frame.id,
-            camera=frame.camera,
-            detector=detections.detector,
-            view=detections.view,
-            found=[_describe(*pair) for pair in zip(detections.found, positions, strict=True)],
-            unsure=[_describe(glimpse.detection, glimpse.position) for glimpse in glimpses],
-            frame_object=frame,
-        )
-
-
-def _describe(detection: Detection, position: Array) -> dict[str, object]:
-    return {
-        "label": detection.label,
-        "confidence": round(detection.confidence, 4),
-        "box": [round(float(edge), 2) for edge in detection.box],
-        "position": [round(float(value), 4) for value in position],
-    }

@@ -81,7 +81,7 @@ class Looks:
                 # The less likely an object was overlooked there, the likelier it is invented.
                 odds = EXPECTED * self._coverage.overlooked(place) / by.invented
                 record = self._enter(records, detection.label, place, odds)
-            if record.why == UNSURE:
+            if record.why.startswith(UNSURE):
                 record.state, record.why = State.SEEN, ""
             record.vote(detection.label, by, alone=not self._may_be_of(absent, place, spreads[index]))
             record.locate(place, spreads[index], settled=self.settled(record))
@@ -143,7 +143,7 @@ class Looks:
                 record.locate(place, spread, settled=True)
                 record.shown(frame, glimpse.detection)
             if record not in counted:
-                record.glimpses += 1
+                record.glimpsed(glimpse.contradiction)
                 counted.append(record)
         return counted
 

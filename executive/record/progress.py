@@ -8,7 +8,13 @@ from typing import Any
 
 from executive.events import Event
 
-_FATES = {"held": "in the tool", "dropped": "dropped", "rejected": "rejected", "lost": "lost"}
+_FATES = {
+    "held": "in the tool",
+    "dropped": "dropped",
+    "rejected": "rejected",
+    "skipped": "skipped",
+    "lost": "lost",
+}
 """What is said of items that are in no bin; those on the table go without saying."""
 
 

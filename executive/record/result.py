@@ -12,6 +12,7 @@ from executive.record.journal import ending_of
 from executive.record.plain import plain
 from executive.record.run_directory import RunDirectory
 from executive.record.whole_file import reason_of, write_whole
+from executive.workcell import PLACES
 
 if TYPE_CHECKING:
     from executive.runtime.outcome import Outcome
@@ -19,16 +20,23 @@ if TYPE_CHECKING:
 QUIT = "quit"
 """Word of the operator who wants nothing more."""
 
-FATES = ("seen", "placed", "rejected", "lost", "phantom")
-"""What the ledger counts."""
+VERSION = 2
+"""Version of the schema of `result.json`; the first had no `version`, no skipped items and no `agrees`."""
 
-PLACES = ("right", "wrong_bin", "left", "elsewhere", "unseen")
-"""What the audit counts."""
+FATES = ("seen", "placed", "rejected", "skipped", "lost", "phantom")
+"""Counts of the ledger."""
 
-EXIT_CODES = {"SUCCESS": 0, "FAILURE": 1, "FAULT": 3, "HALTED": 130}
-"""How a command ends, by the status of its run."""
+MISTAKES = {
+    "wrong_bin": "in a wrong bin",
+    "fell_in_wrong_bin": "fallen into a wrong bin",
+    "unseen": "never seen",
+}
+"""Words for the counts of the audit that the message of a disagreement begins with."""
 
-ENDED = ("SUCCESS", "FAILURE")
+EXIT_CODES = {"SUCCESS": 0, "FAILURE": 1, "FAULT": 3, "INCOMPLETE": 4, "HALTED": 130}
+"""Exit code by the status of the run, unless the audit disagrees (`exit_code`)."""
+
+ENDED = ("SUCCESS", "INCOMPLETE", "FAILURE")
 """Status of a run that cannot be taken up again: its tree has come to its end."""
 
 
@@ -51,6 +59,7 @@ def result_of(
     `story` is as `Story.tell` returns it.
     """
     return {
+        "version": VERSION,
         "mission": mission,
         "status": outcome.status,
         "reason": outcome.reason,
@@ -60,7 +69,9 @@ def result_of(
         "holds": outcome.holds,
         "seed": seed,
         "items": {fate: int(items.get(fate, 0)) for fate in FATES},
-        "audit": None if audit is None else {place: int(audit[place]) for place in PLACES},
+        "unknown": dict(items.get("unknown", {})),
+        "empty": outcome.empty,
+        "audit": None if audit is None else audited(items, audit, outcome.empty),
         "planning": planning_of(noted),
         "requests": requests_of(noted),
         "ticks": outcome.ticks,
@@ -127,15 +138,46 @@ def planning_of(entries: Iterable[Mapping[str, Any]]) -> dict[str, float]:
     return {"motions": len(plans), "ahead": ahead, "waited_s": round(waited, 4)}
 
 
-def ledger_agrees(result: Mapping[str, Any]) -> bool:
-    """Tell whether what the robot believes is what the audit found; true where there was no audit."""
-    items, audit = result["items"], result["audit"]
-    if audit is None:
-        return True
+def audited(items: Mapping[str, int], audit: Mapping[str, int], empty: bool) -> dict[str, int | bool]:
+    """Return the counts of the audit, and as `agrees` the answer of the function of this name."""
+    return {"agrees": agrees(items, audit, empty), **{place: int(audit[place]) for place in PLACES}}
+
+
+def agrees(items: Mapping[str, int], audit: Mapping[str, int], empty: bool) -> bool:
+    """Return True if the audit found each object where the ledger believes it.
+
+    Args:
+        items: Counts of the ledger.
+        audit: Counts of the audit.
+        empty: True if the run reported the table as empty: then no object may be unseen.
+    """
+    left = items["rejected"] + items["skipped"]
     return bool(
-        items["placed"] == audit["right"] + audit["wrong_bin"]
-        and items["rejected"] == audit["left"]
+        audit["wrong_bin"] == audit["fell_in_wrong_bin"] == 0
+        and items["placed"] == audit["right"]
         and items["lost"] == audit["elsewhere"]
-        and audit["wrong_bin"] == 0
-        and audit["unseen"] == 0
+        and left <= audit["left"] <= left + audit["unseen"]
+        and not (empty and audit["unseen"])
     )
+
+
+def disagreement(result: Mapping[str, Any]) -> str:
+    """Return one sentence with the counts of audit and ledger if the audit disagrees, else ""."""
+    audit = result.get("audit")
+    # Results of version 1 do not contain the answer.
+    if audit is None or audit.get("agrees", True):
+        return ""
+    worst = ", ".join(f"{audit[place]} {words}" for place, words in MISTAKES.items() if audit[place])
+    books = result["items"]
+    sides = (
+        f"the audit found {audit['right']} in their bins, {audit['left']} on the table and "
+        f"{audit['elsewhere']} elsewhere; the executive reports {books['placed']} placed, "
+        f"{books['rejected']} rejected, {books['skipped']} skipped and {books['lost']} lost"
+    )
+    return f"THE AUDIT DISAGREES: {worst}; {sides}" if worst else f"THE AUDIT DISAGREES: {sides}"
+
+
+def exit_code(result: Mapping[str, Any]) -> int:
+    """Return the exit code of a run: 1 instead of 0 or 4 if the audit disagrees."""
+    code = EXIT_CODES[result["status"]]
+    return 1 if code in (0, 4) and disagreement(result) else code

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from executive.errors import Fault
+from executive.ledger.accounts import is_balanced
+from executive.workcell import Accounts
+
 
 @dataclass(frozen=True)
 class Ending:
@@ -29,10 +33,13 @@ class Outcome:
     """How a run ended.
 
     Attributes:
-        status: `SUCCESS`, `FAILURE`, `FAULT` or `HALTED`.
+        status: `SUCCESS`; `INCOMPLETE`, if the tree succeeded and items were rejected; `FAILURE`, `FAULT` or
+            `HALTED`.
         reason: What failed, for instance `Transit.dropped`; "" on success.
         message: One sentence with numbers.
         node: Path of the deciding node, or "".
+        empty: True if the run reported the table as empty: the ledger believed that nothing with a route was
+            left, and no look had shown a label that the cell does not know.
         holds: What the tool holds now that the arm is at rest: an item, `something` that nobody knows, or "".
         ticks: Control steps taken.
         robot_time: Time on the run's clock [s].
@@ -42,6 +49,34 @@ class Outcome:
     reason: str
     message: str
     node: str
+    empty: bool
     holds: str
     ticks: int
     robot_time: float
+
+
+def judge_items(accounts: Accounts) -> Ending:
+    """Return the end of a run whose tree succeeded, which depends on the items that are in no bin."""
+    rows = accounts.rows()
+    lost = sum(row["state"] == "lost" for row in rows)
+    if lost:
+        return Ending("FAILURE", "lost", f"{lost} object(s) were lost and not found again")
+    rejected = [f"{row['item']} ({row['why']})" for row in rows if row["state"] == "rejected"]
+    if rejected:
+        message = f"{len(rejected)} object(s) were not sorted: {', '.join(rejected)}"
+        return Ending("INCOMPLETE", "rejected", message)
+    return Ending("SUCCESS")
+
+
+def check_balance(accounts: Accounts) -> None:
+    """Return if the number of items seen is the sum of those placed, rejected, skipped and lost.
+
+    Raises:
+        Fault: It is not.
+    """
+    counts = accounts.balance()
+    if not is_balanced(counts):
+        told = ", ".join(f"{number} {fate}" for fate, number in counts.items())
+        raise Fault(
+            f"the books do not balance: {told}; seen must be what was placed, rejected, skipped and lost"
+        )

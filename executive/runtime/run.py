@@ -21,7 +21,7 @@ from executive.mission.build import build
 from executive.mission.load import LoadedMission
 from executive.runtime.cells import cell_kind
 from executive.runtime.operator import ScriptedOperator, TerminalOperator
-from executive.runtime.outcome import HALTED, Ending, Outcome
+from executive.runtime.outcome import HALTED, Ending, Outcome, check_balance, judge_items
 from executive.runtime.plant import Plant
 from executive.runtime.run_control import RunControl
 from executive.runtime.signals import stopped_by_signals
@@ -143,20 +143,22 @@ class Run:
             # Only now: a record that cannot be written must not keep the arm from braking.
             problems += self._tried(lambda: self._emit("fault", traceback=ending.traceback))
         problems += self._tried(self._ask_tool)
-        problems += self._tried(self._close_books)
+        ledger = self._plant.cell.ledger
+        empty = ledger.believes_empty() and not ledger.unknown
+        problems += self._tried(lambda: self._close_books(completed=ending.status == "SUCCESS"))
         if problems and ending.status == "FAULT":
             ending = replace(ending, message="; ".join([ending.message, *problems]))
         elif problems:
             ending = Ending("FAULT", "fault", "; ".join(problems))
-        outcome = self._outcome(ending)
+        outcome = self._outcome(ending, empty)
         if broken := self._tried(lambda: self._emit("end", **asdict(outcome))):
             outcome = replace(outcome, status="FAULT", reason="fault", message=broken[0], node="")
         return outcome
 
     def items(self) -> dict[str, Any]:
-        """Return the ledger's balance, and a row per item under `rows`."""
+        """Return the ledger's balance, counts by unknown label as `unknown`, and a row per item as `rows`."""
         accounts = self.workcell.accounts
-        return {**accounts.balance(), "rows": accounts.rows()}
+        return {**accounts.balance(), "unknown": accounts.unknown, "rows": accounts.rows()}
 
     def audit(self) -> Mapping[str, int] | None:
         """Return what really became of the objects; call it only after `execute`."""
@@ -268,24 +270,22 @@ class Run:
             return [str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"]
         return []
 
-    def _close_books(self) -> None:
-        """Have the ledger decide what became of everything still open, and see that nothing is left over.
+    def _close_books(self, *, completed: bool) -> None:
+        """Have the ledger decide the final state of each item, and check the balance.
 
         Raises:
-            Fault: More or less was seen than was placed, rejected and lost.
+            Fault: The number of items seen is not the sum of those placed, rejected, skipped and lost.
         """
-        self.workcell.accounts.close()
-        books = self.workcell.accounts.balance()
-        if books["seen"] != books["placed"] + books["rejected"] + books["lost"]:
-            told = ", ".join(f"{number} {fate}" for fate, number in books.items())
-            raise Fault(f"the books do not balance: {told}; seen must be what was placed, rejected and lost")
+        self.workcell.accounts.close(completed=completed)
+        check_balance(self.workcell.accounts)
 
-    def _outcome(self, ending: Ending) -> Outcome:
-        lost = self.workcell.accounts.balance()["lost"]
-        if ending.status == "SUCCESS" and lost:
-            ending = Ending("FAILURE", "lost", f"{lost} object(s) were lost and not found again")
+    def _outcome(self, ending: Ending, empty: bool) -> Outcome:
+        if ending.status == "SUCCESS":
+            ending = judge_items(self.workcell.accounts)
         now = round(self._plant.tape.now, 6)
-        return Outcome(ending.status, ending.reason, ending.message, ending.node, self._holds, self.tick, now)
+        return Outcome(
+            ending.status, ending.reason, ending.message, ending.node, empty, self._holds, self.tick, now
+        )
 
     def _ask_tool(self) -> None:
         """Note what the tool holds: the item that the ledger believes there, or `something`."""

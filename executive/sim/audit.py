@@ -11,6 +11,7 @@ from executive.geometry import Array
 from executive.ledger.item import Record, State
 from executive.messages import BIN_THICKNESS, Bin
 from executive.sim.world import World
+from executive.workcell import PLACES
 
 FLOOR = -0.05
 """A centre below this height has left the table [m]."""
@@ -28,10 +29,9 @@ def audit(
 ) -> dict[str, int]:
     """Return how many bodies ended `right`, `wrong_bin`, `left` on the table, or `elsewhere`.
 
-    What is still in the tool was let go nowhere and is `left`, also over a bin; and what fell into a wrong
-    bin was put there by nobody: it is out of reach, `elsewhere`. What somebody took away is
-    `elsewhere`, if it was seen before. `unseen` counts the other bodies that no item of the ledger was first
-    seen near.
+    A body in the tool is `left`, also over a bin. A body that fell into a wrong bin is out of reach: it
+    counts as `elsewhere` and as `fell_in_wrong_bin`. A body that somebody took away is `elsewhere`, if it
+    was seen before. `unseen` counts the other bodies that no item of the ledger was first seen near.
 
     Args:
         world: The simulated world as the run left it.
@@ -43,7 +43,7 @@ def audit(
         held: Body in the tool, or None.
         fallen: Bodies that fell from the tool and were not in it again.
     """
-    counts = {"right": 0, "wrong_bin": 0, "left": 0, "elsewhere": 0, "unseen": 0}
+    counts = dict.fromkeys(PLACES, 0)
     real = [record for record in records if record.state is not State.PHANTOM]
     for body, places in stood.items():
         seen = any(
@@ -55,7 +55,9 @@ def audit(
             counts["elsewhere"] += seen
             continue
         fate = "left" if body == held else _fate(world, body, bins, routes)
-        counts["elsewhere" if fate == "wrong_bin" and body in fallen else fate] += 1
+        fell = fate == "wrong_bin" and body in fallen
+        counts["elsewhere" if fell else fate] += 1
+        counts["fell_in_wrong_bin"] += fell
         counts["unseen"] += not seen
     return counts
 

@@ -28,7 +28,7 @@ from executive.testing.fake_scenery import FakeScenery
 from executive.testing.fake_times import FakeTimes
 from executive.testing.fake_world import FakeObject, FakeWorld
 from executive.vision.localization.plane import PlaneLocalizer
-from executive.workcell import CellOptions, KeyPath
+from executive.workcell import PLACES, CellOptions, KeyPath
 
 ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
 """Where the classes of the shipped cells go."""
@@ -178,10 +178,10 @@ class FakeCell:
     def audit(self) -> dict[str, int]:
         """Return what became of the objects.
 
-        `elsewhere` is what was taken away, if it was seen before, and what fell into a wrong bin; `unseen`
-        counts what lies there and was never seen.
+        `elsewhere` counts what was taken away, if it was seen before, and what fell into a wrong bin, which
+        `fell_in_wrong_bin` counts again; `unseen` counts what lies there and was never seen.
         """
-        counts = {"right": 0, "wrong_bin": 0, "left": 0, "elsewhere": 0, "unseen": 0}
+        counts = dict.fromkeys(PLACES, 0)
         for thing in self.world.objects:
             bins = self._cell.bins.items()
             # Nothing stands on a wall: what does here would have fallen in, if not into the next bin.
@@ -194,6 +194,7 @@ class FakeCell:
                 counts["right"] += 1
             else:
                 counts["elsewhere" if thing.fell else "wrong_bin"] += 1
+                counts["fell_in_wrong_bin"] += thing.fell
             counts["unseen"] += not self._was_seen(thing)
         counts["elsewhere"] += sum(map(self._was_seen, self.world.removed))
         return counts

@@ -13,7 +13,7 @@ from executive.discovery import discover
 from executive.errors import InputError
 from executive.events import Event, Observer
 from executive.mission.load import load_mission
-from executive.record.result import ledger_agrees
+from executive.record.result import agrees
 from executive.runtime.outcome import Outcome
 from executive.runtime.run import Run
 from executive.skill import Skill
@@ -47,7 +47,7 @@ class MissionResult(Outcome):
     @property
     def agrees(self) -> bool:
         """True if what the ledger believes is what the audit found."""
-        return ledger_agrees({"items": self.items, "audit": self.audit})
+        return self.audit is None or agrees(self.items, self.audit, self.empty)
 
     def entered(self, pattern: str) -> list[str]:
         """Return the path of every node that was activated and whose path fits a pattern, in order."""

@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from executive.events import Event
 
 
 @dataclass(frozen=True)
 class Row:
-    """One item: its class, what became of it, where it was placed, and why if it was given up."""
+    """One item.
+
+    Attributes:
+        item: Its name.
+        label: Its class.
+        state: Its state.
+        bin: The bin that it was placed in, or "".
+        why: Reason of its state, or "".
+        place: Its place on the table in words if it was left there, or "".
+    """
 
     item: str
     label: str
     state: str
     bin: str
     why: str
+    place: str = ""
 
 
 class ItemTable:
@@ -29,6 +39,8 @@ class ItemTable:
         """Take an `item` event; return its row if something a person cares about changed."""
         data = event.data
         row = Row(*(str(data.get(key) or "") for key in ("item", "label", "state", "bin", "why")))
+        if row.state in ("rejected", "skipped"):
+            row = replace(row, place="({:.2f}, {:.2f}) m".format(*data["position"]))
         if self._rows.get(row.item) == row:
             return None
         self._rows[row.item] = row
@@ -51,6 +63,7 @@ class ItemTable:
         for row in self.rows:
             if row.state != "phantom":
                 placed = row.state == "placed"
-                name = f"{row.item} ({row.why})" if row.why and not placed else row.item
+                told = ", ".join(filter(None, (row.place, row.why)))
+                name = f"{row.item} ({told})" if told and not placed else row.item
                 fates[row.bin if placed else row.state].append(name)
         return dict(fates)

@@ -26,7 +26,6 @@ from executive.cli.output import print_json, stdout_kept_clean
 from executive.cli.subject import load_subject, oracle_option
 from executive.errors import ExecutiveError
 from executive.record.recorded_run import recorded_run
-from executive.record.result import ledger_agrees
 
 Figures = dict[str, Any]
 """Figures of a benchmark by name; a name ends with the unit."""
@@ -87,7 +86,7 @@ def record_run(subject: Subject, seed: int, runs: Path) -> tuple[Figures, str]:
     )  # fmt: skip
     if result["status"] == "HALTED":
         raise KeyboardInterrupt
-    if result["status"] == "SUCCESS" and ledger_agrees(result):
+    if result["status"] == "SUCCESS" and result["audit"]["agrees"]:
         return result, ""
     return result, (
         f"seed {seed} ended with {result['status']} {result['reason']}; the ledger says {result['items']}, "

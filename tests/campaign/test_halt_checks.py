@@ -12,7 +12,7 @@ from executive.campaign.halt_checks import check_journal, check_rest, check_tool
 from executive.runtime.outcome import Outcome
 from executive.testing.fake_cell import FakeCell
 
-HALTED = Outcome("HALTED", "halted", "halted by the user", "", "", 40, 0.166667)
+HALTED = Outcome("HALTED", "halted", "halted by the user", "", False, "", 40, 0.166667)
 
 
 def entries(*statuses: tuple[str, str], **end: Any) -> list[dict[str, Any]]:

@@ -19,7 +19,7 @@ from executive.errors import InputError
 def result(seed: int, status: str = "SUCCESS", right: int = 4, left: int = 0, **more) -> dict:
     reason = "" if status == "SUCCESS" else "Grasp.missed"
     items = {"seen": right + left, "placed": right, "rejected": left, "lost": 0, "phantom": 0}
-    audit = {"right": right, "wrong_bin": 0, "left": left, "elsewhere": 0, "unseen": 0}
+    audit = {"agrees": True, "right": right, "wrong_bin": 0, "left": left, "elsewhere": 0, "unseen": 0}
     planning = {"motions": 10, "ahead": 8, "waited_s": 0.1}
     return {
         "seed": seed, "status": status, "reason": reason, "message": "", "node": "", "items": items,
@@ -120,7 +120,7 @@ def test_a_pool_found_broken_is_replaced_and_no_run_is_lost(monkeypatch):
 
 def test_the_summary_counts_objects_and_lists_what_went_wrong():
     wrong = result(2, right=3)
-    wrong["audit"] = {"right": 2, "wrong_bin": 1, "left": 0, "elsewhere": 0, "unseen": 0}
+    wrong["audit"] = {"agrees": False, "right": 2, "wrong_bin": 1, "left": 0, "elsewhere": 0, "unseen": 0}
     figures = summarize([result(0), result(1, "FAILURE", right=3, left=1), wrong], asked=3)
     assert (figures["asked"], figures["cut_off"]) == (3, False)
     assert (figures["runs"], figures["succeeded"]) == (3, 2)

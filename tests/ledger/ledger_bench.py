@@ -61,15 +61,24 @@ class Bench:
         by: Reliability = EYE,
         hidden: slice = slice(0, 0),
         unsure: Sequence[Thing] = (),
+        contradiction: str = "",
+        unknown: Sequence[str] = (),
     ) -> Sequence[Target]:
-        """Look; the columns `hidden` of the image are behind the arm, and of some things it is `unsure`."""
+        """Look; the columns `hidden` of the image are behind the arm, and of some things it is `unsure`.
+
+        `contradiction` is the reason for that, and `unknown` are labels that the cell does not know.
+        """
         self.frames += 1
         frame = take_frame(self.frames, self.ledger.epoch if epoch is None else epoch, hidden)
         found = tuple(Detection(label, 0.9, (0, 0, 1, 1)) for label, _, _ in things)
+        strange = tuple(Detection(label, 0.9, (0, 0, 1, 1)) for label in unknown)
         return self.ledger.observe(
-            Detections(frame, found, "eye", by, view, area_of(view)),
+            Detections(frame, found, "eye", by, view, area_of(view), unknown=strange),
             [np.array([x, y, 0.025]) for _, x, y in things],
-            [Glimpse(Detection(label, 0.4, (0, 0, 1, 1)), np.array([x, y, 0.025])) for label, x, y in unsure],
+            [
+                Glimpse(Detection(label, 0.4, (0, 0, 1, 1)), np.array([x, y, 0.025]), contradiction)
+                for label, x, y in unsure
+            ],
         )
 
     def drop(self, item: str, landing: np.ndarray | None = None) -> None:
@@ -86,7 +95,7 @@ class Bench:
         """State of each item, and where it was placed or why it is in that state."""
         return {record.item: (record.state.value, record.bin or record.why) for record in self.ledger.records}
 
-    def end(self) -> dict[str, tuple[str, str]]:
-        """End the run and return the final states."""
-        self.ledger.close()
+    def end(self, *, completed: bool = True) -> dict[str, tuple[str, str]]:
+        """End the run and return the final states; `completed` is True if the tree succeeded."""
+        self.ledger.close(completed=completed)
         return self.states()

@@ -83,7 +83,7 @@ def test_a_look_that_is_unsure_of_a_known_item_does_not_miss_it(bench: Bench) ->
         bench.look(unsure=[("duck", 0.51, 0.0)])
     record = bench.ledger.records[0]
     assert (record.overlooked, record.label, record.glimpses) == (1.0, "cube", 0)
-    assert bench.end() == {"cube-1": ("rejected", "the run ended before its turn")}
+    assert bench.end() == {"cube-1": ("skipped", "the mission was completed without it")}
 
 
 def test_a_known_item_that_waits_its_turn_is_not_given_up_for_glimpses(bench: Bench) -> None:

@@ -11,7 +11,7 @@ from executive.messages import Reliability, Target
 
 CUBE: Thing = ("cube", 0.5, 0.0)
 FAR: Thing = ("cube", 0.6, 0.2)
-LEFT = ("rejected", "the run ended before its turn")
+LEFT = ("skipped", "the mission was completed without it")
 PHANTOM = ("phantom", "more looks missed it than saw it")
 LOST = ("lost", "known to exist, not found again")
 
@@ -79,7 +79,46 @@ def test_objects_that_the_mission_has_no_route_for_are_nothing_left_to_sort(benc
     for _ in range(2):
         bench.look(("duck", 0.50, 0.0), view="full")
     assert bench.ledger.believes_empty()
-    assert bench.end() == {"duck-1": ("rejected", "the mission has no route for it")}
+    assert bench.end() == {"duck-1": ("skipped", "the mission has no route for it")}
+
+
+@pytest.mark.parametrize(
+    ("completed", "attempts", "final"),
+    [
+        (True, 0, LEFT),
+        (True, 1, ("rejected", "the run ended before its turn")),
+        (False, 0, ("rejected", "the run ended before its turn")),
+    ],
+)
+def test_an_item_is_skipped_only_if_the_mission_was_completed_without_an_attempt_at_it(
+    bench: Bench, completed: bool, attempts: int, final: tuple[str, str]
+) -> None:
+    for _ in range(2):
+        bench.look(CUBE)
+    for _ in range(attempts):
+        bench.ledger.missed("cube-1")
+    assert bench.end(completed=completed) == {"cube-1": final}
+
+
+def test_labels_that_the_cell_does_not_know_are_counted_by_the_look_with_most_of_them(bench: Bench) -> None:
+    bench.look(CUBE, unknown=("rubber-duck", "mug", "rubber-duck"))
+    bench.look(CUBE, unknown=("rubber-duck",))
+    assert bench.ledger.unknown == {"rubber-duck": 2, "mug": 1}
+
+
+def test_a_rejection_after_a_contradiction_contains_it(bench: Bench) -> None:
+    bench.look(CUBE)
+    bench.ledger.contradicted("cube-1", "it was touched 60 mm above the table, and a cube is 50 mm high")
+    bench.ledger.rejected("cube-1", "could not be picked")
+    ((_, why),) = bench.end().values()
+    assert why == "could not be picked: it was touched 60 mm above the table, and a cube is 50 mm high"
+
+
+def test_three_looks_that_contradict_the_class_of_an_item_reject_it(bench: Bench) -> None:
+    for _ in range(3):
+        assert bench.states().get("cube-1", ("seen", ""))[0] == "seen"
+        bench.look(unsure=[CUBE], contradiction="its box is 80 mm long")
+    assert bench.states() == {"cube-1": ("rejected", "no look is sure of it: its box is 80 mm long")}
 
 
 def test_a_frame_from_before_a_pick_brings_nothing_back(bench: Bench) -> None:
@@ -109,7 +148,7 @@ def test_what_looks_agree_on_decides_what_becomes_of_an_item(
     for _ in range(misses):
         bench.look(view="full")
     assert bench.end() == {"cube-1": final}
-    counts = {"placed": 0, "rejected": 0, "lost": 0, "phantom": 0, final[0]: 1}
+    counts = {"placed": 0, "rejected": 0, "skipped": 0, "lost": 0, "phantom": 0, final[0]: 1}
     assert bench.ledger.balance() == {"seen": int(final != PHANTOM), **counts}
 
 
@@ -142,7 +181,9 @@ def test_every_change_is_reported_and_the_accounts_balance(bench: Bench) -> None
         "cube-2": LEFT,
         "duck-1": ("rejected", "slippery"),
     }
-    assert bench.ledger.balance() == {"seen": 3, "placed": 1, "rejected": 2, "lost": 0, "phantom": 0}
+    assert bench.ledger.balance() == {
+        "seen": 3, "placed": 1, "rejected": 1, "skipped": 1, "lost": 0, "phantom": 0,
+    }  # fmt: skip
     items = [data for kind, data in bench.events if kind == "item" and data["item"] == "cube-1"]
     assert [data["state"] for data in items] == ["seen", "seen", "held", "placed"]
     assert items[-1] == {

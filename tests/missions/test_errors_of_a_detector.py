@@ -10,7 +10,7 @@ import pytest
 
 from executive.discovery import discover
 from executive.mission.load import LoadedMission, load_mission
-from executive.record.result import ledger_agrees
+from executive.record.result import agrees
 from executive.runtime.cells import cell_kind
 from executive.runtime.run import Run
 from executive.testing.fake_cell import FakeCell
@@ -83,4 +83,4 @@ def test_everything_is_in_its_bin_and_the_books_are_right(
         run.close()
     assert (outcome.status, outcome.message) == ("SUCCESS", "")
     assert items["placed"] == audit["right"] == items["seen"] >= 3
-    assert ledger_agrees({"items": items, "audit": audit})
+    assert agrees(items, audit, outcome.empty)

@@ -43,7 +43,7 @@ FRAME = Frame(
     np.ones((4, 4), bool), 0,
 )  # fmt: skip
 
-DUCK = {"label": "duck", "confidence": 0.6, "box": [1, 2.5, 3.0, 4]}
+DUCK = {"label": "duck", "confidence": 0.6, "box": [1, 2.5, 3.0, 4], "rival": 0.0}
 
 
 @pytest.mark.parametrize(

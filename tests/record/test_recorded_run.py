@@ -12,7 +12,6 @@ from executive.errors import InputError
 from executive.mission.load import load_mission
 from executive.record.journal import Journal, read_journal
 from executive.record.recorded_run import recorded_run
-from executive.record.result import ledger_agrees
 from executive.runtime.run import Run
 from executive.testing.fake_cell import FakeCell
 
@@ -61,7 +60,7 @@ def test_leaves_a_directory_that_explains_the_run(run, tmp_path):
         "result.json", "frames",
     }  # fmt: skip
     assert json.loads((left / "result.json").read_text()) == result
-    assert ledger_agrees(result)
+    assert result["audit"]["agrees"]
     entries = read_journal(left / "journal.jsonl")
     (decision,) = (entry for entry in entries if entry["kind"] == "decision")
     assert (left / "frames" / f"{decision['tick']:06d}_{decision['item']}.jpg").is_file()

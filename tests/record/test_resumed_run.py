@@ -19,7 +19,6 @@ from executive.record.find_run import find_run
 from executive.record.journal import read_journal
 from executive.record.recorded_run import recorded_run
 from executive.record.replay import replay
-from executive.record.result import ledger_agrees
 from executive.record.resumed_run import resumed_run
 from executive.testing.disturbances.hand import Hand
 from executive.testing.fake_cell import FakeCell
@@ -111,7 +110,7 @@ def test_it_ends_as_if_nothing_had_happened(missions: Path, tmp_path: Path, name
     path = cut_off(loaded, tmp_path, after, nth)
     result = resumed(path)
     assert (result["status"], result["items"]) == (whole["status"], whole["items"])
-    assert ledger_agrees(result)
+    assert result["audit"]["agrees"]
     assert set(placed(path).values()) <= {1}
     assert redecided(path) == ""
     assert json.loads((path / "result.json").read_text()) == result
@@ -149,7 +148,7 @@ def test_what_fell_from_the_tool_is_picked_again(missions: Path, tmp_path: Path,
     meanwhile(path / "world.log", loaded, SEED, act, FakeCell)
     result = resumed(path)
     assert fell
-    assert (result["status"], ledger_agrees(result)) == ("SUCCESS", True)
+    assert (result["status"], result["audit"]["agrees"]) == ("SUCCESS", True)
     assert result["items"]["placed"] == 6
     assert set(placed(path).values()) == {1}
 

@@ -57,8 +57,9 @@ class Interleaved:
         return True
 
     def story(self) -> Story:
-        self._fake.accounts.close()
-        items = {**self._fake.accounts.balance(), "rows": self._fake.accounts.rows()}
+        self._fake.accounts.close(completed=self._root.status is Status.SUCCESS)
+        accounts = self._fake.accounts
+        items = {**accounts.balance(), "unknown": accounts.unknown, "rows": accounts.rows()}
         return (
             self._root.status.value, self._plant.tick, self._trace.hexdigest(), variables(self._root), items,
             self._fake.audit(),

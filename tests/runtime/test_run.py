@@ -41,7 +41,10 @@ def test_an_object_that_cannot_be_had_is_rejected_and_the_others_go_on(missions:
     stubborn = fake.world.objects[0]
     fake.tool.seals = lambda: fake.world.under(fake.arm.tool_pose.position) is not stubborn
     outcome, items, audit = run.execute(), run.items(), run.audit()
-    assert outcome.status == "SUCCESS"
+    assert (outcome.status, outcome.reason) == ("INCOMPLETE", "rejected")
+    named = next(row["item"] for row in items["rows"] if row["state"] == "rejected")
+    why = "could not be picked (6 failed attempts)"
+    assert outcome.message == f"1 object(s) were not sorted: {named} ({why})"
     assert (items["rejected"], audit["left"]) == (1, 1)
     assert items["placed"] == audit["right"] == items["seen"] - 1
     rejected = next(row for row in items["rows"] if row["state"] == "rejected")
@@ -97,7 +100,7 @@ def test_requests_are_served_in_order_and_the_rest_is_left(missions: Path) -> No
     outcome, items, audit = run.execute(), run.items(), run.audit()
     assert outcome.status == "SUCCESS"
     assert [e.data["wanted"] for e in events if e.kind == "request"] == ["cube", "rescan", "cube", None]
-    assert (items["placed"], items["rejected"]) == (2, 1) == (audit["right"], audit["left"])
+    assert (items["placed"], items["skipped"]) == (2, 1) == (audit["right"], audit["left"])
 
 
 def test_an_unknown_kind_of_cell_names_the_installed_ones(missions: Path) -> None:
@@ -131,7 +134,7 @@ def test_an_object_that_slips_out_of_the_cup_every_time_is_given_up_in_the_end(m
 
     fake.advance = slipping  # type: ignore[method-assign]
     outcome, items, audit = run.execute(), run.items(), run.audit()
-    assert outcome.status == "SUCCESS", outcome
+    assert outcome.status == "INCOMPLETE", outcome
     assert (items["rejected"], audit["left"]) == (1, 1)
     assert items["placed"] == audit["right"] == items["seen"] - 1
     assert next(row for row in items["rows"] if row["state"] == "rejected")["attempts"] == 12
@@ -140,12 +143,12 @@ def test_an_object_that_slips_out_of_the_cup_every_time_is_given_up_in_the_end(m
 def test_books_that_do_not_balance_are_a_fault(missions: Path) -> None:
     run, events = make(missions)
     fake_of(run).ledger.balance = lambda: {  # type: ignore[method-assign]
-        "seen": 3, "placed": 1, "rejected": 0, "lost": 1, "phantom": 0,
+        "seen": 3, "placed": 1, "rejected": 0, "skipped": 0, "lost": 1, "phantom": 0,
     }  # fmt: skip
     outcome = run.execute()
     assert outcome.status == "FAULT"
     assert outcome.message == (
-        "the books do not balance: 3 seen, 1 placed, 0 rejected, 1 lost, 0 phantom; "
-        "seen must be what was placed, rejected and lost"
+        "the books do not balance: 3 seen, 1 placed, 0 rejected, 0 skipped, 1 lost, 0 phantom; "
+        "seen must be what was placed, rejected, skipped and lost"
     )
     assert events[-1].kind == "end"

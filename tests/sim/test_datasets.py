@@ -89,7 +89,9 @@ def test_some_scenes_have_objects_of_unknown_kinds_or_other_sizes(overhead: Cell
 def test_a_resized_model_has_the_size_that_it_states(overhead: CellConfig) -> None:
     model = resized(overhead.objects["duck"], 1.2)
     mesh = load_mesh(model)
-    assert (mesh.top - mesh.bottom, mesh.radius) == pytest.approx((model.height, model.radius), abs=0.003 * 1.2)
+    assert (mesh.top - mesh.bottom, mesh.radius) == pytest.approx(
+        (model.height, model.radius), abs=0.003 * 1.2
+    )
 
 
 def test_a_silhouette_has_the_area_of_its_shape(overhead: CellConfig) -> None:

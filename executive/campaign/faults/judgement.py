@@ -10,6 +10,7 @@ from py_trees.common import Status
 
 from executive.campaign.faults.fault import Fault, InjectedError
 from executive.events import Event
+from executive.ledger.accounts import is_balanced
 from executive.ledger.item import State
 from executive.messages import BIN_THICKNESS, Bin, Frame
 from executive.mission.flow.endings import Ending
@@ -82,7 +83,7 @@ def check_books(
     objects some may have been taken where nobody had to look any more.
     """
     told = f"the ledger says {counts_text(items)}"
-    if items["seen"] != items["placed"] + items["rejected"] + items["lost"]:
+    if not is_balanced(items):
         yield f"the ledger does not balance: {told}"
     if audit is None:
         return
@@ -90,12 +91,13 @@ def check_books(
         yield f"{audit['wrong_bin']} misplaced; {told}; the audit {counts_text(audit)}"
     unnoticed = min(max(audit["elsewhere"] - items["lost"], 0), taken)
     left = audit["left"] + unnoticed
+    still = items["rejected"] + items["skipped"]
     if outcome.status == "FAULT" or outcome.node:
-        agrees = items["placed"] <= audit["right"] and items["rejected"] <= left
+        agrees = items["placed"] <= audit["right"] and still <= left
     else:
         agrees = any(
             items["placed"] == audit["right"] + audit["wrong_bin"] - inside
-            and items["rejected"] <= left - outside <= items["rejected"] + audit["unseen"]
+            and still <= left - outside <= still + audit["unseen"]
             and items["lost"] == audit["elsewhere"] - unnoticed + outside + inside
             for outside in range(hidden.outside + 1)
             for inside in range(hidden.inside + 1)
@@ -109,7 +111,8 @@ def check_success(
 ) -> Iterator[str]:
     """Yield a sentence if the run looked, says success, and never saw what lies there."""
     looked = any(event.kind == "look" for event in events)
-    if looked and outcome.status == "SUCCESS" and audit is not None and audit["unseen"]:
+    completed = outcome.status in ("SUCCESS", "INCOMPLETE")
+    if looked and completed and audit is not None and audit["unseen"]:
         yield f"success, and {audit['unseen']} objects were never seen; the audit {counts_text(audit)}"
 
 

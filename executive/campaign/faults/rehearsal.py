@@ -11,7 +11,7 @@ from executive.campaign.faults.judgement import counts_text
 from executive.campaign.subject import Subject
 from executive.errors import InputError
 from executive.events import Event
-from executive.record.result import ledger_agrees
+from executive.record.result import agrees
 from executive.runtime.run import Run
 
 
@@ -88,7 +88,7 @@ def rehearse(subject: Subject) -> Rehearsal:
             f"{undisturbed} ends as {outcome.status} {outcome.reason}: {outcome.message}; "
             "faults are judged by what they change in a run that succeeds: choose another seed"
         )
-    if not ledger_agrees({"items": items, "audit": audit}):
+    if audit is not None and (audit["unseen"] or not agrees(items, audit, outcome.empty)):
         raise InputError(
             f"{undisturbed} leaves books that are not the world: the ledger says {counts_text(items)}; "
             f"the audit {counts_text(audit or {})}; choose another seed, or a mission that looks at the "

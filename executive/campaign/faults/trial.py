@@ -56,8 +56,8 @@ def record(subject: Subject, rehearsal: Rehearsal, faults: Numbered, runs: Path)
         result = recording.execute(subject.seed, began)
         leave_report(result)
         outcome = Outcome(
-            result["status"], result["reason"], result["message"], result["node"], result["holds"],
-            result["ticks"], result["robot_time_s"],
+            result["status"], result["reason"], result["message"], result["node"], result["empty"],
+            result["holds"], result["ticks"], result["robot_time_s"],
         )  # fmt: skip
         return trying.judged(outcome), directory.path
 

@@ -52,7 +52,7 @@ class Story:
         self._course(event)
 
     def tell(self, outcome: Outcome, run: Path, at_rest: Callable[[], bool]) -> dict[str, Any] | None:
-        """Return the story as plain values, or None for a run that succeeded.
+        """Return the story as plain values, or None for a run whose tree succeeded and that lost nothing.
 
         Args:
             outcome: How the run ended.
@@ -77,7 +77,7 @@ class Story:
             * `picture`: a file below `run`, or "".
             * `next`: what can be done now, in sentences.
         """
-        if outcome.status == "SUCCESS":
+        if outcome.status in ("SUCCESS", "INCOMPLETE"):
             return None
         case = Case(self._loaded, self._course, outcome)
         arm = _arm(at_rest) if outcome.status == "FAULT" else "at rest"

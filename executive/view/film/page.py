@@ -31,7 +31,7 @@ CAPTION, CARD = 620, 620
 _TITLE, _NOTE, _TREE_TOP, _BELOW = 26, 14, 122, 22
 _MARGIN, _PAD, _TYPE, _LABEL, _LINE = 20, 12, 17, 13, 23
 _END_STATUS, _END_TYPE, _END_LINE, _END_PAD = 40, 18, 26, 24
-_COLOURS = {"SUCCESS": SUCCESS, "FAILURE": FAILURE, "FAULT": FAILURE}
+_COLOURS = {"SUCCESS": SUCCESS, "INCOMPLETE": FAILURE, "FAILURE": FAILURE, "FAULT": FAILURE}
 
 
 def draw_page(
@@ -91,7 +91,7 @@ def ending_of(result: Mapping[str, Any]) -> tuple[str, str, str]:
         return "CUT OFF", "the record ends here; nothing says how the run would have ended", ""
     figures = ""
     if items := result.get("items"):
-        fates = ", ".join(f"{items[fate]} {fate}" for fate in FATES if items[fate])
+        fates = ", ".join(f"{items[fate]} {fate}" for fate in FATES if items.get(fate))
         figures = f"{fates}; {result['robot_time_s']:.1f} s"
     story = result.get("story") or {}
     return result["status"], story.get("verdict") or result["message"], figures

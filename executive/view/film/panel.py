@@ -36,7 +36,7 @@ _CELL = 3
 _COLUMNS = {"item": 0.0, "class": 0.32, "state": 0.53, "bin": 0.74}
 """Left sides of the columns, as shares of the width."""
 _STATES = {"placed": SUCCESS, "rejected": FAILURE, "lost": FAILURE, "held": RUNNING, "dropped": RUNNING}
-_SETTLED = ("placed", "rejected", "lost", "phantom")
+_SETTLED = ("placed", "rejected", "skipped", "lost", "phantom")
 _SWATCH = 9
 
 

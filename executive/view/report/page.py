@@ -11,7 +11,9 @@ import yaml
 from markupsafe import Markup
 
 from executive.errors import ExecutiveError
+from executive.evidence import describe_unknown
 from executive.record.pictures.palette import PALETTE
+from executive.record.result import disagreement
 from executive.record.run_directory import RunDirectory, refused
 from executive.record.whole_file import write_whole
 from executive.view.report.course import by_node, counts, last_failure
@@ -68,6 +70,7 @@ def report(facts: Facts) -> str:
         "report/report.html",
         facts=facts,
         verdict=_verdict(facts),
+        unknown=describe_unknown(facts.result.get("unknown", {})),
         story=told,
         story_facts=list(summary.facts(told)) if told else [],
         moment=next((each for each in facts.pictures if told and each.file == told["picture"]), None),
@@ -83,6 +86,11 @@ def report(facts: Facts) -> str:
 
 def _verdict(facts: Facts) -> str:
     """Return how the run ended, in one sentence."""
+    warning = disagreement(facts.result)
+    return f"{warning}. {_ending(facts)}" if warning else _ending(facts)
+
+
+def _ending(facts: Facts) -> str:
     told = facts.result.get("story")
     if told:
         return str(told["verdict"])
@@ -95,7 +103,7 @@ def _verdict(facts: Facts) -> str:
         return "It came to its end; only the journal is left of its result."
     if not books["seen"]:
         return "The mission was done; no object was seen."
-    left = {fate: books[fate] for fate in ("rejected", "lost") if books[fate]}
+    left = {fate: books[fate] for fate in ("rejected", "skipped", "lost") if books.get(fate)}
     said = "".join(f", {number} {fate}" for fate, number in left.items())
     return f"{books['placed']} of {books['seen']} objects are in their bins{said}."
 

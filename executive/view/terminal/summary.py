@@ -8,6 +8,8 @@ import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+from executive.evidence import describe_unknown
+from executive.record.result import disagreement
 from executive.view.items import ItemTable
 
 WIDTH = 110
@@ -54,13 +56,16 @@ def summary(result: Mapping[str, Any], items: ItemTable, repeat: str, report: st
     robot, wall = result["robot_time_s"], result["wall_time_s"]
     times = f"{robot:.1f} s on the robot's clock, {wall:.1f} s by the wall clock"
     fates = [f"  {fate}: {', '.join(names)}" for fate, names in sorted(items.by_fate().items())]
+    if unknown := describe_unknown(result.get("unknown", {})):
+        fates.append(f"  {unknown}")
     story = result.get("story")
+    warning = _wrapped(disagreement(result), "", "  ", most=3)
     if story is not None:
         lines = [times, *fates, "", *story_lines(story, result["run"], repeat, report)]
     else:
         lines = [verdict(result), times, f"{result['run']}  (repeat: {repeat})", *fates]
         lines += [f"report: {report}"] if report else []
-    return "\n".join(lines) + "\n"
+    return "\n".join([*warning, *lines]) + "\n"
 
 
 def story_lines(story: Mapping[str, Any], run: str, repeat: str, report: str = "") -> list[str]:

@@ -88,7 +88,8 @@ class OnnxModel:
             left, top = np.clip(centre - extent / 2, 0, size)
             right, bottom = np.clip(centre + extent / 2, 0, size)
             box: Box = (float(left), float(top), float(right), float(bottom))
-            found.append(Detection(self.labels[label], float(confidences[query, label]), box))
+            rival = max(np.delete(confidences[query], label), default=0.0)
+            found.append(Detection(self.labels[label], float(confidences[query, label]), box, float(rival)))
         return sorted(found, key=lambda detection: -detection.confidence)
 
     def _check_shapes(self, path: Path) -> int:

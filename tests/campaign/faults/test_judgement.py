@@ -26,7 +26,7 @@ from executive.testing.fake_cell import FakeCell
 BUG = Fault("tree/Grasp", "Grasp", "", "raises", "first", "", breakages=(Breakage("tree/Grasp", "raises"),))
 MISS = Fault("tree/Grasp", "Grasp", "", "missed", "first", "", reason=True)
 ENDINGS = (Ending("Grasp", "missed", "tree/Grasp", "a.yaml", 3),)
-ITEMS = {"seen": 3, "placed": 2, "rejected": 1, "lost": 0, "phantom": 0}
+ITEMS = {"seen": 3, "placed": 2, "rejected": 1, "skipped": 0, "lost": 0, "phantom": 0}
 AUDIT = {"right": 2, "wrong_bin": 0, "left": 1, "elsewhere": 0, "unseen": 0}
 
 PLACES = ((0.5, 0.0, 0.025), (1.6, 0.0, 0.025), (0.24, -0.48, 0.025))
@@ -34,7 +34,7 @@ PLACES = ((0.5, 0.0, 0.025), (1.6, 0.0, 0.025), (0.24, -0.48, 0.025))
 
 
 def outcome(status: str, reason: str = "", message: str = "", node: str = "") -> Outcome:
-    return Outcome(status, reason, message, node, "", 10, 1.0)
+    return Outcome(status, reason, message, node, True, "", 10, 1.0)
 
 
 def books(*args: Any) -> list[str]:

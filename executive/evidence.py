@@ -1,0 +1,91 @@
+"""Evidence about the class of an object besides the detector's score: height of a touch, size of a box."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from executive.geometry import Array
+from executive.messages import Box, Detection, Frame, ObjectClass
+
+MAX_HEIGHT_ERROR = 0.003
+"""Largest difference between the height of a touch and that of the class [m]; 0.4 mm were measured."""
+SIZE_TOLERANCE = 0.15
+"""Largest relative difference between a box and the sizes that its class allows."""
+MIN_SIZE = 2.0
+"""Smallest margin added to that difference [pixel]."""
+BORDER = 2.0
+"""Distance to the border of the searched area under which a box may be cut off [pixel]."""
+
+
+def describe_unknown(counts: Mapping[str, int]) -> str:
+    """Return counts of boxes by label in the form `unknown: rubber-duck ×2`, or "" if there are none."""
+    listed = ", ".join(f"{label} ×{count}" for label, count in counts.items())  # noqa: RUF001
+    return f"unknown: {listed}" if listed else ""
+
+
+def describe_wrong_height(
+    label: str, height: float, classes: Mapping[str, ObjectClass], offset: float = 0.0
+) -> str:
+    """Return why an object touched at a height is not of a class, or "" if it may be.
+
+    The object stands on the table or on an object of any class.
+
+    Args:
+        label: Class that the object is believed to be of.
+        height: Height of the touch above the table [m].
+        classes: Classes of the cell by label.
+        offset: Distance between the touch and the middle of the object [m]; a round top is lower there.
+    """
+    expected = classes[label].height
+    supports = (0.0, *(kind.height for kind in classes.values()))
+    error = min((height - expected - support for support in supports), key=abs)
+    if -MAX_HEIGHT_ERROR - offset <= error <= MAX_HEIGHT_ERROR:
+        return ""
+    felt = f"it was touched {height * 1000:.0f} mm above the table"
+    return f"{felt}, and a {label} is {expected * 1000:.0f} mm high"
+
+
+def describe_wrong_size(
+    detection: Detection, position: Array, frame: Frame, area: Box, kind: ObjectClass
+) -> str:
+    """Return why a box is not that of a class, or "" if it may be.
+
+    The class is enclosed by a cylinder of its radius and height. The longer side of the box is at most as
+    long as that of the cylinder's image, and at least as long as the side of a square in the circle.
+
+    Args:
+        detection: The box and its class.
+        position: Centre of the object `(3,)` [m].
+        frame: The image.
+        area: Searched part of the image [pixel]; a box at its border may be cut off and is not compared.
+        kind: The class.
+    """
+    left, top, right, bottom = detection.box
+    inside = min(left - area[0], top - area[1], area[2] - right, area[3] - bottom)
+    if inside < BORDER:
+        return ""
+    sides = _project_cylinder(position, frame, kind)
+    depth = float(frame.X_WC.inverse().apply(position)[2])
+    scale = float(frame.matrix[0, 0]) / depth
+    shortest = math.sqrt(2) * kind.radius * scale * (1 - SIZE_TOLERANCE) - MIN_SIZE
+    longest = max(sides) * (1 + SIZE_TOLERANCE) + MIN_SIZE
+    measured = max(right - left, bottom - top)
+    if shortest <= measured <= longest:
+        return ""
+    return (
+        f"its box is {measured / scale * 1000:.0f} mm long, and that of a {detection.label} is "
+        f"{shortest / scale * 1000:.0f} to {longest / scale * 1000:.0f} mm long"
+    )
+
+
+def _project_cylinder(position: Array, frame: Frame, kind: ObjectClass) -> tuple[float, float]:
+    """Return width and height [pixel] of the box around the image of the cylinder that encloses a class."""
+    angles = np.linspace(0, 2 * math.pi, 16, endpoint=False)
+    x, y = kind.radius * np.cos(angles), kind.radius * np.sin(angles)
+    rims = [np.stack((x, y, np.full(16, z)), axis=1) for z in (-kind.height / 2, kind.height / 2)]
+    points = frame.X_WC.inverse().apply(position + np.concatenate(rims)) @ frame.matrix.T
+    width, height = np.ptp(points[:, :2] / points[:, 2:], axis=0)
+    return float(width), float(height)
