@@ -10,6 +10,7 @@ from executive.cell import Routes
 from executive.geometry import Array
 from executive.ledger.item import Record, State
 from executive.messages import BIN_THICKNESS, Bin
+from executive.sim.arrangements import UNKNOWN
 from executive.sim.world import World
 
 FLOOR = -0.05
@@ -31,7 +32,7 @@ def audit(
     What is still in the tool was let go nowhere and is `left`, also over a bin; and what fell into a wrong
     bin was put there by nobody: it is out of reach, `elsewhere`. What somebody took away is
     `elsewhere`, if it was seen before. `unseen` counts the other bodies that no item of the ledger was first
-    seen near.
+    seen near. An unknown object that no item was seen near counts only if it is in a bin: `wrong_bin`.
 
     Args:
         world: The simulated world as the run left it.
@@ -55,8 +56,11 @@ def audit(
             counts["elsewhere"] += seen
             continue
         fate = "left" if body == held else _fate(world, body, bins, routes)
-        counts["elsewhere" if fate == "wrong_bin" and body in fallen else fate] += 1
-        counts["unseen"] += not seen
+        fate = "elsewhere" if fate == "wrong_bin" and body in fallen else fate
+        unclaimed = world.bodies[body] == UNKNOWN and not seen
+        if not unclaimed or fate == "wrong_bin":
+            counts[fate] += 1
+        counts["unseen"] += not seen and not unclaimed
     return counts
 
 
