@@ -100,12 +100,15 @@ class CellOptions:
         base: Folder that paths in the cell file start from.
         gui: Show the world in a window.
         past: What a run that is taken up again has had of the cell; None: a run begins.
+        scene: File that changes the world of a simulated cell, which alone reads it; None: the world is as
+            the cell file declares it.
     """
 
     operator: Operator
     base: Path
     gui: bool = False
     past: CellPast | None = None
+    scene: Path | None = None
 
 
 KeyPath = tuple[str | int, ...]

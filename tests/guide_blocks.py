@@ -6,8 +6,8 @@ The author's guide, `missions/README.md`, marks what a reader sees anyway by com
 * `<!-- mistake -->`: `executive check` finds something in it.
 
 Its mission `hello` is the file `hello.yaml`, its library `mine` `library/mine.yaml`, its cell `trays`
-`cells/trays.yaml`. A ```text block holds what is printed by the command in the ```console block before
-it, or by `executive check` of the mistake before it.
+`cells/trays.yaml`, its scene `dusk` `scenes/dusk.yaml`. A ```text block holds what is printed by the
+command in the ```console block before it, or by `executive check` of the mistake before it.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ def _completed(part: str, whole: str) -> str:
 
 
 def _file_name(text: str) -> str:
-    folders = {"mission": "", "library": "library/", "cell": "cells/"}
+    folders = {"mission": "", "scene": "scenes/", "library": "library/", "cell": "cells/"}
     content = yaml.safe_load(text)
     key = next(key for key in folders if key in content)
     return f"{folders[key]}{content[key]}.yaml"

@@ -21,6 +21,7 @@ from executive.messages import Target
 from executive.mission.findings import CODES, MissionError
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.model import grammar
+from executive.mission.parse.cell_file import load_cell
 from executive.mission.schema.files import mission_schema
 from executive.mission.source import Source
 from executive.mission.text.files import shipped_missions
@@ -28,6 +29,15 @@ from executive.mission.text.yaml_text import parse_yaml, plain
 from executive.record.result import EXIT_CODES
 from executive.runtime.cells import cell_kind
 from executive.runtime.run import Run
+from executive.sim.scene_file import (
+    LightConfig,
+    SceneCameraConfig,
+    SceneConfig,
+    SceneObjectConfig,
+    SceneTableConfig,
+    UnknownConfig,
+    load_scene,
+)
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 
@@ -36,6 +46,7 @@ LONGEST = 300.0
 
 FILES = files()
 MISSIONS = [name for name, file in FILES.items() if "/" not in name and not file.block.is_mistake]
+SCENES = [name for name in FILES if name.startswith("scenes/")]
 MISTAKES = [name for name, file in FILES.items() if file.block.is_mistake]
 TRANSCRIPTS = [pytest.param(words, printed, id=where) for where, words, printed in transcripts()]
 PYTHON = [pytest.param(block.text, id=block.where) for block in shown("python")]
@@ -111,7 +122,24 @@ def lasting(printed: str) -> str:
 
 def test_every_library_and_cell_of_the_authors_guide_is_used_by_a_mission_of_it() -> None:
     missions = "".join(FILES[name].text for name in MISSIONS)
-    assert [name for name in FILES if "/" in name and name not in missions] == []
+    assert [name for name in FILES if "/" in name and name not in missions] == SCENES
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_scene_of_the_authors_guide_fits_the_cell_of_its_missions(name: str, folder: Path) -> None:
+    scene = load_scene(Path(name), load_cell(ROOT / "missions" / "cells" / "overhead.yaml"))
+    assert f"scenes/{scene.scene}.yaml" == name
+
+
+def test_the_authors_guide_names_every_section_and_key_of_a_scene() -> None:
+    told = rows("### Change the world without the knowledge of the mission")
+    sections = list(SceneConfig.model_fields)
+    assert ["section", *(f"`{name}`" for name in sections if name != "scene")] == list(told)
+    models = {"light": LightConfig, "table": SceneTableConfig, "objects": SceneObjectConfig}
+    models |= {"unknown": UnknownConfig, "camera": SceneCameraConfig}
+    for name, model in models.items():
+        assert set(model.model_fields) <= set(in_code(told[f"`{name}`"][0])), name
+    assert in_code(rows("### Keys")["a scene"][0]) == sections
 
 
 def test_the_authors_guide_tells_every_code_of_a_finding_and_no_other() -> None:

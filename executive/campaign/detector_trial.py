@@ -15,6 +15,7 @@ from executive.errors import InputError
 from executive.layout import object_class
 from executive.mission.findings import alternatives
 from executive.sim.datasets import generate, run_frames
+from executive.sim.scene_file import load_scene
 from executive.vision.detectors.registry import wrong_detectors
 from executive.vision.evaluation.asking import CellDetector
 from executive.vision.evaluation.cores import only_cores
@@ -39,6 +40,7 @@ class Scenes:
         as_run: As a run begins with, taken and searched as in a run; else varied as in training.
         view: The part of a run's frame that is searched.
         workers: Processes that render.
+        scene: Scene file that changes the world of scenes as a run begins with; None: nothing does.
     """
 
     images: int
@@ -46,6 +48,7 @@ class Scenes:
     as_run: bool
     view: str
     workers: int
+    scene: Path | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,11 +105,11 @@ def subjects(
         yield Subject(config, configs, name, file.parent)
 
 
-def check_subject(subject: Subject, *, rendered: bool) -> None:
+def check_subject(subject: Subject, *, rendered: bool, scene: Path | None = None) -> None:
     """Refuse what cannot be rendered or built, which else would show after minutes of rendering.
 
     Raises:
-        InputError: The cell is not simulated, or one of its detectors cannot be built.
+        InputError: The cell is not simulated, the scene file is wrong, or a detector cannot be built.
     """
     cell = subject.cell
     if rendered and cell and cell.kind != "sim":
@@ -114,6 +117,8 @@ def check_subject(subject: Subject, *, rendered: bool) -> None:
             f"scenes can be rendered of cells of kind sim, and {cell.cell} is of kind {cell.kind}; "
             "measure its detector on images of your own with --dataset"
         )
+    if rendered and cell:
+        load_scene(scene, cell)
     for (_, name, *_), sentence in wrong_detectors(subject.configs, subject.base):
         raise InputError(f"detector {name}: {sentence}")
 
@@ -160,8 +165,9 @@ def _images(
     if scenes.as_run:
         with progress(f"rendering {config.cell}") as told:
             frames = run_frames(
-                config, images=scenes.images, seed=scenes.seed, workers=scenes.workers, progress=told
-            )
+                config, images=scenes.images, seed=scenes.seed, workers=scenes.workers, progress=told,
+                scene=load_scene(scenes.scene, config),
+            )  # fmt: skip
         yield iter(frames), scenes.images
         return
     with tempfile.TemporaryDirectory() as folder:

@@ -18,13 +18,14 @@ Result = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Job:
-    """One run to do: a mission with one seed."""
+    """One run to do: a mission with one seed, in the world of a scene file if there is one."""
 
     mission: str
     seed: int
     overrides: Mapping[str, str]
     runs: Path
     frames: bool
+    scene: Path | None = None
 
 
 def sweep(
@@ -35,6 +36,7 @@ def sweep(
     runs: Path,
     workers: int = 2,
     frames: bool = False,
+    scene: Path | None = None,
     progress: Callable[[int, int], None] | None = None,
     halting: Callable[[], None] | None = None,
     work: Callable[[Job], Result] | None = None,
@@ -52,11 +54,12 @@ def sweep(
         workers: How many processes run at a time.
         frames: Whether the runs save the pictures behind their decisions; a failing seed can be
             repeated with them, so a sweep does without.
+        scene: Scene file of all runs, or None.
         progress: Told how many runs of how many are done.
         halting: Told that somebody wished to halt, as soon as they do.
         work: What does one job, in a process of its own.
     """
-    jobs = [Job(mission, seed, dict(overrides), runs, frames) for seed in seeds]
+    jobs = [Job(mission, seed, dict(overrides), runs, frames, scene) for seed in seeds]
     results = do_all(jobs, work or run_job, _broken, workers=workers, progress=progress, halting=halting)
     return [result for result in results if result is not None]
 
@@ -70,7 +73,7 @@ def run_job(job: Job) -> Result:
 
     skills = discover()
     loaded = load_mission(job.mission, skills, job.overrides)
-    result = recorded_run(loaded, skills, seed=job.seed, runs=job.runs, frames=job.frames)
+    result = recorded_run(loaded, skills, seed=job.seed, runs=job.runs, frames=job.frames, scene=job.scene)
     # A run without a report counts as well as any other.
     leave_report(result)
     return result

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from executive.cli.options import json_option, seed_option
+from executive.cli.options import json_option, scene_option, seed_option
 from executive.cli.output import print_json, stdout_kept_clean
 
 PICTURES = (".png", ".jpg", ".jpeg")
@@ -48,6 +48,7 @@ PICTURES = (".png", ".jpg", ".jpeg")
     "--view", type=click.Choice(["table", "full"]), default="table", show_default=True,
     help="The part of a run's frame to search, with --as-run.",
 )  # fmt: skip
+@scene_option
 @click.option("--cores", type=click.IntRange(min=1), help="Processor cores the detector may use; else all.")
 @click.option(
     "--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Processes to render."
@@ -68,6 +69,7 @@ def command(
     threshold: float | None,
     as_run: bool,
     view: str,
+    scene: Path | None,
     cores: int | None,
     workers: int,
     sheet: Path | None,
@@ -78,7 +80,7 @@ def command(
     What is measured is a cell's detector with all that its section says, or a model file (--weights), or
     with neither the detector that ships with this project.
     """
-    _check(cells, detector, dataset, weights, labels, as_run, view, sheet)
+    _check(cells, detector, dataset, weights, labels, as_run, view, scene, sheet)
     measured: dict[str, Any] = {}
     with stdout_kept_clean():
         from executive.campaign.detector_trial import Scenes, check_subject, measure, subjects
@@ -87,12 +89,12 @@ def command(
         from executive.view.figures.detector import print_figures
         from executive.vision.evaluation.misses import WorstMisses
 
-        worst, scenes = WorstMisses(), Scenes(images, seed, as_run, view, workers)
+        worst, scenes = WorstMisses(), Scenes(images, seed, as_run, view, workers, scene)
         named = cells or (() if dataset else ("overhead",))
         files = dict(zip(map(find_cell, named), load_cells(named).values(), strict=True))
         asked = list(subjects(files, detector, weights, labels))
         for subject in asked:
-            check_subject(subject, rendered=dataset is None)
+            check_subject(subject, rendered=dataset is None, scene=scene)
         for subject in asked:
             where = subject.place(dataset)
             evaluation = measure(
@@ -107,13 +109,13 @@ def command(
             write_sheet(sheet, worst.kept, ", ".join(measured))
             click.echo(f"the {len(worst.kept)} worst in {sheet}", err=True)
     if as_json:
-        given = {"seed": seed, "as_run": as_run, "weights": weights and str(weights)}
-        print_json({**given, "measured": measured})
+        named_files = {"scene": scene and str(scene), "weights": weights and str(weights)}
+        print_json({"seed": seed, "as_run": as_run, **named_files, "measured": measured})
 
 
 def _check(
     cells: tuple[str, ...], detector: str | None, dataset: Path | None, weights: Path | None,
-    labels: Path | None, as_run: bool, view: str, sheet: Path | None,
+    labels: Path | None, as_run: bool, view: str, scene: Path | None, sheet: Path | None,
 ) -> None:  # fmt: skip
     """Refuse options that contradict each other, before anything is rendered."""
     if detector is not None and weights is not None:
@@ -126,5 +128,7 @@ def _check(
         raise click.UsageError("--as-run renders scenes, and --dataset brings images; give one of them")
     if view != "table" and not as_run:
         raise click.UsageError(f"--view {view} is a part of a run's frame; give --as-run with it")
+    if scene is not None and not as_run:
+        raise click.UsageError(f"--scene {scene} changes scenes as a run begins with; give --as-run with it")
     if sheet is not None and sheet.suffix.lower() not in PICTURES:
         raise click.UsageError(f'"{sheet}" is no picture; its name must end in {", ".join(PICTURES)}')

@@ -35,6 +35,10 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print the re
 seed_option = click.option(
     "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="What chance draws from."
 )
+scene_option = click.option(
+    "--scene", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+    help="Change the simulated world without the executive's knowledge: light, table, objects, camera.",
+)  # fmt: skip
 workers_option = click.option(
     "--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Runs at a time."
 )

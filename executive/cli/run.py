@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from executive.cli.options import json_option, overrides_option, runs_option, seed_option
+from executive.cli.options import json_option, overrides_option, runs_option, scene_option, seed_option
 from executive.cli.output import print_json, stdout_kept_clean
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @seed_option
 @overrides_option
+@scene_option
 @runs_option
 @json_option
 @click.option("--quiet", is_flag=True, help="Show nothing on the terminal, unless the run does not succeed.")
@@ -46,6 +47,7 @@ def command(
     resume: str | None,
     seed: int,
     overrides: dict[str, str],
+    scene: Path | None,
     runs: Path,
     as_json: bool,
     quiet: bool,
@@ -66,6 +68,7 @@ def command(
     with stdout_kept_clean():
         from executive.discovery import discover
         from executive.record.result import exit_code
+        from executive.record.run_directory import RunDirectory
         from executive.view.report.page import leave_report
         from executive.view.terminal.summary import repeat_command, story_lines, summary
 
@@ -84,11 +87,15 @@ def command(
                 result, repeat = _resumed(resume, runs, skills, options)
             else:
                 asked = requests or None
-                options |= {"seed": seed, "runs": runs, "requests": asked}
+                options |= {"seed": seed, "runs": runs, "requests": asked, "scene": scene}
                 result = _fresh(mission, skills, overrides, options)
                 # What was asked for by a person is asked for again.
                 repeat = repeat_command(
-                    mission, seed=seed, overrides=overrides, requests=requests or result["requests"]
+                    mission,
+                    seed=seed,
+                    overrides=overrides,
+                    requests=requests or result["requests"],
+                    scene=RunDirectory(Path(result["run"])).scene,
                 )
             report, problem = leave_report(result)
             if page is not None:
@@ -111,10 +118,10 @@ def _require_sense(ctx: click.Context, mission: str | None, resume: str | None) 
         raise click.UsageError("name a MISSION, or a run to take up again with --resume RUN")
     if resume is None:
         return
-    sources = map(ctx.get_parameter_source, ("mission", "seed", "overrides", "requests"))
+    sources = map(ctx.get_parameter_source, ("mission", "seed", "overrides", "requests", "scene"))
     if any(source is not click.core.ParameterSource.DEFAULT for source in sources):
         raise click.UsageError(
-            "--resume takes mission, seed, params and requests from the run: leave them out here"
+            "--resume takes mission, seed, params, requests and scene from the run: leave them out here"
         )
 
 
@@ -130,6 +137,11 @@ def _fresh(
     if options["views"]:
         for warning in loaded.warnings:
             click.echo(str(warning), err=True)
+    if options["scene"] is not None:
+        from executive.sim.scene_file import load_scene
+
+        # A cell that is not simulated would not read it.
+        load_scene(options["scene"], loaded.cell_config)
     return recorded_run(loaded, skills, **options)
 
 
@@ -140,13 +152,18 @@ def _resumed(
     from executive.record.find_run import find_run
     from executive.record.journal import read_journal
     from executive.record.resumed_run import resumed_run
+    from executive.record.run_directory import RunDirectory
     from executive.view.terminal.summary import repeat_command
 
     path = find_run(name, runs)
     result = resumed_run(path, skills, **options)
     start, *_ = read_journal(path / "journal.jsonl")
     return result, repeat_command(
-        start["file"], seed=start["seed"], overrides=start["overrides"], requests=result["requests"]
+        start["file"],
+        seed=start["seed"],
+        overrides=start["overrides"],
+        requests=result["requests"],
+        scene=RunDirectory(path).scene,
     )
 
 

@@ -8,7 +8,14 @@ from typing import Any
 
 import click
 
-from executive.cli.options import MISSION, json_option, overrides_option, runs_option, workers_option
+from executive.cli.options import (
+    MISSION,
+    json_option,
+    overrides_option,
+    runs_option,
+    scene_option,
+    workers_option,
+)
 from executive.cli.output import print_json, stdout_kept_clean
 
 
@@ -31,6 +38,7 @@ def seed_range(text: str) -> range:
 @workers_option
 @click.option("--frames", is_flag=True, help="Save the pictures behind every decision.")
 @overrides_option
+@scene_option
 @runs_option
 @json_option
 @click.pass_context
@@ -41,6 +49,7 @@ def command(
     workers: int,
     frames: bool,
     overrides: dict[str, str],
+    scene: Path | None,
     runs: Path,
     as_json: bool,
 ) -> None:
@@ -57,17 +66,22 @@ def command(
         from executive.runtime.cells import cell_kind
 
         # What is wrong with the mission, or with the place, is told once and not for every seed.
-        load_mission(mission, discover(), overrides, cell_kind)
+        loaded = load_mission(mission, discover(), overrides, cell_kind)
+        if scene is not None:
+            from executive.sim.scene_file import load_scene
+
+            load_scene(scene, loaded.cell_config)
         check_place(runs)
         with bar(mission) as progress:
             results = sweep(
-                mission, seeds, overrides=overrides, runs=runs, workers=workers, frames=frames,
+                mission, seeds, overrides=overrides, runs=runs, workers=workers, frames=frames, scene=scene,
                 progress=progress, halting=say_halting,
             )  # fmt: skip
         figures = summarize(results, len(seeds))
         click.echo(_text(figures), err=True)
     if as_json:
-        print_json({"mission": mission, "seeds": [seeds[0], seeds[-1]], **figures, "results": results})
+        asked = {"mission": mission, "seeds": [seeds[0], seeds[-1]], "scene": scene and str(scene)}
+        print_json({**asked, **figures, "results": results})
     ctx.exit(130 if figures["cut_off"] else int(figures["succeeded"] < figures["runs"]))
 
 

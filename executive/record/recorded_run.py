@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from executive.errors import ExecutiveError
 from executive.events import Event, Observer
 from executive.mission.outline import outline
+from executive.mission.text.files import read_source
 from executive.record.recorded_mission import tree_text
 from executive.record.recorder import Recorder
 from executive.record.result import ENDED, result_of, write_result
@@ -58,6 +59,7 @@ def recorded_run(
     keyboard: bool = True,
     frames: bool = True,
     kind: Callable[..., Workcell] | None = None,
+    scene: Path | None = None,
 ) -> dict[str, Any]:
     """Run `loaded` once, leave its run directory below `runs` and return the result object.
 
@@ -74,6 +76,7 @@ def recorded_run(
         keyboard: Whether somebody can type there.
         frames: Keep the pictures behind the decisions, and of a run that is over the log of its world.
         kind: Makes the work cell; by default the installed kind that the cell file names.
+        scene: File that changes the world of a simulated cell; the run directory gets a copy.
 
     Raises:
         InputError: The run directory cannot be made, or the cell cannot be built.
@@ -83,12 +86,13 @@ def recorded_run(
 
     began = time.perf_counter()
     run = Run(
-        loaded, skills, seed=seed, gui=gui, realtime=realtime, requests=requests, keyboard=keyboard, kind=kind
-    )
+        loaded, skills, seed=seed, gui=gui, realtime=realtime, requests=requests, keyboard=keyboard,
+        kind=kind, scene=scene,
+    )  # fmt: skip
     with closing(run):
         if paused:
             run.control.pause()
-        directory = new_directory(run, loaded, seed, runs)
+        directory = new_directory(run, loaded, seed, runs, scene)
         recorder = Recorder(directory, frames=frames)
         result = Recording(run, loaded, skills, directory, recorder, views).execute(seed, began)
     if not frames and result["status"] in ENDED:
@@ -97,12 +101,17 @@ def recorded_run(
     return result
 
 
-def new_directory(run: Run, loaded: LoadedMission, seed: int, runs: Path) -> RunDirectory:
+def new_directory(
+    run: Run, loaded: LoadedMission, seed: int, runs: Path, scene: Path | None = None
+) -> RunDirectory:
     """Make a run's directory below `runs`, with all that it begins from in it, and return it.
+
+    `scene` is the scene file of the run, or None.
 
     Raises:
         InputError: It cannot be made or written to.
     """
+    scene_text = "" if scene is None else read_source(scene).text
     directory = RunDirectory.create(runs, mission=loaded.mission.name, seed=seed, started=datetime.now())
     directory.save_inputs(
         mission=loaded.text,
@@ -110,6 +119,7 @@ def new_directory(run: Run, loaded: LoadedMission, seed: int, runs: Path) -> Run
         cell=loaded.cell_config.model_dump(mode="json", exclude_unset=True),
         tree=tree_text(outline(run.root)),
         libraries=loaded.libraries,
+        scene=scene_text,
     )
     run.log_to(directory.world)
     return directory

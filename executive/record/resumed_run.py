@@ -82,7 +82,7 @@ def resumed_run(
             )
         run = Run(
             loaded, skills, seed=seed, gui=gui, realtime=realtime, requests=start["requests"],
-            keyboard=keyboard, kind=kind, past=past, takes_up=directory.world,
+            keyboard=keyboard, kind=kind, past=past, takes_up=directory.world, scene=directory.scene,
         )  # fmt: skip
     except BaseException:
         recorder.close(wait=False)

@@ -18,6 +18,8 @@ from executive.record.whole_file import reason_of, write_whole
 
 NO_ROOM = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
 """What the system says where more space would help."""
+SCENE = "scene.yaml"
+"""Name of the copy of the scene file."""
 
 
 class RunDirectory:
@@ -41,6 +43,12 @@ class RunDirectory:
         self.report = path / "report.html"
         self.result = path / "result.json"
         self.frames = path / "frames"
+
+    @property
+    def scene(self) -> Path | None:
+        """Copy of the scene file, or None if the run had none."""
+        path = self.path / SCENE
+        return path if path.is_file() else None
 
     @staticmethod
     def create(runs: Path, *, mission: str, seed: int, started: datetime) -> RunDirectory:
@@ -68,13 +76,14 @@ class RunDirectory:
         cell: Mapping[str, Any],
         tree: str = "",
         libraries: Mapping[str, str] | None = None,
+        scene: str = "",
     ) -> None:
         """Write the mission's text as it was read, the params as they were resolved, and the cell.
 
-        `tree` is the text of `tree.json`, "" for none. The text of every library goes where the mission looks
-        for it, beside the mission. All of it is on the disk before the run begins; then `runs/latest` points
-        at this directory. Params and cell are of values that YAML knows, and are kept to the last digit: the
-        run may be repeated with them.
+        `tree` is the text of `tree.json` and `scene` that of `scene.yaml`, "" for none. The text of every
+        library goes where the mission looks for it, beside the mission. All of it is on the disk before the
+        run begins; then `runs/latest` points at this directory. Params and cell are of values that YAML
+        knows, and are kept to the last digit: the run may be repeated with them.
 
         Raises:
             InputError: The directory cannot be written to; no file in it is half-written.
@@ -92,6 +101,8 @@ class RunDirectory:
                 write_whole(self.path / name, text)
             if tree:
                 write_whole(self.tree, tree)
+            if scene:
+                write_whole(self.path / SCENE, scene)
         except OSError as error:
             raise refused(f'write to the run directory "{self.path}"', error) from error
         _point_latest(self.path.parents[1], self.path)

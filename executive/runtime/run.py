@@ -53,6 +53,7 @@ class Run:
         past: What an earlier run was told; None: there was none.
         takes_up: The log of the world that the earlier run left, to go on where it was cut off; None: only
             its past is played.
+        scene: File that changes the world of a simulated cell; the run does not read it.
 
     Attributes:
         root: The tree.
@@ -78,6 +79,7 @@ class Run:
         substitutes: Mapping[str, type[Skill]] | None = None,
         past: Past | None = None,
         takes_up: Path | None = None,
+        scene: Path | None = None,
     ) -> None:
         self._loaded = loaded
         self._seed = seed
@@ -90,12 +92,8 @@ class Run:
         self._plant = Plant(observers)
         self._emit = self._plant.emit
         kind = kind or cell_kind(loaded.cell_config.kind)
-        options = CellOptions(
-            self._operator(),
-            base=loaded.cell_path.parent,
-            gui=gui,
-            past=_cell_past(past, takes_up) if past and takes_up else None,
-        )
+        left = _cell_past(past, takes_up) if past and takes_up else None
+        options = CellOptions(self._operator(), loaded.cell_path.parent, gui, past=left, scene=scene)
         workcell = kind(
             loaded.cell_config, seed=seed, routes=loaded.routes, emit=self._plant.emit, options=options
         )

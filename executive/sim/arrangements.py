@@ -26,9 +26,10 @@ SCALES = (0.75, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.2, 1.3)
 """Factors on the size of an object that is not as large as its class."""
 UNKNOWN = "unknown"
 """Label of an object of no class."""
-UNKNOWN_MODELS = tuple(number for number in range(800) if number != 168)
-"""Numbers of pybullet_data's `random_urdfs` that stand for unknown objects; the others are left for tests.
-The mesh of number 168 is damaged."""
+UNKNOWN_COUNT, DAMAGED_MODEL = 1000, 168
+"""Number of shapes in pybullet_data's `random_urdfs`, and the number of the one whose mesh is damaged."""
+UNKNOWN_MODELS = tuple(number for number in range(800) if number != DAMAGED_MODEL)
+"""Numbers of those shapes that stand for unknown objects; the others are left for tests."""
 TABLE_X, TABLE_Y = (-0.05, 0.86), (-0.71, 0.71)
 """Part of the table top where objects may lie [m]."""
 FOOT = 0.16

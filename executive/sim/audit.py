@@ -10,6 +10,7 @@ from executive.cell import Routes
 from executive.geometry import Array
 from executive.ledger.item import Record, State
 from executive.messages import BIN_THICKNESS, Bin
+from executive.sim.arrangements import UNKNOWN
 from executive.sim.world import World
 from executive.workcell import PLACES
 
@@ -31,7 +32,8 @@ def audit(
 
     A body in the tool is `left`, also over a bin. A body that fell into a wrong bin is out of reach: it
     counts as `elsewhere` and as `fell_in_wrong_bin`. A body that somebody took away is `elsewhere`, if it
-    was seen before. `unseen` counts the other bodies that no item of the ledger was first seen near.
+    was seen before. `unseen` counts the other bodies that no item of the ledger was first seen near. An
+    unknown object that no item was seen near counts only if it is in a bin: as `wrong_bin`.
 
     Args:
         world: The simulated world as the run left it.
@@ -56,9 +58,11 @@ def audit(
             continue
         fate = "left" if body == held else _fate(world, body, bins, routes)
         fell = fate == "wrong_bin" and body in fallen
-        counts["elsewhere" if fell else fate] += 1
+        unclaimed = world.bodies[body] == UNKNOWN and not seen
+        if not unclaimed or fate == "wrong_bin":
+            counts["elsewhere" if fell else fate] += 1
         counts["fell_in_wrong_bin"] += fell
-        counts["unseen"] += not seen
+        counts["unseen"] += not seen and not unclaimed
     return counts
 
 

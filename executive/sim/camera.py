@@ -161,6 +161,7 @@ class SimCamera:
         shadow: ArmShadow | None = None,
         epoch: Callable[[], int] = lambda: 0,
         light: Light = CELL_LIGHT,
+        true: CameraConfig | None = None,
     ) -> None:
         """Mount the camera.
 
@@ -173,10 +174,13 @@ class SimCamera:
             shadow: Tells what the arm hides; by default it hides nothing, and the table is always seen.
             epoch: Tells the ledger's count of changes of the table.
             light: How the scene is lit.
+            true: The camera as it really is, if it differs from `config`: pose, lens and noise of the images.
+                Frames carry the matrix and the pose of `config`.
         """
         self.name = name
         self.config = config
         self.matrix, _ = calibrated(config)
+        self._true = true or config
         self._world = world
         self._clock = clock
         self._seed = seed
@@ -211,7 +215,7 @@ class SimCamera:
         """Return a fresh frame of what the camera sees now."""
         self._frames += 1
         X_WC = self._pose()
-        image, depth = self._sense(X_WC)
+        image, depth = self._sense()
         return Frame(
             id=self._frames,
             camera=self.name,
@@ -235,10 +239,14 @@ class SimCamera:
     def _pose(self) -> Pose:
         return camera_pose(self._world, self.config)
 
-    def _sense(self, X_WC: Pose) -> tuple[Image, Array | None]:
+    def _true_view(self) -> tuple[Array, Pose]:
+        """Return the camera matrix and the pose `X_WC` that the images really have."""
+        return calibrated(self._true)[0], camera_pose(self._world, self._true)
+
+    def _sense(self) -> tuple[Image, Array | None]:
         """Return the image and, with a depth sensor, the depth of the frame being taken."""
-        clean = render(self._world, self.matrix, X_WC, (0, 0, *self._size), self._light)
-        image = add_noise(clean.image, self.config.noise, np.random.default_rng([self._seed, self._frames]))
+        clean = render(self._world, *self._true_view(), (0, 0, *self._size), self._light)
+        image = add_noise(clean.image, self._true.noise, np.random.default_rng([self._seed, self._frames]))
         if self.config.depth is None:
             return image, None
         rng = np.random.default_rng([self._seed, self._frames, DEPTH_STREAM])

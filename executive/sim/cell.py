@@ -24,6 +24,8 @@ from executive.sim.least_times import SimLeastTimes
 from executive.sim.models import missing_models, weighed
 from executive.sim.poses import out_of_reach, unfit_poses
 from executive.sim.rebuild import UnderWay, rebuild
+from executive.sim.scene_file import load_scene
+from executive.sim.scene_world import lamp
 from executive.sim.scenery import SimScenery
 from executive.sim.spawn import PartSeeds, find_lack_of_room, first_world
 from executive.sim.tool import SuctionTool
@@ -47,7 +49,7 @@ class SimCell:
         detectors: Makes the detectors; by default the installed kinds that the cell file names.
 
     Raises:
-        InputError: The cell asks for something the simulated cell cannot do yet.
+        InputError: The cell asks for something the simulated cell cannot do yet, or the scene file is wrong.
     """
 
     def __init__(
@@ -66,7 +68,8 @@ class SimCell:
         seeds = PartSeeds.of(seed)
         self._config = config
         self._routes = dict(routes)
-        self._world = first_world(config, seed, gui=options.gui)
+        scene = load_scene(options.scene, config)
+        self._world = first_world(config, seed, gui=options.gui, scene=scene)
         self._initial = {body: self._world.object_pose(body).position for body in self._world.bodies}
         self._bins = bins_of(config)
         self._clock = clock = SimClock(self._world, STEP)
@@ -85,6 +88,8 @@ class SimCell:
             seeds.camera,
             shadow=ArmShadow(self._arm, planner.kinematics, config, lambda: self._tool.holding),
             epoch=lambda: self._ledger.epoch,
+            light=lamp(scene.light),
+            true=self._world.config.cameras[name],
         )
         if options.past is not None:
             self._camera.skip(options.past.frames, options.past.turns)

@@ -16,6 +16,7 @@ from executive.errors import InputError
 from executive.geometry import Array
 from executive.messages import Box
 from executive.sim.models import missing_models
+from executive.sim.scene_file import DECLARED, SceneConfig
 from executive.sim.scenes import SIZE, Sample, SceneRenderer
 from executive.vision.dataset import Entry, image_path, save_image, write_annotations
 from executive.vision.samples import LabelledImage
@@ -72,7 +73,13 @@ def generate(
 
 
 def run_frames(
-    config: CellConfig, *, images: int, seed: int, workers: int, progress: Progress
+    config: CellConfig,
+    *,
+    images: int,
+    seed: int,
+    workers: int,
+    progress: Progress,
+    scene: SceneConfig = DECLARED,
 ) -> list[LabelledImage]:
     """Return whole frames of a cell's camera, each of another scene that a run may begin with.
 
@@ -84,8 +91,9 @@ def run_frames(
         seed: Seed; with the same cell it gives the same frames for any number of workers.
         workers: Processes that render.
         progress: Called now and then.
+        scene: Changes the world without the cell's knowledge.
     """
-    return _in_blocks(partial(_take_frames, config, seed), images, workers, progress)
+    return _in_blocks(partial(_take_frames, config, scene, seed), images, workers, progress)
 
 
 def _in_blocks(
@@ -125,11 +133,13 @@ def _render_block(
     return entries
 
 
-def _take_frames(config: CellConfig, seed: int, numbers: range) -> dict[int, LabelledImage]:
+def _take_frames(
+    config: CellConfig, scene: SceneConfig, seed: int, numbers: range
+) -> dict[int, LabelledImage]:
     """Take the frames of these numbers; runs in a process of its own."""
     cv2.setNumThreads(1)
     camera = next(iter(config.cameras))
-    renderer = SceneRenderer(config, camera, randomized=False)
+    renderer = SceneRenderer(config, camera, randomized=False, scene=scene)
     frames = {}
     for number in numbers:
         sample = renderer.sample(_sample_seed(seed, number))

@@ -19,6 +19,8 @@ from executive.messages import Box
 from executive.sim.arrangements import UNKNOWN, Item, arrange, hanging, random_part, reach
 from executive.sim.camera import CELL_LIGHT, Image, add_noise, camera_pose, render, sense
 from executive.sim.models import load_mesh
+from executive.sim.scene_file import DECLARED, SceneConfig
+from executive.sim.scene_world import lamp, paint_table, true_cell
 from executive.sim.silhouette import outline_box, visible_share
 from executive.sim.spawn import spawn
 from executive.sim.table_top import WOOD
@@ -54,8 +56,8 @@ class Sample:
         centres: Middle of each object's extents `(N, 3)` [m] in the world.
         ignored: Boxes `(M, 4)` of objects too hidden to be labelled and too visible to be background.
         part: Part of the camera's image shown (left, top, right, bottom [pixel]).
-        matrix: Camera matrix of the whole image.
-        X_WC: Where the camera was.
+        matrix: Camera matrix of the whole image; of a scene as a run begins with, the declared one.
+        X_WC: Where the camera was, likewise.
         frame: The camera's whole image `(H, W, 3)`, of a scene as a run begins with.
         depth: What its depth sensor gives `(H, W)` [m], likewise; None without one.
     """
@@ -84,7 +86,7 @@ class View:
         part: Left, top, right and bottom [pixel] in the whole image.
         matrix: Camera matrix of the whole image.
         X_WC: Pose of the camera.
-        noise: The noise that it is going to have.
+        noise: Noise in which an object must be visible to be labelled.
     """
 
     image: Image
@@ -99,14 +101,19 @@ class SceneRenderer:
     """Makes samples of one camera of a cell, reusing one world for all of them.
 
     With `randomized`, everything varies more than a run can: for training. Without, scenes are as a run
-    begins with: objects set down by `spawn`, the cell's own lamp, the arm at one of the scan poses.
+    begins with: objects set down by `spawn`, the lamp of `scene`, the arm at one of the scan poses.
     """
 
-    def __init__(self, config: CellConfig, camera: str, *, randomized: bool = True) -> None:
-        self._config = config
+    def __init__(
+        self, config: CellConfig, camera: str, *, randomized: bool = True, scene: SceneConfig = DECLARED
+    ) -> None:
         self._randomized = randomized
-        self._camera = config.cameras[camera]
-        self._world = World(config)
+        self._scene = scene
+        self._declared = config.cameras[camera]
+        self._config = true_cell(config, scene)
+        self._camera = self._config.cameras[camera]
+        self._world = World(self._config)
+        paint_table(self._world, scene)
         self._matrix, _ = calibrated(self._camera)
 
     def sample(self, seed: int) -> Sample:
@@ -154,15 +161,16 @@ class SceneRenderer:
         world, camera = self._world, self._camera
         pose = np.radians(self._config.arm.poses_deg[str(rng.choice(camera.scan_poses))])
         world.set_arm(pose)
-        bodies = spawn(world, self._config, int(rng.integers(2**32)))
+        bodies = spawn(world, self._config, int(rng.integers(2**32)), unknown=self._scene.unknown)
         world.set_arm(pose)  # settling may have let it sag
         try:
-            X_WC = camera_pose(world, camera)
+            X_WC, declared = camera_pose(world, camera), camera_pose(world, self._declared)
             items = [
                 Item(world.bodies[body], world.models[body], world.object_pose(body), (0.0, 0.0, 0.0))
                 for body in bodies
             ]
-            shot = render(world, self._matrix, X_WC, (0, 0, camera.width, camera.height), CELL_LIGHT)
+            whole, light = (0, 0, camera.width, camera.height), lamp(self._scene.light)
+            shot = render(world, self._matrix, X_WC, whole, light)
         finally:
             for body in bodies:
                 world.remove_object(body)
@@ -170,9 +178,13 @@ class SceneRenderer:
         depth = None if camera.depth is None else sense(shot.depth, camera.depth, rng)
         left, top, right, bottom = part = camera.table_view
         clean, seen = shot.image[top:bottom, left:right], shot.bodies[top:bottom, left:right]
-        sample = self._label(View(clean, seen, part, self._matrix, X_WC, camera.noise), bodies, items)
+        # By the declared noise: more noise in a scene does not excuse a detector from finding an object.
+        view = View(clean, seen, part, self._matrix, X_WC, self._declared.noise)
+        sample = self._label(view, bodies, items)
         if sample is None:
             return None
+        # A run takes the camera for what the cell file declares.
+        sample = replace(sample, matrix=calibrated(self._declared)[0], X_WC=declared)
         return replace(sample, image=_resized(frame[top:bottom, left:right]), frame=frame, depth=depth)
 
     def _label(self, view: View, bodies: Sequence[int], items: Sequence[Item]) -> Sample | None:

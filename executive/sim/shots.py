@@ -15,6 +15,7 @@ from executive.cell_config import CellConfig
 from executive.sim.camera import Image, Light, Render, render
 from executive.sim.command_log import STEP, read_commands
 from executive.sim.rebuild import Rebuilding
+from executive.sim.scene_file import load_scene
 from executive.sim.spawn import first_world
 from executive.sim.tool import SuctionTool
 from executive.sim.viewpoint import Viewpoint
@@ -39,12 +40,14 @@ class Shoot:
         seed: That of the run.
         log: What was done to its world.
         viewpoint: Where it is looked at from.
+        scene: The scene file of the run, or None. Its light is the cameras' alone.
     """
 
     config: CellConfig
     seed: int
     log: Path
     viewpoint: Viewpoint
+    scene: Path | None = None
 
 
 def steps_in(log: Path) -> int:
@@ -83,7 +86,8 @@ def _take(shoot: Shoot, steps: Sequence[int]) -> list[Image]:
 
 def pictures(shoot: Shoot, steps: Sequence[int]) -> Iterator[Image]:
     """Yield the pictures of `shots`, taken in one world in this process."""
-    world, viewpoint = first_world(shoot.config, shoot.seed), shoot.viewpoint
+    scene = load_scene(shoot.scene, shoot.config)
+    world, viewpoint = first_world(shoot.config, shoot.seed, scene=scene), shoot.viewpoint
     try:
         # The floor's pattern would draw the eye; what is transparent is not drawn.
         world.client.changeVisualShape(world.plane, -1, rgbaColor=[1, 1, 1, 0])

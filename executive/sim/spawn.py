@@ -11,7 +11,10 @@ import numpy as np
 from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.geometry import Array, Pose, about_z
-from executive.sim.models import Mesh, load_mesh
+from executive.sim.arrangements import UNKNOWN
+from executive.sim.models import load_mesh
+from executive.sim.scene_file import DECLARED, SceneConfig, UnknownConfig
+from executive.sim.scene_world import paint_table, true_cell, unknown_objects
 from executive.sim.world import World
 from executive.workcell import KeyPath
 
@@ -54,19 +57,28 @@ class PartSeeds:
         return PartSeeds(*(int(part.generate_state(1)[0]) for part in parts))
 
 
-def first_world(config: CellConfig, seed: int, *, gui: bool = False) -> World:
+def first_world(config: CellConfig, seed: int, *, gui: bool = False, scene: SceneConfig = DECLARED) -> World:
     """Return the world as a run of this seed finds it: arm at `home`, its objects at rest on the table.
+
+    The attribute `config` of the world is the cell as the scene changes it.
 
     Raises:
         InputError: The workspace has no room for the objects.
     """
-    world = World(config, gui=gui)
-    spawn(world, config, PartSeeds.of(seed).objects)
+    world = World(true_cell(config, scene), gui=gui)
+    paint_table(world, scene)
+    spawn(world, world.config, PartSeeds.of(seed).objects, unknown=scene.unknown)
     world.stood.clear()
     return world
 
 
-def spawn(world: World, config: CellConfig, seed: int, count: int | None = None) -> tuple[int, ...]:
+def spawn(
+    world: World,
+    config: CellConfig,
+    seed: int,
+    count: int | None = None,
+    unknown: UnknownConfig | None = None,
+) -> tuple[int, ...]:
     """Put objects on the table, let them come to rest and return their bodies.
 
     Args:
@@ -74,6 +86,7 @@ def spawn(world: World, config: CellConfig, seed: int, count: int | None = None)
         config: Says how many, which classes and where.
         seed: Decides everything random.
         count: How many, or None for a random number in the cell file's range.
+        unknown: Objects of no class that lie beside them; None: none do.
 
     Raises:
         InputError: The workspace has no room for so many.
@@ -83,17 +96,18 @@ def spawn(world: World, config: CellConfig, seed: int, count: int | None = None)
     if count is None:
         count = int(rng.integers(table.objects[0], table.objects[1], endpoint=True))
     labels = [str(label) for label in rng.choice(list(config.objects), count)]
-    meshes = {label: load_mesh(config.objects[label]) for label in sorted(set(labels))}
+    kinds = [(label, config.objects[label]) for label in labels]
+    kinds += [(UNKNOWN, model) for model in unknown_objects(unknown, rng)]
+    places = _places(config, [model.radius for _, model in kinds], rng)
     bodies = []
-    for label, place in zip(labels, _places(config, labels, rng), strict=True):
-        model = config.objects[label]
-        height = DROP - meshes[label].bottom
+    for (label, model), place in zip(kinds, places, strict=True):
+        height = DROP - load_mesh(model).bottom
         X_WO = Pose(about_z(rng.uniform(0, math.tau)), np.array([*place, height]))
         colour = model.colours[int(rng.integers(len(model.colours)))]
-        bodies.append(world.add_object(label, X_WO, colour))
+        bodies.append(world.add_object(label, X_WO, colour, model))
     _come_to_rest(world, bodies)
     if table.stacked:
-        _stack(world, bodies, meshes, table.stacked, rng)
+        _stack(world, bodies[:count], table.stacked, rng)
     return tuple(bodies)
 
 
@@ -104,7 +118,7 @@ def find_lack_of_room(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
         rng = np.random.default_rng(seed)
         labels = [str(label) for label in rng.choice(list(config.objects), config.table.objects[1])]
         try:
-            _places(config, labels, rng)
+            _places(config, [config.objects[label].radius for label in labels], rng)
         except InputError as error:
             problem = str(error)
         else:
@@ -112,13 +126,15 @@ def find_lack_of_room(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     yield ("table", "objects"), problem
 
 
-def _places(config: CellConfig, labels: list[str], rng: np.random.Generator) -> list[Array]:
-    """Return places `(2,)` [m] whose outlines keep the gap, the whole set drawn anew when one gets stuck."""
+def _places(config: CellConfig, radii: Sequence[float], rng: np.random.Generator) -> list[Array]:
+    """Return places `(2,)` [m] for outlines of these radii [m] that keep the gap.
+
+    The whole set is drawn anew when one gets stuck.
+    """
     low, high = np.array([config.table.x, config.table.y]).T
-    radii = [config.objects[label].radius for label in labels]
     places: list[Array] = []
     for _ in range(TRIES):
-        if len(places) == len(labels):
+        if len(places) == len(radii):
             return places
         place, radius = rng.uniform(low, high), radii[len(places)]
         gaps = [np.linalg.norm(place - p) - radius - r for p, r in zip(places, radii, strict=False)]
@@ -127,15 +143,13 @@ def _places(config: CellConfig, labels: list[str], rng: np.random.Generator) -> 
         elif rng.random() < 0.02:
             places = []
     raise InputError(
-        f"{len(labels)} objects found no room on the workspace of cell {config.cell}, "
+        f"{len(radii)} objects found no room on the workspace of cell {config.cell}, "
         f"{high[0] - low[0]:.2f} m by {high[1] - low[1]:.2f} m, {config.table.gap * 1000:.0f} mm apart; "
         "ask for fewer or widen table.x and table.y"
     )
 
 
-def _stack(
-    world: World, bodies: Sequence[int], meshes: Mapping[str, Mesh], share: float, rng: np.random.Generator
-) -> None:
+def _stack(world: World, bodies: Sequence[int], share: float, rng: np.random.Generator) -> None:
     """Put each object on another one with probability `share`, if there is one that carries it.
 
     Which others do is found out by trying: what falls, also when nudged, is put back where it lay, and all
@@ -145,7 +159,6 @@ def _stack(
     Args:
         world: Where they lie, at rest.
         bodies: The objects.
-        meshes: Shape of each class.
         share: 0 to 1.
         rng: Decides which, where, and how they are turned.
     """
@@ -154,18 +167,17 @@ def _stack(
         if rng.random() >= share or upper not in free:
             continue
         for lower in map(int, rng.permutation(sorted(free - {upper}))):
-            if _put_on(world, upper, lower, meshes, rng):
+            if _put_on(world, upper, lower, rng):
                 free -= {upper, lower}
                 break
 
 
-def _put_on(
-    world: World, upper: int, lower: int, meshes: Mapping[str, Mesh], rng: np.random.Generator
-) -> bool:
+def _put_on(world: World, upper: int, lower: int, rng: np.random.Generator) -> bool:
     """Put one object on another, and tell whether it stayed; if not, all is again as it was."""
     before = {body: world.object_pose(body) for body in world.bodies}
     base = before[lower].position
-    height = base[2] + meshes[world.bodies[lower]].top - meshes[world.bodies[upper]].bottom + DROP
+    below, above = (load_mesh(world.models[body]) for body in (lower, upper))
+    height = base[2] + below.top - above.bottom + DROP
     place = np.array([*(base[:2] + rng.uniform(-OFFSET, OFFSET, 2)), height])
     goal = {**before, upper: Pose(about_z(rng.uniform(0, math.tau)), place)}
     world.place_object(upper, goal[upper])

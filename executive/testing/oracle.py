@@ -18,11 +18,12 @@ import numpy as np
 
 from executive.cell import Clock
 from executive.cell_config import CameraConfig, DetectorConfig
-from executive.geometry import Array, Pose
+from executive.geometry import Array
 from executive.messages import Detection, Frame
+from executive.sim.arrangements import UNKNOWN
 from executive.sim.camera import Image, SimCamera
 from executive.sim.cell import SimCell
-from executive.sim.models import Mesh, load_mesh
+from executive.sim.models import load_mesh
 from executive.sim.silhouette import outline_box
 from executive.sim.world import World
 from executive.vision.camera_model import NEAR, project
@@ -65,36 +66,32 @@ class TruthCamera(SimCamera):
     def __init__(self, world: World, *args: Any, rendered: bool = False, **options: Any) -> None:
         super().__init__(world, *args, **options)
         self._rendered = rendered
-        self._meshes: dict[str, Mesh] = {}
 
     def capture(self) -> TrueFrame:
         """Return a fresh frame of what the camera sees now, and the truth about it."""
         frame = super().capture()
-        return TrueFrame(**vars(frame), truth=self._truth(frame))
+        return TrueFrame(**vars(frame), truth=self._truth())
 
-    def _sense(self, X_WC: Pose) -> tuple[Image, Array | None]:
+    def _sense(self) -> tuple[Image, Array | None]:
         if self._rendered or self.config.depth:
-            return super()._sense(X_WC)
+            return super()._sense()
         return np.zeros((self.config.height, self.config.width, 3), np.uint8), None
 
-    def _truth(self, frame: Frame) -> tuple[Detection, ...]:
+    def _truth(self) -> tuple[Detection, ...]:
         outlines = []
+        matrix, X_WC = self._true_view()
         for body, label in self._world.bodies.items():
-            outline = self._world.object_pose(body).apply(self._mesh(label).vertices)
-            distances = frame.X_WC.inverse().apply(outline)[:, 2]
+            mesh = load_mesh(self._world.models[body])
+            outline = self._world.object_pose(body).apply(mesh.vertices)
+            distances = X_WC.inverse().apply(outline)[:, 2]
             if np.all(distances > NEAR):
-                pixels = project(frame.matrix, frame.X_WC, outline)
+                pixels = project(matrix, X_WC, outline)
                 outlines.append(_Outline(label, pixels, float(distances.mean())))
         return tuple(
             Detection(outline.label, CONFIDENCE, outline_box(outline.pixels))
             for outline in outlines
-            if not any(other.hides(outline) for other in outlines)
+            if outline.label != UNKNOWN and not any(other.hides(outline) for other in outlines)
         )
-
-    def _mesh(self, label: str) -> Mesh:
-        if label not in self._meshes:
-            self._meshes[label] = load_mesh(self._world.config.objects[label])
-        return self._meshes[label]
 
 
 @dataclass(frozen=True, eq=False)

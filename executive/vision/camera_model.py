@@ -31,6 +31,11 @@ def camera_matrix(width: int, height: int, fov_deg: float) -> Array:
     return np.array([[focal, 0.0, width / 2], [0.0, focal, height / 2], [0.0, 0.0, 1.0]])
 
 
+def field_of_view(matrix: Array, height: int) -> float:
+    """Return the vertical field of view [degree] of a camera matrix `(3, 3)` and an image height [pixel]."""
+    return 2 * math.degrees(math.atan(height / 2 / float(matrix[1, 1])))
+
+
 def looking_at(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> Pose:
     """Return the pose of a camera at `position` whose optical axis passes through `target`.
 

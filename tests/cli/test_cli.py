@@ -224,7 +224,7 @@ def test_a_run_passes_on_everything_it_was_asked_for(project):
     assert options.pop("views")
     assert options == {
         "seed": 7, "runs": Path("out"), "gui": False, "realtime": True, "paused": False, "keyboard": True,
-        "requests": ("cube", "duck"),
+        "requests": ("cube", "duck"), "scene": None,
     }  # fmt: skip
     assert json.loads(shown.stdout) == RESULT, "nothing else is on standard output"
     assert "repeat: executive run sort --seed 7" in shown.stderr

@@ -45,6 +45,17 @@ def test_a_cells_detector_is_measured_as_in_a_run_with_a_sheet_of_its_worst_miss
     assert cv2.imread(str(sheet)) is not None
 
 
+def test_a_detector_is_measured_in_the_world_of_a_scene_file(tmp_path):
+    scene = tmp_path / "moved.yaml"
+    scene.write_text("scene: moved\ncamera: {shift: [0.0, 0.03, 0.0]}\ntable: {objects: [4, 4]}\n")
+    options = ("--cell", "overhead", "--as-run", "--images", 1, "--workers", 1, "--scene", scene)
+    _, told = evaluate(*options)
+    measured = told["measured"]["overhead"]
+    assert (told["scene"], measured["objects"]) == (str(scene), 4)
+    # The detector is told nothing of the shift, so that its objects are localized beside their places.
+    assert measured["localized"]["median"] == pytest.approx(30, abs=5)
+
+
 @pytest.mark.parametrize(
     ("arguments", "where", "detector"),
     [
@@ -74,6 +85,8 @@ def test_a_dataset_is_measured_on_with_or_without_a_cell_or_a_model_file(dataset
         (("--labels", "names.txt"), "--labels are those of a model file; name it with --weights"),
         (("--as-run", "--dataset", "."), "--as-run renders scenes, and --dataset brings images; give one"),
         (("--view", "full"), "--view full is a part of a run's frame; give --as-run with it"),
+        (("--scene", "dim.yaml"), "--scene dim.yaml changes scenes as a run begins with; give --as-run with"),
+        (("--as-run", "--scene", "dim.yaml"), "there is no file dim.yaml"),
         (
             ("--cell", "fruit"),
             "fruit is of kind fake; measure its detector on images of your own",

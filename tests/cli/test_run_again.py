@@ -77,11 +77,15 @@ def test_a_replay_says_what_is_decided_otherwise(runs: Path, tmp_path: Path) -> 
         ((), "name a MISSION, or a run to take up again with --resume RUN"),
         (
             ("sort_fruit", "--resume", "latest"),
-            "--resume takes mission, seed, params and requests from the run",
+            "--resume takes mission, seed, params, requests and scene from the run",
         ),
         (
             ("--resume", "latest", "--seed", "3"),
-            "--resume takes mission, seed, params and requests from the run",
+            "--resume takes mission, seed, params, requests and scene from the run",
+        ),
+        (
+            ("--resume", "latest", "--scene", "dim.yaml"),
+            "--resume takes mission, seed, params, requests and scene from the run",
         ),
         (("--resume", "nowhere"), '"nowhere" is no run directory'),
     ],

@@ -22,6 +22,7 @@ from executive.record.replay import replay
 from executive.record.resumed_run import resumed_run
 from executive.testing.disturbances.hand import Hand
 from executive.testing.fake_cell import FakeCell
+from executive.testing.oracle import oracle_cell
 from executive.testing.substitutes import raising
 from tests.meanwhile import meanwhile
 
@@ -61,7 +62,7 @@ def load(missions: Path, name: str) -> LoadedMission:
 def run_of(loaded: LoadedMission, runs: Path, **options: Any) -> dict[str, Any]:
     """Run a mission on the fake cell, asking for every class four times."""
     options = {"skills": discover(), "requests": [*loaded.routes] * 4, **options}
-    return recorded_run(loaded, seed=SEED, runs=runs, kind=FakeCell, frames=False, **options)
+    return recorded_run(loaded, seed=SEED, runs=runs, frames=False, **{"kind": FakeCell, **options})
 
 
 def cut_off(loaded: LoadedMission, runs: Path, tick: int, nth: int = 1) -> Path:
@@ -72,7 +73,7 @@ def cut_off(loaded: LoadedMission, runs: Path, tick: int, nth: int = 1) -> Path:
 
 
 def resumed(path: Path, **options: Any) -> dict[str, Any]:
-    return resumed_run(path, **{"skills": discover(), **options}, frames=False, kind=FakeCell)
+    return resumed_run(path, **{"skills": discover(), "kind": FakeCell, **options}, frames=False)
 
 
 def redecided(path: Path) -> str:
@@ -114,6 +115,17 @@ def test_it_ends_as_if_nothing_had_happened(missions: Path, tmp_path: Path, name
     assert set(placed(path).values()) <= {1}
     assert redecided(path) == ""
     assert json.loads((path / "result.json").read_text()) == result
+
+
+def test_the_world_of_a_scene_is_rebuilt(missions: Path, tmp_path: Path) -> None:
+    loaded, scene = load(missions, "sort_overhead"), tmp_path / "scene.yaml"
+    scene.write_text("scene: two objects\ntable: {objects: [2, 2]}\nunknown: {count: [1, 1], scale: 0.4}\n")
+    with pytest.raises(Cut):
+        run_of(loaded, tmp_path, kind=oracle_cell(), scene=scene, views=[Cutter(600)])
+    # What happens to the file afterwards is nothing to the run.
+    scene.unlink()
+    result = resumed(find_run("latest", tmp_path), kind=oracle_cell())
+    assert (result["status"], result["audit"]["right"], ledger_agrees(result)) == ("SUCCESS", 2, True)
 
 
 @pytest.mark.slow

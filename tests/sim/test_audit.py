@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,23 +11,28 @@ import pytest
 
 from executive.geometry import Pose
 from executive.messages import Bin
+from executive.sim.arrangements import UNKNOWN
 from executive.sim.audit import audit
+
+IN_BIN, ON_TABLE, ON_FLOOR = (0.2, -0.44, 0.12), (0.5, 0.0, 0.025), (1.4, 0.0, -0.6)
 
 
 class OneBody:
-    """A world with one cube over the bin."""
+    """A world with one body, by default a cube over the bin."""
 
-    def __init__(self) -> None:
-        self.bodies = {7: "cube"}
+    def __init__(self, label: str = "cube", place: Sequence[float] = IN_BIN) -> None:
+        self.bodies = {7: label}
+        self._place = place
 
     def object_pose(self, body: int) -> Pose:
-        return Pose.of((0.2, -0.44, 0.12))
+        return Pose.of(self._place)
 
 
-def counted(bins_of_cube: tuple[str, ...], **more: Any) -> dict[str, int]:
+def counted(bins_of_cube: tuple[str, ...], world: OneBody | None = None, **more: Any) -> dict[str, int]:
     bins = {"red_bin": Bin("red_bin", np.array([0.2, -0.44, 0]), np.array([0.2, 0.2, 0.1]), np.zeros((1, 2)))}
     stood = {7: [np.array([0.5, 0.0, 0.025])]}
-    return audit(OneBody(), stood, [], bins, {"cube": bins_of_cube}, 0.025, **more)  # type: ignore[arg-type]
+    options = {"records": [], **more}
+    return audit(world or OneBody(), stood, bins=bins, routes={"cube": bins_of_cube}, reach=0.025, **options)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -44,3 +51,22 @@ def test_a_body_in_a_bin_counts_by_its_class_and_by_who_put_it_there(
 ) -> None:
     none = {"right": 0, "wrong_bin": 0, "left": 0, "elsewhere": 0, "unseen": 1}
     assert counted(bins, **more) == {**none, end: 1}
+
+
+@pytest.mark.parametrize(
+    ("place", "claimed", "end"),
+    [
+        (ON_TABLE, False, {}),
+        (ON_FLOOR, False, {}),
+        (IN_BIN, False, {"wrong_bin": 1}),
+        (ON_TABLE, True, {"left": 1}),
+        (ON_FLOOR, True, {"elsewhere": 1}),
+        (IN_BIN, True, {"wrong_bin": 1}),
+    ],
+)
+def test_an_unknown_object_counts_if_an_item_stands_for_it_or_if_it_is_in_a_bin(
+    place: Sequence[float], claimed: bool, end: dict[str, int]
+) -> None:
+    items = [SimpleNamespace(state=None, first=np.array(ON_TABLE))] if claimed else []
+    none = dict.fromkeys(("right", "wrong_bin", "left", "elsewhere", "unseen"), 0)
+    assert counted(("red_bin",), OneBody(UNKNOWN, place), records=items) == {**none, **end}

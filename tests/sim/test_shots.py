@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -77,3 +78,11 @@ def test_a_viewpoint_has_arm_workspace_and_bins_in_the_given_part_of_the_image(o
     assert view.matrix == pytest.approx(np.array([[1215.34, 0, 400], [0, 1215.34, 360], [0, 0, 1]]), rel=1e-5)
     pose = [1.8486, -1.1888, 1.3928, -0.7711, -0.3845, 0.2265, 0.4542]
     assert (view.X_WC.rounded(4), view.size) == (pytest.approx(pose, abs=2e-4), (800, 720))
+
+
+def test_a_picture_is_of_the_world_of_the_scene(shoot: Shoot, tmp_path: Path) -> None:
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("scene: green\ntable: {colour: [0.2, 0.9, 0.2]}\nlight: {brightness: 0.1}\n")
+    (usual,), (other,) = (pictures(each, [0]) for each in (shoot, replace(shoot, scene=scene)))
+    greener = (other[..., 1] > 1.5 * other[..., 0]) & (usual[..., 1] <= usual[..., 0])
+    assert greener.mean() > 0.1

@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from types import NoneType
 from typing import Any, Generic, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
@@ -100,7 +101,7 @@ def _annotation(model: Any, path: KeyPath) -> Any:
     for step in path:
         if isinstance(here, type) and issubclass(here, BaseModel):
             field = here.model_fields.get(str(step))
-            here = field.annotation if field else None
+            here = _without_none(field.annotation) if field else None
         elif get_origin(here) is dict:
             here = get_args(here)[1]
         elif get_origin(here) in (tuple, list):
@@ -108,6 +109,12 @@ def _annotation(model: Any, path: KeyPath) -> Any:
         else:
             return None
     return here
+
+
+def _without_none(annotation: Any) -> Any:
+    """Return `T` for the declared type `T | None`, and any other type as it is."""
+    kinds = [kind for kind in get_args(annotation) if kind is not NoneType]
+    return kinds[0] if NoneType in get_args(annotation) and len(kinds) == 1 else annotation
 
 
 def _section(model: type[BaseModel], path: KeyPath) -> type[BaseModel] | None:

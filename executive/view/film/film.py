@@ -68,7 +68,7 @@ def _pages(
     length = steps[-1] * start["step"]
     course = Course(source.entries, source.nodes, list(directory.frames.glob("*.jpg")))
     view = overview(source.config, STAGE, SHOWN)
-    shoot = Shoot(source.config, int(start["seed"]), directory.world, view)
+    shoot = Shoot(source.config, int(start["seed"]), directory.world, view, directory.scene)
     with closing(shots(shoot, steps, workers)) as pictures:
         for step, picture in zip(steps, pictures, strict=True):
             course.go_to(step, step * start["step"])

@@ -74,7 +74,11 @@ class Facts:
         file = Path(start["file"])
         mission = file.stem if file.parent == shipped_folder() else str(file)
         self.repeat = repeat_command(
-            mission, seed=start["seed"], overrides=start["overrides"], requests=self.requests
+            mission,
+            seed=start["seed"],
+            overrides=start["overrides"],
+            requests=self.requests,
+            scene=directory.scene,
         )
         ended = self.status in ENDED
         self.resume = "" if ended else shlex.join(["executive", "run", "--resume", str(path)])

@@ -6,6 +6,7 @@ import re
 import shlex
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from executive.evidence import describe_unknown
@@ -26,14 +27,20 @@ _JOINED = "\N{NO-BREAK SPACE}"
 
 
 def repeat_command(
-    mission: str, *, seed: int, overrides: Mapping[str, str], requests: Iterable[str] = ()
+    mission: str,
+    *,
+    seed: int,
+    overrides: Mapping[str, str],
+    requests: Iterable[str] = (),
+    scene: Path | None = None,
 ) -> str:
-    """Return the command line that repeats a run exactly."""
+    """Return the command line that repeats a run exactly; `scene` is its scene file, or None."""
     words = ["executive", "run", mission, "--seed", str(seed)]
     for key, value in overrides.items():
         words += ["--set", f"{key}={value}"]
     for request in requests:
         words += ["--request", request]
+    words += [] if scene is None else ["--scene", str(scene)]
     return shlex.join(words)
 
 
