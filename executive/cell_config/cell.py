@@ -32,7 +32,8 @@ class CellConfig(Section):
     """A whole cell file."""
 
     base: str = Field("", exclude=True)
-    """Another cell file, which gives every key of the first level that this one does not; "" once it has."""
+    """Another cell file. It gives every key of the first level that this file lacks, and every detector and
+    key of a detector that `detectors` lacks; "" once it has."""
     cell: str
     """Name of the cell."""
     description: str = ""
@@ -48,6 +49,8 @@ class CellConfig(Section):
     detector: str = ""
     """The one of `detectors` that missions use unless they name another; "": the first."""
     detectors: dict[str, DetectorConfig] = Field(min_length=1)
+    """By name. With a `base`, a detector of the same name and kind changes keys of the base's detector,
+    another kind replaces it, another name adds a detector, and a name without a value removes one."""
     localization: Literal["plane", "depth", "ray"] = "plane"
     objects: dict[str, ObjectConfig] = Field(min_length=1)
     ledger: LedgerConfig = LedgerConfig()

@@ -101,6 +101,72 @@ def test_a_cell_takes_from_its_base_every_key_that_it_has_not_itself(small_cell:
     assert "base" not in cell.model_dump(), "what is recorded of a cell stands by itself"
 
 
+def with_detectors(cell: str, written: str) -> str:
+    """Return the text of a cell with other detectors."""
+    return cell.replace("detectors:\n  first: {kind: embedded}", f"detectors: {written}")
+
+
+def detectors(text: str, base: str, small_cell: str) -> list[tuple[str, dict[str, object]]]:
+    """Return the detectors of a cell on a base, in order, each with the values that its files write."""
+    Path("base.yaml").write_text(with_detectors(small_cell, base))
+    Path("c.yaml").write_text(f"base: base.yaml\n{text}\n")
+    found = load_cell(Path("c.yaml")).detectors
+    return [(name, detector.model_dump(exclude_unset=True)) for name, detector in found.items()]
+
+
+FIRST = {"kind": "rfdetr", "threshold": 0.6, "class_map": {"a": "cube", "b": "duck"}}
+SECOND = {"kind": "embedded", "latency": 0.1}
+TWO = "{first: {kind: rfdetr, threshold: 0.6, class_map: {a: cube, b: duck}}, second: {kind: embedded, latency: 0.1}}"
+CHANGED = {**FIRST, "threshold": 0.7, "class_map": {"c": "cube"}}
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("cell: c", [("first", FIRST), ("second", SECOND)]),
+        ("detectors: {first: {threshold: 0.7, class_map: {c: cube}}}", [("first", CHANGED), ("second", SECOND)]),
+        ("detectors: {second: {kind: embedded, floor: 0.2}}", [("second", {**SECOND, "floor": 0.2}), ("first", FIRST)]),
+        ("detectors: {first: {kind: fake}}", [("first", {"kind": "fake"}), ("second", SECOND)]),
+        ("detectors: {third: {kind: fake}, first: {}}", [("third", {"kind": "fake"}), ("first", FIRST), ("second", SECOND)]),
+        ("detectors: {third: {kind: fake}, second: }", [("third", {"kind": "fake"}), ("first", FIRST)]),
+        ("detector: second\ndetectors: {third: {kind: fake}}", [("second", SECOND), ("third", {"kind": "fake"}), ("first", FIRST)]),
+    ],
+)  # fmt: skip
+def test_the_detectors_of_a_base_are_merged_by_name(
+    text: str, expected: list[tuple[str, dict[str, object]]], small_cell: str
+) -> None:
+    assert detectors(text, TWO, small_cell) == expected
+
+
+def test_the_choice_of_a_base_holds_until_a_cell_makes_its_own(small_cell: str) -> None:
+    base = f"{TWO}\ndetector: second"
+    kept = detectors("detectors: {third: {kind: fake}}", base, small_cell)
+    assert [name for name, _ in kept] == ["second", "third", "first"]
+    changed = detectors("detector: third\ndetectors: {third: {kind: fake}}", base, small_cell)
+    assert [name for name, _ in changed] == ["third", "first", "second"]
+
+
+@pytest.mark.parametrize(
+    ("base", "text", "expected"),
+    [
+        ("{kind: fake}", "{first: {floor: 2}}", "c.yaml:2:28: error[out-of-range]: detectors.first.floor must be less than 1, not 2\n"),
+        ("{kind: fake, threshold: 0.6}", "{first: {floor: 0.7}}", "c.yaml:2:13: error[wrong-value]: detectors.first needs a floor up to its threshold, 0.6, not 0.7\n"),
+        ("{kind: fake, latency: -1}", "{first: {floor: 0.2}}", "base.yaml:26:42: error[out-of-range]: detectors.first.latency must be at least 0, not -1\n"),
+        ("{kind: fake, latency: -1}", "{first: {kind: rfdetr}, other: {floor: 0.2}}", 'c.yaml:2:36: error[missing-key]: detectors.other needs the key "kind"\n'),
+        ("{kind: fake}", "{other: }", "c.yaml:2:19: error[wrong-type]: detectors.other must be a mapping, not nothing\n"),
+        ("{kind: fake}", "{first: }", "c.yaml:2:1: error[wrong-length]: detectors needs at least 1, has 0\n"),
+        ("{kind: fake}", "[first]", "c.yaml:2:1: error[wrong-type]: detectors must be a mapping, not a list of 1\n"),
+    ],
+)  # fmt: skip
+def test_a_finding_about_a_merged_detector_stands_in_the_file_that_writes_the_value(
+    base: str, text: str, expected: str, small_cell: str
+) -> None:
+    Path("base.yaml").write_text(with_detectors(small_cell, f"{{first: {base}}}"))
+    found = complaint(f"base: base.yaml\ndetectors: {text}\n") + "\n"
+    assert expected in found
+    assert found.count("error[") == 1
+
+
 def test_a_finding_about_a_value_of_the_base_stands_in_the_base(small_cell: str) -> None:
     Path("parts").mkdir()
     Path("parts/base.yaml").write_text(small_cell.replace("force: 12.0", "force: 0", 1))

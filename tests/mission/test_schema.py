@@ -208,6 +208,13 @@ def test_a_cell_with_a_base_needs_no_other_key(small_cell: str) -> None:
     assert problems(schema, "base: small.yaml") == []
     assert ": 'arm' is a required property" in problems(schema, "cell: a")
     assert "'tabel' was unexpected" in problems(schema, "base: small.yaml\ntabel: {}")[0]
+    changed = "detectors: {embedded: {floor: 0.3}, other: }"
+    assert problems(schema, f"base: small.yaml\n{changed}") == []
+    alone = problems(schema, small_cell.replace("detectors:\n  first: {kind: embedded}", changed))
+    assert sorted(alone) == [
+        "detectors.embedded: 'kind' is a required property",
+        "detectors.other: None is not of type 'object'",
+    ]
     assert "safe_place: [0, 0] is too short" in problems(schema, "base: a.yaml\nsafe_place: [0, 0]")[0]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import yaml
 
 from executive.cell_config import CellConfig
 from executive.mission.parse.cell_file import load_cell
@@ -25,7 +26,16 @@ def config(path: Path) -> CellConfig:
 
 
 def test_there_are_cells() -> None:
-    expected = {"overhead", "wrist", "cascade", "kitting", "recycling", "fruit", "instruments"}
+    expected = {
+        "overhead",
+        "wrist",
+        "two_detectors",
+        "hosted",
+        "kitting",
+        "recycling",
+        "fruit",
+        "instruments",
+    }
     assert {path.stem for path in CELLS} >= expected
 
 
@@ -33,6 +43,20 @@ def test_it_has_the_name_of_its_file_and_says_what_it_stands_for(path: Path, con
     assert config.cell == path.stem
     assert config.description
     assert path.read_text().startswith("# ")
+
+
+def test_three_keys_make_a_hosted_model_of_a_server_of_ones_own() -> None:
+    hosted, own = (load_cell(CELLS[0].with_name(f"{name}.yaml")) for name in ("hosted", "roboflow"))
+    written = yaml.safe_load(CELLS[0].with_name("hosted.yaml").read_text())
+    assert {name: list(keys) for name, keys in written["detectors"].items()} == {
+        "server": ["url", "model_id", "class_map"]
+    }
+    changed = {"url": "https://serverless.roboflow.com"}
+    assert hosted.detectors["server"].options == {**own.detectors["server"].options, **changed}
+    assert list(hosted.detectors) == ["server", "embedded"]
+    assert (
+        hosted.detectors["embedded"] == load_cell(CELLS[0].with_name("overhead.yaml")).detectors["embedded"]
+    )
 
 
 def test_its_kind_finds_nothing_wrong_with_it(path: Path, config: CellConfig) -> None:

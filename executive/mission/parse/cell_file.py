@@ -16,11 +16,14 @@ from executive.mission.parse.overrides import CELL, override_cell, override_sour
 from executive.mission.parse.validate import KeyPath, mark_of, validate
 from executive.mission.source import Source
 from executive.mission.text.files import below, read_source
-from executive.mission.text.yaml_text import Mapping, Node, Scalar, parse_yaml, plain
+from executive.mission.text.yaml_text import Entry, Mapping, Node, Scalar, parse_yaml, plain
 from executive.mission.words import describe
 
 BASE = "base"
 """The key that names the file which gives every key of the first level that this one does not."""
+
+DETECTORS = "detectors"
+"""The key whose value is merged with that of the base, detector by detector."""
 
 DEEPEST = 5
 """How many files may stand below a cell file, each the base of the one before."""
@@ -112,9 +115,8 @@ class _Parts:
         base = self._base(named, (*above, path))
         if base is None:
             return None
-        own = tuple(entry for entry in root.entries if entry.key.text != BASE)
-        inherited = tuple(entry for entry in base.entries if entry.key.text not in root.keys)
-        return replace(root, entries=(*own, *inherited))
+        own = tuple(_merge(entry, base) for entry in root.entries if entry.key.text != BASE)
+        return _complete(replace(root, entries=own), base)
 
     def _base(self, named: Scalar, files: tuple[Path, ...]) -> Mapping | None:
         """Return the nodes of the base that the last of `files` names, or None where there are none."""
@@ -135,6 +137,38 @@ class _Parts:
             self.findings.append(error(named.mark, "no-base", str(problem)))
             return None
         return root
+
+
+def _merge(entry: Entry, base: Mapping) -> Entry:
+    """Return an entry of a file; that of its detectors with those of the base.
+
+    A detector that both files have in one kind takes the keys that the file lacks from the base; in another
+    kind it is the file's alone. A detector without a value is removed. The detectors of the file come first.
+    """
+    own, inherited = entry.value, base.get(DETECTORS)
+    if entry.key.text != DETECTORS or not isinstance(own, Mapping) or not isinstance(inherited, Mapping):
+        return entry
+    merged = []
+    for detector in own.entries:
+        older = inherited.get(detector.key.text)
+        if older is None or plain(detector.value) is not None:
+            merged.append(replace(detector, value=_merge_detector(detector.value, older)))
+    others = (older for older in inherited.entries if older.key.text not in own.keys)
+    return replace(entry, value=replace(own, entries=(*merged, *others)))
+
+
+def _merge_detector(own: Node, base: Node | None) -> Node:
+    """Return a detector with the keys of the base's detector that it lacks, if both are of one kind."""
+    if not isinstance(own, Mapping) or not isinstance(base, Mapping):
+        return own
+    kind, older = own.get("kind"), base.get("kind")
+    is_one_kind = kind is None or (older is not None and plain(kind) == plain(older))
+    return _complete(own, base) if is_one_kind else own
+
+
+def _complete(own: Mapping, base: Mapping) -> Mapping:
+    """Return a mapping with the entries of the base for the keys that it lacks."""
+    return replace(own, entries=(*own.entries, *(e for e in base.entries if e.key.text not in own.keys)))
 
 
 def _rebased(overrides: Mapped[str, str]) -> Iterator[Finding]:

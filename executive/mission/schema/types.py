@@ -55,15 +55,21 @@ def type_schema(declared: Any) -> Json:
 
 
 def cell_schema() -> Json:
-    """Return the schema of a cell file; one with a `base` needs no other key."""
+    """Return the schema of a cell file.
+
+    With a `base` no other key is needed, no detector needs a kind, and a detector may have no value.
+    """
     written = CellConfig.model_json_schema(schema_generator=Draft07, ref_template="#/definitions/{model}")
     sections, required = written.pop("$defs"), written.pop("required")
+    detector = sections["DetectorConfig"]
+    whole = {"type": detector["type"], "required": detector.pop("required")}
+    detector["type"] = [whole["type"], "null"]
     return {
         "$schema": DIALECT,
         "title": "A cell",
         **written,
         "if": {"required": ["base"]},
-        "else": {"required": required},
+        "else": {"required": required, "properties": {"detectors": {"additionalProperties": whole}}},
         "definitions": sections,
     }
 

@@ -71,7 +71,7 @@ class Evaluation:
         confusion: How often each class was taken for which, `nothing` among both.
         unavailable: Images about which the detector gave no usable answer.
         why: What it said when it did so for the last time, or "".
-        answered_by: How many answers came from which detector: a cascade asks several.
+        answered_by: Number of answers by the name of the detector.
         reliability: How it errs, as a cell file states it; None where nothing was answered.
     """
 

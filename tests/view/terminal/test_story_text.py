@@ -106,11 +106,11 @@ def test_a_detector_that_gives_no_answer(at_home) -> None:
     run.fake.detector.answers = lambda look, true: "the server is gone"
     story = run.tell()
     chain = [link["why"] for link in story["chain"] if link["why"]]
-    assert chain[0::2] == ["catches only Detect.unsure", "all 8 attempts failed: 8 x Detect.unavailable"]
+    assert chain[0::2] == ["catches only Detect.unsure", "all 10 attempts failed: 10 x Detect.unavailable"]
     assert [unnumbered(each) for each in story["next"]] == [
         "see to it that detector.embedded answers again",
         "to let the mission go on after Detect.unavailable: catch it in the try at "
-        "missions/library/sorting.yaml:N, or allow more than 8 attempts at missions/library/sorting.yaml:N",
+        "missions/library/sorting.yaml:N, or allow more than 10 attempts at missions/library/sorting.yaml:N",
     ]
 
 

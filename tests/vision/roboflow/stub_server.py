@@ -1,4 +1,4 @@
-"""A Roboflow inference server on the loopback: both of its interfaces, and every way to fail."""
+"""A Roboflow inference server on the loopback: its three interfaces, and every way to fail."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ import cv2
 import numpy as np
 
 MODEL = "shapes/1"
+WORKFLOW = "/acme/workflows/sorting"
+"""Path of a workflow with the input `photo` and the output `boxes`."""
 DRIP = 0.05
 """Time between two bytes of a slow answer [s]."""
 
@@ -36,6 +38,8 @@ class StubServer:
         self.finds = finds
         self.faults = faults
         self.looks = 0
+        self.delay = 0.0
+        """Time before every answer to an image [s]."""
         self.asked: list[tuple[str, dict[str, str], bytes]] = []
         """Path, headers and body of every request."""
         self.loaded: set[str] = set()
@@ -67,6 +71,10 @@ class _Handler(BaseHTTPRequestHandler):
     stub: StubServer
 
     def do_GET(self) -> None:
+        self.stub.asked.append((self.path, dict(self.headers), b""))
+        self._list_models()
+
+    def _list_models(self) -> None:
         self._json({"models": [{"model_id": m, "task_type": "object-detection"} for m in self.stub.loaded]})
 
     def do_POST(self) -> None:
@@ -74,15 +82,19 @@ class _Handler(BaseHTTPRequestHandler):
         self.stub.asked.append((self.path, dict(self.headers), body))
         if self.path.startswith("/model/add"):
             self.stub.loaded.add(json.loads(body)["model_id"])
-            self.do_GET()
+            self._list_models()
             return
-        data = json.loads(body)["image"]["value"] if self.path.startswith("/infer/") else body.decode()
+        if self.path == WORKFLOW:
+            data = json.loads(body)["inputs"]["photo"]["value"]
+        else:
+            data = json.loads(body)["image"]["value"] if self.path.startswith("/infer/") else body.decode()
         bgr = cv2.imdecode(np.frombuffer(base64.b64decode(data), np.uint8), cv2.IMREAD_COLOR)
         with contextlib.suppress(OSError):  # Nobody may be listening any more.
             self._answer(np.ascontiguousarray(bgr[..., ::-1]))
 
     def _answer(self, image: np.ndarray) -> None:
         self.stub.looks += 1
+        self.stub.over.wait(self.stub.delay)
         fault = self.stub.faults(self.stub.looks)
         height, width = image.shape[:2]
         found = [dict(prediction) for prediction in self.stub.finds(image)]
@@ -93,7 +105,7 @@ class _Handler(BaseHTTPRequestHandler):
             threading.Thread(target=self.stub.stop).start()
             self.stub.over.wait()
         elif fault == "drip":
-            self._drip(json.dumps({**answer, "predictions": found}).encode())
+            self._drip(json.dumps(self._told({**answer, "predictions": found})).encode())
         elif fault.isdecimal():
             # A server may say anything: this one tells the key that it was given.
             key = self.headers.get("Authorization", "").removeprefix("Bearer ")
@@ -102,7 +114,18 @@ class _Handler(BaseHTTPRequestHandler):
             self._send(BODIES[fault].encode(), "text/html" if fault == "html" else "application/json")
         else:
             spoilt = SPOILT[fault](found, answer) if fault else found
-            self._json({**answer, "predictions": spoilt})
+            self._json(self._told({**answer, "predictions": spoilt}))
+
+    def _told(self, answer: dict[str, Any]) -> dict[str, Any]:
+        """Return the answer of a model, or the answer of a workflow with it."""
+        if self.path != WORKFLOW:
+            return answer
+        boxes = {"image": answer["image"], "predictions": answer["predictions"]}
+        if not answer["predictions"]:
+            boxes["image"] = {"width": None, "height": None}
+        # A picture is larger than anything that the detector hands on.
+        picture = {"type": "base64", "value": "A" * (2 << 20)}
+        return {"outputs": [{"picture": picture, "boxes": boxes}], "profiler_trace": []}
 
     def _drip(self, body: bytes) -> None:
         self.send_response(200)

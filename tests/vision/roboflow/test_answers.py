@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from executive.messages import Detection
-from executive.vision.detectors.roboflow.answers import read_answer
-from executive.vision.detectors.roboflow.complaints import failed, late, plain
+from executive.vision.detectors.roboflow.answers import read_answer, read_output
+from executive.vision.detectors.roboflow.complaints import failed, late, plain, unbelievable
 from executive.vision.detectors.roboflow.options import RoboflowOptions
 
 CUBE = {"x": 50.0, "y": 40.0, "width": 20, "height": 10.0, "confidence": 0.9, "class": "cube", "class_id": 0}
@@ -60,6 +60,44 @@ def test_what_cannot_be_is_refused_with_its_place(spoilt, text):
         read_answer(spoilt, (100, 80))
 
 
+@pytest.mark.parametrize(
+    "output",
+    [
+        answer(CUBE),
+        [CUBE],
+        {"inference_id": "1", "predictions": answer(CUBE)},
+        {"image": {"width": 100, "height": 80}, "predictions": [CUBE]},
+    ],
+    ids=["answer", "predictions", "outputs of a step", "serialized detections"],
+)
+def test_the_output_of_a_workflow_is_read_in_every_form_that_it_has(output):
+    assert read_output(output, (100, 80)) == read_answer(answer(CUBE), (100, 80))
+
+
+def test_an_output_without_predictions_has_an_image_without_a_size():
+    assert read_output({"image": {"width": None, "height": None}, "predictions": []}, (100, 80)) == []
+    with pytest.raises(ValueError, match=r"image\.width: input should be a valid number"):
+        read_output({"image": {"width": None, "height": 80}, "predictions": []}, (100, 80))
+
+
+@pytest.mark.parametrize(
+    ("output", "text"),
+    [
+        ("ball", "of type str, not an object with predictions"),
+        (None, "of type NoneType, not an object with predictions"),
+        ({"top": "ball"}, "predictions: field required"),
+        ([answer(CUBE), answer()], r"predictions\[0\].x: field required"),
+        ([[CUBE]], r"predictions\[0\]: input should be a valid dictionary"),
+        (answer(answer(CUBE)), r"predictions\[0\].x: field required"),
+        ({"predictions": answer({**CUBE, "x": -30.0})}, r"box from \(-40, 35\) to \(-20, 45\)"),
+        (answer(CUBE, image={"width": 50, "height": 40}), "image of 50 x 40 pixels, and 100 x 80 were sent"),
+    ],
+)
+def test_an_output_that_holds_no_boxes_in_the_image_that_was_sent_is_refused(output, text):
+    with pytest.raises(ValueError, match=text):
+        read_output(output, (100, 80))
+
+
 def test_values_are_not_repeated_for_they_may_be_secret():
     with pytest.raises(ValueError) as caught:
         read_answer(answer({**CUBE, "x": "SECRET"}), (100, 80))
@@ -85,7 +123,7 @@ ANYTHING = st.recursive(
 )
 def test_whatever_a_server_says_only_sound_boxes_get_in(said):
     try:
-        found = read_answer(said, (100, 80))
+        found = read_output(said, (100, 80))
     except ValueError:
         return
     for detection in found:
@@ -97,6 +135,7 @@ def test_whatever_a_server_says_only_sound_boxes_get_in(said):
 
 HOST = "https://serverless.roboflow.com"
 OPTIONS = RoboflowOptions(url=f"{HOST}/", model_id="shapes/1")
+WORKFLOW = RoboflowOptions(api="workflow", workspace="acme", workflow_id="sorting", workflow_output="boxes")
 
 
 def test_somebody_elses_words_become_one_short_line():
@@ -111,6 +150,35 @@ def test_a_sentence_says_what_where_and_what_to_look_at():
     )
     unknown = {"failure": "status", "status": 599, "said": ""}
     assert failed(unknown, OPTIONS) == f"{HOST} gave no answer (599); look at its log"
+
+
+@pytest.mark.parametrize(
+    ("failure", "sentence"),
+    [
+        (
+            {"failure": "status", "status": 404, "said": "no such workflow"},
+            "has no workflow acme/sorting (404: no such workflow); check workspace and workflow_id and url",
+        ),
+        (
+            {"failure": "status", "status": 400, "said": ""},
+            "could not use the request (400); check workspace and workflow_id and api",
+        ),
+        (
+            {"failure": "no output", "said": "it has: picture, top"},
+            'ran workflow acme/sorting, which has no output "boxes" (it has: picture, top); '
+            "check workflow_output",
+        ),
+    ],
+)
+def test_a_sentence_about_a_workflow_names_its_options(failure, sentence):
+    assert failed(failure, WORKFLOW) == f"{HOST} {sentence}"
+
+
+def test_an_answer_that_cannot_be_right_is_told_with_what_to_check():
+    beginning = f"{HOST} gave an answer that cannot be right: no box; "
+    assert unbelievable("no box", OPTIONS) == f"{beginning}is shapes/1 a model that detects objects?"
+    question = 'is "boxes" the predictions of a model that detects objects?'
+    assert unbelievable("no box", WORKFLOW) == beginning + question
 
 
 def test_a_deadline_that_has_passed_is_told_with_what_the_server_said_meanwhile():

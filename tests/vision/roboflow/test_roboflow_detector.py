@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from stub_server import BODIES, MODEL, SPOILT, StubServer
+from stub_server import BODIES, MODEL, SPOILT, WORKFLOW, StubServer
 
 from executive.cell_config import DetectorConfig
 from executive.errors import DeadlinePassed, Unavailable
@@ -23,6 +23,9 @@ SECRET = "SECRET1234567890"
 DEADLINE = 2.0
 """Time for an answer [s]: more than inference-sdk takes for the three times that it asks."""
 V1 = {"api": "v1", "class_map": {"ball": "sphere"}}
+NAMES = {"workspace": "acme", "workflow_id": "sorting", "workflow_input": "photo", "workflow_output": "boxes"}
+APIS = {"v1": V1, "v0": {**V1, "api": "v0"}, "workflow": {**V1, "api": "workflow", **NAMES}}
+"""Options of a detector by its interface."""
 CAMERA = SimpleNamespace(table_view=(192, 100, 448, 356))
 
 
@@ -104,9 +107,9 @@ def assert_unavailable(detector, *patterns):
 
 
 @pytest.mark.parametrize("view", ["table", "full"])
-@pytest.mark.parametrize("api", ["v1", pytest.param("v0", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("api", ["v1", pytest.param("v0", marks=pytest.mark.slow), "workflow"])
 def test_a_box_is_returned_in_the_frames_pixels_and_renamed(make, server, api, view):
-    detector = make(**{**V1, "api": api})
+    detector = make(**APIS[api])
     answer = search(detector, spot(channel=2), view)
     ((label, box),) = [(found.label, found.box) for found in answer.found]
     assert (label, answer.detector) == ("sphere", "server")
@@ -116,15 +119,49 @@ def test_a_box_is_returned_in_the_frames_pixels_and_renamed(make, server, api, v
     path, headers, body = server.asked[-1]
     assert headers["Authorization"] == f"Bearer {SECRET}"
     assert all(SECRET not in path and SECRET.encode() not in body for path, _, body in server.asked)
-    assert "confidence=0.25" in path if api == "v0" else json.loads(body)["confidence"] == 0.25
+    if api == "workflow":
+        assert path == WORKFLOW
+    else:
+        assert "confidence=0.25" in path if api == "v0" else json.loads(body)["confidence"] == 0.25
 
 
 @pytest.mark.slow
-def test_a_full_frame_can_be_sent_in_tiles(make, server):
-    looks = server.looks
-    (found,) = search(make(full="tiles", deadline=5.0), spot(180, 240), "full").found
+@pytest.mark.parametrize(("api", "requests"), [("v0", 1), ("v1", 2), ("workflow", 1)])
+def test_an_image_takes_the_requests_and_a_full_frame_the_images_that_the_options_state(
+    make, server, api, requests
+):
+    detector = make(**{**APIS[api], "full": "tiles", "deadline": 5.0})
+    server.loaded.clear()
+    (found,) = search(detector, spot(180, 240), "full").found
     assert found.box == pytest.approx((180, 240, 210, 260), abs=1.0)
-    assert server.looks - looks == 9
+    # A server that has not loaded the model is asked to load it.
+    assert len(server.asked) == 9 * requests + (api == "v1")
+    server.asked.clear()
+    search(detector, spot(), "table")
+    assert len(server.asked) == requests
+    server.asked.clear()
+    search(make(**APIS[api]), spot(), "full")
+    assert len(server.asked) == requests
+
+
+@pytest.mark.slow
+def test_one_deadline_covers_the_images_of_all_tiles(make, server):
+    detector = make(**{**V1, "full": "tiles", "deadline": 1.0})
+    detector._helper.wait_until_ready()
+    server.delay, began = 0.2, time.monotonic()
+    with pytest.raises(DeadlinePassed, match=r"^no answer within 1\.0 s from"):
+        search(detector, spot(), "full")
+    assert 1.0 <= time.monotonic() - began < 2.0
+    server.delay = 0.0
+
+
+def test_an_output_that_a_workflow_lacks_is_named_with_those_that_it_has(make, server):
+    detector = make(**{**APIS["workflow"], "workflow_output": "circles"})
+    assert_unavailable(
+        detector,
+        f'^{server.url} ran workflow acme/sorting, which has no output "circles" '
+        r"\(it has: picture, boxes\); check workflow_output$",
+    )
 
 
 def test_what_is_below_the_floor_is_left_out_and_a_class_nobody_asked_for_is_not(detector, server):
@@ -145,7 +182,7 @@ REFUSED = {
     "429": "asked too often",
     "500": "has an error of its own .* look at its log",
     "502": "has lost the server behind it",
-    "503": "is not ready, or cannot load shapes/1",
+    "503": "is not ready, or cannot load model shapes/1",
 }
 GARBLED = "(answered with something that|gave an answer that)"
 ABSURD = "gave an answer that cannot be right: .*shapes/1"
@@ -154,22 +191,40 @@ FAULTS = {
     **dict.fromkeys(sorted(BODIES), GARBLED),
     **dict.fromkeys(sorted(set(SPOILT) - {"strangers", "doubtful"}), ABSURD),
 }
+
+
+def asked_for(sentence, api):
+    """Return a sentence about a model for another interface."""
+    if api != "workflow":
+        return sentence
+    words = {
+        "right: .*shapes/1": 'right: .*"boxes"',
+        "model shapes/1": "workflow acme/sorting",
+        "model_id": "workspace and workflow_id",
+    }
+    for model, workflow in words.items():
+        sentence = sentence.replace(model, workflow)
+    return sentence
+
+
 QUICK = ("401", "404", "html", "deep", "nan")
 """Faults of every kind; the others are slow tests, and units in test_answers.py and test_complaints.py."""
 
 
 @pytest.mark.parametrize("fault", QUICK)
-def test_a_fault_of_the_server_is_unavailable_with_what_to_do(detector, server, fault):
+@pytest.mark.parametrize("api", ["v1", "workflow"])
+def test_a_fault_of_the_server_is_unavailable_with_what_to_do(make, server, fault, api):
     server.faults = lambda look: fault
-    assert_unavailable(detector, f"^{server.url}", FAULTS[fault])
+    assert_unavailable(make(**APIS[api]), f"^{server.url}", asked_for(FAULTS[fault], api))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
-@pytest.mark.parametrize("api", ["v0", "v1"])
+@pytest.mark.parametrize("api", APIS)
 def test_every_fault_of_the_server_is_unavailable_with_what_to_do(make, server, fault, api):
     server.faults = lambda look: fault
-    assert_unavailable(make(**{**V1, "api": api}), f"^{server.url}|no answer within", FAULTS[fault])
+    expected = asked_for(FAULTS[fault], api)
+    assert_unavailable(make(**APIS[api]), f"^{server.url}|no answer within", expected)
 
 
 def test_a_server_that_is_gone_and_comes_back(detector, server):

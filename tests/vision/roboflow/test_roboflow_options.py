@@ -20,10 +20,41 @@ def configured(**options):
 @pytest.mark.parametrize(
     ("options", "option", "text"),
     [
-        ({"model_id": ""}, "model_id", "at least 1 character"),
+        (
+            {"model_id": ""},
+            "model_id",
+            "^api: auto needs model_id: project/version, or a name such as rfdetr-",
+        ),
+        ({"model_id": "a b"}, "model_id", "^model_id must be a name or project/version alone, without"),
+        (
+            {"workflow_id": "a"},
+            "workflow_id",
+            "^api: auto does not use workflow_id; write api: workflow, or d",
+        ),
+        (
+            {"api": "v1", "workflow_output": "boxes", "workspace": "acme"},
+            "workspace",
+            "^api: v1 does not use workspace, workflow_output; write .* delete workspace, workflow_output$",
+        ),
+        (
+            {"api": "workflow", "workspace": "acme"},
+            "workflow_id",
+            "^api: workflow needs workspace and workflow_id; workflow_id is missing$",
+        ),
+        ({"api": "workflow", "workflow_id": "a"}, "workspace", "workflow_id; workspace is missing$"),
+        (
+            {"api": "workflow", "workspace": "acme", "workflow_id": "a/b"},
+            "workflow_id",
+            "^workflow_id must be a name alone, without /, ",
+        ),
+        (
+            {"api": "workflow", "workspace": "acme", "workflow_id": "a", "workflow_output": ""},
+            "workflow_output",
+            "at least 1 character",
+        ),
         ({"model_id": "shapes/", "api": "v0"}, "model_id", 'project/version for v0, or .*, not "shapes/"'),
         ({"model_id": "a/b/c", "api": "v0"}, "model_id", 'project/version for v0, or .*, not "a/b/c"'),
-        ({"api": "v2"}, "api", "'auto', 'v0' or 'v1'"),
+        ({"api": "v2"}, "api", "'auto', 'v0', 'v1' or 'workflow'"),
         ({"url": "127.0.0.1:9001"}, "url", "an address such as http://127.0.0.1:9001"),
         ({"url": "ftp://there"}, "url", "an address such as"),
         ({"url": "http://"}, "url", "an address such as"),
@@ -61,6 +92,12 @@ def test_addresses_of_servers_are_right_and_the_hosted_service_is_asked_without_
     for url in ("http://127.0.0.1:9001", "https://serverless.roboflow.com/", "http://[::1]:9001"):
         assert list(RoboflowDetector.check(configured(url=url), tmp_path, {})) == []
     assert RoboflowOptions(model_id="shapes/1").url == "https://serverless.roboflow.com"
+
+
+def test_a_workflow_needs_two_names_and_takes_a_model_id_from_a_base(tmp_path):
+    names = {"api": "workflow", "workspace": "acme", "workflow_id": "sorting"}
+    assert list(RoboflowDetector.check(configured(**names), tmp_path, {})) == []
+    assert list(RoboflowDetector.check(DetectorConfig(kind="roboflow", **names), tmp_path, {})) == []
 
 
 def test_the_classes_are_known_where_labels_are_given(tmp_path):

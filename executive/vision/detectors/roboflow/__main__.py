@@ -1,8 +1,9 @@
 """The program that talks to a Roboflow inference server: `python -m executive.vision.detectors.roboflow`.
 
-Its argument is JSON: which server, model and confidence. On its standard input it gets for every image a line
-of JSON with width and height, and the pixels. On its standard output it says a line of JSON for each, and one
-when it is ready. The key comes through the environment. It ends with its input, whatever it is doing.
+Its argument is JSON: which server, model or workflow, and confidence. On its standard input it gets for every
+image a line of JSON with width and height, and the pixels. On its standard output it says a line of JSON for
+each, and one when it is ready. The key comes through the environment. It ends with its input, whatever it is
+doing.
 """
 
 from __future__ import annotations
@@ -14,18 +15,25 @@ import queue
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from executive.vision.detectors.roboflow.key import VARIABLE
 
+if TYPE_CHECKING:
+    from inference_sdk import InferenceHTTPClient
+
 LONGEST = 1 << 20
 """Characters of an answer that are handed on; 300 predictions take a twentieth of it."""
 
 Say = Callable[..., None]
 """Says one line of JSON."""
+
+
+class NoOutput(Exception):
+    """A workflow has no output of the name that is asked for; the text names its outputs."""
 
 
 def main() -> None:
@@ -71,7 +79,7 @@ def _read(pipe: BinaryIO, images: queue.Queue[NDArray[np.uint8]]) -> None:
 
 
 def _client(setup: dict[str, Any]) -> Callable[[NDArray[np.uint8]], Any]:
-    """Return what sends an RGB image to the model and returns its answer."""
+    """Return what sends an RGB image to the model or workflow and returns its answer."""
     from inference_sdk import InferenceConfiguration, InferenceHTTPClient
 
     client = InferenceHTTPClient(setup["url"].rstrip("/"), os.environ.get(VARIABLE, "").strip() or None)
@@ -84,7 +92,18 @@ def _client(setup: dict[str, Any]) -> Callable[[NDArray[np.uint8]], Any]:
     elif setup["api"] == "v1":
         client.select_api_v1()
     # It takes arrays as OpenCV has them: BGR.
+    if setup["api"] == "workflow":
+        return lambda image: _run_workflow(client, setup, image[..., ::-1])
     return lambda image: client.infer(image[..., ::-1], model_id=setup["model_id"])
+
+
+def _run_workflow(client: InferenceHTTPClient, setup: dict[str, Any], image: NDArray[np.uint8]) -> Any:
+    """Return the output of a workflow that holds the predictions for a BGR image."""
+    images = {setup["workflow_input"]: image}
+    (outputs,) = client.run_workflow(setup["workspace"], setup["workflow_id"], images=images)
+    if setup["workflow_output"] not in outputs:
+        raise NoOutput(f"it has: {', '.join(outputs)}")
+    return outputs[setup["workflow_output"]]
 
 
 def _answer(infer: Callable[[NDArray[np.uint8]], Any], image: NDArray[np.uint8], say: Say) -> None:
@@ -113,6 +132,8 @@ def _failure(error: Exception) -> dict[str, Any]:
 
     if isinstance(error, sdk.HTTPCallErrorError):
         return {"failure": "status", "status": error.status_code, "said": str(error.api_message or "")}
+    if isinstance(error, NoOutput):
+        return {"failure": "no output", "said": str(error)}
     kinds: tuple[tuple[str, tuple[type[BaseException], ...]], ...] = (
         ("no key", (sdk.APIKeyNotProvided,)),
         ("no model", (sdk.InvalidModelIdentifier, sdk.ModelNotInitializedError)),

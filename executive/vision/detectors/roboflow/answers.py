@@ -68,6 +68,28 @@ def read_answer(answer: Any, size: tuple[int, int]) -> list[Detection]:
     return list(_detections(read.predictions, size))
 
 
+def read_output(output: Any, size: tuple[int, int]) -> list[Detection]:
+    """Return the detections in an output of a workflow, in its order.
+
+    An output is an answer, the predictions of an answer alone, or all outputs of a step (`$steps.model.*`),
+    in which the answer stands under `predictions`. Without predictions the size of the image is null.
+
+    Args:
+        output: Its JSON.
+        size: Width and height of the image that was sent [pixel].
+
+    Raises:
+        ValueError: It holds something that cannot be; the text says what.
+    """
+    if isinstance(output, dict) and isinstance(output.get("predictions"), dict):
+        output = output["predictions"]
+    elif isinstance(output, list):
+        output = {"predictions": output}
+    if isinstance(output, dict) and output.get("image") == {"width": None, "height": None}:
+        output = {**output, "image": None}
+    return read_answer(output, size)
+
+
 def _detections(predictions: list[_Prediction], size: tuple[int, int]) -> Iterator[Detection]:
     """Yield the predictions with their boxes cut off at the border of the image."""
     width, height = size

@@ -13,22 +13,23 @@ LONGEST = 100
 
 _KEY = f"set {VARIABLE} to a key that may use it"
 _BY_STATUS: Mapping[int, tuple[str, str]] = {
-    400: ("could not use the request", "check model_id and api"),
+    400: ("could not use the request", "check {options} and api"),
     401: ("does not accept the key", _KEY),
     402: ("wants to be paid", f"look at the plan of the account that {VARIABLE} belongs to"),
     403: ("does not accept the key", _KEY),
-    404: ("has no model {model}", "check model_id and url"),
+    404: ("has no {subject}", "check {options} and url"),
     413: ("finds the image too large", "give the camera a smaller table_view, or set full: tiles"),
     429: ("has been asked too often", "ask less often, or look at the plan of the account"),
     500: ("has an error of its own", "look at its log"),
     502: ("has lost the server behind it", "is that running?"),
-    503: ("is not ready, or cannot load {model}", "look at its log, and check model_id"),
+    503: ("is not ready, or cannot load {subject}", "look at its log, and check {options}"),
 }
 _UNKNOWN = ("gave no answer", "look at its log")
 _BY_KIND: Mapping[str, tuple[str, str]] = {
     "no key": ("wants a key", f"set {VARIABLE}"),
-    "no model": ("has no model {model}", "check model_id"),
-    "no detector": ("has a model {model} that detects no objects", "check model_id"),
+    "no model": ("has no {subject}", "check {options}"),
+    "no detector": ("has a {subject} that detects no objects", "check {options}"),
+    "no output": ('ran {subject}, which has no output "{output}"', "check workflow_output"),
     "refused": ("refused the connection", "is it running, and is url right?"),
     "unknown host": ("is not known by this name", "check url and the network"),
     "tls": ("cannot be trusted (TLS)", "check url, its certificate and the clock"),
@@ -43,11 +44,10 @@ def failed(failure: Mapping[str, Any], options: RoboflowOptions) -> str:
     said = plain(str(failure.get("said", "")))
     status = failure.get("status")
     if status is None:
-        what, advice = _BY_KIND[failure["failure"]]
+        what, advice = _worded(_BY_KIND[failure["failure"]], options)
     else:
-        what, advice = _BY_STATUS.get(status, _UNKNOWN)
+        what, advice = _worded(_BY_STATUS.get(status, _UNKNOWN), options)
         said = f"{status}: {said}" if said else str(status)
-    what = what.format(model=options.model_id)
     return f"{options.host} {what}{f' ({said})' if said else ''}; {advice}"
 
 
@@ -60,17 +60,23 @@ def late(repeats: Sequence[int | None], options: RoboflowOptions) -> str:
     status = repeats[-1]
     if status is None:
         return f"{sentence}, to which there was no connection; is it running, and is url right?"
-    what, advice = _BY_STATUS.get(status, _UNKNOWN)
-    what = what.format(model=options.model_id)
+    what, advice = _worded(_BY_STATUS.get(status, _UNKNOWN), options)
     return f"{sentence}, which {what} ({status}); {advice}"
 
 
 def unbelievable(problem: str, options: RoboflowOptions) -> str:
     """Return the sentence about an answer that cannot be right."""
-    return (
-        f"{options.host} gave an answer that cannot be right: {plain(problem)}; "
-        f"is {options.model_id} a model that detects objects?"
-    )
+    question = f"is {options.model_id} a model that detects objects?"
+    if options.api == "workflow":
+        question = f'is "{options.workflow_output}" the predictions of a model that detects objects?'
+    return f"{options.host} gave an answer that cannot be right: {plain(problem)}; {question}"
+
+
+def _worded(sentence: tuple[str, str], options: RoboflowOptions) -> tuple[str, str]:
+    """Return what happened and what to do, with the names of model, workflow and options."""
+    what, advice = sentence
+    what = what.format(subject=options.subject, output=options.workflow_output)
+    return what, advice.format(options=options.subject_options)
 
 
 def plain(text: str) -> str:

@@ -14,11 +14,11 @@ from executive.cell_config import DetectorConfig
 from executive.errors import DeadlinePassed, InputError, Unavailable
 from executive.messages import Detection, Frame
 from executive.vision.detectors.requests import Pending
-from executive.vision.detectors.roboflow.answers import read_answer
+from executive.vision.detectors.roboflow.answers import read_answer, read_output
 from executive.vision.detectors.roboflow.complaints import failed, late, unbelievable
 from executive.vision.detectors.roboflow.helper import Helper, NoAnswer
 from executive.vision.detectors.roboflow.key import ApiKey
-from executive.vision.detectors.roboflow.options import RoboflowOptions, wrong_roboflow
+from executive.vision.detectors.roboflow.options import WORKFLOW, RoboflowOptions, wrong_roboflow
 from executive.vision.detectors.setting import Setting
 from executive.vision.detectors.views import Part, parts_of, search_parts, without_duplicates
 
@@ -39,7 +39,8 @@ class RoboflowDetector:
         self._config = config
         self._options = options
         self._setting = setting
-        server = {"url": options.url, "model_id": options.model_id, "api": options.api}
+        self._read = read_output if options.api == "workflow" else read_answer
+        server = options.model_dump(include={"url", "model_id", "api", *WORKFLOW})
         self._helper = Helper({**server, "confidence": config.floor}, key)
         self._thread = ThreadPoolExecutor(1, f"detector-{setting.name}")
 
@@ -102,7 +103,7 @@ class RoboflowDetector:
         if "failure" in message:
             raise Unavailable(failed(message, self._options))
         try:
-            answer = read_answer(message["answer"], (crop.shape[1], crop.shape[0]))
+            answer = self._read(message["answer"], (crop.shape[1], crop.shape[0]))
         except ValueError as error:
             raise Unavailable(unbelievable(str(error), self._options)) from None
         found = [one for one in answer if one.confidence >= self._config.floor]

@@ -1,0 +1,36 @@
+"""The library of shipped subtrees outlasts the restart of a detection server."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from executive.testing.disturbances import after, between, detector_dead
+from executive.testing.run_mission import run_mission
+
+LONGEST_RESTART = 40.0
+"""Longest measured time in which a restarted detection server gives no answer [s]; the shortest is 15 s."""
+MAX_TOTAL_WAIT = 70.0
+"""Longest time that a look may wait for a server that never answers [s]."""
+
+
+def test_the_waits_of_a_look_grow_and_outlast_a_restart() -> None:
+    result = run_mission("sort_overhead", disturbances=[after(0.0, detector_dead())])
+    assert (result.status, result.reason) == ("FAILURE", "Detect.unavailable")
+    asked = [event.clock for event in result.events if event.kind == "disturbance"]
+    waits = np.diff(asked)
+    # Each answer shows 0.05 s after its frame.
+    assert waits - 0.05 == pytest.approx([1, 2, 4, 8, 8, 8, 8, 8, 8], abs=0.02)
+    assert LONGEST_RESTART < waits.sum() < MAX_TOTAL_WAIT
+
+
+@pytest.mark.parametrize("start", [0.0, 4.0])
+@pytest.mark.parametrize("duration", [15.0, LONGEST_RESTART])
+def test_a_sort_outlasts_the_restart_of_a_server(start: float, duration: float) -> None:
+    restart = between(start, start + duration, detector_dead())
+    result = run_mission("sort_overhead", seed=1, disturbances=[restart])
+    assert (result.status, result.message) == ("SUCCESS", "")
+    assert result.audit is not None
+    assert result.agrees
+    assert result.items["placed"] == result.audit["right"] == result.items["seen"] >= 3
+    assert result.robot_time > start + duration
