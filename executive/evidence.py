@@ -26,26 +26,28 @@ def describe_unknown(counts: Mapping[str, int]) -> str:
     return f"unknown: {listed}" if listed else ""
 
 
-def describe_wrong_height(
-    label: str, height: float, classes: Mapping[str, ObjectClass], offset: float = 0.0
-) -> str:
+def describe_wrong_height(label: str, height: float, classes: Mapping[str, ObjectClass]) -> str:
     """Return why an object touched at a height is not of a class, or "" if it may be.
 
-    The object stands on the table or on an object of any class.
+    The object stands on the table or on an object of any class. A touch that is too high is a contradiction.
+    A touch that is too low is one only at the height of another class: it may be off the top of an object.
 
     Args:
         label: Class that the object is believed to be of.
         height: Height of the touch above the table [m].
         classes: Classes of the cell by label.
-        offset: Distance between the touch and the middle of the object [m]; a round top is lower there.
     """
-    expected = classes[label].height
-    supports = (0.0, *(kind.height for kind in classes.values()))
-    error = min((height - expected - support for support in supports), key=abs)
-    if -MAX_HEIGHT_ERROR - offset <= error <= MAX_HEIGHT_ERROR:
+
+    def error_of(kind: ObjectClass) -> float:
+        supports = (0.0, *(other.height for other in classes.values()))
+        return min((height - kind.height - support for support in supports), key=abs)
+
+    error = error_of(classes[label])
+    others = [other for other, kind in classes.items() if abs(error_of(kind)) <= MAX_HEIGHT_ERROR]
+    if abs(error) <= MAX_HEIGHT_ERROR or (error < 0 and not others):
         return ""
     felt = f"it was touched {height * 1000:.0f} mm above the table"
-    return f"{felt}, and a {label} is {expected * 1000:.0f} mm high"
+    return f"{felt}, and a {label} is {classes[label].height * 1000:.0f} mm high"
 
 
 def describe_wrong_size(

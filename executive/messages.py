@@ -13,7 +13,6 @@ from executive.geometry import Array, Pose
 Box = tuple[float, float, float, float]
 """Left, top, right, bottom [pixel] in a frame's image; pixel i covers [i, i + 1)."""
 
-
 REACH = 0.03
 """How far an object extends around its centre [m], about."""
 SURROUNDINGS = REACH * np.array([(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)], dtype=float)

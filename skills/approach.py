@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
@@ -64,8 +63,7 @@ class Approach(Skill):
             cell.ledger.bumped()
             met = f"the tool met something at {height * 1000:.0f} mm"
             raise self.failed("blocked", f"{met}, on its way to {item}, which was {expected}")
-        offset = self.offset * math.sqrt(cell.ledger.attempts(item))
-        if doubt := describe_wrong_height(self.target.label, height, cell.classes, offset):
+        if doubt := describe_wrong_height(self.target.label, height, cell.classes):
             cell.ledger.contradicted(item, doubt)
             raise self.failed("contradicted", f"{item} may be no {self.target.label}: {doubt}")
         cell.ledger.touched(item)

@@ -40,7 +40,7 @@ class ItemTable:
         data = event.data
         row = Row(*(str(data.get(key) or "") for key in ("item", "label", "state", "bin", "why")))
         if row.state in ("rejected", "skipped"):
-            row = replace(row, place="({:.2f}, {:.2f}) m".format(*data["position"]))
+            row = replace(row, place="x {:.2f} m, y {:.2f} m".format(*data["position"]))
         if self._rows.get(row.item) == row:
             return None
         self._rows[row.item] = row
@@ -63,7 +63,7 @@ class ItemTable:
         for row in self.rows:
             if row.state != "phantom":
                 placed = row.state == "placed"
-                told = ", ".join(filter(None, (row.place, row.why)))
+                told = ": ".join(filter(None, (row.place, row.why)))
                 name = f"{row.item} ({told})" if told and not placed else row.item
                 fates[row.bin if placed else row.state].append(name)
         return dict(fates)

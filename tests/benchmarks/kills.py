@@ -27,6 +27,7 @@ from executive.record.find_run import LATEST, find_run
 from executive.record.journal import ending_of, read_journal
 from executive.record.recorded_mission import recorded_mission
 from executive.record.replay import compare
+from executive.record.result import disagreement
 from executive.record.resumed_run import resumed_run
 from executive.runtime.cells import cell_kind
 from executive.tape.past import Past
@@ -179,7 +180,7 @@ def is_on_table(position: Array, table: TableConfig) -> bool:
 def check_result(result: Mapping[str, Any], *, change_made: str) -> list[str]:
     """Return what is wrong with the end of a resumed run; only a removed or dropped object may be lost."""
     problems = []
-    if not result["audit"]["agrees"]:
+    if disagreement(result):
         problems.append(f"the ledger says {result['items']}; the audit {result['audit']}")
     may_lose = change_made.startswith(("removed", "dropped"))
     if result["status"] != "SUCCESS" and not (may_lose and result["reason"] == "lost"):

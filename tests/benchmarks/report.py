@@ -26,6 +26,7 @@ from executive.cli.output import print_json, stdout_kept_clean
 from executive.cli.subject import load_subject, oracle_option
 from executive.errors import ExecutiveError
 from executive.record.recorded_run import recorded_run
+from executive.record.result import disagreement
 
 Figures = dict[str, Any]
 """Figures of a benchmark by name; a name ends with the unit."""
@@ -86,7 +87,7 @@ def record_run(subject: Subject, seed: int, runs: Path) -> tuple[Figures, str]:
     )  # fmt: skip
     if result["status"] == "HALTED":
         raise KeyboardInterrupt
-    if result["status"] == "SUCCESS" and result["audit"]["agrees"]:
+    if result["status"] == "SUCCESS" and not disagreement(result):
         return result, ""
     return result, (
         f"seed {seed} ended with {result['status']} {result['reason']}; the ledger says {result['items']}, "

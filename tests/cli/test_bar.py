@@ -86,7 +86,7 @@ def test_dataset_shows_how_many_images_were_rendered(
 def test_train_shows_batches_and_a_line_per_epoch(
     at_terminal: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def train(dataset, out, *, start, epochs, seed, progress, batches):
+    def train(dataset, out, *, start, rate, epochs, seed, progress, batches):
         for done in range(1, 2 * epochs + 1):
             batches(done, 2 * epochs)
             if done % 2 == 0:

@@ -27,7 +27,7 @@ RESULT = {
     "node": "",
     "seed": 7,
     "items": {"seen": 1, "placed": 1, "rejected": 0, "lost": 0, "phantom": 0},
-    "audit": {"right": 1, "wrong_bin": 0, "left": 0, "elsewhere": 0, "unseen": 0},
+    "audit": {"agrees": True, "right": 1, "wrong_bin": 0, "left": 0, "elsewhere": 0, "unseen": 0},
     "planning": {"motions": 3, "ahead": 2, "waited_s": 0.05},
     "requests": [],
     "story": None,

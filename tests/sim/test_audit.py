@@ -13,6 +13,7 @@ from executive.geometry import Pose
 from executive.messages import Bin
 from executive.sim.arrangements import UNKNOWN
 from executive.sim.audit import audit
+from executive.workcell import PLACES
 
 IN_BIN, ON_TABLE, ON_FLOOR = (0.2, -0.44, 0.12), (0.5, 0.0, 0.025), (1.4, 0.0, -0.6)
 
@@ -49,8 +50,9 @@ def counted(bins_of_cube: tuple[str, ...], world: OneBody | None = None, **more:
 def test_a_body_in_a_bin_counts_by_its_class_and_by_who_put_it_there(
     bins: tuple[str, ...], more: dict[str, Any], end: str
 ) -> None:
-    none = {"right": 0, "wrong_bin": 0, "left": 0, "elsewhere": 0, "unseen": 1}
-    assert counted(bins, **more) == {**none, end: 1}
+    none = {"right": 0, "wrong_bin": 0, "left": 0, "elsewhere": 0, "fell_in_wrong_bin": 0, "unseen": 1}
+    fell = bins == ("blue_bin",) and "fallen" in more
+    assert counted(bins, **more) == {**none, end: 1, "fell_in_wrong_bin": int(fell)}
 
 
 @pytest.mark.parametrize(
@@ -68,5 +70,5 @@ def test_an_unknown_object_counts_if_an_item_stands_for_it_or_if_it_is_in_a_bin(
     place: Sequence[float], claimed: bool, end: dict[str, int]
 ) -> None:
     items = [SimpleNamespace(state=None, first=np.array(ON_TABLE))] if claimed else []
-    none = dict.fromkeys(("right", "wrong_bin", "left", "elsewhere", "unseen"), 0)
+    none = dict.fromkeys(PLACES, 0)
     assert counted(("red_bin",), OneBody(UNKNOWN, place), records=items) == {**none, **end}

@@ -68,7 +68,14 @@ def test_it_is_picked_at_the_first_attempt_and_lands_in_its_bin(
     done(Release(held=held, bin=bin), made)
     for _ in range(240):
         made.advance()
-    assert made.audit() == {"right": 1, "wrong_bin": 0, "left": 0, "elsewhere": 0, "unseen": 0}
+    assert made.audit() == {
+        "right": 1,
+        "wrong_bin": 0,
+        "left": 0,
+        "elsewhere": 0,
+        "fell_in_wrong_bin": 0,
+        "unseen": 0,
+    }
 
 
 def test_the_table_felt_through_a_hole_is_no_contact(with_one: Callable[..., SimCell]) -> None:

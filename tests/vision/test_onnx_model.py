@@ -42,7 +42,14 @@ IMAGE = np.zeros((100, 200, 3), np.uint8)
 
 def test_boxes_are_scaled_and_clipped_to_the_image_and_the_background_is_dropped(decoded):
     found, _ = decoded([[0.5, 0.5, 0.1, 0.2]], [[2.0, -9, -9, 9]], IMAGE)
-    assert found == [Detection("cube", pytest.approx(1 / (1 + np.exp(-2))), pytest.approx((90, 40, 110, 60)))]
+    assert found == [
+        Detection(
+            "cube",
+            pytest.approx(1 / (1 + np.exp(-2))),
+            pytest.approx((90, 40, 110, 60)),
+            pytest.approx(1.234e-4, rel=1e-3),
+        )
+    ]
     (found,), _ = decoded([[0.0, 1.0, 0.2, 0.2]], [[-9, 2.0, -9, -9]], IMAGE)
     assert found.box == pytest.approx((0, 90, 20, 100))
 

@@ -87,7 +87,7 @@ def test_any_exported_model_can_be_used_by_path_and_the_embedded_one_needs_no_op
     mine = configured(RfdetrDetector, model_path="model.onnx", labels="names.txt", threshold=0.6)
     for kind, config in ((RfdetrDetector, mine), (EmbeddedDetector, configured(EmbeddedDetector))):
         detector = kind.from_config(config, setting(tmp_path))
-        assert found_by(detector, frame_with_spot(300, 200), "table") == ()
+        assert found_by(detector, frame_with_spot(640, 480), "table") == ()
 
 
 def test_an_answer_shows_after_the_latency_with_its_detector_and_the_cells_names():

@@ -28,8 +28,8 @@ def test_the_weights_fit_into_a_package_and_a_card_goes_with_them(missions):
 @pytest.mark.parametrize(
     ("name", "scenes", "randomized", "precision", "recall"),
     [
-        ("overhead", range(1000, 1020), True, 0.95, 0.90),
-        pytest.param("wrist", range(1000, 1020), True, 0.95, 0.90, marks=pytest.mark.slow),
+        ("overhead", range(1000, 1020), True, 0.90, 0.80),
+        pytest.param("wrist", range(1000, 1020), True, 0.90, 0.80, marks=pytest.mark.slow),
         ("fasteners", range(2000, 2008), False, 0.95, 0.94),
     ],
 )

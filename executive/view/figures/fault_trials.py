@@ -67,7 +67,7 @@ class Trial:
             return "!!"
         if not self.happened:
             return "-"
-        if self.status == "SUCCESS":
+        if self.status in ("SUCCESS", "INCOMPLETE"):
             return f"ok -{self.missing}" if self.missing > 0 else "ok"
         if self.status == "FAILURE":
             return f"FAILURE {self.reason}"

@@ -74,7 +74,7 @@ def test_the_books_have_to_be_what_the_world_is() -> None:
     assert books(outcome("SUCCESS"), ITEMS, AUDIT) == books(outcome("SUCCESS"), ITEMS, None) == []
     lost = {**ITEMS, "rejected": 0, "lost": 1}
     (problem,) = books(outcome("SUCCESS"), lost, AUDIT)
-    assert problem.startswith("the ledger says seen 3, placed 2, rejected 0, lost 1")
+    assert problem.startswith("the ledger says seen 3, placed 2, rejected 0, skipped 0, lost 1")
     assert "the audit right 2, wrong_bin 0, left 1" in problem
     (problem,) = books(outcome("SUCCESS"), ITEMS, {**AUDIT, "right": 1, "wrong_bin": 1})
     assert problem.startswith("1 misplaced; ")

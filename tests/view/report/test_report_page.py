@@ -61,7 +61,7 @@ def test_the_verdict_comes_first_and_then_why_objects_timeline_and_tree(failed):
 def test_a_success_has_no_story_and_says_what_is_in_the_bins(done):
     found = page(done)
     assert list(found.texts) == ["header", *SECTIONS[1:]]
-    assert found.texts["header"].startswith("SUCCESS 1 of 2 objects are in their bins, 1 rejected.")
+    assert found.texts["header"].startswith("SUCCESS 1 of 2 objects are in their bins, 1 skipped.")
 
 
 def test_every_object_is_there_with_its_fate_its_time_its_picture_and_what_went_wrong(failed):

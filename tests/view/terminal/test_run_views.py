@@ -36,7 +36,7 @@ RUN = SimpleNamespace(root=TREE, control=RunControl())
 
 
 def item(state: str, **data) -> Event:
-    row = {"item": "cube-1", "label": "cube", "state": state, "bin": "", "why": ""}
+    row = {"item": "cube-1", "label": "cube", "state": state, "bin": "", "why": "", "position": [0.5, 0.1, 0]}
     return Event("item", 9, 1.5, row | data)
 
 
@@ -136,7 +136,7 @@ def test_the_summary_says_how_it_ended_how_long_it_took_and_how_to_repeat_it_in_
         "34.2 s on the robot's clock, 6.8 s by the wall clock",
         "runs/latest  (repeat: executive run 'my mission.yaml' --seed 7 --set 'attempts=a b' --request cube)",
         "  red_bin: cube-1, cube-2",
-        "  rejected: duck-1 (three misses)",
+        "  rejected: duck-1 (x 0.50 m, y 0.10 m: three misses)",
     ]
     assert summary(RESULT, items, repeat).splitlines() == lines
     result = {**RESULT, "status": "SUCCESS", "reason": "", "node": "", "message": ""}

@@ -1,0 +1,64 @@
+"""Evidence about the class of an object besides the detector's score."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from executive.evidence import describe_unknown, describe_wrong_height, describe_wrong_size
+from executive.geometry import looking_down
+from executive.messages import Box, Detection, Frame, ObjectClass
+
+CUBE, SPHERE = ObjectClass("cube", 0.05, 0.0354), ObjectClass("sphere", 0.06, 0.03)
+CLASSES = {
+    "cube": CUBE, "sphere": SPHERE, "duck": ObjectClass("duck", 0.056, 0.0295),
+}  # fmt: skip
+FRAME = Frame(
+    1, "overhead", np.zeros((480, 640, 3), np.uint8), None,
+    np.array([[461.0, 0, 319.5], [0, 461.0, 239.5], [0, 0, 1]]), looking_down((0.5, 0.0, 1.2)), 0.0,
+    np.ones((480, 640), bool), 0,
+)  # fmt: skip
+AREA: Box = (192.0, 100.0, 448.0, 356.0)
+
+
+@pytest.mark.parametrize(
+    ("label", "height", "contradiction"),
+    [
+        ("cube", 0.0504, ""),
+        ("cube", 0.1004, ""),  # on another cube
+        ("cube", 0.06, "it was touched 60 mm above the table, and a cube is 50 mm high"),
+        ("sphere", 0.05, "it was touched 50 mm above the table, and a sphere is 60 mm high"),
+        ("sphere", 0.056, "it was touched 56 mm above the table, and a sphere is 60 mm high"),
+        ("sphere", 0.04, ""),  # beside its top, or a small one: no other class is as low
+        ("duck", 0.08, "it was touched 80 mm above the table, and a duck is 56 mm high"),
+    ],
+)
+def test_the_height_of_a_touch_has_to_be_that_of_the_class(
+    label: str, height: float, contradiction: str
+) -> None:
+    assert describe_wrong_height(label, height, CLASSES) == contradiction
+
+
+@pytest.mark.parametrize(
+    ("side", "contradiction"),
+    [
+        (24.0, ""),
+        (40.0, "its box is 102 mm long, and that of a sphere is 31 to 76 mm long"),
+        (10.0, "its box is 25 mm long, and that of a sphere is 31 to 76 mm long"),
+    ],
+)
+def test_the_size_of_a_box_has_to_be_that_of_the_class(side: float, contradiction: str) -> None:
+    box = (319.5 - side / 2, 239.5 - side / 2, 319.5 + side / 2, 239.5 + side / 2)
+    place = np.array([0.5, 0.0, 0.03])
+    assert describe_wrong_size(Detection("sphere", 0.9, box), place, FRAME, AREA, SPHERE) == contradiction
+
+
+def test_a_box_at_the_border_of_the_searched_area_may_be_cut_off() -> None:
+    cut = Detection("sphere", 0.9, (192.5, 230.0, 200.0, 240.0))
+    assert describe_wrong_size(cut, np.array([0.5, 0.3, 0.03]), FRAME, AREA, SPHERE) == ""
+
+
+def test_unknown_labels_are_listed_with_their_counts() -> None:
+    expected = "unknown: rubber-duck ×2, mug ×1"  # noqa: RUF001
+    assert describe_unknown({"rubber-duck": 2, "mug": 1}) == expected
+    assert describe_unknown({}) == ""
