@@ -1,4 +1,4 @@
-"""The accounts of a run that is over: the final state of each item, and their balance."""
+"""Final state of each item after a run, and the balance of the counts."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ def fate_of(record: Record, *, gone: bool, routed: bool, completed: bool) -> tup
     """Return the final state of an item and its reason, or None if the item has its final state already.
 
     An item that is known to exist and was not found again is lost. An item that is likelier a false
-    detection than an object is a phantom. An item that looks were unsure of, and none has missed, may be an
-    object: it is rejected. Any other item on the table is skipped if the mission did not have to sort it:
-    it has no route, or the mission was completed without an attempt at it, because a quota was reached or
-    the operator quit. Else the item is rejected.
+    detection than an object is a phantom. An item that was seen with low confidence only, and never missed,
+    may be an object: it is rejected. Any other item on the table is skipped if the mission did not have to
+    sort it: it has no route, or the mission was completed without an attempt at it, because a quota was
+    reached or the operator quit. Else the item is rejected.
 
     Args:
         record: The item.
-        gone: True if its place was searched in vain, as far as one can be sure.
+        gone: True if its place was searched without a detection.
         routed: True if the mission has a bin for its class.
-        completed: True if the tree succeeded.
+        completed: True if the behaviour tree succeeded.
     """
     if record.state is State.HELD:
         return State.REJECTED, "still in the tool when the run ended"

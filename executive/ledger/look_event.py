@@ -1,4 +1,4 @@
-"""Content of the event `look`, as plain values."""
+"""Content of the event `look` as JSON-serializable values."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ def describe_look(
     """Return frame, camera, detector and view of a look, and each of its detections.
 
     Args:
-        detections: The look.
-        positions: Places of `detections.found` `(3,)` [m], one to one.
-        glimpses: Its detections that do not count as one.
+        detections: Detections in one frame.
+        positions: Positions of `detections.found` `(3,)` [m], in the same order.
+        glimpses: Detections that are too uncertain to count.
     """
     frame = detections.frame
     return {

@@ -31,7 +31,7 @@ MISTAKES = {
     "fell_in_wrong_bin": "fallen into a wrong bin",
     "unseen": "never seen",
 }
-"""Words for the counts of the audit that the message of a disagreement begins with."""
+"""Words for the mistakes that the audit counts."""
 
 EXIT_CODES = {"SUCCESS": 0, "FAILURE": 1, "FAULT": 3, "INCOMPLETE": 4, "HALTED": 130}
 """Exit code by the status of the run, unless the audit disagrees (`exit_code`)."""
@@ -71,7 +71,7 @@ def result_of(
         "items": {fate: int(items.get(fate, 0)) for fate in FATES},
         "unknown": dict(items.get("unknown", {})),
         "empty": outcome.empty,
-        "audit": None if audit is None else audited(items, audit, outcome.empty),
+        "audit": None if audit is None else audit_section(items, audit, outcome.empty),
         "planning": planning_of(noted),
         "requests": requests_of(noted),
         "ticks": outcome.ticks,
@@ -138,13 +138,13 @@ def planning_of(entries: Iterable[Mapping[str, Any]]) -> dict[str, float]:
     return {"motions": len(plans), "ahead": ahead, "waited_s": round(waited, 4)}
 
 
-def audited(items: Mapping[str, int], audit: Mapping[str, int], empty: bool) -> dict[str, int | bool]:
-    """Return the counts of the audit, and as `agrees` the answer of the function of this name."""
+def audit_section(items: Mapping[str, int], audit: Mapping[str, int], empty: bool) -> dict[str, int | bool]:
+    """Return the counts of the audit, and the result of `agrees` under the key `agrees`."""
     return {"agrees": agrees(items, audit, empty), **{place: int(audit[place]) for place in PLACES}}
 
 
 def agrees(items: Mapping[str, int], audit: Mapping[str, int], empty: bool) -> bool:
-    """Return True if the audit found each object where the ledger believes it.
+    """Return True if the audit found each object where the ledger says that it is.
 
     Args:
         items: Counts of the ledger.
@@ -167,14 +167,16 @@ def disagreement(result: Mapping[str, Any]) -> str:
     # Results of version 1 do not contain the answer.
     if audit is None or audit.get("agrees", True):
         return ""
-    worst = ", ".join(f"{audit[place]} {words}" for place, words in MISTAKES.items() if audit[place])
+    mistakes = ", ".join(f"{audit[place]} {words}" for place, words in MISTAKES.items() if audit[place])
     books = result["items"]
-    sides = (
+    comparison = (
         f"the audit found {audit['right']} in their bins, {audit['left']} on the table and "
         f"{audit['elsewhere']} elsewhere; the executive reports {books['placed']} placed, "
         f"{books['rejected']} rejected, {books['skipped']} skipped and {books['lost']} lost"
     )
-    return f"THE AUDIT DISAGREES: {worst}; {sides}" if worst else f"THE AUDIT DISAGREES: {sides}"
+    return (
+        f"THE AUDIT DISAGREES: {mistakes}; {comparison}" if mistakes else f"THE AUDIT DISAGREES: {comparison}"
+    )
 
 
 def exit_code(result: Mapping[str, Any]) -> int:

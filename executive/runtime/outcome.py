@@ -56,7 +56,7 @@ class Outcome:
 
 
 def judge_items(accounts: Accounts) -> Ending:
-    """Return the end of a run whose tree succeeded, which depends on the items that are in no bin."""
+    """Return the end of a run whose tree succeeded: its items decide whether it is a success."""
     rows = accounts.rows()
     lost = sum(row["state"] == "lost" for row in rows)
     if lost:
@@ -69,10 +69,10 @@ def judge_items(accounts: Accounts) -> Ending:
 
 
 def check_balance(accounts: Accounts) -> None:
-    """Return if the number of items seen is the sum of those placed, rejected, skipped and lost.
+    """Check that the number of items seen is the sum of those placed, rejected, skipped and lost.
 
     Raises:
-        Fault: It is not.
+        Fault: The counts do not add up.
     """
     counts = accounts.balance()
     if not is_balanced(counts):

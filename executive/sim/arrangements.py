@@ -23,7 +23,7 @@ from executive.sim.world import World, add_bin
 FEW, MANY = 7, 20
 """Largest number of objects in a scene with few of them, and in one with many."""
 SCALES = (0.75, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.2, 1.3)
-"""Factors on the size of an object that is not as large as its class."""
+"""Scale factors of objects that have another size than their class."""
 UNKNOWN = "unknown"
 """Label of an object of no class."""
 UNKNOWN_COUNT, DAMAGED_MODEL = 1000, 168
@@ -44,7 +44,7 @@ class Item:
 
     Attributes:
         label: Its class, or `UNKNOWN`.
-        model: Its model, of its own size.
+        model: Its model, already scaled.
         X_WO: Its pose.
         colour: Its colour.
     """
@@ -91,8 +91,8 @@ def random_part(camera: CameraConfig, rng: np.random.Generator) -> tuple[int, in
     return x, y, x + right - left, y + bottom - top
 
 
-def random_kinds(config: CellConfig, count: int, table: Colour, rng: np.random.Generator) -> list[Item]:
-    """Return `count` random objects, nowhere yet; in some scenes a few are unknown or have another size."""
+def random_items(config: CellConfig, count: int, table: Colour, rng: np.random.Generator) -> list[Item]:
+    """Return `count` random objects at the origin; some scenes have unknown objects or other sizes."""
     share_unknown = rng.uniform(0.05, 0.4) if rng.random() < 0.35 else 0.0
     share_resized = rng.uniform(0.2, 1.0) if rng.random() < 0.35 else 0.0
     items = []
@@ -132,10 +132,10 @@ def arrange(
         footprint: Corners `(N, 2)` [m] of the part of the table in the image.
         plain_view: True if the image shows the workspace: then most objects lie there.
         table: Mean colour of the table.
-        rng: Source of everything random.
+        rng: Random number generator.
     """
     count = int(rng.integers(0, (FEW if rng.random() < 0.45 else MANY) + 1))
-    items = random_kinds(config, count, table, rng)
+    items = random_items(config, count, table, rng)
     low = np.maximum(footprint.min(axis=0), (TABLE_X[0], TABLE_Y[0]))
     high = np.minimum(footprint.max(axis=0), (TABLE_X[1], TABLE_Y[1]))
     if (high - low < 0.05).any():
@@ -151,20 +151,20 @@ def arrange(
         return settle(config, _heap(items[:FEW], low, high, in_view, rng))
     items = _spread(config, items, low, high, in_view, rng)
     if style < 0.23:
-        return settle(config, [_tumbling(item, rng) for item in items])
+        return settle(config, [_lift_and_rotate(item, rng) for item in items])
     if style < 0.40:
         _stack(items, rng)
     return items
 
 
-def _tumbling(item: Item, rng: np.random.Generator) -> Item:
-    """Return an object 4 cm above its place, turned in any way."""
+def _lift_and_rotate(item: Item, rng: np.random.Generator) -> Item:
+    """Return an object 4 cm above its place, randomly rotated."""
     return replace(item, X_WO=Pose(_any_rotation(rng), item.X_WO.position + np.array([0, 0, 0.04])))
 
 
 def hanging(X_WT: Pose, config: CellConfig, rng: np.random.Generator) -> Item:
     """Return a random object that hangs upright at the tool's tip."""
-    (item,) = random_kinds(config, 1, (0.5, 0.5, 0.5), rng)
+    (item,) = random_items(config, 1, (0.5, 0.5, 0.5), rng)
     place = X_WT.position - [0, 0, load_mesh(item.model).top]
     return replace(item, X_WO=Pose(about_z(rng.uniform(0, math.tau)), place))
 

@@ -17,7 +17,7 @@ WOOD, PLAIN = "wood", "plain"
 PATTERNS = 24
 """Number of generated textures, which are called `pattern 0` to `pattern 23`."""
 TEXTURES = (WOOD, PLAIN, *(f"pattern {number}" for number in range(PATTERNS)))
-"""Names of all textures: that of the model, none, and the generated ones."""
+"""Names of all textures: that of the URDF, no texture, and the generated ones."""
 TEXTURE_SIZE = 256
 """Side of a generated texture [pixel]."""
 
@@ -58,12 +58,12 @@ def generate_pattern(number: int) -> NDArray[np.uint8]:
     """Return a bright random texture `(N, N, 3)`: clouds, stripes, tiles or speckles."""
     rng = np.random.default_rng(number)
     contrast = rng.uniform(15, 90)
-    cells = int(rng.choice([4, 8, 16, 32]))
+    grid = int(rng.choice([4, 8, 16, 32]))
     kind = number % 4
-    shape = ((cells, cells, 3), (1, cells * 2, 3), (cells, cells, 1), (TEXTURE_SIZE, TEXTURE_SIZE, 1))[kind]
-    smooth = cv2.INTER_CUBIC if kind in (0, 3) else cv2.INTER_NEAREST
+    shape = ((grid, grid, 3), (1, grid * 2, 3), (grid, grid, 1), (TEXTURE_SIZE, TEXTURE_SIZE, 1))[kind]
+    interpolation = cv2.INTER_CUBIC if kind in (0, 3) else cv2.INTER_NEAREST
     values = 255 - rng.uniform(0, contrast, shape) * np.ones(3)
     size = (TEXTURE_SIZE, TEXTURE_SIZE)
     return np.asarray(
-        cv2.resize(values.astype(np.float32), size, interpolation=smooth).clip(0, 255), np.uint8
+        cv2.resize(values.astype(np.float32), size, interpolation=interpolation).clip(0, 255), np.uint8
     )

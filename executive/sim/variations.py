@@ -1,6 +1,6 @@
 """Random light, table, camera and noise of a labelled scene.
 
-The variation is larger than any scene of a mission, so that a mission lies inside of it.
+The ranges are larger than those of the scenes of missions (domain randomization).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from executive.sim.camera import CELL_LIGHT, Light
 from executive.sim.table_top import PLAIN, TEXTURES, WOOD
 from executive.vision.camera_model import on_plane
 
-MAX_FIELD_CHANGE = 0.27
+MAX_FOV_CHANGE = 0.27
 """Largest relative change of the field of view."""
 MAX_HEIGHT_CHANGE = 0.27
 """Largest relative change of the height of a fixed camera over the table."""
@@ -31,17 +31,17 @@ WOOD_COLOUR = (0.87, 0.78, 0.65)
 
 
 def random_light(rng: np.random.Generator) -> Light:
-    """Return the cell's lamp, or another one: from 12 % of its brightness to glare, some with shadows."""
+    """Return the cell's lamp in 20 % of the scenes, else another one: from 12 % brightness to glare."""
     shadow = bool(rng.random() < 0.35)
     if rng.random() < 0.2:
         return Light(shadow=shadow) if shadow else CELL_LIGHT
     azimuth, elevation = rng.uniform(0, math.tau), rng.uniform(math.radians(18), math.pi / 2)
-    across = math.cos(elevation)
+    horizontal = math.cos(elevation)
     red, green, blue = rng.uniform(0.72, 1.0, 3)
     kind = rng.random()
     level = 1.0 if kind < 0.5 else math.exp(rng.uniform(math.log(0.12), 0.0)) if kind < 0.8 else 1.5
     return Light(
-        direction=(across * math.cos(azimuth), across * math.sin(azimuth), math.sin(elevation)),
+        direction=(horizontal * math.cos(azimuth), horizontal * math.sin(azimuth), math.sin(elevation)),
         colour=(red, green, blue),
         ambient=level * rng.uniform(0.40, 0.70),
         diffuse=level * rng.uniform(0.20, 0.60),
@@ -51,7 +51,7 @@ def random_light(rng: np.random.Generator) -> Light:
 
 
 def random_table(rng: np.random.Generator) -> tuple[Colour, str]:
-    """Return colour and texture of the table: as it is in a third of the scenes, often slightly tinted."""
+    """Return colour and texture of the table: unchanged in 30 % of the scenes, slightly tinted in 20 %."""
     kind = rng.random()
     if kind < 0.3:
         return (1.0, 1.0, 1.0), WOOD
@@ -68,7 +68,7 @@ def random_object_colour(palette: Sequence[Colour], table: Colour, rng: np.rando
     Args:
         palette: Colours of its class.
         table: Mean colour of the table.
-        rng: Source of everything random.
+        rng: Random number generator.
     """
     kind = rng.random()
     if kind < 0.35:
@@ -85,47 +85,47 @@ def random_object_colour(palette: Sequence[Colour], table: Colour, rng: np.rando
 
 
 def random_hue(
-    rng: np.random.Generator, least_saturation: float, saturation: float, least_value: float, value: float
+    rng: np.random.Generator, min_saturation: float, saturation: float, min_value: float, value: float
 ) -> Colour:
     """Return a colour of any hue, with saturation and value in the ranges given, all 0 to 1."""
     return colorsys.hsv_to_rgb(
-        rng.random(), rng.uniform(least_saturation, saturation), rng.uniform(least_value, value)
+        rng.random(), rng.uniform(min_saturation, saturation), rng.uniform(min_value, value)
     )
 
 
 def random_camera(
     camera: CameraConfig, matrix: Array, X_WC: Pose, rng: np.random.Generator
 ) -> tuple[Array, Pose]:
-    """Return camera matrix and pose: as declared in four of ten scenes, else another lens and place.
+    """Return camera matrix and pose: as declared in 40 % of the scenes, else random.
 
     A camera on the wrist keeps its place on the arm, whose poses vary.
 
     Args:
         camera: Section of the cell file.
         matrix: Declared camera matrix `(3, 3)` [pixel].
-        X_WC: Its pose as declared.
-        rng: Source of everything random.
+        X_WC: Declared pose of the camera.
+        rng: Random number generator.
     """
     if rng.random() < 0.4:
         return matrix, X_WC
     centre = np.array([camera.width - 1, camera.height - 1]) / 2
     half_field = math.atan(camera.height / 2 / matrix[1, 1])
-    factor = math.tan(half_field) / math.tan(half_field * (1 + rng.uniform(-1, 1) * MAX_FIELD_CHANGE))
+    factor = math.tan(half_field) / math.tan(half_field * (1 + rng.uniform(-1, 1) * MAX_FOV_CHANGE))
     matrix = np.diag([factor, factor, 1.0]) @ matrix
     matrix[:2, 2] = centre
     if camera.mount == "wrist":
         return matrix, X_WC
     target = on_plane(matrix, X_WC, (centre[0], centre[1]), 0.0)
     axis, tilt = rng.uniform(0, math.tau), MAX_TILT * float(rng.choice([0.0, 0.1, 0.3, 1.0])) * rng.random()
-    turned, _ = cv2.Rodrigues(tilt * np.array([math.cos(axis), math.sin(axis), 0.0]))
-    turned = np.asarray(turned) @ about_z(rng.normal(0, math.radians(3)))
+    rotation, _ = cv2.Rodrigues(tilt * np.array([math.cos(axis), math.sin(axis), 0.0]))
+    rotation = np.asarray(rotation) @ about_z(rng.normal(0, math.radians(3)))
     offset = (X_WC.position - target) * (1 + rng.uniform(-1, 1) * MAX_HEIGHT_CHANGE)
     shift = np.array([*rng.uniform(-MAX_SHIFT, MAX_SHIFT, 2), 0.0])
-    return matrix, Pose(turned @ X_WC.rotation, target + turned @ offset + shift)
+    return matrix, Pose(rotation @ X_WC.rotation, target + rotation @ offset + shift)
 
 
 def random_noise(noise: NoiseConfig, rng: np.random.Generator) -> NoiseConfig:
-    """Return the noise of a camera: as declared in six of ten scenes, else up to ten times as much."""
+    """Return the noise of a camera: as declared in 60 % of the scenes, else mostly more."""
     if rng.random() < 0.6:
         return noise
     return NoiseConfig(

@@ -13,7 +13,7 @@ import pytest
 from executive.cell_config import CellConfig, DepthConfig, ObjectConfig
 from executive.errors import InputError
 from executive.geometry import Pose
-from executive.sim.arrangements import UNKNOWN, Item, arrange, hanging, random_kinds, resized, settle
+from executive.sim.arrangements import UNKNOWN, Item, arrange, hanging, random_items, resized, settle
 from executive.sim.datasets import as_labelled_frame, generate, run_frames
 from executive.sim.models import load_mesh
 from executive.sim.scenes import SIZE, Sample, SceneRenderer
@@ -76,7 +76,7 @@ def test_an_arrangement_follows_from_its_generator(overhead: CellConfig) -> None
 
 
 def test_some_scenes_have_objects_of_unknown_kinds_or_other_sizes(overhead: CellConfig) -> None:
-    scenes = [random_kinds(overhead, 20, (0.9, 0.8, 0.7), np.random.default_rng(seed)) for seed in range(20)]
+    scenes = [random_items(overhead, 20, (0.9, 0.8, 0.7), np.random.default_rng(seed)) for seed in range(20)]
     unknown = [sum(item.label == UNKNOWN for item in scene) for scene in scenes]
     resized_ones = [
         sum(item.label != UNKNOWN and item.model != overhead.objects[item.label] for item in scene)

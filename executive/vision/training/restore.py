@@ -27,9 +27,9 @@ GROUPS: int = ARCHITECTURE["group_detr"]
 def restore(model: Path) -> Any:
     """Return an `rfdetr.RFDETRNano` with the weights of an exported model.
 
-    The export neither names nor keeps all weights as training does. The names are found by exporting a model
-    whose weights are all different. Each further group of queries becomes a copy of the first. Layers behind
-    the last one that is read do not influence the result.
+    The export renames some weights and drops others. The names are found by exporting a model whose weights
+    are all different. Each further group of queries becomes a copy of the first. Layers after the last one
+    that the detector reads stay random; they do not influence its output.
 
     Args:
         model: ONNX file that `executive train` wrote.
