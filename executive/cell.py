@@ -169,7 +169,10 @@ class Ledger(Protocol):
         """Largest number of boxes in one look for each label that the cell does not know."""
 
     def touched(self, item: Item) -> None:
-        """Record that the tool met the item, which proves that it exists."""
+        """Record that the tool touched the item at the height of its class."""
+
+    def was_touched(self, item: Item) -> bool:
+        """Return True if the tool has touched the item before, at the height of its class."""
 
     def contradicted(self, item: Item, why: str) -> None:
         """Record evidence against the class of the item, which a rejection will report."""

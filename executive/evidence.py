@@ -13,6 +13,8 @@ from executive.messages import Box, Detection, Frame, ObjectClass
 MAX_HEIGHT_ERROR = 0.003
 """Largest difference between the height of a touch and that of the class [m]; the largest measured one is
 0.4 mm (52 touches of `sort_overhead`)."""
+SAME_HEIGHT = 0.0025
+"""Largest difference at which a low touch is at the height of another class [m]."""
 SIZE_TOLERANCE = 0.15
 """Largest relative difference between a box and the sizes that its class allows."""
 SIZE_MARGIN = 2.0
@@ -45,7 +47,7 @@ def describe_wrong_height(label: str, height: float, classes: Mapping[str, Objec
         return min((height - kind.height - support for support in supports), key=abs)
 
     error = error_of(classes[label])
-    others = [other for other, kind in classes.items() if abs(error_of(kind)) <= MAX_HEIGHT_ERROR]
+    others = [other for other, kind in classes.items() if abs(error_of(kind)) <= SAME_HEIGHT]
     if abs(error) <= MAX_HEIGHT_ERROR or (error < 0 and not others):
         return ""
     measured = f"it was touched {height * 1000:.0f} mm above the table"

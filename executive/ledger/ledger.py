@@ -131,8 +131,13 @@ class ItemLedger:
         return not waiting and self._coverage.worst <= self._config.overlooked
 
     def touched(self, item: Item) -> None:
-        """Record that the tool met the item, which proves that it exists."""
-        self._record(item).exists = True
+        """Record that the tool touched the item at the height of its class, which proves that it exists."""
+        record = self._record(item)
+        record.exists = record.touched = True
+
+    def was_touched(self, item: Item) -> bool:
+        """Return True if the tool has touched the item before, at the height of its class."""
+        return self._record(item).touched
 
     def contradicted(self, item: Item, why: str) -> None:
         """Record evidence against the class of an item that the tool touched; its place is in doubt now."""

@@ -80,11 +80,12 @@ def test_figures_are_a_table_or_json_and_problems_an_exit_code(
 
 
 class Coasting(FakeCell):
-    """A cell whose arm does not stop before its motion is over."""
+    """A cell whose arm stops on contact only, else not before its motion is over."""
 
     def __init__(self, *given: Any, **options: Any) -> None:
         super().__init__(*given, **options)
-        self.arm.stop = lambda: None  # type: ignore[method-assign]
+        brake = self.arm.stop
+        self.arm.stop = lambda: brake() if self.tool.touching else None  # type: ignore[method-assign]
 
 
 class TestHalts:

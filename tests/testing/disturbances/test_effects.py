@@ -68,8 +68,14 @@ MISSIONS: list[tuple[Disturbance, str, list[str], str, int]] = [
 ]
 """A disturbance, a pattern of nodes, their failures, the status of sort_overhead, and what it rejects."""
 MORE: list[tuple[Disturbance, str, list[str], str, int]] = [
-    (during("*/Transit", effects.arm_runs_into(), nth=(1, 2, 3)), "*/Transit", ["blocked"] * 3, "SUCCESS", 1),
-    (during("*/Approach", effects.no_way(), nth=2), "*/Approach", ["unreachable"], "SUCCESS", 1),
+    (
+        during("*/Transit", effects.arm_runs_into(), nth=(1, 2, 3)),
+        "*/Transit",
+        ["blocked"] * 3,
+        "INCOMPLETE",
+        1,
+    ),
+    (during("*/Approach", effects.no_way(), nth=2), "*/Approach", ["unreachable"], "INCOMPLETE", 1),
     (during("tree/look/*/Detect", effects.detector_unsure(), nth=1), "*/Detect", ["unsure"], "SUCCESS", 0),
     (during("tree/look/*/Detect", effects.workspace_hidden(), nth=1), "*/Detect", ["hidden"], "SUCCESS", 0),
     (during("*/watch/*/Localize", effects.no_depth(), nth=1), "*/Localize", ["no_depth"], "SUCCESS", 0),

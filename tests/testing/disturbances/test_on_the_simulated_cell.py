@@ -57,7 +57,7 @@ def holding(cell: SimCell, event: Event) -> bool:
 
 @pytest.mark.slow
 def test_when_a_seal_breaks_in_mid_carry_the_object_falls_and_is_picked_up_again(watched: Watched) -> None:
-    result = watched.run(during("*/Transit", effects.seal_breaks(), nth=2), places)
+    result = watched.run(during("*/Transit", effects.seal_breaks(), nth=3), places)
     (told,) = result.disturbances()
     hung = watched.seen["disturbance"]
     fallen = watched.seen["SelectTarget.unseen"]
