@@ -93,7 +93,7 @@ class Record:
         looks: In how many looks it was seen.
         moved: True once it has been seen again after something may have moved it.
         exists: True once it is known to exist: enough looks agree, or the tool has touched it.
-        touched: True once the tool has touched it at the height of its class.
+        touched: Class at whose height the tool has touched it last, or "".
         attempts: Failed grasps so far.
         bin: Where it was placed, or "".
         why: Why it was rejected, is lost, a phantom or believed to be in its bin, or "".
@@ -124,7 +124,7 @@ class Record:
     expected: float = 0.0
     moved: bool = False
     exists: bool = False
-    touched: bool = False
+    touched: str = ""
     attempts: int = 0
     bin: str = ""
     why: str = ""

@@ -133,11 +133,12 @@ class ItemLedger:
     def touched(self, item: Item) -> None:
         """Record that the tool touched the item at the height of its class, which proves that it exists."""
         record = self._record(item)
-        record.exists = record.touched = True
+        record.exists, record.touched = True, record.label
 
     def was_touched(self, item: Item) -> bool:
         """Return True if the tool has touched the item before, at the height of its class."""
-        return self._record(item).touched
+        record = self._record(item)
+        return record.touched == record.label
 
     def contradicted(self, item: Item, why: str) -> None:
         """Record evidence against the class of an item that the tool touched; its place is in doubt now."""
