@@ -66,12 +66,13 @@ def describe_wrong_size(
         detection: The box and its class.
         position: Centre of the object `(3,)` [m].
         frame: The image.
-        area: Searched part of the image [pixel]; a box at its border may be cut off and is not compared.
+        area: Searched part of the image [pixel]. A box is not compared if it may be cut off at the border of
+            this part, or if the arm hides part of it.
         kind: The class.
     """
     left, top, right, bottom = detection.box
     border_distance = min(left - area[0], top - area[1], area[2] - right, area[3] - bottom)
-    if border_distance < BORDER_DISTANCE:
+    if border_distance < BORDER_DISTANCE or frame.shown(detection.box) < 1.0:
         return ""
     sides = _project_cylinder(position, frame, kind)
     depth = float(frame.X_WC.inverse().apply(position)[2])

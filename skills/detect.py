@@ -13,8 +13,6 @@ from executive.skill import Out, Skill, param, port
 
 IN_VIEW = 0.7
 """Share of a box that the arm must leave in view for the box to be believed."""
-
-
 MAX_RIVAL = 0.5
 """Largest ratio between the confidences of the second and the first class of a box."""
 
@@ -22,8 +20,8 @@ MAX_RIVAL = 0.5
 class Detect(Skill):
     """Know which objects a fresh image shows, beside the running tick loop.
 
-    Succeeds with everything at or above the detector's threshold, and what is below it as in doubt; an empty
-    list is a result, not a failure.
+    Succeeds with each detection at or above the detector's threshold; a detection below it, or with a second
+    class that is nearly as likely, is in doubt. An empty list is a result, not a failure.
     What the arm hides is not believed: neither that nothing is there, nor what is seen of it.
     """
 
@@ -83,10 +81,12 @@ class Detect(Skill):
         doubtful = tuple(detection for detection in known if not _is_clear(detection, threshold))
         if not found and doubtful and self.doubtful == "fail":
             best = doubtful[0]
+            weak = best.confidence < threshold
+            limit = f"< {threshold:.2f}" if weak else f"with another class at {best.rival:.2f}"
             raise self.failed(
                 "unsure",
                 f"detector {answer.detector} saw nothing it is sure of: at best a {best.label} "
-                f"at {best.confidence:.2f} < {threshold:.2f}",
+                f"at {best.confidence:.2f} {limit}",
             )
         self.detections = Detections(
             frame,

@@ -9,7 +9,8 @@ from typing import ClassVar
 from executive.cell import Cell
 from executive.errors import NoDepth
 from executive.evidence import describe_wrong_size
-from executive.messages import Detections, Glimpse, Target
+from executive.geometry import Array
+from executive.messages import BIN_THICKNESS, Detection, Detections, Glimpse, Target
 from executive.skill import In, Out, Skill, port
 
 
@@ -40,14 +41,21 @@ class Localize(Skill):
             raise self.failed("no_depth", str(error)) from error
         found, positions = [], []
         for detection, place in zip(self.detections.found, places, strict=True):
-            kind = cell.classes[detection.label]
-            if doubt := describe_wrong_size(detection, place, frame, self.detections.area, kind):
+            doubt = self._contradiction(cell, detection, place)
+            if doubt:
                 glimpses.append(Glimpse(detection, place, doubt))
             else:
                 found.append(detection)
                 positions.append(place)
         look = replace(self.detections, found=tuple(found))
         self.targets = list(cell.ledger.observe(look, positions, glimpses))
+
+    def _contradiction(self, cell: Cell, detection: Detection, place: Array) -> str:
+        """Return how the size of a box contradicts its class, or ""; in a bin, objects lean and lie deep."""
+        if any(bin.contains(place, BIN_THICKNESS) for bin in cell.bins.values()):
+            return ""
+        look = self.detections
+        return describe_wrong_size(detection, place, look.frame, look.area, cell.classes[detection.label])
 
     def _glimpses(self, cell: Cell) -> Iterator[Glimpse]:
         """Yield where what is in doubt seems to be.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -56,6 +58,17 @@ def test_the_size_of_a_box_has_to_be_that_of_the_class(side: float, contradictio
 def test_a_box_at_the_border_of_the_searched_area_may_be_cut_off() -> None:
     cut = Detection("sphere", 0.9, (192.5, 230.0, 200.0, 240.0))
     assert describe_wrong_size(cut, np.array([0.5, 0.3, 0.03]), FRAME, AREA, SPHERE) == ""
+
+
+def test_a_box_that_the_arm_hides_in_part_is_not_compared() -> None:
+    behind = np.ones((480, 640), bool)
+    behind[230:235] = False
+    box = (299.5, 219.5, 339.5, 259.5)
+    seen = replace(FRAME, visible=behind)
+    assert (
+        describe_wrong_size(Detection("sphere", 0.9, box), np.array([0.5, 0.0, 0.03]), seen, AREA, SPHERE)
+        == ""
+    )
 
 
 def test_unknown_labels_are_listed_with_their_counts() -> None:

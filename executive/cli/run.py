@@ -67,10 +67,10 @@ def command(
         raise click.UsageError("--gui needs a display, and DISPLAY names none; leave it out")
     with stdout_kept_clean():
         from executive.discovery import discover
-        from executive.record.result import exit_code
+        from executive.record.result import disagreement, exit_code
         from executive.record.run_directory import RunDirectory
         from executive.view.report.page import leave_report
-        from executive.view.terminal.summary import repeat_command, story_lines, summary
+        from executive.view.terminal.summary import repeat_command, story_lines, summary, verdict
 
         skills = discover()
         shown = None if quiet else _view()
@@ -107,6 +107,8 @@ def command(
             click.echo(summary(result, shown.items, repeat, report), err=True, nl=False)
         elif result["story"] is not None:
             click.echo("\n".join(story_lines(result["story"], result["run"], repeat, report)), err=True)
+        elif result["status"] == "INCOMPLETE" or disagreement(result):
+            click.echo("\n".join(filter(None, (disagreement(result), verdict(result)))), err=True)
     if as_json:
         print_json(result)
     ctx.exit(exit_code(result))

@@ -82,7 +82,8 @@ def command(
     if as_json:
         asked = {"mission": mission, "seeds": [seeds[0], seeds[-1]], "scene": scene and str(scene)}
         print_json({**asked, **figures, "results": results})
-    ctx.exit(130 if figures["cut_off"] else int(figures["succeeded"] < figures["runs"]))
+    wrong = figures["succeeded"] < figures["runs"] or bool(figures["disagreements"])
+    ctx.exit(130 if figures["cut_off"] else int(wrong))
 
 
 def _text(figures: dict[str, Any]) -> str:

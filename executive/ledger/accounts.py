@@ -11,18 +11,21 @@ FATES = (State.PLACED, State.REJECTED, State.SKIPPED, State.LOST)
 """Final states of an object; each item that was no phantom has one of them."""
 
 
-def fate_of(record: Record, *, gone: bool, routed: bool, completed: bool) -> tuple[State, str] | None:
+def fate_of(
+    record: Record, *, gone: bool, sure: bool, routed: bool, completed: bool
+) -> tuple[State, str] | None:
     """Return the final state of an item and its reason, or None if the item has its final state already.
 
     An item that is known to exist and was not found again is lost. An item that is likelier a false
     detection than an object is a phantom. An item that was seen with low confidence only, and never missed,
     may be an object: it is rejected. Any other item on the table is skipped if the mission did not have to
-    sort it: it has no route, or the mission was completed without an attempt at it, because a quota was
-    reached or the operator quit. Else the item is rejected.
+    sort it: it has no route, or the mission was completed without an attempt at an item that it was sure of,
+    because a quota was reached or the operator quit. Else the item is rejected.
 
     Args:
         record: The item.
         gone: True if its place was searched without a detection.
+        sure: True if enough looks agree on its existence, class and position.
         routed: True if the mission has a bin for its class.
         completed: True if the behaviour tree succeeded.
     """
@@ -40,7 +43,7 @@ def fate_of(record: Record, *, gone: bool, routed: bool, completed: bool) -> tup
         return None
     if not routed:
         return State.SKIPPED, "the mission has no route for it"
-    if completed and not record.attempts:
+    if completed and sure and not (record.attempts or record.contradiction):
         return State.SKIPPED, "the mission was completed without it"
     return State.REJECTED, "the run ended before its turn"
 

@@ -238,7 +238,8 @@ class ItemLedger:
                 record.why = "it fell there"
                 self.placed(record.item, bin)
             routed = record.label in self._routes
-            fate = fate_of(record, gone=self._is_gone(record), routed=routed, completed=completed)
+            sure = record.is_sure(self._config)
+            fate = fate_of(record, gone=self._is_gone(record), sure=sure, routed=routed, completed=completed)
             if fate is not None:
                 state, record.why = fate
                 self._change(record.item, state)

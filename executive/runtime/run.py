@@ -87,7 +87,7 @@ class Run:
         self._keyboard = keyboard
         self._realtime = realtime
         self._past = past
-        self._holds = ""
+        self._holds, self._empty = "", False
         self.control = RunControl()
         self._plant = Plant(observers)
         self._emit = self._plant.emit
@@ -141,14 +141,13 @@ class Run:
             # Only now: a record that cannot be written must not keep the arm from braking.
             problems += self._tried(lambda: self._emit("fault", traceback=ending.traceback))
         problems += self._tried(self._ask_tool)
-        ledger = self._plant.cell.ledger
-        empty = ledger.believes_empty() and not ledger.unknown
+        problems += self._tried(self._note_whether_empty)
         problems += self._tried(lambda: self._close_books(completed=ending.status == "SUCCESS"))
         if problems and ending.status == "FAULT":
             ending = replace(ending, message="; ".join([ending.message, *problems]))
         elif problems:
             ending = Ending("FAULT", "fault", "; ".join(problems))
-        outcome = self._outcome(ending, empty)
+        outcome = self._outcome(ending)
         if broken := self._tried(lambda: self._emit("end", **asdict(outcome))):
             outcome = replace(outcome, status="FAULT", reason="fault", message=broken[0], node="")
         return outcome
@@ -277,12 +276,23 @@ class Run:
         self.workcell.accounts.close(completed=completed)
         check_balance(self.workcell.accounts)
 
-    def _outcome(self, ending: Ending, empty: bool) -> Outcome:
+    def _note_whether_empty(self) -> None:
+        ledger = self._plant.cell.ledger
+        self._empty = ledger.believes_empty() and not ledger.unknown
+
+    def _outcome(self, ending: Ending) -> Outcome:
         if ending.status == "SUCCESS":
             ending = judge_items(self.workcell.accounts)
         now = round(self._plant.tape.now, 6)
         return Outcome(
-            ending.status, ending.reason, ending.message, ending.node, empty, self._holds, self.tick, now
+            ending.status,
+            ending.reason,
+            ending.message,
+            ending.node,
+            self._empty,
+            self._holds,
+            self.tick,
+            now,
         )
 
     def _ask_tool(self) -> None:

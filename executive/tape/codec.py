@@ -86,14 +86,18 @@ def write_answer(answer: Answer) -> dict[str, Any]:
     sure = answer.reliability
     return {
         "detector": answer.detector,
-        "found": [[one.label, float(one.confidence), [float(x) for x in one.box]] for one in answer.found],
+        "found": [
+            [one.label, float(one.confidence), [float(x) for x in one.box], float(one.rival)]
+            for one in answer.found
+        ],
         "reliability": [sure.threshold, sure.misses, sure.confused, sure.invented, sure.jitter],
     }
 
 
 def read_answer(value: Any) -> Answer:
     """Return what `write_answer` was given."""
-    found = tuple(Detection(label, confidence, tuple(box)) for label, confidence, box in value["found"])
+    # Journals of version 0.1.0 do not contain the confidence of the second class.
+    found = tuple(Detection(label, sure, tuple(box), *rival) for label, sure, box, *rival in value["found"])
     return Answer(value["detector"], found, Reliability(*value["reliability"]))
 
 

@@ -117,6 +117,19 @@ def test_quiet_tells_the_story_of_a_run_that_does_not_succeed(missions, tmp_path
     assert lines[-1].startswith(f"repeat      executive run {mission} ")
 
 
+def test_quiet_shows_a_run_with_rejected_objects_and_one_that_the_audit_contradicts(project):
+    message = "1 object(s) were not sorted: cube-1 (could not be picked)"
+    project.result |= {"status": "INCOMPLETE", "reason": "rejected", "message": message}
+    shown = invoke("run", "sort", "--quiet")
+    assert (shown.exit_code, shown.stderr.splitlines()[-1]) == (4, f"INCOMPLETE rejected: {message}")
+    wrong = {**RESULT["audit"], "agrees": False, "right": 0, "wrong_bin": 1, "fell_in_wrong_bin": 0}
+    items = {**RESULT["items"], "skipped": 0}
+    project.result |= {"status": "SUCCESS", "reason": "", "message": "", "audit": wrong, "items": items}
+    shown = invoke("run", "sort", "--quiet")
+    assert shown.exit_code == 1
+    assert shown.stderr.splitlines()[-2].startswith("THE AUDIT DISAGREES: 1 in a wrong bin; ")
+
+
 def test_what_libraries_print_does_not_reach_standard_output():
     code = """
 import ctypes, os

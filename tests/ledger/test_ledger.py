@@ -100,6 +100,13 @@ def test_an_item_is_skipped_only_if_the_mission_was_completed_without_an_attempt
     assert bench.end(completed=completed) == {"cube-1": final}
 
 
+def test_an_item_that_was_still_in_doubt_or_contradicted_is_not_skipped(bench: Bench) -> None:
+    bench.look(CUBE, FAR)
+    bench.look(("duck", 0.5, 0.0), FAR)  # a contradiction about the class of the first
+    bench.ledger.contradicted("cube-2", "it was touched 60 mm above the table, and a cube is 50 mm high")
+    assert {state for state, _ in bench.end().values()} == {"rejected"}
+
+
 def test_labels_that_the_cell_does_not_know_are_counted_by_the_look_with_most_of_them(bench: Bench) -> None:
     bench.look(CUBE, unknown=("rubber-duck", "mug", "rubber-duck"))
     bench.look(CUBE, unknown=("rubber-duck",))
@@ -178,11 +185,11 @@ def test_every_change_is_reported_and_the_accounts_balance(bench: Bench) -> None
     bench.look(view="full")
     assert bench.end() == {
         "cube-1": ("placed", "red_bin"),
-        "cube-2": LEFT,
+        "cube-2": ("rejected", "the run ended before its turn"),
         "duck-1": ("rejected", "slippery"),
     }
     assert bench.ledger.balance() == {
-        "seen": 3, "placed": 1, "rejected": 1, "skipped": 1, "lost": 0, "phantom": 0,
+        "seen": 3, "placed": 1, "rejected": 2, "skipped": 0, "lost": 0, "phantom": 0,
     }  # fmt: skip
     items = [data for kind, data in bench.events if kind == "item" and data["item"] == "cube-1"]
     assert [data["state"] for data in items] == ["seen", "seen", "held", "placed"]

@@ -11,6 +11,7 @@ from executive.testing.run_skill import run_skill
 from skills.detect import Detect
 
 WEAK = Detection("duck", 0.4, (0, 0, 9, 9))
+TORN = Detection("cube", 0.62, (0, 0, 9, 9), rival=0.58)
 
 
 def test_an_answer_becomes_visible_after_the_detectors_latency(fake: FakeCell) -> None:
@@ -44,6 +45,7 @@ def test_only_what_is_sure_is_found(
     ("answer", "reason", "message"),
     [
         ([WEAK], "unsure", "detector embedded saw nothing it is sure of: at best a duck at 0.40 < 0.50"),
+        ([TORN], "unsure", "detector embedded saw nothing it is sure of: at best a cube at 0.62 with another class at 0.58"),
         ("no answer within 1.0 s", "unavailable", "detector embedded: no answer within 1.0 s"),
         *(
             ([Detection("duck", 0.9, box)], "unavailable",

@@ -50,7 +50,19 @@ def test_a_frame_comes_back_without_its_image(visible: np.ndarray, epoch: int) -
 
 
 @few
-@given(st.lists(st.tuples(st.text(max_size=5), finite, st.tuples(finite, finite, finite, finite))), finite)
+@given(
+    st.lists(st.tuples(st.text(max_size=5), finite, st.tuples(finite, finite, finite, finite), finite)),
+    finite,
+)
 def test_an_answer_comes_back(found: list[tuple], misses: float) -> None:
     answer = Answer("eye", tuple(Detection(*one) for one in found), Reliability(0.5, misses, 0.1, 0.2, 0.7))
     assert back(ANSWER, answer) == answer
+
+
+def test_an_answer_of_a_journal_without_second_classes_is_read() -> None:
+    old = {
+        "detector": "eye",
+        "found": [["duck", 0.9, [1, 2, 3, 4]]],
+        "reliability": [0.5, 0.1, 0.1, 0.2, 0.7],
+    }
+    assert ANSWER.read(old).found == (Detection("duck", 0.9, (1, 2, 3, 4)),)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from executive.errors import InputError
 from executive.messages import Detection
-from executive.vision.detectors.views import Finding, merge, parts_of, without_duplicates
+from executive.vision.detectors.views import Finding, merge, parts_of, search_parts, without_duplicates
 
 TABLE = (192, 100, 448, 356)
 SIZE = (640, 480)
@@ -23,6 +24,14 @@ def test_the_table_view_is_the_square_of_the_cell_file_and_a_smaller_frame_is_on
     assert parts_of("full", TABLE, (200, 150)) == [(0, 0, 200, 150)]
     with pytest.raises(InputError, match='no view "ceiling"; there are table and full'):
         parts_of("ceiling", TABLE, SIZE)
+
+
+def test_a_detection_keeps_the_confidence_of_its_second_class_and_gets_the_name_of_the_cell():
+    ball = Detection("ball", 0.6, (1, 2, 3, 4), rival=0.5)
+    (kept,) = search_parts(
+        np.zeros((480, 640, 3), np.uint8), [TABLE], lambda part: [ball], {"ball": "sphere"}
+    )
+    assert kept == Detection("sphere", 0.6, (193, 102, 195, 104), rival=0.5)
 
 
 @given(

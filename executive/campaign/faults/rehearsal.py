@@ -91,7 +91,7 @@ def rehearse(subject: Subject) -> Rehearsal:
     if audit is not None and (audit["unseen"] or not agrees(items, audit, outcome.empty)):
         raise InputError(
             f"{undisturbed} leaves books that are not the world: the ledger says {counts_text(items)}; "
-            f"the audit {counts_text(audit or {})}; choose another seed, or a mission that looks at the "
+            f"the audit {counts_text(audit)}; choose another seed, or a mission that looks at the "
             "whole table"
         )
     found = {node: tuple(ticks) for node, ticks in activations.lasted.items()}

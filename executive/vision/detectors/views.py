@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,7 +81,7 @@ def search_parts(
             x0, y0, x1, y1 = found.box
             box = left + x0, top + y0, left + x1, top + y1
             label = class_map.get(found.label, found.label)
-            findings.append(Finding(Detection(label, found.confidence, box), part))
+            findings.append(Finding(replace(found, label=label, box=box), part))
     return merge(findings, (image.shape[1], image.shape[0]))
 
 
