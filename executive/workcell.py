@@ -12,7 +12,7 @@ from executive.events import Emit
 from executive.scenery import Scenery
 
 PLACES = ("right", "wrong_bin", "left", "elsewhere", "fell_in_wrong_bin", "unseen")
-"""Counts of an audit; the last two count objects that the others count, too."""
+"""Keys of the counts of an audit; the last two count objects that the others count, too."""
 
 
 class Accounts(Protocol):

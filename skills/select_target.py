@@ -63,6 +63,6 @@ class SelectTarget(Skill):
         sought = self.same or self.wanted or "object to sort"
         if self.same is None and cell.ledger.believes_empty():
             left = f"no {sought} is left on the table but what was rejected"
-            told = "; ".join(filter(None, (left, describe_unknown(cell.ledger.unknown))))
-            return self.failed("no_candidate", told)
+            message = "; ".join(filter(None, (left, describe_unknown(cell.ledger.unknown))))
+            return self.failed("no_candidate", message)
         return self.failed("unseen", f"no {sought} is in sight, and the table is not known to be empty")

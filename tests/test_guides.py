@@ -132,13 +132,13 @@ def test_every_scene_of_the_authors_guide_fits_the_cell_of_its_missions(name: st
 
 
 def test_the_authors_guide_names_every_section_and_key_of_a_scene() -> None:
-    told = rows("### Change the world without the knowledge of the mission")
+    documented = rows("### Change the world without the knowledge of the mission")
     sections = list(SceneConfig.model_fields)
-    assert ["section", *(f"`{name}`" for name in sections if name != "scene")] == list(told)
+    assert ["section", *(f"`{name}`" for name in sections if name != "scene")] == list(documented)
     models = {"light": LightConfig, "table": SceneTableConfig, "objects": SceneObjectConfig}
     models |= {"unknown": UnknownConfig, "camera": SceneCameraConfig}
     for name, model in models.items():
-        assert set(model.model_fields) <= set(in_code(told[f"`{name}`"][0])), name
+        assert set(model.model_fields) <= set(in_code(documented[f"`{name}`"][0])), name
     assert in_code(rows("### Keys")["a scene"][0]) == sections
 
 

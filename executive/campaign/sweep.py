@@ -10,7 +10,7 @@ from typing import Any
 from executive.campaign.pool import do_all
 from executive.campaign.statistics import spread, wilson
 from executive.errors import ExecutiveError
-from executive.record.result import FATES
+from executive.record.result import ITEM_COUNTS
 from executive.workcell import PLACES
 
 Result = Mapping[str, Any]
@@ -131,7 +131,7 @@ def _broken(job: Job, error: BaseException) -> Result:
         "message": str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}",
         "node": "",
         "seed": job.seed,
-        "items": dict.fromkeys(FATES, 0),
+        "items": dict.fromkeys(ITEM_COUNTS, 0),
         "audit": {**dict.fromkeys(PLACES, 0), "agrees": True},
         "planning": {"motions": 0, "ahead": 0, "waited_s": 0.0},
         "ticks": 0,

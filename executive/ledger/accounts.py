@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping
 
 from executive.ledger.item import NOTHING, ON_TABLE, UNSURE, Record, State
 
-FATES = (State.PLACED, State.REJECTED, State.SKIPPED, State.LOST)
+FINAL_STATES = (State.PLACED, State.REJECTED, State.SKIPPED, State.LOST)
 """Final states of an object; each item that was no phantom has one of them."""
 
 
-def fate_of(
+def find_final_state(
     record: Record, *, gone: bool, sure: bool, routed: bool, completed: bool
 ) -> tuple[State, str] | None:
     """Return the final state of an item and its reason, or None if the item has its final state already.
@@ -53,10 +53,10 @@ def balance(records: Iterable[Record]) -> dict[str, int]:
     states = Counter(record.state for record in records)
     return {
         "seen": sum(states.values()) - states[State.PHANTOM],
-        **{state.value: states[state] for state in (*FATES, State.PHANTOM)},
+        **{state.value: states[state] for state in (*FINAL_STATES, State.PHANTOM)},
     }
 
 
 def is_balanced(counts: Mapping[str, int]) -> bool:
     """Return True if each item that was seen is placed, rejected, skipped or lost."""
-    return counts["seen"] == sum(counts[state.value] for state in FATES)
+    return counts["seen"] == sum(counts[state.value] for state in FINAL_STATES)

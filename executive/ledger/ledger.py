@@ -14,7 +14,7 @@ from executive.cell_config import LedgerConfig, TableConfig
 from executive.errors import Fault
 from executive.events import Emit
 from executive.geometry import Array
-from executive.ledger.accounts import balance, fate_of
+from executive.ledger.accounts import balance, find_final_state
 from executive.ledger.bins import Bins
 from executive.ledger.coverage import Coverage
 from executive.ledger.freshness import Freshness
@@ -232,16 +232,17 @@ class ItemLedger:
         return next((r.item for r in self._records.values() if r.state is State.HELD), None)
 
     def close(self, *, completed: bool) -> None:
-        """Decide the final state of each item (`fate_of`); `completed` is True if the tree succeeded."""
+        """Decide the final state of each item; `completed` is True if the tree succeeded."""
         for record in self._records.values():
             if bin := self._in_bins.believed(record):
                 record.why = "it fell there"
                 self.placed(record.item, bin)
-            routed = record.label in self._routes
-            sure = record.is_sure(self._config)
-            fate = fate_of(record, gone=self._is_gone(record), sure=sure, routed=routed, completed=completed)
-            if fate is not None:
-                state, record.why = fate
+            final = find_final_state(
+                record, gone=self._is_gone(record), sure=record.is_sure(self._config),
+                routed=record.label in self._routes, completed=completed,
+            )  # fmt: skip
+            if final is not None:
+                state, record.why = final
                 self._change(record.item, state)
 
     def balance(self) -> dict[str, int]:

@@ -23,8 +23,8 @@ QUIT = "quit"
 VERSION = 2
 """Version of the schema of `result.json`; the first had no `version`, no skipped items and no `agrees`."""
 
-FATES = ("seen", "placed", "rejected", "skipped", "lost", "phantom")
-"""Counts of the ledger."""
+ITEM_COUNTS = ("seen", "placed", "rejected", "skipped", "lost", "phantom")
+"""Keys of the counts of the ledger."""
 
 MISTAKES = {
     "wrong_bin": "in a wrong bin",
@@ -68,7 +68,7 @@ def result_of(
         "node": outcome.node,
         "holds": outcome.holds,
         "seed": seed,
-        "items": {fate: int(items.get(fate, 0)) for fate in FATES},
+        "items": {fate: int(items.get(fate, 0)) for fate in ITEM_COUNTS},
         "unknown": dict(items.get("unknown", {})),
         "empty": outcome.empty,
         "audit": None if audit is None else audit_section(items, audit, outcome.empty),

@@ -76,7 +76,7 @@ def check_balance(accounts: Accounts) -> None:
     """
     counts = accounts.balance()
     if not is_balanced(counts):
-        told = ", ".join(f"{number} {fate}" for fate, number in counts.items())
+        listed = ", ".join(f"{number} {state}" for state, number in counts.items())
         raise Fault(
-            f"the books do not balance: {told}; seen must be what was placed, rejected, skipped and lost"
+            f"the books do not balance: {listed}; seen must be what was placed, rejected, skipped and lost"
         )

@@ -56,17 +56,17 @@ def audit(
         if body not in world.bodies:
             counts["elsewhere"] += seen
             continue
-        fate = "left" if body == held else _fate(world, body, bins, routes)
-        fell = fate == "wrong_bin" and body in fallen
+        end = "left" if body == held else _find_place(world, body, bins, routes)
+        fell = end == "wrong_bin" and body in fallen
         unclaimed = world.bodies[body] == UNKNOWN and not seen
-        if not unclaimed or fate == "wrong_bin":
-            counts["elsewhere" if fell else fate] += 1
+        if not unclaimed or end == "wrong_bin":
+            counts["elsewhere" if fell else end] += 1
         counts["fell_in_wrong_bin"] += fell
         counts["unseen"] += not seen and not unclaimed
     return counts
 
 
-def _fate(world: World, body: int, bins: Mapping[str, Bin], routes: Routes) -> str:
+def _find_place(world: World, body: int, bins: Mapping[str, Bin], routes: Routes) -> str:
     position = world.object_pose(body).position
     # What leans on a wall from inside may have its middle over it.
     inside = next((name for name, bin in bins.items() if bin.contains(position, BIN_THICKNESS)), None)

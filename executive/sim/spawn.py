@@ -129,7 +129,7 @@ def find_lack_of_room(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
 def _places(config: CellConfig, radii: Sequence[float], rng: np.random.Generator) -> list[Array]:
     """Return places `(2,)` [m] for outlines of these radii [m] that keep the gap.
 
-    The whole set is drawn anew when one gets stuck.
+    The whole set is drawn again when one gets stuck.
     """
     low, high = np.array([config.table.x, config.table.y]).T
     places: list[Array] = []

@@ -63,7 +63,7 @@ class ItemTable:
         for row in self.rows:
             if row.state != "phantom":
                 placed = row.state == "placed"
-                told = ": ".join(filter(None, (row.place, row.why)))
-                name = f"{row.item} ({told})" if told and not placed else row.item
+                place_and_reason = ": ".join(filter(None, (row.place, row.why)))
+                name = f"{row.item} ({place_and_reason})" if place_and_reason and not placed else row.item
                 fates[row.bin if placed else row.state].append(name)
         return dict(fates)

@@ -33,7 +33,7 @@ def sort(tmp_path: Path) -> str:
     return str(path)
 
 
-def told(*words: str, runs: Path) -> dict[str, Any]:
+def run_json(*words: str, runs: Path) -> dict[str, Any]:
     done = invoke("run", *words, "--runs", str(runs), "--json")
     assert done.exit_code == 0, done.output
     result: dict[str, Any] = json.loads(done.stdout)
@@ -44,7 +44,7 @@ def test_the_run_directory_has_a_copy_from_which_the_run_is_repeated_and_replaye
     sort: str, scene: Path, tmp_path: Path
 ) -> None:
     runs = tmp_path / "runs"
-    result = told(sort, "--scene", str(scene), runs=runs)
+    result = run_json(sort, "--scene", str(scene), runs=runs)
     directory = RunDirectory(Path(result["run"]))
     copy = directory.scene
     assert copy is not None
@@ -56,9 +56,9 @@ def test_the_run_directory_has_a_copy_from_which_the_run_is_repeated_and_replaye
     assert "one object" not in directory.journal.read_text()
     assert scene.name not in directory.journal.read_text()
     assert invoke("replay", "latest", "--runs", str(runs)).exit_code == 0
-    again = told(sort, "--scene", str(copy), runs=runs)
+    again = run_json(sort, "--scene", str(copy), runs=runs)
     assert (again["trace"], again["audit"]) == (result["trace"], result["audit"])
-    plain = told(sort, runs=runs)
+    plain = run_json(sort, runs=runs)
     assert (RunDirectory(Path(plain["run"])).scene, "--scene" in plain["said"]) == (None, False)
     assert plain["audit"]["left"] > 1
 
@@ -81,7 +81,7 @@ def test_a_cell_that_is_not_simulated_takes_no_scene(command: str, scene: Path, 
 
 
 @pytest.mark.parametrize("command", ["run {sort}", "sweep {sort} --seeds 0-3"])
-def test_a_mistake_in_a_scene_is_told_once_and_nothing_runs(
+def test_a_mistake_in_a_scene_is_reported_once_and_nothing_runs(
     command: str, sort: str, scene: Path, tmp_path: Path
 ) -> None:
     scene.write_text("scene: wrong\nlight: {brightnes: 1}\n")

@@ -45,7 +45,8 @@ def test_only_what_is_sure_is_found(
     ("answer", "reason", "message"),
     [
         ([WEAK], "unsure", "detector embedded saw nothing it is sure of: at best a duck at 0.40 < 0.50"),
-        ([TORN], "unsure", "detector embedded saw nothing it is sure of: at best a cube at 0.62 with another class at 0.58"),
+        ([TORN], "unsure",
+         "detector embedded saw nothing it is sure of: at best a cube at 0.62 with another class at 0.58"),
         ("no answer within 1.0 s", "unavailable", "detector embedded: no answer within 1.0 s"),
         *(
             ([Detection("duck", 0.9, box)], "unavailable",

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from executive.record.pictures.strip import HEIGHT as STRIP
-from executive.record.result import FATES
+from executive.record.result import ITEM_COUNTS
 from executive.view.film import panel
 from executive.view.film.course import Course
 from executive.view.film.ink import BACK, DIM, FAILURE, INK, RULE, RUNNING, SUCCESS, clipped, font, wrapped
@@ -91,7 +91,7 @@ def ending_of(result: Mapping[str, Any]) -> tuple[str, str, str]:
         return "CUT OFF", "the record ends here; nothing says how the run would have ended", ""
     figures = ""
     if items := result.get("items"):
-        fates = ", ".join(f"{items[fate]} {fate}" for fate in FATES if items.get(fate))
+        fates = ", ".join(f"{items[fate]} {fate}" for fate in ITEM_COUNTS if items.get(fate))
         figures = f"{fates}; {result['robot_time_s']:.1f} s"
     story = result.get("story") or {}
     return result["status"], story.get("verdict") or result["message"], figures

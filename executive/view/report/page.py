@@ -103,7 +103,7 @@ def _ending(facts: Facts) -> str:
         return "It came to its end; only the journal is left of its result."
     if not books["seen"]:
         return "The mission was done; no object was seen."
-    left = {fate: books[fate] for fate in ("rejected", "skipped", "lost") if books.get(fate)}
+    left = {state: books[state] for state in ("rejected", "skipped", "lost") if books.get(state)}
     said = "".join(f", {number} {fate}" for fate, number in left.items())
     return f"{books['placed']} of {books['seen']} objects are in their bins{said}."
 
