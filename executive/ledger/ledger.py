@@ -137,8 +137,7 @@ class ItemLedger:
 
     def was_touched(self, item: Item) -> bool:
         """Return True if the tool has touched the item before, at the height of its class."""
-        record = self._record(item)
-        return record.touched == record.label
+        return (record := self._record(item)).touched == record.label
 
     def contradicted(self, item: Item, why: str) -> None:
         """Record evidence against the class of an item that the tool touched; its place is in doubt now."""
@@ -242,8 +241,8 @@ class ItemLedger:
                 routed=record.label in self._routes, completed=completed,
             )  # fmt: skip
             if final is not None:
-                state, record.why = final
-                self._change(record.item, state)
+                record.why = final[1]
+                self._change(record.item, final[0])
 
     def balance(self) -> dict[str, int]:
         """Return the counts `seen, placed, rejected, skipped, lost, phantom`."""
