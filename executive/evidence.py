@@ -11,10 +11,10 @@ from executive.geometry import Array
 from executive.messages import Box, Detection, Frame, ObjectClass
 
 MAX_HEIGHT_ERROR = 0.003
-"""Largest difference between the height of a touch and that of the class [m]; the largest measured one is
-0.4 mm (52 touches of `sort_overhead`)."""
-SAME_HEIGHT = 0.0025
-"""Largest difference at which a low touch is at the height of another class [m]."""
+"""Largest accepted difference between the measured and the expected height of a touch [m]; 52 touches of
+`sort_overhead` were at most 0.4 mm off."""
+OTHER_CLASS_TOLERANCE = 0.0025
+"""Tolerance within which a touch that is too low for its class matches another class [m]."""
 SIZE_TOLERANCE = 0.15
 """Largest relative difference between a box and the sizes that its class allows."""
 SIZE_MARGIN = 2.0
@@ -47,7 +47,7 @@ def describe_wrong_height(label: str, height: float, classes: Mapping[str, Objec
         return min((height - kind.height - support for support in supports), key=abs)
 
     error = error_of(classes[label])
-    others = [other for other, kind in classes.items() if abs(error_of(kind)) <= SAME_HEIGHT]
+    others = [other for other, kind in classes.items() if abs(error_of(kind)) <= OTHER_CLASS_TOLERANCE]
     if abs(error) <= MAX_HEIGHT_ERROR or (error < 0 and not others):
         return ""
     measured = f"it was touched {height * 1000:.0f} mm above the table"
@@ -59,8 +59,8 @@ def describe_wrong_size(
 ) -> str:
     """Return how the size of a box contradicts a class, or "" if it does not.
 
-    The class is enclosed by a cylinder of its radius and height. The longer side of the box is at most as
-    long as that of the cylinder's image, and at least as long as a side of the square inscribed in its base.
+    The class is enclosed by a cylinder of its radius and height. The longer side of the box is at
+    most that of the box around the cylinder's image, and at least a side of the square inscribed in its base.
 
     Args:
         detection: The box and its class.

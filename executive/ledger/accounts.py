@@ -16,11 +16,16 @@ def find_final_state(
 ) -> tuple[State, str] | None:
     """Return the final state of an item and its reason, or None if the item has its final state already.
 
-    An item that is known to exist and was not found again is lost. An item that is likelier a false
-    detection than an object is a phantom. An item that was seen with low confidence only, and never missed,
-    may be an object: it is rejected. Any other item on the table is skipped if the mission did not have to
-    sort it: it has no route, or the mission was completed without an attempt at an item that it was sure of,
-    because a quota was reached or the operator quit. Else the item is rejected.
+    The first rule that applies decides:
+
+    1. An item in the tool is rejected.
+    2. An item with uncertain detections only, whose place no look has found empty, is rejected.
+    3. An item that is likelier a false detection than an object is a phantom.
+    4. An item that was dropped, or whose place was found empty, is lost.
+    5. An item without a route is skipped.
+    6. If the mission was completed, a certain item without a contradiction or an attempt is skipped: a quota
+       was reached, or the operator quit.
+    7. Any other item is rejected.
 
     Args:
         record: The item.
@@ -48,7 +53,7 @@ def find_final_state(
     return State.REJECTED, "the run ended before its turn"
 
 
-def balance(records: Iterable[Record]) -> dict[str, int]:
+def count_states(records: Iterable[Record]) -> dict[str, int]:
     """Return the counts `seen, placed, rejected, skipped, lost, phantom`; phantoms are not among the seen."""
     states = Counter(record.state for record in records)
     return {

@@ -14,7 +14,7 @@ from executive.cell_config import LedgerConfig, TableConfig
 from executive.errors import Fault
 from executive.events import Emit
 from executive.geometry import Array
-from executive.ledger.accounts import balance, find_final_state
+from executive.ledger.accounts import count_states, find_final_state
 from executive.ledger.bins import Bins
 from executive.ledger.coverage import Coverage
 from executive.ledger.freshness import Freshness
@@ -246,7 +246,7 @@ class ItemLedger:
 
     def balance(self) -> dict[str, int]:
         """Return the counts `seen, placed, rejected, skipped, lost, phantom`."""
-        return balance(self._records.values())
+        return count_states(self._records.values())
 
     def rows(self) -> list[dict[str, object]]:
         """Return a plain row per item, in the order of first sight."""

@@ -16,7 +16,7 @@ def describe_look(
     Args:
         detections: Detections in one frame.
         positions: Positions of `detections.found` `(3,)` [m], in the same order.
-        glimpses: Detections that are too uncertain to count.
+        glimpses: Detections below the threshold, or contradicted by evidence about their class.
     """
     frame = detections.frame
     return {

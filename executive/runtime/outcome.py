@@ -14,7 +14,7 @@ class Ending:
     """How the tick loop ended; see `Outcome`.
 
     Attributes:
-        traceback: Of the exception behind a fault, or "".
+        traceback: Traceback of the exception that caused a fault, or "".
     """
 
     status: str

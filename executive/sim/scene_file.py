@@ -16,7 +16,7 @@ from executive.mission.parse.validate import mark_of, validate
 from executive.mission.text.files import read_source
 from executive.mission.text.yaml_text import Node, parse_yaml
 from executive.sim.arrangements import DAMAGED_MODEL, UNKNOWN_COUNT
-from executive.sim.table_top import PATTERNS, PLAIN, TEXTURES, WOOD
+from executive.sim.table_top import PATTERN_COUNT, PLAIN, TEXTURES, WOOD
 from executive.vision.camera_model import calibrated, field_of_view
 
 ANY = "any"
@@ -32,7 +32,7 @@ def check_texture(name: str) -> str:
         ValueError: There is no such texture.
     """
     if name not in TEXTURES:
-        known = f'"{WOOD}", "{PLAIN}", or "pattern 0" to "pattern {PATTERNS - 1}"'
+        known = f'"{WOOD}", "{PLAIN}", or "pattern 0" to "pattern {PATTERN_COUNT - 1}"'
         raise ValueError(f'must be {known}, not "{name}"')
     return name
 

@@ -14,9 +14,9 @@ from pybullet_utils.bullet_client import BulletClient
 from executive.cell_config import Colour
 
 WOOD, PLAIN = "wood", "plain"
-PATTERNS = 24
+PATTERN_COUNT = 24
 """Number of generated textures, which are called `pattern 0` to `pattern 23`."""
-TEXTURES = (WOOD, PLAIN, *(f"pattern {number}" for number in range(PATTERNS)))
+TEXTURES = (WOOD, PLAIN, *(f"pattern {number}" for number in range(PATTERN_COUNT)))
 """Names of all textures: that of the URDF, no texture, and the generated ones."""
 TEXTURE_SIZE = 256
 """Side of a generated texture [pixel]."""
@@ -38,7 +38,7 @@ class TableTop:
         self._textures = {PLAIN: -1, WOOD: shapes[0][8] if shapes else -1}
 
     def paint(self, colour: Colour, texture: str = WOOD) -> None:
-        """Give the table a texture of `TEXTURES`, its brightness multiplied by `colour`."""
+        """Give the table a texture of `TEXTURES`, its RGB values multiplied by `colour`."""
         if texture not in self._textures:
             self._textures[texture] = self._load(texture)
         self._client.changeVisualShape(
@@ -46,20 +46,20 @@ class TableTop:
         )
 
     def _load(self, texture: str) -> int:
-        number = TEXTURES.index(texture)
-        # PyBullet returns an earlier texture if a file of the same name is loaded again.
+        seed = TEXTURES.index(texture)
+        # PyBullet caches textures by path, so that each texture needs its own path.
         with tempfile.TemporaryDirectory() as folder:
-            path = str(Path(folder) / f"{number}.png")
-            cv2.imwrite(path, generate_pattern(number))
+            path = str(Path(folder) / f"{seed}.png")
+            cv2.imwrite(path, generate_pattern(seed))
             return int(self._client.loadTexture(path))
 
 
-def generate_pattern(number: int) -> NDArray[np.uint8]:
+def generate_pattern(seed: int) -> NDArray[np.uint8]:
     """Return a bright random texture `(N, N, 3)`: clouds, stripes, tiles or speckles."""
-    rng = np.random.default_rng(number)
+    rng = np.random.default_rng(seed)
     contrast = rng.uniform(15, 90)
     grid = int(rng.choice([4, 8, 16, 32]))
-    kind = number % 4
+    kind = seed % 4
     shape = ((grid, grid, 3), (1, grid * 2, 3), (grid, grid, 1), (TEXTURE_SIZE, TEXTURE_SIZE, 1))[kind]
     interpolation = cv2.INTER_CUBIC if kind in (0, 3) else cv2.INTER_NEAREST
     values = 255 - rng.uniform(0, contrast, shape) * np.ones(3)

@@ -31,35 +31,38 @@ WOOD_COLOUR = (0.87, 0.78, 0.65)
 
 
 def random_light(rng: np.random.Generator) -> Light:
-    """Return the cell's lamp in 20 % of the scenes, else another one: from 12 % brightness to glare."""
+    """Return the cell's lamp in 20 % of the scenes, else one that is normal, dimmed or too bright."""
     shadow = bool(rng.random() < 0.35)
     if rng.random() < 0.2:
         return Light(shadow=shadow) if shadow else CELL_LIGHT
     azimuth, elevation = rng.uniform(0, math.tau), rng.uniform(math.radians(18), math.pi / 2)
     horizontal = math.cos(elevation)
     red, green, blue = rng.uniform(0.72, 1.0, 3)
-    kind = rng.random()
-    level = 1.0 if kind < 0.5 else math.exp(rng.uniform(math.log(0.12), 0.0)) if kind < 0.8 else 1.5
+    draw = rng.random()
+    level = 1.0 if draw < 0.5 else math.exp(rng.uniform(math.log(0.12), 0.0)) if draw < 0.8 else 1.5
     return Light(
         direction=(horizontal * math.cos(azimuth), horizontal * math.sin(azimuth), math.sin(elevation)),
         colour=(red, green, blue),
         ambient=level * rng.uniform(0.40, 0.70),
         diffuse=level * rng.uniform(0.20, 0.60),
-        specular=rng.uniform(0.0, 0.8) if kind >= 0.8 else level * rng.uniform(0.0, 0.30),
+        specular=rng.uniform(0.0, 0.8) if draw >= 0.8 else level * rng.uniform(0.0, 0.30),
         shadow=shadow,
     )
 
 
 def random_table(rng: np.random.Generator) -> tuple[Colour, str]:
-    """Return colour and texture of the table: unchanged in 30 % of the scenes, slightly tinted in 20 %."""
-    kind = rng.random()
-    if kind < 0.3:
+    """Return colour and texture of the table: unchanged in 30 % of the scenes, slightly tinted in 20 %.
+
+    In the others it has any colour, on wood, on a plain surface or on a random texture.
+    """
+    draw = rng.random()
+    if draw < 0.3:
         return (1.0, 1.0, 1.0), WOOD
-    if kind < 0.5:
+    if draw < 0.5:
         red, green, blue = rng.uniform(0.75, 1.0) * rng.uniform(0.88, 1.0, 3)
         return (red, green, blue), WOOD
-    texture = WOOD if kind < 0.6 else PLAIN if kind < 0.75 else str(rng.choice(TEXTURES))
-    return random_hue(rng, 0.0, 0.8, 0.10, 1.0), texture
+    texture = WOOD if draw < 0.6 else PLAIN if draw < 0.75 else str(rng.choice(TEXTURES))
+    return random_hsv_colour(rng, 0.0, 0.8, 0.10, 1.0), texture
 
 
 def random_object_colour(palette: Sequence[Colour], table: Colour, rng: np.random.Generator) -> Colour:
@@ -70,26 +73,30 @@ def random_object_colour(palette: Sequence[Colour], table: Colour, rng: np.rando
         table: Mean colour of the table.
         rng: Random number generator.
     """
-    kind = rng.random()
-    if kind < 0.35:
+    draw = rng.random()
+    if draw < 0.35:
         return palette[int(rng.integers(len(palette)))]
-    if kind < 0.65:
-        return random_hue(rng, 0.3, 1.0, 0.25, 1.0)
-    if kind < 0.78:
+    if draw < 0.65:
+        return random_hsv_colour(rng, 0.3, 1.0, 0.25, 1.0)
+    if draw < 0.78:
         grey = rng.uniform(0.05, 1.0)
         return grey, grey, grey
-    if kind < 0.93:
-        return random_hue(rng, 0.0, 0.6, 0.02, 0.16)
+    if draw < 0.93:
+        return random_hsv_colour(rng, 0.0, 0.6, 0.02, 0.16)
     red, green, blue = np.clip(table + rng.normal(0, 0.12, 3), 0.02, 1.0)
     return float(red), float(green), float(blue)
 
 
-def random_hue(
-    rng: np.random.Generator, min_saturation: float, saturation: float, min_value: float, value: float
+def random_hsv_colour(
+    rng: np.random.Generator,
+    min_saturation: float,
+    max_saturation: float,
+    min_value: float,
+    max_value: float,
 ) -> Colour:
-    """Return a colour of any hue, with saturation and value in the ranges given, all 0 to 1."""
+    """Return a colour of any hue, with saturation and value in the given ranges, all 0 to 1."""
     return colorsys.hsv_to_rgb(
-        rng.random(), rng.uniform(min_saturation, saturation), rng.uniform(min_value, value)
+        rng.random(), rng.uniform(min_saturation, max_saturation), rng.uniform(min_value, max_value)
     )
 
 
@@ -98,7 +105,7 @@ def random_camera(
 ) -> tuple[Array, Pose]:
     """Return camera matrix and pose: as declared in 40 % of the scenes, else random.
 
-    A camera on the wrist keeps its place on the arm, whose poses vary.
+    The pose of a camera on the wrist is not changed: the pose of the arm already varies.
 
     Args:
         camera: Section of the cell file.
@@ -125,7 +132,10 @@ def random_camera(
 
 
 def random_noise(noise: NoiseConfig, rng: np.random.Generator) -> NoiseConfig:
-    """Return the noise of a camera: as declared in 60 % of the scenes, else mostly more."""
+    """Return the noise of a camera: as declared in 60 % of the scenes.
+
+    Else the noise of the gain is larger, and the read noise is 0.37 to 9 times as large.
+    """
     if rng.random() < 0.6:
         return noise
     return NoiseConfig(

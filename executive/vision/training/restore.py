@@ -19,7 +19,7 @@ from executive.vision.training.architecture import ARCHITECTURE, create
 from executive.vision.training.export import export
 
 CLASS_BIAS = "class_embed.bias"
-"""Name of the weight whose length is the number of outputs per class."""
+"""Name of the bias with one element for each class and one for "no object"."""
 GROUPS: int = ARCHITECTURE["group_detr"]
 """Number of groups of queries during training; an exported model contains the first one only."""
 
@@ -27,9 +27,9 @@ GROUPS: int = ARCHITECTURE["group_detr"]
 def restore(model: Path) -> Any:
     """Return an `rfdetr.RFDETRNano` with the weights of an exported model.
 
-    The export renames some weights and drops others. The names are found by exporting a model whose weights
-    are all different. Each further group of queries becomes a copy of the first. Layers after the last one
-    that the detector reads stay random; they do not influence its output.
+    The export renames some weights and drops others. To find the tensor of each exported weight, a model with
+    random weights is exported and the values are compared. Each further group of queries becomes a copy of
+    the first. Layers that the export drops, because no output depends on them, stay random.
 
     Args:
         model: ONNX file that `executive train` wrote.
@@ -53,7 +53,8 @@ def restore(model: Path) -> Any:
                 f"{model} cannot be trained further: its weight {name} is missing or has another shape than "
                 "in the architecture that `executive train` trains; start from a model that it made"
             )
-        found = next((view for view in _views(state, name) if _is_equal(view, values)), None)
+        found = next((view for view in _candidate_tensors(state, name) if _is_equal(view, values)), None)
+        # An initializer without a tensor is a constant of the graph.
         if found is not None:
             found.copy_(torch.from_numpy(stored[name]))
     _copy_groups(state)
@@ -72,7 +73,7 @@ def _read_weights(model: onnx.ModelProto) -> dict[str, Array]:
     return weights
 
 
-def _views(state: dict[str, torch.Tensor], name: str) -> Iterator[torch.Tensor]:
+def _candidate_tensors(state: dict[str, torch.Tensor], name: str) -> Iterator[torch.Tensor]:
     """Yield the parts of a model's weights that an export can contain under `name`."""
     if name in state:
         yield state[name]
