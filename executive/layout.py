@@ -9,6 +9,7 @@ import numpy as np
 from executive.cell import Cell, Ledger, Routes
 from executive.cell_config import BinConfig, CellConfig, ObjectConfig
 from executive.events import Emit
+from executive.evidence import MAX_HEIGHT_ERROR
 from executive.messages import Bin, ObjectClass, Target
 
 TOOL_RADIUS = 0.012
@@ -53,6 +54,16 @@ def bins_of(config: CellConfig) -> dict[str, Bin]:
 def object_classes(config: CellConfig) -> dict[str, ObjectClass]:
     """Return the classes of a cell file by label, each of the default mass."""
     return {label: object_class(label, kind) for label, kind in config.objects.items()}
+
+
+def classes_told_by_touch(config: CellConfig) -> frozenset[str]:
+    """Return the classes whose height differs from that of each other class by more than a touch may err."""
+    heights = {label: kind.height for label, kind in config.objects.items()}
+    return frozenset(
+        label
+        for label, height in heights.items()
+        if all(abs(height - other) > MAX_HEIGHT_ERROR for name, other in heights.items() if name != label)
+    )
 
 
 def cell_without_hardware(config: CellConfig, routes: Routes, ledger: Ledger, emit: Emit) -> Cell:

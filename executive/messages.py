@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.geometry import Array, Pose
+from executive.reliability import Reliability
 
 Box = tuple[float, float, float, float]
 """Left, top, right, bottom [pixel] in a frame's image; pixel i covers [i, i + 1)."""
@@ -114,25 +115,6 @@ class Detection:
         """Centre of the box [pixel]."""
         left, top, right, bottom = self.box
         return (left + right) / 2, (top + bottom) / 2
-
-
-@dataclass(frozen=True)
-class Reliability:
-    """How a detector errs, as measured (`executive evaluate`); what its looks are worth rests on it.
-
-    Attributes:
-        threshold: Confidence from which a detection counts.
-        misses: Share of the objects in full view that one look overlooks.
-        confused: Share of the objects it finds that it gives a wrong class.
-        invented: Objects that are not there, per look.
-        jitter: Standard deviation of the centre of a found box, along each axis [pixel].
-    """
-
-    threshold: float
-    misses: float
-    confused: float
-    invented: float
-    jitter: float
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -30,6 +30,10 @@ class Accounts(Protocol):
     @property
     def unknown(self) -> Mapping[str, int]:
         """Largest number of boxes in one look for each label that the cell does not know."""
+
+    @property
+    def doubts(self) -> Sequence[str]:
+        """Reasons why error rates of detectors were assumed and not measured."""
 
     def rows(self) -> list[dict[str, object]]:
         """Return a plain row per item, in the order of first sight."""

@@ -16,6 +16,7 @@ from executive.layout import object_class
 from executive.mission.findings import alternatives
 from executive.sim.datasets import generate, run_frames
 from executive.sim.scene_file import load_scene
+from executive.sim.spawn import count_that_fits
 from executive.vision.detectors.registry import wrong_detectors
 from executive.vision.evaluation.asking import CellDetector
 from executive.vision.evaluation.cores import only_cores
@@ -26,6 +27,8 @@ from executive.vision.evaluation.model_file import FLOOR, NAME, model_detector
 from executive.vision.localization.build import build_localizer
 from executive.vision.samples import LabelledImage, count_samples, read_samples
 
+MAX_OBJECTS = 20
+"""Largest number of objects in a scene, if the workspace has room for so many."""
 Progress = Callable[[str], AbstractContextManager[Callable[[int, int], None]]]
 """Opens a progress bar of a name, which is told (done, all)."""
 
@@ -37,7 +40,8 @@ class Scenes:
     Attributes:
         images: How many of each cell.
         seed: What chance draws from.
-        as_run: As a run begins with, taken and searched as in a run; else varied as in training.
+        varied: True for scenes varied as widely as in training; False for scenes as a run begins with, with 0
+            to `MAX_OBJECTS` objects as far as they fit, taken and searched as in a run.
         view: The part of a run's frame that is searched.
         workers: Processes that render.
         scene: Scene file that changes the world of scenes as a run begins with; None: nothing does.
@@ -45,7 +49,7 @@ class Scenes:
 
     images: int
     seed: int
-    as_run: bool
+    varied: bool
     view: str
     workers: int
     scene: Path | None = None
@@ -135,7 +139,7 @@ def measure(
 ) -> Evaluation:
     """Return how good a detector is on the dataset or, without one, on scenes of its cell."""
     config = subject.cell
-    in_run = config is not None and scenes.as_run
+    in_run = config is not None and dataset is None and not scenes.varied
     with _images(subject, dataset, scenes, progress) as (samples, count), only_cores(cores):
         asked = CellDetector(
             subject.configs,
@@ -149,7 +153,10 @@ def measure(
             localizer = _localizer(config) if config and in_run else None
             with progress(f"asking {subject.name}") as told:
                 counted = _counted(samples, count, told)
-                return evaluate(asked, counted, threshold=threshold, localizer=localizer, worst=worst)
+                return evaluate(
+                    asked, counted, threshold=threshold, localizer=localizer, worst=worst,
+                    table=config.table if config and in_run else None,
+                )  # fmt: skip
 
 
 @contextlib.contextmanager
@@ -162,10 +169,12 @@ def _images(
         assert dataset is not None
         yield read_samples(dataset), count_samples(dataset)
         return
-    if scenes.as_run:
+    if not scenes.varied:
         with progress(f"rendering {config.cell}") as told:
+            table = {"objects": (0, count_that_fits(config, MAX_OBJECTS))}
+            filled = config.model_copy(update={"table": config.table.model_copy(update=table)})
             frames = run_frames(
-                config, images=scenes.images, seed=scenes.seed, workers=scenes.workers, progress=told,
+                filled, images=scenes.images, seed=scenes.seed, workers=scenes.workers, progress=told,
                 scene=load_scene(scenes.scene, config),
             )  # fmt: skip
         yield iter(frames), scenes.images

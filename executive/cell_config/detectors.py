@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import ConfigDict, Field, model_validator
 
 from executive.cell_config.section import Section
-from executive.messages import Reliability
+from executive.reliability import Reliability
 
 
 class DetectorConfig(Section):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,8 +10,10 @@ if TYPE_CHECKING:
     from executive.cell_config import CellConfig
 
 
-def load_cells(names: tuple[str, ...]) -> dict[str, CellConfig]:
+def load_cells(names: tuple[str, ...], overrides: Mapping[str, str] | None = None) -> dict[str, CellConfig]:
     """Return the cells by name; each argument is a path or the name of a shipped cell.
+
+    `overrides` name keys of the cells as `cell.<key>.<key>`.
 
     Raises:
         InputError: There is no such cell, two have one name, or something is wrong with a file.
@@ -20,7 +23,7 @@ def load_cells(names: tuple[str, ...]) -> dict[str, CellConfig]:
 
     cells: dict[str, CellConfig] = {}
     for name in names:
-        config = load_cell(find_cell(name))
+        config = load_cell(find_cell(name), overrides)
         if config.cell in cells:
             raise InputError(f'two of the cell files are called "{config.cell}"; give each a name of its own')
         cells[config.cell] = config

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import click
 
-from executive.cli.options import json_option, scene_option, seed_option
+from executive.cli.options import json_option, overrides_option, scene_option, seed_option
 from executive.cli.output import print_json, stdout_kept_clean
 
 PICTURES = (".png", ".jpg", ".jpeg")
@@ -41,14 +43,19 @@ PICTURES = (".png", ".jpg", ".jpeg")
     help="Confidence from which a detection counts; without it, the detector's own.",
 )  # fmt: skip
 @click.option(
-    "--as-run", is_flag=True,
-    help="Scenes as a run begins with, searched as in a run; else varied as widely as in training.",
+    "--varied", is_flag=True,
+    help="Scenes varied as widely as in training; else scenes as a run begins with, searched as in a run.",
 )  # fmt: skip
 @click.option(
     "--view", type=click.Choice(["table", "full"]), default="table", show_default=True,
-    help="The part of a run's frame to search, with --as-run.",
+    help="The part of a run's frame to search.",
 )  # fmt: skip
 @scene_option
+@overrides_option
+@click.option(
+    "--out", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+    help="File for the measurement that runs read; without it, CELL.measured.json beside the cell file.",
+)  # fmt: skip
 @click.option("--cores", type=click.IntRange(min=1), help="Processor cores the detector may use; else all.")
 @click.option(
     "--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Processes to render."
@@ -67,9 +74,11 @@ def command(
     images: int,
     seed: int,
     threshold: float | None,
-    as_run: bool,
+    varied: bool,
     view: str,
     scene: Path | None,
+    overrides: dict[str, str],
+    out: Path | None,
     cores: int | None,
     workers: int,
     sheet: Path | None,
@@ -77,32 +86,43 @@ def command(
 ) -> None:
     """Measure a detector on fresh scenes of cells, or on labelled images.
 
-    What is measured is a cell's detector with all that its section says, or a model file (--weights), or
-    with neither the detector that ships with this project.
+    The detector is that of a cell with all settings of its section, or a model file (--weights), or with
+    neither the one that ships with this project. The measurement of a cell's detector, as it is declared, is
+    stored: runs take the error rates of the detector from it.
     """
-    _check(cells, detector, dataset, weights, labels, as_run, view, scene, sheet)
+    _check(cells, detector, dataset, weights, labels, varied, view, scene, sheet, overrides, out)
     measured: dict[str, Any] = {}
+    # Under other conditions than those of a run, a measurement says nothing about runs.
+    as_declared = not (weights or varied or scene or threshold) and view == "table"
+    stored = bool(cells) and as_declared and (out is not None or not overrides)
     with stdout_kept_clean():
         from executive.campaign.detector_trial import Scenes, check_subject, measure, subjects
+        from executive.campaign.measuring import store_evaluation
         from executive.cli.cells import find_cell, load_cells
         from executive.cli.progress import bar
         from executive.view.figures.detector import print_figures
         from executive.vision.evaluation.misses import WorstMisses
 
-        worst, scenes = WorstMisses(), Scenes(images, seed, as_run, view, workers, scene)
+        worst, scenes = WorstMisses(), Scenes(images, seed, varied, view, workers, scene)
         named = cells or (() if dataset else ("overhead",))
-        files = dict(zip(map(find_cell, named), load_cells(named).values(), strict=True))
+        files = dict(zip(map(find_cell, named), load_cells(named, overrides).values(), strict=True))
         asked = list(subjects(files, detector, weights, labels))
         for subject in asked:
             check_subject(subject, rendered=dataset is None, scene=scene)
         for subject in asked:
-            where = subject.place(dataset)
+            where, began = subject.place(dataset), time.monotonic()
             evaluation = measure(
                 subject, dataset, scenes, threshold=threshold, cores=cores, worst=worst, progress=bar
             )
             print_figures(where, subject.name, evaluation)
             kind = subject.configs[subject.name].kind
             measured[where] = {"detector": subject.name, "kind": kind, **evaluation.as_dict()}
+            if stored and subject.cell is not None:
+                source = f"--dataset {dataset}" if dataset else f"--images {images} --seed {seed}"
+                repeat = f"executive evaluate --cell {subject.cell.cell} --detector {subject.name} {source}"
+                seconds = time.monotonic() - began
+                path = store_evaluation(subject, evaluation, out, command=repeat, seconds=seconds)
+                click.echo(f"stored in {path}", err=True)
         if sheet is not None:
             from executive.vision.evaluation.sheet import write_sheet
 
@@ -110,12 +130,13 @@ def command(
             click.echo(f"the {len(worst.kept)} worst in {sheet}", err=True)
     if as_json:
         named_files = {"scene": scene and str(scene), "weights": weights and str(weights)}
-        print_json({"seed": seed, "as_run": as_run, **named_files, "measured": measured})
+        print_json({"seed": seed, "varied": varied, **named_files, "measured": measured})
 
 
 def _check(
     cells: tuple[str, ...], detector: str | None, dataset: Path | None, weights: Path | None,
-    labels: Path | None, as_run: bool, view: str, scene: Path | None, sheet: Path | None,
+    labels: Path | None, varied: bool, view: str, scene: Path | None, sheet: Path | None,
+    overrides: Mapping[str, str], out: Path | None,
 ) -> None:  # fmt: skip
     """Refuse options that contradict each other, before anything is rendered."""
     if detector is not None and weights is not None:
@@ -124,11 +145,16 @@ def _check(
         raise click.UsageError(f"--detector {detector} is of which cell? Name it with --cell")
     if labels is not None and weights is None:
         raise click.UsageError("--labels are those of a model file; name it with --weights")
-    if dataset is not None and as_run:
-        raise click.UsageError("--as-run renders scenes, and --dataset brings images; give one of them")
-    if view != "table" and not as_run:
-        raise click.UsageError(f"--view {view} is a part of a run's frame; give --as-run with it")
-    if scene is not None and not as_run:
-        raise click.UsageError(f"--scene {scene} changes scenes as a run begins with; give --as-run with it")
+    if dataset is not None and (varied or scene is not None):
+        option = "--varied" if varied else "--scene"
+        raise click.UsageError(f"{option} renders scenes, and --dataset brings images; give one of them")
+    if varied and scene is not None:
+        raise click.UsageError(f"--scene {scene} changes scenes of the cell; --varied draws them itself")
+    if varied and view != "table":
+        raise click.UsageError(f"--view {view} is a part of a run's frame; leave out --varied")
+    if out is not None and len(cells) != 1:
+        raise click.UsageError(f"--out {out} is the file for one cell; name the cell with --cell")
+    if unknown := [key for key in overrides if not key.startswith("cell.")]:
+        raise click.UsageError(f"--set {unknown[0]} is no key of a cell; write cell.KEY.KEY=VALUE")
     if sheet is not None and sheet.suffix.lower() not in PICTURES:
         raise click.UsageError(f'"{sheet}" is no picture; its name must end in {", ".join(PICTURES)}')

@@ -6,9 +6,31 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 
 from executive.ledger.item import NOTHING, ON_TABLE, UNSURE, Record, State
+from executive.messages import Detections
 
 FINAL_STATES = (State.PLACED, State.REJECTED, State.SKIPPED, State.LOST)
 """Final states of an object; each item that was no phantom has one of them."""
+
+
+class Remarks:
+    """Circumstances of looks that a run reports at its end.
+
+    Attributes:
+        unknown: Largest number of boxes in one look for each label that the cell does not know.
+        doubts: Reasons why error rates of detectors were assumed and not measured, in the order of the looks.
+    """
+
+    def __init__(self) -> None:
+        self.unknown: Counter[str] = Counter()
+        self.doubts: list[str] = []
+
+    def add(self, look: Detections) -> None:
+        """Take a look into account."""
+        self.unknown |= Counter(detection.label for detection in look.unknown)
+        doubt = look.reliability.doubt
+        # The figures of each frame differ a little; the first frame stands for all of them.
+        if doubt and not any(known.startswith(doubt.partition(":")[0]) for known in self.doubts):
+            self.doubts.append(doubt)
 
 
 def find_final_state(

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from executive.cell_config import TableConfig
 from executive.geometry import Array
+from executive.ledger.independence import repeat, viewpoint_of
 from executive.messages import Detections
 
 PITCH = 0.02
@@ -27,6 +28,9 @@ BORDER = 12.0
 """Width of the image's border in which a point does not count as shown [pixel]."""
 NEAR = 0.03
 """How far beside the workspace the middle of what lies at its edge may be [m]."""
+OCCUPIED = 0.1
+"""Prior probability that an object lies at a given place of the workspace: three objects of 6 cm x 6 cm on the
+22 cm x 44 cm of the shipped cells."""
 HEIGHT = 0.025
 """Height of the points over the table [m]: the middle of a usual object."""
 
@@ -34,7 +38,8 @@ HEIGHT = 0.025
 class Coverage:
     """The chance, at every point of the table, that an object lies there which no look has shown.
 
-    It starts at one in the workspace, and low beside it. A look that searches a point multiplies it by the
+    It starts at one in the workspace, where it is the chance for an object that is there, and low beside it,
+    where it includes the chance that there is an object. A look that searches a point multiplies it by the
     share of objects that its detector misses; whatever may have brought an object there sets it back to
     one. What a look does not show, because the arm hides it, it lies outside the image or has been
     disturbed since, stays as it was.
@@ -53,6 +58,7 @@ class Coverage:
         self._overlooked = np.where(self._within(self._points, NEAR), 1.0, ASTRAY)
         self._after_a_change = np.where(self._within(self._points, NEAR), 1.0, STRAYED)
         self._changed = np.zeros(len(self._points), dtype=int)
+        self._searched_from: dict[str, NDArray[np.bool_]] = {}
         self._full_looks = 0
         self._shown = np.full(len(self._points), -RECENT)
 
@@ -65,8 +71,12 @@ class Coverage:
         for place in unsure:
             searched &= np.hypot(*(self._points - place)[:, :2].T) > PITCH
         current = self._changed <= detections.frame.epoch
-        self._overlooked[current & searched] *= detections.reliability.misses
+        now = searched & current
+        misses, repeated = detections.reliability.misses, detections.reliability.repeated
+        again = self._searched_from.setdefault(viewpoint_of(detections), np.zeros(len(self._points), bool))
+        self._overlooked[now] *= np.where(again[now], repeat(misses, repeated), misses)
         self._overlooked = self._overlooked.clip(LEAST)
+        again |= now
         if detections.view == "full":
             self._full_looks += 1
             # What only just shows may not show again: nothing would ever be said about it.
@@ -76,6 +86,8 @@ class Coverage:
         """Take account of change `epoch`, which may have put an object within `radius` [m] of `centre`."""
         near = np.hypot(*(self._points - centre)[:, :2].T) <= radius
         self._overlooked[near], self._changed[near] = self._after_a_change[near], epoch
+        for searched in self._searched_from.values():
+            searched[near] = False
 
     def overlooked(self, position: Array) -> float:
         """Return the chance, 0 to 1, that an object at a place `(3,)` [m] has not been seen yet."""
@@ -96,7 +108,8 @@ class Coverage:
         """
         if not self._full_looks:
             return 1.0
-        return float(self._overlooked[self._in_sight].max())
+        chances = np.where(self._workspace, OCCUPIED, 1.0) * self._overlooked
+        return float(chances[self._in_sight].max())
 
     def in_sight(self, position: Array) -> bool:
         """Tell whether a place `(3,)` [m] is one that `worst` counts, like all the points around it.

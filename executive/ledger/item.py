@@ -9,9 +9,10 @@ from enum import Enum
 
 import numpy as np
 
-from executive.cell_config import LedgerConfig
 from executive.geometry import Array
-from executive.messages import Detection, Frame, Reliability, Target
+from executive.ledger.independence import repeat
+from executive.messages import Detection, Frame, Target
+from executive.reliability import Reliability
 
 LIKELY = 0.9
 """Probability of its existence from which an item is worth a grasp, and may be one missed elsewhere."""
@@ -29,18 +30,6 @@ CERTAIN = 100.0
 """Log odds beyond which more makes no difference."""
 CONFIRMED = math.log(1e4)
 """Log odds of existence from which an item is known to exist: two looks of a good detector agree."""
-CREDIBLE, CONTRADICTED = 0.01, 0.001
-"""Chance of as much disagreement about its class, above which an item is sorted, and under which given up."""
-SHARPER = 2 / 3
-"""Factor on the standard error of its position that is allowed for another attempt at an item."""
-PRESENT = 0.1
-"""Chance of having been overlooked by the looks that missed it, down to which it is taken to be there."""
-ENOUGH = 40
-"""Looks after which an item whose class they contradict each other about is given up."""
-MAX_CONTRADICTIONS = 3
-"""Looks that contradict its class after which an item is given up."""
-GLIMPSES = 20
-"""Looks with a detector unsure of it, since one was sure, after which an item not known well is given up."""
 
 
 class State(Enum):
@@ -91,6 +80,9 @@ class Record:
         stamp: When that was [s].
         state: What became of it.
         looks: In how many looks it was seen.
+        bias: Standard deviation of the systematic error of its position, along each axis [m].
+        answers: Last class by viewpoint (`executive.ledger.independence`), since it may last have been moved.
+        repeats: Number of looks that repeated the answer of an earlier look from the same viewpoint.
         moved: True once it has been seen again after something may have moved it.
         exists: True once it is known to exist: enough looks agree, or the tool has touched it.
         touched: Class at whose height the tool has touched it last, or "".
@@ -122,6 +114,9 @@ class Record:
     state: State = State.SEEN
     looks: int = 0
     expected: float = 0.0
+    bias: float = 0.0
+    answers: dict[str, str] = field(default_factory=dict)
+    repeats: int = 0
     moved: bool = False
     exists: bool = False
     touched: str = ""
@@ -193,32 +188,24 @@ class Record:
             "why": self.why,
         }
 
-    def is_sure(self, config: LedgerConfig) -> bool:
-        """Return True if enough looks agree that it exists, of which class it is, and where.
-
-        After a failed grasp they must agree better on where.
-        """
-        return (
-            self.probability >= LIKELY
-            and self.contradictions <= self.looks
-            and self.overlooked >= PRESENT
-            and self.misjudged <= config.misjudged
-            and self.consistency >= CREDIBLE
-            and self.spread <= config.aim * (SHARPER if self.attempts else 1.0)
-        )
-
-    def vote(self, label: str, by: Reliability, *, alone: bool = True) -> None:
+    def vote(self, label: str, by: Reliability, viewpoint: str = "", *, alone: bool = True) -> None:
         """Count one detection as `label`: that much likelier than any other class, by a detector's errors.
 
         That it was seen proves that it exists only if it is `alone`: nothing else may have been seen there.
+        The same answer from the same viewpoint counts with the independent share of the errors only.
         """
-        self.votes[label] += math.log((1.0 - by.confused) / by.confused)
+        repeated = by.repeated if self.answers.get(viewpoint) == label else 0.0
+        self.repeats += repeated > 0.0
+        self.answers[viewpoint] = label
+        self.bias = by.bias
+        self.votes[label] += math.log(repeat(1.0 - by.confused, repeated) / repeat(by.confused, repeated))
         self.tally[label] += 1
         self.expected = max(self.expected, by.confused)
         if not alone:
             self.existence = min(self.existence, DOUBTFUL) if not self.looks else self.existence
         elif self.looks or self.glimpses:
-            self.existence += math.log((1.0 - by.misses) / (by.invented * NEARBY))
+            false_detection = min(by.invented * NEARBY, 1.0)
+            self.existence += math.log(repeat(1.0 - by.misses, repeated) / repeat(false_detection, repeated))
         self.looks, self.glimpses = self.looks + 1, 0
         self.exists = self.exists or self.existence >= CONFIRMED
 
@@ -235,6 +222,8 @@ class Record:
         else:
             self.moved = math.isfinite(self.spread)
             self.position, self.spread = position, spread
+            self.answers.clear()
+            self.repeats = 0
         if not self.moved:
             self.first = self.position
         self.overlooked = 1.0
@@ -246,32 +235,12 @@ class Record:
         self.epoch, self.frame, self.stamp = frame.epoch, frame.id, frame.stamp
         self.confidence = detection.confidence
 
-    def review(self, *, known: bool) -> None:
-        """Give it up if looks contradict each other about its class, or are unsure of it time and again.
-
-        `known`: it is sure, and nothing has disturbed it.
-        """
-        if self.state is State.SEEN and self.looks >= ENOUGH and self.consistency < CONTRADICTED:
-            votes = ", ".join(f"{count} {label}" for label, count in self.tally.most_common())
-            self.state, self.why = State.REJECTED, f"its class is in doubt: {votes}"
-        if known:
-            self.glimpses = 0
-        elif self.state is State.SEEN and (self.glimpses >= GLIMPSES or self.is_contradicted):
-            self.state = State.REJECTED
-            self.why = f"{UNSURE}: {self.contradiction}" if self.contradiction else UNSURE
-            self.existence = max(self.existence, 0.0)
-
     def glimpsed(self, contradiction: str) -> None:
         """Count a look that was unsure of it, because of a contradiction or for a low confidence ("")."""
         self.glimpses += 1
         if contradiction:
             self.contradictions += 1
             self.contradiction = contradiction
-
-    @property
-    def is_contradicted(self) -> bool:
-        """True if enough looks contradict its class, and more than have seen it without a contradiction."""
-        return self.contradictions >= MAX_CONTRADICTIONS and self.contradictions > self.looks
 
     def miss(self, by: Reliability) -> None:
         """Count one look that searched its place without seeing it."""

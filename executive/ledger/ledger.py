@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,8 +13,9 @@ from executive.cell_config import LedgerConfig, TableConfig
 from executive.errors import Fault
 from executive.events import Emit
 from executive.geometry import Array
-from executive.ledger.accounts import count_states, find_final_state
+from executive.ledger.accounts import Remarks, count_states, find_final_state
 from executive.ledger.bins import Bins
+from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage
 from executive.ledger.freshness import Freshness
 from executive.ledger.item import LYING, OPEN, Record, State
@@ -37,8 +37,10 @@ class ItemLedger:
         bins: Mapping[str, Bin],
         routes: Routes,
         emit: Emit,
+        told_by_touch: Collection[str] = (),
     ) -> None:
         self._config = config
+        self._certainty = Certainty(config, told_by_touch)
         self._routes = routes
         self._emit = emit
         self._records: dict[Item, Record] = {}
@@ -47,12 +49,17 @@ class ItemLedger:
         self._coverage = Coverage(table)
         self._looks = Looks(config, self._coverage, self._freshness)
         self._frame = 0
-        self._unknown: Counter[str] = Counter()
+        self._remarks = Remarks()
 
     @property
     def unknown(self) -> Mapping[str, int]:
         """Largest number of boxes in one look for each label that the cell does not know."""
-        return dict(self._unknown)
+        return self._remarks.unknown
+
+    @property
+    def doubts(self) -> Sequence[str]:
+        """Reasons why error rates of detectors were assumed and not measured, in the order of the looks."""
+        return self._remarks.doubts
 
     @property
     def records(self) -> Sequence[Record]:
@@ -78,7 +85,7 @@ class ItemLedger:
         second look.
         """
         frame = detections.frame
-        self._unknown |= Counter(detection.label for detection in detections.unknown)
+        self._remarks.add(detections)
         if frame.id != self._frame:
             self._frame = frame.id
             self._take(detections, positions, glimpses)
@@ -103,11 +110,8 @@ class ItemLedger:
         return record.state in OPEN and not record.why
 
     def is_sure(self, item: Item) -> bool:
-        """Tell whether enough looks agree that the item exists, of which class it is, and where.
-
-        After a failed grasp they must agree better on where.
-        """
-        return self._record(item).is_sure(self._config)
+        """Tell whether there is enough evidence that the item exists, of which class it is, and where."""
+        return self._certainty.is_sure(self._record(item))
 
     def in_doubt(self) -> Sequence[Item]:
         """Return the open items in the workspace that a further look may make sure, or show to be gone."""
@@ -237,7 +241,7 @@ class ItemLedger:
                 record.why = "it fell there"
                 self.placed(record.item, bin)
             final = find_final_state(
-                record, gone=self._is_gone(record), sure=record.is_sure(self._config),
+                record, gone=self._is_gone(record), sure=self._certainty.is_sure(record),
                 routed=record.label in self._routes, completed=completed,
             )  # fmt: skip
             if final is not None:
@@ -253,10 +257,11 @@ class ItemLedger:
         return [record.row for record in self._records.values()]
 
     def _take(self, detections: Detections, positions: Sequence[Array], glimpses: Sequence[Glimpse]) -> None:
-        frame, jitter = detections.frame, detections.reliability.jitter
+        frame, by = detections.frame, detections.reliability
 
         def bin_at(position: Array) -> str | None:
-            return self._in_bins.at(position, spread_of(frame, position, jitter))
+            error = math.hypot(spread_of(frame, position, by.jitter), by.bias)
+            return self._in_bins.at(position, error)
 
         inside = [bin_at(position) for position in positions]
         outside = [number for number, bin in enumerate(inside) if bin is None]
@@ -264,7 +269,7 @@ class ItemLedger:
         places = [positions[number] for number in outside]
         unsure = [glimpse for glimpse in glimpses if bin_at(glimpse.position) is None]
         for record in self._looks.take(self._records, look, places, unsure):
-            record.review(known=self._is_known(record))
+            self._certainty.review(record, settled=self._looks.settled(record))
             self._emit("item", **record.row)
         if detections.view == "full":
             for record, bin in self._in_bins.fallen(detections, positions, inside):
@@ -277,7 +282,7 @@ class ItemLedger:
         return record.state is State.SEEN and likely and not self._is_gone(record)
 
     def _is_known(self, record: Record) -> bool:
-        return record.is_sure(self._config) and self._looks.settled(record)
+        return self._certainty.is_sure(record) and self._looks.settled(record)
 
     def _is_gone(self, record: Record) -> bool:
         return record.overlooked <= self._config.overlooked

@@ -12,6 +12,7 @@ from executive.cell_config import LedgerConfig
 from executive.geometry import Array
 from executive.ledger.coverage import Coverage
 from executive.ledger.freshness import Freshness
+from executive.ledger.independence import viewpoint_of
 from executive.ledger.item import LIKELY, LYING, NEARBY, NOTHING, UNSURE, Record, State
 from executive.messages import Detections, Frame, Glimpse, Item
 
@@ -61,7 +62,7 @@ class Looks:
             positions: Where `detections.found` are `(3,)` [m], one to one.
             glimpses: What the detector is not sure of.
         """
-        frame, by = detections.frame, detections.reliability
+        frame, by, viewpoint = detections.frame, detections.reliability, viewpoint_of(detections)
         current = [i for i, p in enumerate(positions) if self._freshness.holds(p, frame.epoch)]
         found = [detections.found[i] for i in current]
         places = [positions[i] for i in current]
@@ -83,7 +84,9 @@ class Looks:
                 record = self._enter(records, detection.label, place, odds)
             if record.why.startswith(UNSURE):
                 record.state, record.why = State.SEEN, ""
-            record.vote(detection.label, by, alone=not self._may_be_of(absent, place, spreads[index]))
+            record.vote(
+                detection.label, by, viewpoint, alone=not self._may_be_of(absent, place, spreads[index])
+            )
             record.locate(place, spreads[index], settled=self.settled(record))
             record.shown(frame, detection)
             seen.append(record)

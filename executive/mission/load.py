@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,14 +12,17 @@ from executive.errors import InputError
 from executive.mission.check.case import Case
 from executive.mission.check.checks import check
 from executive.mission.expand.expand import expand
-from executive.mission.findings import Finding, MissionError, in_file_order
+from executive.mission.findings import Finding, MissionError, in_file_order, warning
 from executive.mission.flow.endings import Ending, endings
 from executive.mission.model.mission import Mission
 from executive.mission.model.nodes import Node, UnknownNode
 from executive.mission.model.paths import with_paths
+from executive.mission.parse.cell_file import CellFile
 from executive.mission.parse.read_mission import GivenCell, MissionFiles, read_mission
-from executive.mission.text.files import find_mission
+from executive.mission.parse.validate import mark_of
+from executive.mission.text.files import find_mission, shipped_folder
 from executive.skill import Skill
+from executive.vision.envelope.rated_detectors import find_unmeasured
 from executive.workcell import CellKind
 
 Kinds = Callable[[str], CellKind]
@@ -95,6 +98,7 @@ def load_mission(
         base = files.cell_path.parent
         wrong = [files.cell.finding(keys, "robot", text) for keys, text in kind.check(config, base)]
         findings += wrong
+        findings += _unmeasured(files.cell, base)
         labels = dict(kind.labels(config, base))
         least = None if wrong else kind.least_times(config)
     expanded = expand(mission, skills)
@@ -109,6 +113,15 @@ def load_mission(
         mission, tree, config, files.source.text, file, files.cell_path, files.libraries,
         endings(case.flow), ordered, dict(overrides or {}),
     )  # fmt: skip
+
+
+def _unmeasured(cell: CellFile, base: Path) -> Iterator[Finding]:
+    """Yield a warning for each detector of a cell without a measurement that applies to it."""
+    assert cell.config is not None
+    folders = (base, shipped_folder() / "cells")
+    for keys, text in find_unmeasured(cell.config, base, folders):
+        mark = mark_of(cell.root, keys, of_key=True) if cell.root else cell.source.mark()
+        yield warning(mark, "not-measured", text)
 
 
 def _kind(files: MissionFiles, kinds: Kinds | None, findings: list[Finding]) -> CellKind | None:

@@ -70,6 +70,7 @@ def result_of(
         "seed": seed,
         "items": {fate: int(items.get(fate, 0)) for fate in ITEM_COUNTS},
         "unknown": dict(items.get("unknown", {})),
+        "doubts": list(items.get("doubts", ())),
         "empty": outcome.empty,
         "audit": None if audit is None else audit_section(items, audit, outcome.empty),
         "planning": planning_of(noted),

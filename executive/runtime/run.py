@@ -153,9 +153,10 @@ class Run:
         return outcome
 
     def items(self) -> dict[str, Any]:
-        """Return the ledger's balance, counts by unknown label as `unknown`, and a row per item as `rows`."""
+        """Return the ledger's balance, its `unknown` and `doubts`, and a row per item as `rows`."""
         accounts = self.workcell.accounts
-        return {**accounts.balance(), "unknown": accounts.unknown, "rows": accounts.rows()}
+        told = {"unknown": accounts.unknown, "doubts": accounts.doubts, "rows": accounts.rows()}
+        return {**accounts.balance(), **told}
 
     def audit(self) -> Mapping[str, int] | None:
         """Return what really became of the objects; call it only after `execute`."""

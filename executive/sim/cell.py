@@ -11,8 +11,9 @@ from executive.cell_config import CellConfig
 from executive.clock import STEP
 from executive.errors import InputError
 from executive.events import Emit
-from executive.layout import bins_of, cell_without_hardware
+from executive.layout import bins_of, cell_without_hardware, classes_told_by_touch
 from executive.ledger.ledger import ItemLedger
+from executive.mission.text.files import shipped_folder
 from executive.motion.planner import Planner
 from executive.sim.arm import SimArm
 from executive.sim.audit import audit
@@ -30,8 +31,9 @@ from executive.sim.scenery import SimScenery
 from executive.sim.spawn import PartSeeds, find_lack_of_room, first_world
 from executive.sim.tool import SuctionTool
 from executive.sim.view import ArmShadow
-from executive.vision.detectors.registry import build_detectors, known_labels, wrong_detectors
+from executive.vision.detectors.registry import known_labels, wrong_detectors
 from executive.vision.detectors.setting import ClosableDetector
+from executive.vision.envelope.rated_detectors import build_rated_detectors
 from executive.vision.localization.build import build_localizer
 from executive.workcell import Accounts, CellOptions, KeyPath
 
@@ -61,7 +63,7 @@ class SimCell:
         emit: Emit,
         options: CellOptions,
         camera: Callable[..., SimCamera] = SimCamera,
-        detectors: Callable[..., Mapping[str, ClosableDetector]] = build_detectors,
+        detectors: Callable[..., Mapping[str, ClosableDetector]] = build_rated_detectors,
     ) -> None:
         for _, sentence in _lacking_depth(config):
             raise InputError(f"cell {config.cell}: {sentence}")
@@ -78,7 +80,9 @@ class SimCell:
         self._tool = SuctionTool(self._world, config.tool)
         under_way = None if options.past is None else self._rebuilt(options.past.log)
         self._arm = SimArm(self._world, planner, config, clock, lambda: self._tool.held_body, emit, under_way)
-        self._ledger = ItemLedger(config.ledger, config.table, self._bins, routes, emit)
+        self._ledger = ItemLedger(
+            config.ledger, config.table, self._bins, routes, emit, classes_told_by_touch(config)
+        )
         name, camera_config = next(iter(config.cameras.items()))
         self._camera = camera(
             self._world,
@@ -97,8 +101,9 @@ class SimCell:
 
         localizer = build_localizer(config.localization, classes, self._world.cast_ray)
         # Last of all: some of them start processes, which nobody would end if something after them failed.
+        folders = (options.base, shipped_folder() / "cells")
         self._detectors = detectors(
-            config.detectors, camera=camera_config, clock=clock, base=options.base, seed=seeds.detectors
+            config, clock=clock, base=options.base, seed=seeds.detectors, folders=folders
         )
         self._cell = replace(
             cell_without_hardware(config, self._routes, self._ledger, emit),

@@ -193,6 +193,7 @@ def as_labelled_frame(sample: Sample, camera: str, file: str) -> LabelledImage:
         },
         area=(left, top, right, bottom),
         depth=sample.depth,
+        second=sample.second,
     )
 
 

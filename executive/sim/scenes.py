@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell_config import CellConfig, NoiseConfig
+from executive.errors import InputError
 from executive.geometry import Array, Pose
 from executive.messages import Box
 from executive.sim.arrangements import UNKNOWN, Item, arrange, hanging, random_part, reach
@@ -36,6 +37,8 @@ UNNOTICED = 0.15
 """Share under which an object counts as hidden; in between it is neither labelled nor background."""
 IGNORED_SHARE = 1 / 6
 """Share of the objects that may lie between the two, but always one: more would confuse training."""
+MAX_ATTEMPTS = 50
+"""Number of random scenes after which a lack of room for the objects is an error."""
 DECLARED_SHARE = 0.2
 """Share of the scenes with table, lamp, camera and noise as in the cell file."""
 VISIBLE_CONTRAST = 5
@@ -60,6 +63,7 @@ class Sample:
         X_WC: Where the camera was, likewise.
         frame: The camera's whole image `(H, W, 3)`, of a scene as a run begins with.
         depth: What its depth sensor gives `(H, W)` [m], likewise; None without one.
+        second: Whole image `(H, W, 3)` of the same scene with other noise, likewise.
     """
 
     image: Image
@@ -74,6 +78,7 @@ class Sample:
     X_WC: Pose
     frame: Image | None = None
     depth: Array | None = None
+    second: Image | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,14 +122,24 @@ class SceneRenderer:
         self._matrix, _ = calibrated(self._camera)
 
     def sample(self, seed: int) -> Sample:
-        """Return the sample of `seed`: the first of its random scenes with few half-hidden objects."""
+        """Return the sample of `seed`: the first of its random scenes with few half-hidden objects.
+
+        Raises:
+            InputError: The workspace has no room for the objects.
+        """
         attempt = 0
         while True:
             rng = np.random.default_rng([seed, attempt])
-            sample = self._draw(rng) if self._randomized else self._draw_as_run(rng)
+            attempt += 1
+            try:
+                sample = self._draw(rng) if self._randomized else self._draw_as_run(rng)
+            except InputError:
+                # So many objects fit in some scenes and not in others.
+                if attempt == MAX_ATTEMPTS:
+                    raise
+                continue
             if sample is not None:
                 return sample
-            attempt += 1
 
     def close(self) -> None:
         """Give the world back."""
@@ -176,6 +191,7 @@ class SceneRenderer:
                 world.remove_object(body)
         frame = add_noise(shot.image, camera.noise, rng)
         depth = None if camera.depth is None else sense(shot.depth, camera.depth, rng)
+        second = add_noise(shot.image, camera.noise, rng)
         left, top, right, bottom = part = camera.table_view
         clean, seen = shot.image[top:bottom, left:right], shot.bodies[top:bottom, left:right]
         # By the declared noise: more noise in a scene does not excuse a detector from finding an object.
@@ -185,7 +201,8 @@ class SceneRenderer:
             return None
         # A run takes the camera for what the cell file declares.
         sample = replace(sample, matrix=calibrated(self._declared)[0], X_WC=declared)
-        return replace(sample, image=_resized(frame[top:bottom, left:right]), frame=frame, depth=depth)
+        image = _resized(frame[top:bottom, left:right])
+        return replace(sample, image=image, frame=frame, depth=depth, second=second)
 
     def _label(self, view: View, bodies: Sequence[int], items: Sequence[Item]) -> Sample | None:
         """Label a render, or return None if too many objects are half hidden."""

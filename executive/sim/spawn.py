@@ -126,6 +126,15 @@ def find_lack_of_room(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     yield ("table", "objects"), problem
 
 
+def count_that_fits(config: CellConfig, most: int) -> int:
+    """Return the largest number of objects, up to `most`, for which the workspace has room."""
+    for count in range(most, 0, -1):
+        table = config.table.model_copy(update={"objects": (0, count)})
+        if not any(find_lack_of_room(config.model_copy(update={"table": table}))):
+            return count
+    return 0
+
+
 def _places(config: CellConfig, radii: Sequence[float], rng: np.random.Generator) -> list[Array]:
     """Return places `(2,)` [m] for outlines of these radii [m] that keep the gap.
 

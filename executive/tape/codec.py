@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from executive.arm import Motion
 from executive.geometry import Array, Pose
-from executive.messages import Answer, Detection, Frame, Reliability
+from executive.messages import Answer, Detection, Frame
+from executive.reliability import Reliability
 
 
 class Codec(NamedTuple):
@@ -90,7 +91,7 @@ def write_answer(answer: Answer) -> dict[str, Any]:
             [one.label, float(one.confidence), [float(x) for x in one.box], float(one.rival)]
             for one in answer.found
         ],
-        "reliability": [sure.threshold, sure.misses, sure.confused, sure.invented, sure.jitter],
+        "reliability": list(astuple(sure)),
     }
 
 

@@ -12,7 +12,8 @@ from executive.cell import Clock, Request
 from executive.cell_config import CameraConfig, DetectorConfig, TableConfig
 from executive.errors import Unavailable
 from executive.geometry import Pose
-from executive.messages import Answer, Box, Detection, Frame, Reliability
+from executive.messages import Answer, Box, Detection, Frame
+from executive.reliability import Reliability
 from executive.testing.fake_world import FakeWorld
 from executive.vision.camera_model import calibrated
 

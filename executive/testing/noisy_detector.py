@@ -36,7 +36,12 @@ class NoisyDetector:
     gives a share `confused` a wrong class with low confidence, moves every box by a normal deviate of
     `jitter` along each axis, and adds `invented` boxes in the mean: the very figures of its section of the
     cell file, which say how far its looks can be trusted.
+
+    Attributes:
+        is_fake: True: its error rates are exact as stated, so that they need not be measured.
     """
+
+    is_fake = True
 
     def __init__(self, config: DetectorConfig, options: NoisyOptions, setting: Setting) -> None:
         self._config = config

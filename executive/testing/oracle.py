@@ -6,7 +6,7 @@ took for a duck. The truth goes with the frame, as an image does, so nothing kno
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from executive.cell import Clock
-from executive.cell_config import CameraConfig, DetectorConfig
+from executive.cell_config import CameraConfig, CellConfig, DetectorConfig
 from executive.geometry import Array
 from executive.messages import Detection, Frame
 from executive.sim.arrangements import UNKNOWN
@@ -154,6 +154,11 @@ def oracle_cell(*, jitter: float = 0.7, rendered: bool = False) -> Callable[...,
     return partial(SimCell, camera=camera, detectors=partial(_oracles, jitter=jitter))
 
 
-def _oracles(configs: Mapping[str, DetectorConfig], *, base: Path, **settings: Any) -> dict[str, Oracle]:
-    del base
-    return {name: Oracle(name, config, **settings) for name, config in configs.items()}
+def _oracles(
+    config: CellConfig, *, clock: Clock, base: Path, seed: int, folders: Sequence[Path], jitter: float
+) -> dict[str, Oracle]:
+    del base, folders
+    camera = next(iter(config.cameras.values()))
+    return {
+        name: Oracle(name, section, camera, clock, jitter, seed) for name, section in config.detectors.items()
+    }

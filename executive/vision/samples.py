@@ -36,6 +36,7 @@ class LabelledImage:
         truth: What the renderer knows beyond that: `camera`, `part`, `matrix`, `X_WC`, `positions`, …
         area: Part of the image [pixel] that is searched and labelled; None: all of it.
         depth: `(H, W)` [m], as in a `Frame`; None without a depth sensor.
+        second: Another image of the same scene from the same pose; None without one.
     """
 
     file: str
@@ -46,6 +47,7 @@ class LabelledImage:
     truth: Mapping[str, Any] = field(default_factory=dict)
     area: Box | None = None
     depth: Array | None = None
+    second: NDArray[np.uint8] | None = None
 
 
 def read_samples(folder: Path) -> Iterator[LabelledImage]:

@@ -9,7 +9,8 @@ import numpy as np
 from executive.cell_config import LedgerConfig, TableConfig
 from executive.geometry import looking_down
 from executive.ledger.ledger import ItemLedger
-from executive.messages import Bin, Detection, Detections, Frame, Glimpse, Reliability, Target
+from executive.messages import Bin, Detection, Detections, Frame, Glimpse, Target
+from executive.reliability import Reliability
 
 EYE = Reliability(threshold=0.5, misses=0.03, confused=0.004, invented=0.02, jitter=1.0)
 

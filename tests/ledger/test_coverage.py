@@ -10,7 +10,8 @@ from ledger_bench import area_of, take_frame
 
 from executive.cell_config import TableConfig
 from executive.ledger.coverage import ASTRAY, LEAST, STRAYED, Coverage
-from executive.messages import Detections, Reliability
+from executive.messages import Detections
+from executive.reliability import Reliability
 
 TABLE = TableConfig()
 MIDDLE, CORNER = np.array([0.53, 0.0, 0.025]), np.array([0.43, 0.21, 0.025])

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from executive.ledger.item import Record
 from executive.ledger.looks import reach
-from executive.messages import Reliability
+from executive.reliability import Reliability
 
 GOOD = Reliability(threshold=0.5, misses=0.02, confused=0.0025, invented=0.02, jitter=0.7)
 BAD = Reliability(threshold=0.5, misses=0.2, confused=0.1, invented=0.5, jitter=5.0)

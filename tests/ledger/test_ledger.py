@@ -7,7 +7,8 @@ import pytest
 from ledger_bench import Bench, Thing
 
 from executive.errors import Fault
-from executive.messages import Reliability, Target
+from executive.messages import Target
+from executive.reliability import Reliability
 
 CUBE: Thing = ("cube", 0.5, 0.0)
 FAR: Thing = ("cube", 0.6, 0.2)

@@ -16,8 +16,9 @@ from hypothesis import strategies as st
 
 from executive.events import Exact
 from executive.geometry import Pose
-from executive.messages import Detection, Frame, Reliability
+from executive.messages import Detection, Frame
 from executive.record.plain import LONGEST, plain
+from executive.reliability import Reliability
 
 
 class Corner(NamedTuple):

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from executive.geometry import Pose, about_z
-from executive.messages import Answer, Detection, Frame, Reliability
+from executive.messages import Answer, Detection, Frame
+from executive.reliability import Reliability
 from executive.tape.codec import ANSWER, ARRAY, BOX, FRAME, MOTION, POSE, Codec, PlayedMotion
 
 finite = st.floats(allow_nan=False, allow_infinity=False)

@@ -9,7 +9,8 @@ from types import SimpleNamespace
 import pytest
 
 from executive.errors import DeadlinePassed, Unavailable
-from executive.messages import Answer, Detection, Reliability
+from executive.messages import Answer, Detection
+from executive.reliability import Reliability
 from executive.vision.detectors.requests import Pending
 
 FOUND = [Detection("cube", 0.9, (0.0, 0.0, 1.0, 1.0))]

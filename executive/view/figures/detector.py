@@ -37,8 +37,8 @@ def _parts(detector: str, one: Evaluation) -> Iterator[RenderableType]:
         yield _confusions(one)
     yield _spreads(one)
     if one.reliability is not None:
-        yield "  for its section of the cell file, from objects in full view:"
-        yield "\n".join(f"    {line}" for line in one.reliability.yaml().splitlines())
+        yield "  error rates for the ledger (of shares and counts the upper 95 % bound):"
+        yield "  " + ", ".join(f"{name} {value:g}" for name, value in one.reliability.rates)
         yield ""
 
 

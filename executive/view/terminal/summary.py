@@ -65,6 +65,7 @@ def summary(result: Mapping[str, Any], items: ItemTable, repeat: str, report: st
     fates = [f"  {fate}: {', '.join(names)}" for fate, names in sorted(items.by_fate().items())]
     if unknown := describe_unknown(result.get("unknown", {})):
         fates.append(f"  {unknown}")
+    fates += [f"  assumed error rates: {doubt}" for doubt in result.get("doubts", ())]
     story = result.get("story")
     warning = _wrapped(disagreement(result), "", "  ", most=3)
     if story is not None:

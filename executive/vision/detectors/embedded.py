@@ -42,3 +42,9 @@ class EmbeddedDetector(RfdetrDetector):
         """Return the classes that the shipped weights were trained on."""
         del config, base
         return read_labels(LABELS)
+
+    @staticmethod
+    def weights(config: DetectorConfig, base: Path) -> Path | None:
+        """Return the path of the shipped model."""
+        del config, base
+        return MODEL

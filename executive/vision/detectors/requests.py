@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from executive.cell import Clock
 from executive.errors import DeadlinePassed
-from executive.messages import Answer, Detection, Reliability
+from executive.messages import Answer, Detection
+from executive.reliability import Reliability
 
 SLICE = 0.05
 """Longest time the caller is held at once while an answer is overdue [s]; a second Ctrl-C ends it."""

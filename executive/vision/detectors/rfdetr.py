@@ -111,6 +111,14 @@ class RfdetrDetector:
         except InputError:
             return None
 
+    @staticmethod
+    def weights(config: DetectorConfig, base: Path) -> Path | None:
+        """Return the path of the model file, None if the options do not name it."""
+        try:
+            return base / read_options(RfdetrOptions, config).model_path
+        except InputError:
+            return None
+
     def request(self, frame: Frame, view: str) -> Pending:
         """Start to search `frame`: the `table` part or the `full` image."""
         height, width = frame.image.shape[:2]

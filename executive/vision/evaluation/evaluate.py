@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
 
 from executive.cell import Localizer
+from executive.cell_config import TableConfig
 from executive.errors import Unavailable
+from executive.vision.envelope.frame_statistics import FrameRange, FrameStatistics, measure_frame
 from executive.vision.evaluation.asking import CellDetector
 from executive.vision.evaluation.average_precision import AveragePrecision
 from executive.vision.evaluation.figures import Evaluation, Spread
 from executive.vision.evaluation.matching import is_ignored, match
 from executive.vision.evaluation.misses import WorstMisses
+from executive.vision.evaluation.repeats import Repeats
 from executive.vision.evaluation.tally import Tally
 from executive.vision.evaluation.truth import as_frame
 from executive.vision.samples import LabelledImage
@@ -24,6 +29,7 @@ def evaluate(
     threshold: float | None = None,
     localizer: Localizer | None = None,
     worst: WorstMisses | None = None,
+    table: TableConfig | None = None,
 ) -> Evaluation:
     """Return how good a detector is on labelled images; ignored objects may be found or not.
 
@@ -33,8 +39,10 @@ def evaluate(
         threshold: Confidence from which a detection counts; None for the detector's own.
         localizer: Turns detections into positions, to be held against the objects' true ones.
         worst: Gathers the worst mistakes.
+        table: Declares the workspace whose brightness, contrast and colours are measured; None: they are not.
     """
-    tally, precision = Tally(localizer), AveragePrecision()
+    tally, precision, repeats = Tally(localizer), AveragePrecision(), Repeats(localizer)
+    frames: list[FrameStatistics] = []
     latencies: list[float] = []
     answered: Counter[str] = Counter()
     unavailable, why = 0, ""
@@ -52,6 +60,14 @@ def evaluate(
         least = answer.reliability.threshold if threshold is None else threshold
         matches = match([one for one in found if one.confidence >= least], sample)
         tally.add(matches, sample, frame)
+        if sample.second is not None:
+            with contextlib.suppress(Unavailable):
+                second, _ = detector.ask(replace(frame, image=sample.second))
+                found = [one for one in second.found if not is_ignored(one, sample)]
+                sure = [one for one in found if one.confidence >= least]
+                repeats.add(matches, match(sure, sample), sample, frame)
+        if table is not None and (statistics := measure_frame(frame, table)):
+            frames.append(statistics)
         if worst is not None:
             worst.add(matches, sample)
     map50, map50_95 = precision.result()
@@ -73,5 +89,7 @@ def evaluate(
         unavailable=unavailable,
         why=why,
         answered_by=dict(answered),
-        reliability=tally.reliability(),
+        by_count={count: dict(errors) for count, errors in tally.by_count.items()},
+        reliability=tally.reliability(repeats),
+        frames=FrameRange.of(frames),
     )

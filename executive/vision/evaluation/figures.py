@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from executive.vision.envelope.frame_statistics import FrameRange
 from executive.vision.evaluation.reliability import MeasuredReliability
 
 NOTHING = "nothing"
@@ -72,7 +73,10 @@ class Evaluation:
         unavailable: Images about which the detector gave no usable answer.
         why: What it said when it did so for the last time, or "".
         answered_by: Number of answers by the name of the detector.
-        reliability: How it errs, as a cell file states it; None where nothing was answered.
+        by_count: Numbers of `objects` in full view, `missed`, `confused` and `invented` ones by the number of
+            objects on the image.
+        reliability: Error rates for the ledger; None where nothing was answered.
+        frames: Brightness, contrast and colours of the workspace; None if no image showed all of it.
     """
 
     threshold: float
@@ -91,11 +95,14 @@ class Evaluation:
     unavailable: int = 0
     why: str = ""
     answered_by: Mapping[str, int] = field(default_factory=dict)
+    by_count: Mapping[int, Mapping[str, int]] = field(default_factory=dict)
     reliability: MeasuredReliability | None = None
+    frames: FrameRange | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything as plain values."""
         plain = asdict(self)
+        plain["frames"] = self.frames and self.frames.model_dump()
         if self.reliability is not None:
-            plain["reliability"]["stated"] = self.reliability.stated
+            plain["reliability"]["rates"] = self.reliability.rates.model_dump()
         return plain

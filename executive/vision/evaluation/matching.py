@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from executive.geometry import Array
 from executive.messages import Box, Detection
 from executive.vision.samples import LabelledImage
 
@@ -56,6 +57,12 @@ def is_ignored(detection: Detection, sample: LabelledImage) -> bool:
     """Return True for a detection of one of the objects that may be found or not."""
     best = overlap([detection.box], sample.ignored).max(initial=0.0)
     return bool(best >= MATCH and best > overlap([detection.box], sample.boxes).max(initial=0.0))
+
+
+def offset_of(one: Match, number: int, sample: LabelledImage) -> Array:
+    """Return the vector from the centre of object `number`'s box to that of the found one, `(2,)` [pixel]."""
+    left, top, right, bottom = sample.boxes[number]
+    return np.array(one.detection.centre) - [(left + right) / 2, (top + bottom) / 2]
 
 
 def overlap(boxes: Sequence[Box], others: Sequence[Box]) -> NDArray[np.float32]:

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from executive.messages import Box, Detection
-from executive.vision.evaluation.matching import Match
-from executive.vision.evaluation.tally import offset_of
+from executive.vision.evaluation.matching import Match, offset_of
 from executive.vision.evaluation.truth import is_whole, visible_fraction
 from executive.vision.samples import LabelledImage
 

@@ -1,4 +1,4 @@
-"""Error rates of a detector, in the four figures that its section of a cell file states.
+"""Error rates of a detector with their bounds.
 
 The bounds are exact and one-sided: a worse rate would show so few events in at most one of twenty
 measurements (Clopper and Pearson, Biometrika 26 (1934), 404-413; Garwood, Biometrika 28 (1936), 437-442).
@@ -11,12 +11,14 @@ from dataclasses import dataclass
 
 from scipy.special import betaincinv, gammaincinv
 
+from executive.vision.envelope.measurement import Rates
+
 CONFIDENCE = 0.95
 """Probability with which the true rate lies below its bound."""
 MAX_SHARE = 0.99
-"""Largest share that a cell file is advised to state: it takes none of 1."""
+"""Largest share that is stored: a share of 1 would make every look worthless."""
 MIN_JITTER = 0.01
-"""Smallest jitter that a cell file is advised to state [pixel]: it takes none of 0."""
+"""Smallest jitter that is stored [pixel]: a jitter of 0 would make one look exact."""
 
 
 @dataclass(frozen=True)
@@ -42,45 +44,48 @@ class MeasuredReliability:
         misses: Objects that it overlooked, of those in full view.
         confused: Objects that it gave a wrong class, of those it found.
         invented: Objects that are not there, per look.
-        jitter: Standard deviation of the centre of a found box, along each axis [pixel of the frame].
+        jitter: Standard deviation of the random error of a box's centre, along each axis [pixel].
+        repeated: Share of the errors that a second look from the same pose repeats.
+        bias: Standard deviation of the systematic error of a position, along each axis [m].
     """
 
     misses: Count
     confused: Count
     invented: Count
     jitter: float
+    repeated: float
+    bias: float
 
     @staticmethod
     def of(
-        *, whole: int, overlooked: int, confused: int, invented: int, looks: int, jitter: float
+        *,
+        whole: int,
+        overlooked: int,
+        confused: int,
+        invented: int,
+        looks: int,
+        jitter: float,
+        repeated: float,
+        bias: float,
     ) -> MeasuredReliability:
         """Return the figures; `whole` counts the objects in full view, `looks` the answers."""
         return MeasuredReliability(
             _count_share(overlooked, whole), _count_share(confused, whole - overlooked),
             Count(invented, looks, float(gammaincinv(invented + 1, CONFIDENCE)) / looks), jitter,
+            repeated, bias,
         )  # fmt: skip
 
     @property
-    def stated(self) -> dict[str, float]:
-        """Values for a cell file, by its keys: upper bounds, rounded up, in the range that it takes."""
-        return {
-            "misses": min(round_up(self.misses.bound), MAX_SHARE),
-            "confused": min(round_up(self.confused.bound), MAX_SHARE),
-            "invented": round_up(self.invented.bound),
-            "jitter": max(round_up(self.jitter), MIN_JITTER),
-        }
-
-    def yaml(self) -> str:
-        """Return the lines for the detector's section of a cell file, with what was counted."""
-        remarks = (
-            f"{self.misses.events} of {self.misses.trials} objects in full view; upper 95 % bound",
-            f"{self.confused.events} of {self.confused.trials} found; upper 95 % bound",
-            f"{self.invented.events} in {self.invented.trials} looks; upper 95 % bound",
-            "pixels of the frame, as measured",
+    def rates(self) -> Rates:
+        """Rates for the ledger: upper bounds, rounded up."""
+        return Rates(
+            misses=min(round_up(self.misses.bound), MAX_SHARE),
+            confused=min(round_up(self.confused.bound), MAX_SHARE),
+            invented=round_up(self.invented.bound),
+            jitter=max(round_up(self.jitter), MIN_JITTER),
+            repeated=min(round_up(self.repeated), MAX_SHARE),
+            bias=round_up(self.bias),
         )
-        lines = [f"{key}: {value:g}" for key, value in self.stated.items()]
-        width = max(map(len, lines))
-        return "\n".join(f"{line:{width}}  # {remark}" for line, remark in zip(lines, remarks, strict=True))
 
 
 def _count_share(events: int, trials: int) -> Count:

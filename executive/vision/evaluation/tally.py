@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import contextlib
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 
 import numpy as np
 
 from executive.cell import Localizer
 from executive.errors import NoDepth
-from executive.geometry import Array
 from executive.messages import Frame
 from executive.vision.camera_model import on_plane
 from executive.vision.evaluation.figures import NOTHING, ClassFigures
-from executive.vision.evaluation.matching import Match
+from executive.vision.evaluation.matching import Match, offset_of
 from executive.vision.evaluation.reliability import MeasuredReliability
+from executive.vision.evaluation.repeats import Repeats
 from executive.vision.evaluation.truth import in_full_view, is_whole, pixel_size
 from executive.vision.samples import LabelledImage
 
@@ -28,6 +28,8 @@ class Tally:
 
     Attributes:
         objects: Number of objects on the images.
+        by_count: Numbers of `objects` in full view, `missed`, `confused` and `invented` ones by the number of
+            objects on the image.
         confusion: Number of times that a true class was taken for another, `nothing` among both.
         centre: Distances between the centres of found and true box, of right detections [pixel of the image].
         position: These distances in the world, at the object's height, of objects wholly in view [mm].
@@ -40,6 +42,7 @@ class Tally:
         # Of objects in full view: how many there are, were overlooked and were given a wrong class.
         self._whole = self._overlooked = self._confused = 0
         self._squares: list[float] = []
+        self.by_count: dict[int, Counter[str]] = defaultdict(Counter)
         self.confusion: Counter[tuple[str, str]] = Counter()
         self.centre: list[float] = []
         self.position: list[float] = []
@@ -56,12 +59,16 @@ class Tally:
             one = taken.get(number)
             self.confusion[label, one.detection.label if one else NOTHING] += 1
             if in_full_view(sample, number):
+                missed, confused = one is None, one is not None and not one.right
                 self._whole += 1
-                self._overlooked += one is None
-                self._confused += one is not None and not one.right
+                self._overlooked += missed
+                self._confused += confused
+                self.by_count[len(sample.labels)].update(objects=1, missed=missed, confused=confused)
             if one is not None and one.right:
                 self._measure(one, number, sample, frame)
-        self.confusion.update((NOTHING, one.detection.label) for one in matches if one.number is None)
+        invented = [one.detection.label for one in matches if one.number is None]
+        self.confusion.update((NOTHING, label) for label in invented)
+        self.by_count[len(sample.labels)].update(invented=len(invented))
 
     @property
     def precision(self) -> float:
@@ -91,17 +98,20 @@ class Tally:
         )
         return {true: {found: self.confusion[true, found] for found in columns} for true in rows}
 
-    def reliability(self) -> MeasuredReliability | None:
+    def reliability(self, repeats: Repeats) -> MeasuredReliability | None:
         """Return the error rates on objects in full view, None where nothing was answered."""
         if not self._looks:
             return None
+        total = float(np.sqrt(np.mean(self._squares))) if self._squares else 0.0
         return MeasuredReliability.of(
             whole=self._whole,
             overlooked=self._overlooked,
             confused=self._confused,
             invented=sum(count for (true, _), count in self.confusion.items() if true == NOTHING),
             looks=self._looks,
-            jitter=float(np.sqrt(np.mean(self._squares))) if self._squares else 0.0,
+            jitter=total if repeats.jitter is None else repeats.jitter,
+            repeated=repeats.share,
+            bias=repeats.bias,
         )
 
     def _measure(self, one: Match, number: int, sample: LabelledImage, frame: Frame) -> None:
@@ -122,9 +132,3 @@ class Tally:
                 located = self._localizer.locate(one.detection, frame)
                 true = np.array(sample.truth["centres"][number])
                 self.localized.append(float(np.linalg.norm(located - true) * 1000))
-
-
-def offset_of(one: Match, number: int, sample: LabelledImage) -> Array:
-    """Return the vector from the centre of object `number`'s box to that of the found one, `(2,)` [pixel]."""
-    left, top, right, bottom = sample.boxes[number]
-    return np.array(one.detection.centre) - [(left + right) / 2, (top + bottom) / 2]

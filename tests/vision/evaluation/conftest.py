@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from executive.errors import Unavailable
-from executive.messages import Answer, Detection, Reliability
+from executive.messages import Answer, Detection
+from executive.reliability import Reliability
 from executive.vision.samples import LabelledImage
 
 CUBE, DUCK, HALF_HIDDEN = (10.0, 10.0, 40.0, 40.0), (100.0, 100.0, 140.0, 130.0), (200.0, 20.0, 230.0, 50.0)

@@ -1,0 +1,81 @@
+"""Storing the measurement of a detector where runs find it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from executive.campaign.detector_trial import Subject
+from executive.errors import InputError
+from executive.record.whole_file import reason_of, write_whole
+from executive.vision.envelope.fingerprint import take_fingerprint
+from executive.vision.envelope.measurement import (
+    SUFFIX,
+    GroupFigures,
+    Measurement,
+    add_measurement,
+    read_measurements,
+)
+from executive.vision.evaluation.figures import NOTHING, Evaluation
+
+
+def store_evaluation(
+    subject: Subject, evaluation: Evaluation, out: Path | None, *, command: str, seconds: float
+) -> Path:
+    """Write the errors of a detector in its cell into a file and return the path of the file.
+
+    Measurements of other detectors in the file are kept.
+
+    Args:
+        subject: The detector and its cell.
+        evaluation: Its errors.
+        out: The file; None: `CELL.measured.json` beside the cell file.
+        command: Command line that repeats the evaluation.
+        seconds: Duration of the evaluation [s].
+
+    Raises:
+        InputError: The detector answered no image, or the file cannot be read or written.
+    """
+    assert subject.cell is not None
+    path = out or subject.base / f"{subject.cell.cell}{SUFFIX}"
+    measurement = _as_measurement(subject, evaluation, command, seconds)
+    try:
+        write_whole(path, add_measurement(read_measurements(path), measurement))
+    except OSError as error:
+        raise InputError(
+            f"the measurement {path} cannot be written: {reason_of(error)}; name another file with --out, "
+            "and copy it into the folder of your cell file"
+        ) from error
+    return path
+
+
+def _as_measurement(subject: Subject, evaluation: Evaluation, command: str, seconds: float) -> Measurement:
+    """Return an evaluation of a detector in its cell in the form in which it is stored."""
+    assert subject.cell is not None
+    if evaluation.reliability is None:
+        raise InputError(f"detector {subject.name} answered no image: {evaluation.why}; nothing was measured")
+    table = evaluation.confusion
+    return Measurement(
+        detector=subject.name,
+        fingerprint=dict(take_fingerprint(subject.cell, subject.name, subject.base)),
+        command=command,
+        seconds=round(seconds, 1),
+        images=evaluation.images,
+        rates=evaluation.reliability.rates,
+        classes={
+            label: GroupFigures(
+                objects=sum(row.values()),
+                missed=row.get(NOTHING, 0),
+                confused=sum(row.values()) - row.get(NOTHING, 0) - row.get(label, 0),
+                invented=table.get(NOTHING, {}).get(label, 0),
+            )
+            for label, row in table.items()
+            if label != NOTHING
+        },
+        counts={str(count): _figures(errors) for count, errors in sorted(evaluation.by_count.items())},
+        frames=evaluation.frames,
+    )
+
+
+def _figures(errors: Mapping[str, int]) -> GroupFigures:
+    return GroupFigures(**{name: errors.get(name, 0) for name in GroupFigures.model_fields})

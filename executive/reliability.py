@@ -1,0 +1,41 @@
+"""Error rates of a detector, by which the ledger weighs its looks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Reliability:
+    """Error rates of a detector in its cell, measured by `executive evaluate` or assumed.
+
+    Attributes:
+        threshold: Confidence from which a detection counts.
+        misses: Share of the objects in full view that one look overlooks.
+        confused: Share of the objects it finds that it gives a wrong class.
+        invented: Number of false detections per look.
+        jitter: Standard deviation of the random error of a box's centre, along each axis [pixel].
+        repeated: Share of its errors that a second look from the same pose repeats.
+        bias: Standard deviation of the systematic error of a position, along each axis [m].
+        doubt: Reason why the rates are assumed and not measured, or "".
+    """
+
+    threshold: float
+    misses: float
+    confused: float
+    invented: float
+    jitter: float
+    repeated: float = 0.0
+    bias: float = 0.0
+    doubt: str = ""
+
+
+def assume_rates(threshold: float, doubt: str) -> Reliability:
+    """Return conservative error rates for a detector that was not measured under the present conditions.
+
+    On 26 kinds of unusual scenes, the first embedded detector missed 4 % and confused 5 % of the objects on
+    average; an error was mostly the same in each look.
+    """
+    return Reliability(
+        threshold, misses=0.15, confused=0.05, invented=0.2, jitter=2.0, repeated=0.8, bias=0.002, doubt=doubt
+    )

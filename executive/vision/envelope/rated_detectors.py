@@ -1,0 +1,172 @@
+"""Detectors of a cell whose answers carry measured error rates, or assumed ones outside the envelope."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from executive.cell import Clock, Request
+from executive.cell_config import CellConfig, TableConfig
+from executive.errors import InputError
+from executive.messages import Answer, Frame
+from executive.reliability import Reliability, assume_rates
+from executive.vision.detectors.registry import build_detectors, installed
+from executive.vision.detectors.setting import ClosableDetector
+from executive.vision.envelope.fingerprint import describe_change, take_fingerprint
+from executive.vision.envelope.frame_statistics import FrameRange, measure_frame
+from executive.vision.envelope.measurement import SUFFIX, Measurement, read_measurements
+
+FAKE = "fake"
+"""Kind of cell whose detectors are not measured: they know which objects there are."""
+MEASURING_MINUTES = 2
+"""Usual duration of a measurement on two cores [min]."""
+
+
+@dataclass(frozen=True)
+class DetectorEnvelope:
+    """Error rates of one detector and the conditions for them.
+
+    Attributes:
+        reliability: Error rates: measured, or assumed if `reliability.doubt` is not "".
+        frames: Ranges of the measured frames, None if nothing was measured.
+    """
+
+    reliability: Reliability
+    frames: FrameRange | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class RatedDetector:
+    """Detector whose answers carry the error rates of its envelope; implements `ClosableDetector`.
+
+    Attributes:
+        detector: The detector.
+        envelope: Its error rates and the conditions for them.
+        table: Declares the workspace, whose image is compared with the measured frames.
+        name: Name of the detector.
+    """
+
+    detector: ClosableDetector
+    envelope: DetectorEnvelope
+    table: TableConfig
+    name: str
+
+    def request(self, frame: Frame, view: str) -> RatedRequest:
+        """Start to search `frame`; rates are assumed if the frame lies outside the measured ranges."""
+        reliability, frames = self.envelope.reliability, self.envelope.frames
+        statistics = measure_frame(frame, self.table) if frames else None
+        if frames and statistics and (difference := frames.describe_difference(statistics)):
+            doubt = f"the workspace looks different from all images that detector {self.name} was measured on"
+            reliability = assume_rates(reliability.threshold, f"{doubt}: {difference}")
+        return RatedRequest(self.detector.request(frame, view), reliability)
+
+    def close(self) -> None:
+        """Close the detector."""
+        self.detector.close()
+
+
+@dataclass(frozen=True, eq=False)
+class RatedRequest:
+    """Request whose answer carries other error rates; implements `executive.cell.Request`."""
+
+    request: Request
+    reliability: Reliability
+
+    @property
+    def ready(self) -> bool:
+        """True from the tick at which the answer is due on the run's clock."""
+        return self.request.ready
+
+    def result(self) -> Answer:
+        """Return the answer.
+
+        Raises:
+            Unavailable: The detector gave no usable answer.
+        """
+        return replace(self.request.result(), reliability=self.reliability)
+
+
+def build_rated_detectors(
+    config: CellConfig, *, clock: Clock, base: Path, seed: int, folders: Sequence[Path]
+) -> dict[str, ClosableDetector]:
+    """Return the detectors of a cell by name, in its order, each with its measured or assumed error rates.
+
+    Args:
+        config: The cell.
+        clock: Clock of the run.
+        base: Folder from which paths in the cell file start.
+        seed: Seed of everything random in the detectors.
+        folders: Folders with files `CELL.measured.json`.
+
+    Raises:
+        InputError: A detector cannot be built.
+    """
+    camera = next(iter(config.cameras.values()))
+    built = build_detectors(config.detectors, camera=camera, clock=clock, base=base, seed=seed)
+    envelopes = find_envelopes(config, base, folders)
+    return {
+        name: RatedDetector(one, envelopes[name], config.table, name) if name in envelopes else one
+        for name, one in built.items()
+    }
+
+
+def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> dict[str, DetectorEnvelope]:
+    """Return the envelope of each detector of a cell that is not fake, by name.
+
+    A measurement applies if its fingerprint is that of the detector, whichever cell it was made in.
+
+    Args:
+        config: The cell.
+        base: Folder from which paths in the cell file start.
+        folders: Folders with files `CELL.measured.json`.
+    """
+    names = list(measured_detectors(config))
+    stored, problems = _read_all(folders) if names else ([], [])
+    envelopes = {}
+    for name in names:
+        threshold = config.detectors[name].threshold
+        present = take_fingerprint(config, name, base)
+        match = next((one for _, one in stored if one.fingerprint == present), None)
+        if match is not None:
+            envelopes[name] = DetectorEnvelope(match.rates.reliability(threshold), match.frames)
+            continue
+        older = next((one for cell, one in stored if (cell, one.detector) == (config.cell, name)), None)
+        change = describe_change(older.fingerprint, present) if older else ""
+        was = f"was measured before a change of {change}" if change else "was never measured in this cell"
+        doubt = (
+            f"detector {name} {was}, so high error rates are assumed; measure it with "
+            f"`executive evaluate --cell {config.cell}` (about {MEASURING_MINUTES} min)"
+        )
+        envelopes[name] = DetectorEnvelope(assume_rates(threshold, "; ".join([doubt, *problems])))
+    return envelopes
+
+
+def find_unmeasured(
+    config: CellConfig, base: Path, folders: Sequence[Path]
+) -> Iterator[tuple[tuple[str, str], str]]:
+    """Yield the keys of each detector that no measurement applies to, and a sentence."""
+    for name, envelope in find_envelopes(config, base, folders).items():
+        if envelope.reliability.doubt:
+            yield ("detectors", name), envelope.reliability.doubt
+
+
+def measured_detectors(config: CellConfig) -> Iterator[str]:
+    """Yield the names of the detectors whose errors are measured: those that are installed and not fake."""
+    kinds = installed()
+    for name, section in config.detectors.items():
+        is_known = config.kind != FAKE and section.kind in kinds
+        if is_known and not getattr(kinds[section.kind].load(), "is_fake", False):
+            yield name
+
+
+def _read_all(folders: Sequence[Path]) -> tuple[list[tuple[str, Measurement]], list[str]]:
+    """Return each stored measurement with the name of its cell, and the problems of unreadable files."""
+    stored: list[tuple[str, Measurement]] = []
+    problems = []
+    for file in (file for folder in folders for file in sorted(folder.glob(f"*{SUFFIX}"))):
+        try:
+            stored += [(file.name.removesuffix(SUFFIX), one) for one in read_measurements(file)]
+        except InputError as error:
+            problems.append(str(error))
+    return stored, problems
