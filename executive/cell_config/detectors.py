@@ -24,7 +24,8 @@ class DetectorConfig(Section):
     latency: float = Field(0.05, ge=0)
     """Time from a frame to its answer on the run's clock [s]."""
     misses: float = Field(0.03, gt=0, lt=1)
-    """Share of the objects in full view that one look overlooks, as `executive evaluate` measures it."""
+    """Share of the objects in full view that one look overlooks; this and the next three keys are only for
+    fake detectors, those of others are measured by `executive evaluate`."""
     confused: float = Field(0.004, gt=0, lt=1)
     """Share of the objects it finds that it gives a wrong class."""
     invented: float = Field(0.02, gt=0)

@@ -13,6 +13,8 @@ from executive.vision.detectors.setting import ClosableDetector, Setting
 from executive.workcell import KeyPath
 
 GROUP = "executive.detectors"
+RATES = frozenset({"misses", "confused", "invented", "jitter"})
+"""Keys of the error rates that only a fake detector states."""
 
 
 def installed() -> dict[str, Entry]:
@@ -75,7 +77,11 @@ def wrong_detectors(configs: Mapping[str, DetectorConfig], base: Path) -> Iterat
         if config.kind not in kinds:
             yield ("detectors", name, "kind"), _not_installed(name, config.kind, kinds)
             continue
-        check = getattr(kinds[config.kind].load(), "check", None)
+        kind = kinds[config.kind].load()
+        for key in sorted(RATES & config.model_fields_set) if not getattr(kind, "is_fake", False) else ():
+            remedy = "remove the key and run `executive evaluate --cell` with this cell"
+            yield ("detectors", name, key), f"error rates of this kind of detector are measured; {remedy}"
+        check = getattr(kind, "check", None)
         for option, sentence in check(config, base, configs) if check else ():
             yield ("detectors", name, option), sentence
 
