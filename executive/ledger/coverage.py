@@ -29,8 +29,8 @@ BORDER = 12.0
 NEAR = 0.03
 """How far beside the workspace the middle of what lies at its edge may be [m]."""
 OCCUPIED = 0.1
-"""Prior probability that an object lies at a given place of the workspace: three objects of 6 cm x 6 cm on the
-22 cm x 44 cm of the shipped cells."""
+"""Prior probability that an object lies at a given place of the workspace: three objects of 6 cm x 6 cm on
+the 22 cm x 44 cm of the shipped cells."""
 HEIGHT = 0.025
 """Height of the points over the table [m]: the middle of a usual object."""
 

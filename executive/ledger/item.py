@@ -209,6 +209,11 @@ class Record:
         self.looks, self.glimpses = self.looks + 1, 0
         self.exists = self.exists or self.existence >= CONFIRMED
 
+    def forget_answers(self) -> None:
+        """Take further looks as independent of earlier ones, because something may have moved the item."""
+        self.answers.clear()
+        self.repeats = 0
+
     def locate(self, position: Array, spread: float, *, settled: bool) -> None:
         """Take a position `(3,)` [m] measured with a standard deviation of `spread` [m].
 
@@ -222,8 +227,6 @@ class Record:
         else:
             self.moved = math.isfinite(self.spread)
             self.position, self.spread = position, spread
-            self.answers.clear()
-            self.repeats = 0
         if not self.moved:
             self.first = self.position
         self.overlooked = 1.0

@@ -84,9 +84,10 @@ class Looks:
                 record = self._enter(records, detection.label, place, odds)
             if record.why.startswith(UNSURE):
                 record.state, record.why = State.SEEN, ""
-            record.vote(
-                detection.label, by, viewpoint, alone=not self._may_be_of(absent, place, spreads[index])
-            )
+            if not self.settled(record):
+                record.forget_answers()
+            alone = not self._may_be_of(absent, place, spreads[index])
+            record.vote(detection.label, by, viewpoint, alone=alone)
             record.locate(place, spreads[index], settled=self.settled(record))
             record.shown(frame, detection)
             seen.append(record)

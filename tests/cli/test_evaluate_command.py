@@ -12,6 +12,7 @@ from click.testing import CliRunner
 from executive.cli.main import main
 from executive.vision.dataset import Entry, image_path, save_image, write_annotations
 from executive.vision.detectors.embedded import LABELS, MODEL
+from executive.vision.envelope.measurement import Rates, read_measurements
 
 
 @pytest.fixture
@@ -34,13 +35,22 @@ def evaluate(*arguments, code=0):
 
 def test_a_cells_detector_is_measured_as_in_a_run_with_a_sheet_of_its_worst_misses(tmp_path):
     sheet = tmp_path / "sheet.png"
-    said, told = evaluate("--cell", "overhead", "--as-run", "--images", 1, "--workers", 1, "--sheet", sheet)
+    stored = tmp_path / "overhead.measured.json"
+    options = ("--cell", "overhead", "--images", 1, "--workers", 1, "--seed", 2, "--out", stored)
+    said, told = evaluate(*options, "--sheet", sheet)
     measured = told["measured"]["overhead"]
     assert (measured["detector"], measured["kind"], measured["images"]) == ("embedded", "embedded", 1)
     assert (measured["recall"], measured["localized"]["median"] < 5) == (1, True)
-    assert set(measured["reliability"]["stated"]) == {"misses", "confused", "invented", "jitter"}
+    (measurement,) = read_measurements(stored)
+    assert (measurement.detector, measurement.rates) == (
+        "embedded",
+        Rates(**measured["reliability"]["rates"]),
+    )
+    assert measurement.command == "executive evaluate --cell overhead --detector embedded --images 1 --seed 2"
+    assert measurement.frames is not None
+    assert f"stored in {stored}" in said
     assert "overhead, detector embedded" in said
-    assert "misses: " in said
+    assert "misses 0." in said
     assert f"worst in {sheet}" in said
     assert cv2.imread(str(sheet)) is not None
 
@@ -48,7 +58,7 @@ def test_a_cells_detector_is_measured_as_in_a_run_with_a_sheet_of_its_worst_miss
 def test_a_detector_is_measured_in_the_world_of_a_scene_file(tmp_path):
     scene = tmp_path / "moved.yaml"
     scene.write_text("scene: moved\ncamera: {shift: [0.0, 0.03, 0.0]}\ntable: {objects: [4, 4]}\n")
-    options = ("--cell", "overhead", "--as-run", "--images", 1, "--workers", 1, "--scene", scene)
+    options = ("--cell", "overhead", "--images", 1, "--workers", 1, "--scene", scene)
     _, told = evaluate(*options)
     measured = told["measured"]["overhead"]
     assert (told["scene"], measured["objects"]) == (str(scene), 4)
@@ -60,7 +70,7 @@ def test_a_detector_is_measured_in_the_world_of_a_scene_file(tmp_path):
     ("arguments", "where", "detector"),
     [
         ((), "grey", "embedded"),
-        (("--cell", "wrist", "--detector", "embedded"), "wrist on grey", "embedded"),
+        (("--cell", "wrist", "--detector", "embedded", "--out", "wrist.json"), "wrist on grey", "embedded"),
         (("--weights", MODEL, "--labels", LABELS, "--threshold", 0.9), "grey", "model"),
     ],
 )
@@ -73,6 +83,17 @@ def test_a_dataset_is_measured_on_with_or_without_a_cell_or_a_model_file(dataset
     assert (told["weights"], measured["threshold"]) == ((str(MODEL), 0.9) if model else (None, 0.5))
 
 
+def test_a_cell_with_other_values_is_measured_and_stored_in_a_named_file_only(missions, tmp_path):
+    options = ("--cell", "overhead", "--images", 1, "--workers", 1, "--seed", 2)
+    changed = ("--set", "cell.detectors.embedded.threshold=0.7")
+    before = sorted((missions / "cells").iterdir())
+    said, told = evaluate(*options, *changed)
+    assert (told["measured"]["overhead"]["threshold"], "stored" in said) == (0.7, False)
+    assert sorted((missions / "cells").iterdir()) == before
+    evaluate(*options, *changed, "--out", tmp_path / "o.json")
+    assert read_measurements(tmp_path / "o.json")[0].fingerprint["threshold"] == "0.7"
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
@@ -83,10 +104,12 @@ def test_a_dataset_is_measured_on_with_or_without_a_cell_or_a_model_file(dataset
         (("--cell", "overhead", "--detector", "embedded", "--weights", "m.onnx"), "; give one of them"),
         (("--detector", "eye", "--dataset", "."), "--detector eye is of which cell? Name it with --cell"),
         (("--labels", "names.txt"), "--labels are those of a model file; name it with --weights"),
-        (("--as-run", "--dataset", "."), "--as-run renders scenes, and --dataset brings images; give one"),
-        (("--view", "full"), "--view full is a part of a run's frame; give --as-run with it"),
-        (("--scene", "dim.yaml"), "--scene dim.yaml changes scenes as a run begins with; give --as-run with"),
-        (("--as-run", "--scene", "dim.yaml"), "there is no file dim.yaml"),
+        (("--varied", "--dataset", "."), "--varied renders scenes, and --dataset brings images; give one"),
+        (("--varied", "--view", "full"), "--view full is a part of a run's frame; leave out --varied"),
+        (("--varied", "--scene", "dim.yaml"), "--scene dim.yaml changes scenes of the cell; --varied draws"),
+        (("--scene", "dim.yaml"), "there is no file dim.yaml"),
+        (("--out", "o.json"), "--out o.json is the file for one cell; name the cell with --cell"),
+        (("--set", "attempts=3"), "--set attempts is no key of a cell; write cell.KEY.KEY=VALUE"),
         (
             ("--cell", "fruit"),
             "fruit is of kind fake; measure its detector on images of your own",

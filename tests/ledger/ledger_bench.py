@@ -37,7 +37,8 @@ def area_of(view: str) -> tuple[float, float, float, float]:
 class Bench:
     """A ledger with a camera above it that sees exactly what a test says."""
 
-    def __init__(self) -> None:
+    def __init__(self, told_by_touch: Sequence[str] = ()) -> None:
+        self.config = LedgerConfig()
         self.events: list[tuple[str, dict]] = []
         size, slots = np.array([0.22, 0.24, 0.06]), np.zeros((6, 2))
         bins = {
@@ -46,11 +47,12 @@ class Bench:
             "grey_bin": Bin("grey_bin", np.array([-0.2, 0.44, 0]), size, slots),
         }
         self.ledger = ItemLedger(
-            LedgerConfig(),
+            self.config,
             TableConfig(),
             bins,
             {"cube": ("red_bin", "pink_bin")},
             lambda kind, **data: self.events.append((kind, data)),
+            told_by_touch,
         )
         self.frames = 0
 
@@ -64,6 +66,7 @@ class Bench:
         unsure: Sequence[Thing] = (),
         contradiction: str = "",
         unknown: Sequence[str] = (),
+        detector: str = "eye",
     ) -> Sequence[Target]:
         """Look; the columns `hidden` of the image are behind the arm, and of some things it is `unsure`.
 
@@ -74,13 +77,17 @@ class Bench:
         found = tuple(Detection(label, 0.9, (0, 0, 1, 1)) for label, _, _ in things)
         strange = tuple(Detection(label, 0.9, (0, 0, 1, 1)) for label in unknown)
         return self.ledger.observe(
-            Detections(frame, found, "eye", by, view, area_of(view), unknown=strange),
+            Detections(frame, found, detector, by, view, area_of(view), unknown=strange),
             [np.array([x, y, 0.025]) for _, x, y in things],
             [
                 Glimpse(Detection(label, 0.4, (0, 0, 1, 1)), np.array([x, y, 0.025]), contradiction)
                 for label, x, y in unsure
             ],
         )
+
+    def overlooked(self, x: float, y: float) -> float:
+        """The chance that an object at a place has been overlooked."""
+        return self.ledger._coverage.overlooked(np.array([x, y, 0.025]))
 
     def drop(self, item: str, landing: np.ndarray | None = None) -> None:
         """Have the tool pick an item and lose it on the way."""

@@ -9,7 +9,7 @@ import pytest
 from ledger_bench import area_of, take_frame
 
 from executive.cell_config import TableConfig
-from executive.ledger.coverage import ASTRAY, LEAST, STRAYED, Coverage
+from executive.ledger.coverage import ASTRAY, Coverage, LEAST, OCCUPIED, STRAYED
 from executive.messages import Detections
 from executive.reliability import Reliability
 
@@ -55,7 +55,7 @@ def test_what_the_arm_hides_is_not_believed_empty(coverage: Coverage) -> None:
         coverage.look(look(hidden=slice(320, 640)))
     sides = [coverage.overlooked(np.array([0.53, y, 0.025])) for y in (-0.15, 0.15)]
     assert sorted(sides) == [pytest.approx(0.2**5), 1.0]
-    assert coverage.worst == 1.0
+    assert coverage.worst == OCCUPIED
 
 
 def test_a_place_is_searched_only_if_all_of_an_object_there_would_show(coverage: Coverage) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from ledger_bench import Bench
 
-from executive.ledger.item import GLIMPSES
+from executive.ledger.certainty import GLIMPSES
 
 THERE = ("cube", 0.5, 0.0)
 UNSURE = ("rejected", "no look is sure of it")

@@ -17,7 +17,7 @@ MEASURED = Evaluation(
     confusion={"cube": {"cube": 882, "nothing": 18}, "nothing": {"cube": 8, "nothing": 0}},
     answered_by={"eye": 300},
     reliability=MeasuredReliability.of(
-        whole=800, overlooked=2, confused=0, invented=8, looks=300, jitter=0.5
+        whole=800, overlooked=2, confused=0, invented=8, looks=300, jitter=0.5, repeated=0.8, bias=0.001
     ),
 )  # fmt: skip
 
@@ -35,7 +35,7 @@ def printed(capsys):
     return lines
 
 
-def test_rates_classes_confusions_who_answered_and_the_lines_for_the_cell_file_are_told(printed):
+def test_rates_classes_confusions_who_answered_and_the_rates_for_the_ledger_are_told(printed):
     lines = printed(MEASURED)
     assert lines[0] == "overhead, detector eye"
     assert set(lines) >= {
@@ -43,7 +43,7 @@ def test_rates_classes_confusions_who_answered_and_the_lines_for_the_cell_file_a
         "precision 99.10%, recall 98.00%, mAP50 0.9950, mAP50-95 0.8000",
         "cube 900 99.10% 98.00%", "taken for cube nothing", "cube 882 18", "nothing 8",
         "frame to detections [ms] 15.00 16.00 17.00 18.00",
-        "invented: 0.049 # 8 in 300 looks; upper 95 % bound",
+        "misses 0.0079, confused 0.0038, invented 0.049, jitter 0.5, repeated 0.8, bias 0.001",
     }  # fmt: skip
     assert not any("unavailable" in line or "answered" in line for line in lines)
     other = replace(MEASURED, answered_by={"server": 290, "embedded": 10})

@@ -1,4 +1,4 @@
-"""Figures about a detector, on images whose truth is known, and those that a cell file states."""
+"""Figures about a detector, on images whose truth is known, and the error rates for the ledger."""
 
 from __future__ import annotations
 
@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import yaml
 
-from executive.cell_config import DetectorConfig
 from executive.errors import NoDepth
+from executive.vision.envelope.measurement import Rates
 from executive.vision.evaluation.evaluate import evaluate
 from executive.vision.evaluation.figures import ClassFigures, Spread
 from executive.vision.evaluation.misses import WorstMisses
@@ -44,8 +43,9 @@ def test_a_perfect_detector_is_perfect(saying, sample, both):
     plain = measured.as_dict()
     perfect = {"objects": 1, "precision": 1, "recall": 1}
     assert plain["by_class"] == {"cube": perfect, "duck": perfect}
-    stated = {"misses": 0.78, "confused": 0.78, "invented": 3.0, "jitter": 0.01}
-    assert plain["reliability"]["stated"] == stated
+    bounds = {"misses": 0.78, "confused": 0.78, "invented": 3.0}
+    assert plain["reliability"]["rates"] == {**bounds, "jitter": 0.01, "repeated": 0.5, "bias": 0.0}
+    assert plain["by_count"] == {2: {"objects": 2, "missed": 0, "confused": 0, "invented": 0}}
 
 
 def test_a_miss_lowers_recall_and_a_phantom_lowers_precision(saying, sample, both):
@@ -144,24 +144,21 @@ def test_a_spread_names_its_quantiles():
 
 def rates(whole, overlooked, confused, invented, looks, jitter):
     return MeasuredReliability.of(
-        whole=whole, overlooked=overlooked, confused=confused, invented=invented, looks=looks, jitter=jitter
+        whole=whole, overlooked=overlooked, confused=confused, invented=invented, looks=looks, jitter=jitter,
+        repeated=0.751, bias=0.00112,
+    )  # fmt: skip
+
+
+def test_the_rates_for_the_ledger_are_upper_bounds_rounded_up():
+    assert rates(1344, 0, 2, 1, 300, 0.432).rates == Rates(
+        misses=0.0023, confused=0.0047, invented=0.016, jitter=0.44, repeated=0.76, bias=0.0012
     )
 
 
-def test_a_cell_file_is_advised_to_state_upper_bounds_with_what_was_counted():
-    assert rates(1344, 0, 2, 1, 300, 0.432).yaml().splitlines() == [
-        "misses: 0.0023    # 0 of 1344 objects in full view; upper 95 % bound",
-        "confused: 0.0047  # 2 of 1344 found; upper 95 % bound",
-        "invented: 0.016   # 1 in 300 looks; upper 95 % bound",
-        "jitter: 0.44      # pixels of the frame, as measured",
-    ]
-
-
 @pytest.mark.parametrize("whole", [0, 5])
-def test_a_cell_file_takes_what_it_is_advised_to_state_also_at_the_extremes(whole):
-    stated = yaml.safe_load(rates(whole, whole, 0, 0, 1, 0.0).yaml())
-    config = DetectorConfig(kind="embedded", **stated)
-    assert (config.misses, config.confused, config.invented, config.jitter) == (0.99, 0.99, 3.0, 0.01)
+def test_no_rate_is_zero_or_one_even_if_nothing_was_counted(whole):
+    extreme = rates(whole, whole, 0, 0, 1, 0.0).rates
+    assert (extreme.misses, extreme.confused, extreme.invented, extreme.jitter) == (0.99, 0.99, 3.0, 0.01)
 
 
 @pytest.mark.parametrize(
