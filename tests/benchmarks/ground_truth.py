@@ -119,6 +119,11 @@ class AuditedRun:
     wall_time_s: float
     run: str
 
+    @staticmethod
+    def without_result(mission: str, seed: int, status: str, message: str) -> AuditedRun:
+        """Return what is known of a run that ended without a result."""
+        return AuditedRun(mission, seed, status, -1, message, {}, {}, (), 0.0, 0.0, "")
+
     @property
     def known(self) -> list[FoundObject]:
         """The objects of the cell's classes."""
@@ -250,7 +255,7 @@ def run_audited(
     if isinstance(answer, AuditedRun):
         return answer
     status = HUNG if "was killed" in problem else FAULT
-    return AuditedRun(mission, seed, status, -1, problem, {}, {}, (), 0.0, 0.0, "")
+    return AuditedRun.without_result(mission, seed, status, problem)
 
 
 def _run_in_this_process(

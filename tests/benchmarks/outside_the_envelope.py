@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import statistics
 import tempfile
@@ -20,7 +19,7 @@ from executive.discovery import discover
 from executive.mission.load import load_mission
 from executive.sim.scene_file import load_scene
 from tests.benchmarks.ground_truth import FAULT, HUNG, AuditedRun, run_audited
-from tests.benchmarks.report import Figures, run_command
+from tests.benchmarks.report import Figures, run_command, write_json
 from tests.benchmarks.scenes_outside import DECLARED, GROUPS, MISSIONS, Case, list_cases
 
 SEEDS_PER_CASE = 20
@@ -90,7 +89,8 @@ def measure(
     done = [result for result in results if result is not None and result.run.status != HALTED]
     figures = {"asked": len(jobs), "runs": len(done), "first_seed": first_seed, **summarize(done)}
     listed = [{**asdict(one), **_derived(one)} for one in done]
-    out.write_text(json.dumps({**figures, "all_runs": listed}, indent=1) + "\n", encoding="utf-8")
+    scenes_by_name = {case.name: case.scene for case in cases}
+    write_json(out, {**figures, "scenes": scenes_by_name, "all_runs": listed})
     return figures
 
 
@@ -116,8 +116,7 @@ def run_job(job: Job) -> Done:
 def _describe_broken(job: Job, error: BaseException) -> Done:
     """Return the result of a job whose process ended."""
     message = f"{type(error).__name__}: {error}"
-    run = AuditedRun(job.case.mission, job.seed, FAULT, -1, message, {}, {}, (), 0.0, 0.0, "")
-    return Done(job.case, run)
+    return Done(job.case, AuditedRun.without_result(job.case.mission, job.seed, FAULT, message))
 
 
 def summarize(done: Sequence[Done]) -> Figures:

@@ -24,7 +24,7 @@ from executive.cli.cells import load_cells
 from executive.cli.options import MISSION, json_option, overrides_option, seed_option
 from executive.cli.output import print_json, stdout_kept_clean
 from executive.cli.subject import load_subject, oracle_option
-from executive.errors import ExecutiveError
+from executive.errors import ExecutiveError, InputError
 from executive.record.recorded_run import recorded_run
 from executive.record.result import disagreement
 
@@ -104,6 +104,19 @@ def show_progress(items: Iterable[T], description: str) -> Iterable[T]:
     """Yield `items`, with a progress bar if stderr is a terminal."""
     console = Console(stderr=True)
     return track(items, description, console=console, disable=not console.is_interactive)
+
+
+def write_json(path: Path, figures: Figures) -> None:
+    """Write figures to a JSON file.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(figures, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f'cannot write the figures "{path}": {error.strerror}; name another file') from error
 
 
 def print_figures(figures: Figures) -> None:
