@@ -25,25 +25,27 @@ MISSION = "two_detectors"
 """Mission that fuses the looks of two detectors."""
 SERVER = "second"
 """Name in its cell of the detector that stands for the server."""
-TRUE_CLASS, GIVEN_CLASS = "duck", "cube"
-"""Class whose objects the server misnames, and the class that it names instead."""
 STATES = ("rejected", "lost")
 """States of items that are counted apart for the objects that are in no bin."""
 
 
 @dataclass(frozen=True, eq=False)
 class MisclassifyingDetector:
-    """Answers as another detector, with `TRUE_CLASS` renamed to `GIVEN_CLASS`; implements `Detector`.
+    """Answers as another detector, with one class renamed to another; implements `Detector`.
 
     Attributes:
         other: The other detector.
+        true_class: Class whose objects it misnames.
+        given_class: Class that it names instead.
     """
 
     other: ClosableDetector
+    true_class: str
+    given_class: str
 
     def request(self, frame: Frame, view: str) -> MisclassifyingRequest:
         """Ask the other detector about `frame`."""
-        return MisclassifyingRequest(self.other.request(frame, view))
+        return MisclassifyingRequest(self.other.request(frame, view), self.true_class, self.given_class)
 
     def close(self) -> None:
         """Close the other detector."""
@@ -55,6 +57,8 @@ class MisclassifyingRequest:
     """A request to the other detector; implements `executive.cell.Request`."""
 
     other: Request
+    true_class: str
+    given_class: str
 
     @property
     def ready(self) -> bool:
@@ -69,9 +73,19 @@ class MisclassifyingRequest:
         """
         answer = self.other.result()
         found = tuple(
-            replace(one, label=GIVEN_CLASS) if one.label == TRUE_CLASS else one for one in answer.found
+            replace(one, label=self.given_class) if one.label == self.true_class else one
+            for one in answer.found
         )
         return replace(answer, found=found)
+
+
+@dataclass(frozen=True)
+class Server:
+    """The detector that misnames objects: its name in the cell, their true class, and the class it names."""
+
+    name: str
+    true_class: str
+    given_class: str
 
 
 def build_with_misclassifying(
@@ -81,37 +95,53 @@ def build_with_misclassifying(
     clock: Clock,
     base: Path,
     seed: int,
-    server: str,
+    server: Server,
 ) -> dict[str, ClosableDetector]:
-    """Return the detectors of a cell file, of which `server` misnames objects."""
+    """Return the detectors of a cell file, one of which misnames objects."""
     built = build_detectors(configs, camera=camera, clock=clock, base=base, seed=seed)
-    return {**built, server: MisclassifyingDetector(built[server])}
+    misnaming = MisclassifyingDetector(built[server.name], server.true_class, server.given_class)
+    return {**built, server.name: misnaming}
 
 
 @dataclass(frozen=True)
 class Job:
-    """A run to do: mission, seed, name of the misclassifying detector, folder of the run directories."""
+    """A run to do: mission, seed, misclassifying detector, folder of the run directories."""
 
     mission: str
     seed: int
-    server: str
+    server: Server
     runs: Path
 
 
 def measure(
-    mission: str, server: str, seeds: int, first_seed: int, workers: int, runs: Path, out: Path
+    mission: str,
+    server: str,
+    true_class: str,
+    given_class: str,
+    seeds: int,
+    first_seed: int,
+    workers: int,
+    runs: Path,
+    out: Path,
 ) -> Figures:
-    """Sort with two detectors, one of which calls every duck a cube.
+    """Sort with two detectors, one of which gives every object of a class the name of another class.
 
-    A problem is an object in a wrong bin, or a cube or a sphere that is not in its bin.
+    A problem is an object in a wrong bin, or an object of another class that is not in its bin.
     """
-    jobs = [Job(mission, seed, server, runs) for seed in range(first_seed, first_seed + seeds)]
+    misnaming = Server(server, true_class, given_class)
+    jobs = [Job(mission, seed, misnaming, runs) for seed in range(first_seed, first_seed + seeds)]
     with bar("misclassifying server") as progress:
         results = do_all(
             jobs, run_job, _describe_broken, workers=workers, progress=progress, halting=say_halting
         )
     done = [run for run in results if run is not None and run.status != "HALTED"]
-    figures = {"mission": mission, "first_seed": first_seed, "asked": len(jobs), **summarize(done)}
+    figures = {
+        "mission": mission,
+        "first_seed": first_seed,
+        "asked": len(jobs),
+        "misnamed": f"{true_class} as {given_class}",
+    }
+    figures |= summarize(done, true_class)
     write_json(out, {**figures, "all_runs": [asdict(run) for run in done]})
     return figures
 
@@ -128,7 +158,7 @@ def _describe_broken(job: Job, error: BaseException) -> AuditedRun:
     return AuditedRun.without_result(job.mission, job.seed, FAULT, message)
 
 
-def summarize(runs: Sequence[AuditedRun]) -> Figures:
+def summarize(runs: Sequence[AuditedRun], true_class: str) -> Figures:
     """Return a row per class, a row for the times, and the problems."""
     objects = [(run, one) for run in runs for one in run.objects]
     labels = sorted({one.label for _, one in objects})
@@ -149,7 +179,7 @@ def summarize(runs: Sequence[AuditedRun]) -> Figures:
             *(
                 f"seed {run.seed}: {one.label} is {one.place}, its items are {_reports(one)}, {run.run}"
                 for run, one in objects
-                if one.label != TRUE_CLASS and one.place != "right" and not one.is_in_wrong_bin
+                if one.label != true_class and one.place != "right" and not one.is_in_wrong_bin
             ),
             *(f"seed {run.seed}: {run.status} {run.message}" for run in runs if not run.objects),
         ],
@@ -182,6 +212,8 @@ if __name__ == "__main__":
         measure,
         click.option("--mission", default=MISSION, show_default=True, help="Mission to run."),
         click.option("--server", default=SERVER, show_default=True, help="The detector that misnames."),
+        click.option("--true-class", default="duck", show_default=True, help="Class that it misnames."),
+        click.option("--given-class", default="cube", show_default=True, help="Class that it names instead."),
         click.option(
             "--seeds", type=click.IntRange(min=1), default=20, show_default=True, help="Number of runs."
         ),
