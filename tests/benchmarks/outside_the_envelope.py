@@ -7,12 +7,14 @@ import statistics
 import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 
 import click
 import yaml
 
 from executive.campaign.pool import do_all
+from executive.cell_config import CellConfig
 from executive.cli.options import runs_option, workers_option
 from executive.cli.progress import bar, say_halting
 from executive.discovery import discover
@@ -104,8 +106,14 @@ def write_scene(case: Case, folder: Path) -> Path | None:
         return None
     path = folder / f"{case.number:03d}.yaml"
     path.write_text(yaml.safe_dump({"scene": case.name, **case.scene}), encoding="utf-8")
-    load_scene(path, load_mission(case.mission, discover()).cell_config)
+    load_scene(path, _load_cell_of(case.mission))
     return path
+
+
+@cache
+def _load_cell_of(mission: str) -> CellConfig:
+    """Return the cell file of a mission."""
+    return load_mission(mission, discover()).cell_config
 
 
 def run_job(job: Job) -> Done:

@@ -161,7 +161,9 @@ GROUPS = tuple(FOR_BOTH)
 
 def list_cases() -> list[Case]:
     """Return all cases: for each mission that without a scene, then those of every group."""
-    listed = [(DECLARED, "as declared", mission, {}) for mission in MISSIONS]
+    listed: list[tuple[str, str, str, Scene]] = [
+        (DECLARED, "as declared", mission, {}) for mission in MISSIONS
+    ]
     listed += [*_in_groups(FOR_BOTH, OVERHEAD), *_in_groups(FOR_OVERHEAD, OVERHEAD)]
     listed += _in_groups(FOR_BOTH, WRIST)
     return [Case(*values, number) for number, values in enumerate(listed)]
