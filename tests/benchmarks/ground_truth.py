@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,11 +27,10 @@ from executive.vision.detectors.registry import build_detectors
 from executive.vision.detectors.setting import ClosableDetector
 from executive.workcell import CellOptions
 from tests.benchmarks.forks import ForkRunner
+from tests.benchmarks.report import WALL_TIME_LIMIT
 
 HUNG, FAULT = "HUNG", "FAULT"
 """Status of a run that exceeded its wall time, and of a run whose process ended without a result."""
-WALL_TIME_LIMIT = 180.0
-"""Wall time after which a run counts as hung and is killed [s]."""
 END_PLACES = ("wrong_bin", "right", "left", "elsewhere")
 """Keys of the audit of which a single object counts in one at most."""
 DetectorMaker = Callable[..., Mapping[str, ClosableDetector]]
@@ -104,6 +104,7 @@ class AuditedRun:
         objects: The objects; none if there is no result.
         robot_time_s: Time on the clock of the run [s].
         wall_time_s: Wall time [s].
+        cpu_time_s: Processor time of the run's process, all threads [s].
         run: Run directory, or "".
     """
 
@@ -117,12 +118,13 @@ class AuditedRun:
     objects: tuple[FoundObject, ...]
     robot_time_s: float
     wall_time_s: float
+    cpu_time_s: float
     run: str
 
     @staticmethod
     def without_result(mission: str, seed: int, status: str, message: str) -> AuditedRun:
         """Return what is known of a run that ended without a result."""
-        return AuditedRun(mission, seed, status, -1, message, {}, {}, (), 0.0, 0.0, "")
+        return AuditedRun(mission, seed, status, -1, message, {}, {}, (), 0.0, 0.0, 0.0, "")
 
     @property
     def known(self) -> list[FoundObject]:
@@ -281,6 +283,8 @@ def _run_in_this_process(
         objects=objects,
         robot_time_s=result["robot_time_s"],
         wall_time_s=result["wall_time_s"],
+        # A forked process begins at zero.
+        cpu_time_s=round(time.process_time(), 3),
         run=result["run"],
     )
 

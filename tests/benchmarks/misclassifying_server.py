@@ -19,7 +19,7 @@ from executive.messages import Answer, Frame
 from executive.vision.detectors.registry import build_detectors
 from executive.vision.detectors.setting import ClosableDetector
 from tests.benchmarks.ground_truth import FAULT, AuditedRun, FoundObject, run_audited
-from tests.benchmarks.report import Figures, run_command, write_json
+from tests.benchmarks.report import Figures, limit_option, run_command, write_json
 
 MISSION = "two_detectors"
 """Mission that fuses the looks of two detectors."""
@@ -105,12 +105,13 @@ def build_with_misclassifying(
 
 @dataclass(frozen=True)
 class Job:
-    """A run to do: mission, seed, misclassifying detector, folder of the run directories."""
+    """A run to do: mission, seed, misclassifying detector, folder of the record, wall time limit [s]."""
 
     mission: str
     seed: int
     server: Server
     runs: Path
+    wall_time_limit: float
 
 
 def measure(
@@ -120,6 +121,7 @@ def measure(
     given_class: str,
     seeds: int,
     first_seed: int,
+    wall_time_limit: float,
     workers: int,
     runs: Path,
     out: Path,
@@ -129,7 +131,9 @@ def measure(
     A problem is an object in a wrong bin, or an object of another class that is not in its bin.
     """
     misnaming = Server(server, true_class, given_class)
-    jobs = [Job(mission, seed, misnaming, runs) for seed in range(first_seed, first_seed + seeds)]
+    jobs = [
+        Job(mission, seed, misnaming, runs, wall_time_limit) for seed in range(first_seed, first_seed + seeds)
+    ]
     with bar("misclassifying server") as progress:
         results = do_all(
             jobs, run_job, _describe_broken, workers=workers, progress=progress, halting=say_halting
@@ -149,7 +153,9 @@ def measure(
 def run_job(job: Job) -> AuditedRun:
     """Do one run."""
     detectors = partial(build_with_misclassifying, server=job.server)
-    return run_audited(job.mission, job.seed, job.runs, detectors=detectors)
+    return run_audited(
+        job.mission, job.seed, job.runs, detectors=detectors, wall_time_limit=job.wall_time_limit
+    )
 
 
 def _describe_broken(job: Job, error: BaseException) -> AuditedRun:
@@ -169,6 +175,7 @@ def summarize(runs: Sequence[AuditedRun], true_class: str) -> Figures:
         "robot_time_median_s": statistics.median(times) if times else None,
         "robot_time_most_s": max(times, default=None),
         "wall_time_median_s": statistics.median(run.wall_time_s for run in runs) if runs else None,
+        "cpu_time_median_s": statistics.median(run.cpu_time_s for run in runs) if runs else None,
         "classes": [_row(label, [one for _, one in objects if one.label == label]) for label in labels],
         "problems": [
             *(
@@ -220,6 +227,7 @@ if __name__ == "__main__":
         click.option(
             "--first-seed", type=click.IntRange(min=0), default=310000, show_default=True, help="First seed."
         ),
+        limit_option,
         workers_option,
         runs_option,
         click.option(

@@ -21,7 +21,7 @@ from executive.discovery import discover
 from executive.mission.load import load_mission
 from executive.sim.scene_file import load_scene
 from tests.benchmarks.ground_truth import FAULT, HUNG, AuditedRun, run_audited
-from tests.benchmarks.report import Figures, run_command, write_json
+from tests.benchmarks.report import Figures, limit_option, run_command, write_json
 from tests.benchmarks.scenes_outside import DECLARED, GROUPS, MISSIONS, Case, list_cases
 
 SEEDS_PER_CASE = 20
@@ -34,12 +34,21 @@ NAMES = tuple(dict.fromkeys(case.name for case in list_cases() if case.group != 
 
 @dataclass(frozen=True)
 class Job:
-    """A run to do: a case with a seed, its scene file (None: as declared), recorded below `runs`."""
+    """A run to do.
+
+    Attributes:
+        case: Mission and scene.
+        seed: Seed of the run.
+        scene: Scene file; None: as declared.
+        runs: Folder of the run directories.
+        wall_time_limit: Wall time after which it is killed [s].
+    """
 
     case: Case
     seed: int
     scene: Path | None
     runs: Path
+    wall_time_limit: float
 
 
 @dataclass(frozen=True)
@@ -62,6 +71,7 @@ def measure(
     runs_per_scene: int,
     declared_runs: int,
     first_seed: int,
+    wall_time_limit: float,
     workers: int,
     runs: Path,
     out: Path,
@@ -83,7 +93,7 @@ def measure(
             scene = write_scene(case, Path(folder))
             first = first_seed + SEEDS_PER_CASE * case.number
             count = declared_runs if case.group == DECLARED else runs_per_scene
-            jobs += [Job(case, seed, scene, runs) for seed in range(first, first + count)]
+            jobs += [Job(case, seed, scene, runs, wall_time_limit) for seed in range(first, first + count)]
         with bar("outside the envelope") as progress:
             results = do_all(
                 jobs, run_job, _describe_broken, workers=workers, progress=progress, halting=say_halting
@@ -118,7 +128,8 @@ def _load_cell_of(mission: str) -> CellConfig:
 
 def run_job(job: Job) -> Done:
     """Do one run."""
-    return Done(job.case, run_audited(job.case.mission, job.seed, job.runs, job.scene))
+    run = run_audited(job.case.mission, job.seed, job.runs, job.scene, wall_time_limit=job.wall_time_limit)
+    return Done(job.case, run)
 
 
 def _describe_broken(job: Job, error: BaseException) -> Done:
@@ -175,7 +186,7 @@ def _row(group: str, done: Sequence[Done], usual: dict[str, float | None]) -> Fi
         "HUNG": sum(run.status == HUNG for run in runs),
         "s per object": _median([one.time_per_object for one in done]),
         "times declared": _median(ratios),
-        "wall s": _median([run.wall_time_s for run in runs]),
+        "cpu s": _median([run.cpu_time_s for run in runs]),
     }
 
 
@@ -240,6 +251,7 @@ if __name__ == "__main__":
             "--first-seed", type=click.IntRange(min=0), default=300000, show_default=True,
             help="Seed of the first run; each scene has seeds of its own.",
         ),
+        limit_option,
         workers_option,
         runs_option,
         click.option(

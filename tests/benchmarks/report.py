@@ -38,6 +38,12 @@ T = TypeVar("T")
 
 CELL_OPTIONS = (click.argument("cell", default="overhead"), seed_option)
 """Options of a benchmark that measures a cell."""
+WALL_TIME_LIMIT = 180.0
+"""Wall time after which a run counts as hung and is killed, unless an option says otherwise [s]."""
+limit_option = click.option(
+    "--wall-time-limit", type=click.FloatRange(min=0, min_open=True), default=WALL_TIME_LIMIT,
+    show_default=True, help="Wall time in seconds after which a run is killed and counts as HUNG.",
+)  # fmt: skip
 
 
 def run_command(measure: Callable[..., Figures], *options: Option) -> None:

@@ -32,7 +32,7 @@ def misplaced(*reports: Report, fell: bool = False) -> FoundObject:
 
 def run_of(status: str, *objects: FoundObject, mission: str = OVERHEAD, time: float = 10.0) -> AuditedRun:
     """Return a run with a status and objects."""
-    return AuditedRun(mission, 1, status, 0, "", {}, {}, objects, time, 5.0, "runs/1")
+    return AuditedRun(mission, 1, status, 0, "", {}, {}, objects, time, 5.0, 5.0, "runs/1")
 
 
 def test_there_are_75_cases_and_every_scene_fits_its_cell(tmp_path: Path) -> None:
