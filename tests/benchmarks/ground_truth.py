@@ -102,10 +102,10 @@ class AuditedRun:
         items: Counts of the ledger.
         audit: Counts of the audit, and `agrees`.
         objects: The objects; none if there is no result.
-        robot_time_s: Time on the clock of the run [s].
+        robot_time_s: Time on the clock of the run [s]; without a result, as far as its journal tells.
         wall_time_s: Wall time [s].
         cpu_time_s: Processor time of the run's process, all threads [s].
-        run: Run directory, or "".
+        run: Run directory; "" if there is none.
     """
 
     mission: str
@@ -251,13 +251,21 @@ def run_audited(
     wall_time_limit: float = WALL_TIME_LIMIT,
 ) -> AuditedRun:
     """Record a run below `runs` in a forked process, which is killed after `wall_time_limit` [s]."""
+    began = time.time()
     answer, problem = ForkRunner(wall_time_limit).call(
         lambda: _run_in_this_process(mission, seed, runs, scene, detectors)
     )
     if isinstance(answer, AuditedRun):
         return answer
     status = HUNG if "was killed" in problem else FAULT
-    return AuditedRun.without_result(mission, seed, status, problem)
+    run = AuditedRun.without_result(mission, seed, status, problem)
+    journals = runs.glob(f"*/*_s{seed}/journal.jsonl")
+    journal = next((path for path in journals if path.stat().st_mtime >= began), None)
+    if journal is None:
+        return run
+    clock = max((entry["clock"] for entry in read_journal(journal)), default=0.0)
+    message = f"{problem}; its clock had come to {clock:.1f} s"
+    return replace(run, message=message, robot_time_s=clock, run=str(journal.parent))
 
 
 def _run_in_this_process(

@@ -113,4 +113,6 @@ def test_a_cube_as_large_as_a_duck_that_is_called_a_duck_is_found_in_a_wrong_bin
 
 @pytest.mark.slow
 def test_a_run_that_takes_too_long_is_hung(tmp_path: Path) -> None:
-    assert run_audited(OVERHEAD, 1, tmp_path, wall_time_limit=0.5).status == HUNG
+    run = run_audited(OVERHEAD, 1, tmp_path, wall_time_limit=0.5)
+    assert (run.status, run.exit_code, run.objects) == (HUNG, -1, ())
+    assert run.message.startswith("the child sent nothing for 0.5 s and was killed")
