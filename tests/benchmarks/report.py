@@ -24,7 +24,7 @@ from executive.cli.cells import load_cells
 from executive.cli.options import MISSION, json_option, overrides_option, seed_option
 from executive.cli.output import print_json, stdout_kept_clean
 from executive.cli.subject import load_subject, oracle_option
-from executive.errors import ExecutiveError
+from executive.errors import ExecutiveError, InputError
 from executive.record.recorded_run import recorded_run
 from executive.record.result import disagreement
 
@@ -38,6 +38,12 @@ T = TypeVar("T")
 
 CELL_OPTIONS = (click.argument("cell", default="overhead"), seed_option)
 """Options of a benchmark that measures a cell."""
+WALL_TIME_LIMIT = 180.0
+"""Wall time after which a run counts as hung and is killed, unless an option says otherwise [s]."""
+limit_option = click.option(
+    "--wall-time-limit", type=click.FloatRange(min=0, min_open=True), default=WALL_TIME_LIMIT,
+    show_default=True, help="Wall time in seconds after which a run is killed and counts as HUNG.",
+)  # fmt: skip
 
 
 def run_command(measure: Callable[..., Figures], *options: Option) -> None:
@@ -104,6 +110,19 @@ def show_progress(items: Iterable[T], description: str) -> Iterable[T]:
     """Yield `items`, with a progress bar if stderr is a terminal."""
     console = Console(stderr=True)
     return track(items, description, console=console, disable=not console.is_interactive)
+
+
+def write_json(path: Path, figures: Figures) -> None:
+    """Write figures to a JSON file.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(figures, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f'cannot write the figures "{path}": {error.strerror}; name another file') from error
 
 
 def print_figures(figures: Figures) -> None:

@@ -1,0 +1,306 @@
+"""Simulated runs with the true end of every object, and what the executive itself reported about it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from executive.cell import Routes
+from executive.cell_config import CellConfig
+from executive.discovery import discover
+from executive.events import Emit
+from executive.ledger.item import State
+from executive.messages import BIN_THICKNESS
+from executive.mission.load import load_mission
+from executive.record.journal import read_journal
+from executive.record.recorded_run import recorded_run
+from executive.record.result import exit_code
+from executive.runtime.cells import cell_kind
+from executive.sim.arrangements import UNKNOWN
+from executive.sim.audit import audit
+from executive.sim.cell import SimCell
+from executive.vision.detectors.registry import build_detectors
+from executive.vision.detectors.setting import ClosableDetector
+from executive.workcell import CellOptions
+from tests.benchmarks.forks import ForkRunner
+from tests.benchmarks.report import WALL_TIME_LIMIT
+
+HUNG, FAULT = "HUNG", "FAULT"
+"""Status of a run that exceeded its wall time, and of a run whose process ended without a result."""
+END_PLACES = ("wrong_bin", "right", "left", "elsewhere")
+"""Keys of the audit of which a single object counts in one at most."""
+DetectorMaker = Callable[..., Mapping[str, ClosableDetector]]
+"""Makes the detectors of a cell, as `build_detectors` does."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """What the journal says last about an item.
+
+    Attributes:
+        label: Class.
+        state: State.
+        why: Reason for the state, or "".
+    """
+
+    label: str
+    state: str
+    why: str
+
+    @property
+    def is_doubted(self) -> bool:
+        """True if it tells a reader that the item may not be where it belongs."""
+        return self.state in ("rejected", "lost") or (self.state == "placed" and bool(self.why))
+
+
+@dataclass(frozen=True)
+class FoundObject:
+    """The true end of an object.
+
+    Attributes:
+        label: True class, or `unknown`.
+        place: One of `END_PLACES`; "" for an unknown object outside of bins that no item was seen near.
+        bin: The bin that it lies in, or "".
+        fell_in_wrong_bin: True if it fell from the tool into a wrong bin; `place` is then `elsewhere`.
+        items: Items that stand for it: the one with which it was carried last, else those first seen where
+            it stood.
+        reports: What the journal says last about these items.
+    """
+
+    label: str
+    place: str
+    bin: str
+    fell_in_wrong_bin: bool
+    items: tuple[str, ...]
+    reports: tuple[Report, ...] = ()
+
+    @property
+    def is_known(self) -> bool:
+        """True if it is of a class of the cell."""
+        return self.label != UNKNOWN
+
+    @property
+    def is_in_wrong_bin(self) -> bool:
+        """True if it was put or fell into a wrong bin."""
+        return self.place == "wrong_bin" or self.fell_in_wrong_bin
+
+
+@dataclass(frozen=True)
+class AuditedRun:
+    """A run, its result and the true end of its objects.
+
+    Attributes:
+        mission: Name of the mission.
+        seed: Seed of the run.
+        status: Status in `result.json`, `HUNG` or `FAULT`.
+        exit_code: Exit code of `executive run`; -1 if there is no result.
+        message: Message of the result, or why there is none.
+        items: Counts of the ledger.
+        audit: Counts of the audit, and `agrees`.
+        objects: The objects; none if there is no result.
+        robot_time_s: Time on the clock of the run [s]; without a result, as far as its journal tells.
+        wall_time_s: Wall time [s].
+        cpu_time_s: Processor time of the run's process, all threads [s].
+        run: Run directory; "" if there is none.
+    """
+
+    mission: str
+    seed: int
+    status: str
+    exit_code: int
+    message: str
+    items: Mapping[str, int]
+    audit: Mapping[str, int | bool]
+    objects: tuple[FoundObject, ...]
+    robot_time_s: float
+    wall_time_s: float
+    cpu_time_s: float
+    run: str
+
+    @staticmethod
+    def without_result(mission: str, seed: int, status: str, message: str) -> AuditedRun:
+        """Return what is known of a run that ended without a result."""
+        return AuditedRun(mission, seed, status, -1, message, {}, {}, (), 0.0, 0.0, 0.0, "")
+
+    @property
+    def known(self) -> list[FoundObject]:
+        """The objects of the cell's classes."""
+        return [one for one in self.objects if one.is_known]
+
+    @property
+    def right(self) -> int:
+        """Number of objects of the cell's classes in a right bin."""
+        return sum(one.place == "right" for one in self.known)
+
+    @property
+    def in_wrong_bin(self) -> list[FoundObject]:
+        """The objects in a wrong bin, unknown ones included."""
+        return [one for one in self.objects if one.is_in_wrong_bin]
+
+    @property
+    def unreported(self) -> list[FoundObject]:
+        """The objects in a wrong bin that the executive itself, without the audit, does not report.
+
+        An object is reported if the status is not SUCCESS and one of its items is rejected, lost, or placed
+        with a doubt.
+        """
+        return [
+            one
+            for one in self.in_wrong_bin
+            if self.status == "SUCCESS" or not any(report.is_doubted for report in one.reports)
+        ]
+
+
+class AuditedCell(SimCell):
+    """A simulated cell that tells the true end of every object after `audit`.
+
+    Attributes:
+        objects: The objects; empty before `audit`.
+    """
+
+    def __init__(
+        self,
+        config: CellConfig,
+        *,
+        seed: int,
+        routes: Routes,
+        emit: Emit,
+        options: CellOptions,
+        detectors: DetectorMaker,
+    ) -> None:
+        super().__init__(config, seed=seed, routes=routes, emit=emit, options=options, detectors=detectors)
+        self.objects: tuple[FoundObject, ...] = ()
+        self._labels = dict(self._world.bodies)
+        self._carried: dict[int, str] = {}
+
+    def advance(self) -> None:
+        """Let one physics step pass, and note the item with which a body is carried."""
+        super().advance()
+        body = self._tool.held_body
+        if body is None:
+            return
+        for record in self._ledger.records:
+            if record.state is State.HELD:
+                self._carried[body] = record.item
+
+    def audit(self) -> dict[str, int]:
+        """Return what really became of the objects, and keep it object by object."""
+        self.objects = tuple(map(self._find, self._initial))
+        return super().audit()
+
+    def _find(self, body: int) -> FoundObject:
+        """Return the true end of a body."""
+        places = [self._initial[body], *self._world.stood.get(body, ())]
+        gate = self._config.ledger.gate
+        counts = audit(
+            self._world, {body: places}, self._ledger.records, self._bins, self._routes, gate,
+            held=self._tool.held_body, fallen=self._tool.fallen,
+        )  # fmt: skip
+        seen_there = tuple(
+            record.item
+            for record in self._ledger.records
+            if any(float(np.linalg.norm(record.first[:2] - place[:2])) <= gate for place in places)
+        )
+        carried = self._carried.get(body)
+        inside = ""
+        if body in self._world.bodies:
+            position = self._world.object_pose(body).position
+            bins = self._bins.items()
+            inside = next((name for name, bin in bins if bin.contains(position, BIN_THICKNESS)), "")
+        return FoundObject(
+            label=self._labels[body],
+            place=next((place for place in END_PLACES if counts[place]), ""),
+            bin=inside,
+            fell_in_wrong_bin=bool(counts["fell_in_wrong_bin"]),
+            items=seen_there if carried is None else (carried,),
+        )
+
+
+class AuditedCellMaker:
+    """Makes an audited cell and keeps it; `detectors` makes its detectors.
+
+    Attributes:
+        made: The cell; set once it is made.
+    """
+
+    made: AuditedCell
+
+    def __init__(self, detectors: DetectorMaker = build_detectors) -> None:
+        self._detectors = detectors
+
+    def __call__(
+        self, config: CellConfig, *, seed: int, routes: Routes, emit: Emit, options: CellOptions
+    ) -> AuditedCell:
+        """Return a cell made from a cell file."""
+        self.made = AuditedCell(
+            config, seed=seed, routes=routes, emit=emit, options=options, detectors=self._detectors
+        )
+        return self.made
+
+
+def run_audited(
+    mission: str,
+    seed: int,
+    runs: Path,
+    scene: Path | None = None,
+    detectors: DetectorMaker = build_detectors,
+    wall_time_limit: float = WALL_TIME_LIMIT,
+) -> AuditedRun:
+    """Record a run below `runs` in a forked process, which is killed after `wall_time_limit` [s]."""
+    began = time.time()
+    answer, problem = ForkRunner(wall_time_limit).call(
+        lambda: _run_in_this_process(mission, seed, runs, scene, detectors)
+    )
+    if isinstance(answer, AuditedRun):
+        return answer
+    status = HUNG if "was killed" in problem else FAULT
+    run = AuditedRun.without_result(mission, seed, status, problem)
+    journals = runs.glob(f"*/*_s{seed}/journal.jsonl")
+    journal = next((path for path in journals if path.stat().st_mtime >= began), None)
+    if journal is None:
+        return run
+    clock = max((entry["clock"] for entry in read_journal(journal)), default=0.0)
+    message = f"{problem}; its clock had come to {clock:.1f} s"
+    return replace(run, message=message, robot_time_s=clock, run=str(journal.parent))
+
+
+def _run_in_this_process(
+    mission: str, seed: int, runs: Path, scene: Path | None, detectors: DetectorMaker
+) -> AuditedRun:
+    skills = discover()
+    loaded = load_mission(mission, skills, {}, cell_kind)
+    maker = AuditedCellMaker(detectors)
+    result = recorded_run(loaded, skills, seed=seed, runs=runs, frames=False, kind=maker, scene=scene)
+    reports = read_reports(Path(result["run"]) / "journal.jsonl")
+    objects = tuple(
+        replace(one, reports=tuple(reports[item] for item in one.items if item in reports))
+        for one in maker.made.objects
+    )
+    return AuditedRun(
+        mission=mission,
+        seed=seed,
+        status=result["status"],
+        exit_code=exit_code(result),
+        message=result["message"],
+        items=result["items"],
+        audit=result["audit"],
+        objects=objects,
+        robot_time_s=result["robot_time_s"],
+        wall_time_s=result["wall_time_s"],
+        # A forked process begins at zero.
+        cpu_time_s=round(time.process_time(), 3),
+        run=result["run"],
+    )
+
+
+def read_reports(journal: Path) -> dict[str, Report]:
+    """Return what a journal says last about each item, by item."""
+    return {
+        entry["item"]: Report(entry["label"], entry["state"], entry["why"])
+        for entry in read_journal(journal)
+        if entry["kind"] == "item"
+    }
