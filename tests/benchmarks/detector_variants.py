@@ -112,7 +112,7 @@ def evaluate_scene(
     """Return the figures of the first detector of a cell in a scene, as `executive evaluate` does."""
     (subject,) = subjects({file: cell}, None, None, None)
     check_subject(subject, rendered=True, scene=scene)
-    scenes = Scenes(images, seed, as_run=True, view="table", workers=workers, scene=scene)
+    scenes = Scenes(images, seed, varied=False, view="table", workers=workers, scene=scene)
     return measure_detector(
         subject, None, scenes, threshold=THRESHOLD, cores=None, worst=WorstMisses(), progress=bar
     )

@@ -9,7 +9,7 @@ import pytest
 from ledger_bench import area_of, take_frame
 
 from executive.cell_config import TableConfig
-from executive.ledger.coverage import ASTRAY, Coverage, LEAST, OCCUPIED, STRAYED
+from executive.ledger.coverage import ASTRAY, LEAST, OCCUPIED, STRAYED, Coverage
 from executive.messages import Detections
 from executive.reliability import Reliability
 
