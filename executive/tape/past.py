@@ -77,7 +77,7 @@ class Past:
     @property
     def incomplete(self) -> Sequence[int]:
         """Control steps after which it had ended as INCOMPLETE: the tree begins again when it is resumed."""
-        return [e["tick"] for e in self.entries if e["kind"] == "end" and e["status"] == "INCOMPLETE"]
+        return [e["tick"] for e in self.entries if e["kind"] == "end" and e.get("status") == "INCOMPLETE"]
 
     @property
     def step(self) -> float:
