@@ -21,6 +21,9 @@ class Accounts(Protocol):
     def close(self, *, completed: bool) -> None:
         """Decide the final state of each item; `completed` is True if the tree succeeded."""
 
+    def reopen(self) -> None:
+        """Forget the items that were left on the table; the next look enters those that still lie there."""
+
     def balance(self) -> dict[str, int]:
         """Return the counts `seen, placed, rejected, skipped, lost, phantom`.
 

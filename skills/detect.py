@@ -13,6 +13,9 @@ from executive.skill import Out, Skill, param, port
 
 IN_VIEW = 0.7
 """Share of a box that the arm must leave in view for the box to be believed."""
+MAX_BOXES = 100
+"""Maximum number of boxes in one look, doubtful ones and unknown labels included. Shipped cells hold at most
+20 objects, and the time to match boxes with items grows faster than their number."""
 MAX_RIVAL = 0.5
 """Largest ratio between the confidences of the second and the first class of a box."""
 
@@ -23,6 +26,7 @@ class Detect(Skill):
     Succeeds with each detection at or above the detector's threshold; a detection below it, or with a second
     class that is nearly as likely, is in doubt. An empty list is a result, not a failure.
     What the arm hides is not believed: neither that nothing is there, nor what is seen of it.
+    More than 100 boxes in one look are no objects: the look fails as crowded, whatever their confidence.
     """
 
     detections: Out[Detections] = port(doc="what was found, with the frame it was found in")
@@ -40,7 +44,7 @@ class Detect(Skill):
         choices=("fail", "pass"),
         doc="where the arm hides part of the workspace: `fail` as hidden, or `pass` with a look at the rest",
     )
-    reasons: ClassVar = ("unsure", "hidden", "unavailable")
+    reasons: ClassVar = ("unsure", "hidden", "unavailable", "crowded")
     uses: ClassVar = ("camera",)
     senses: ClassVar = True
 
@@ -63,6 +67,13 @@ class Detect(Skill):
             answer = request.result()
         except Unavailable as error:
             raise self.failed("unavailable", f"detector {name}: {error}") from error
+        if len(answer.found) > MAX_BOXES:
+            raise self.failed(
+                "crowded",
+                f"detector {answer.detector} found {len(answer.found)} boxes in the view {self.view}, which "
+                f"cannot all be objects; at most {MAX_BOXES} are allowed: raise its floor in the cell file, "
+                "or use another detector",
+            )
         if wrong := next((one for one in answer.found if not _can_be(one)), None):
             raise self.failed(
                 "unavailable",

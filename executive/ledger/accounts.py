@@ -75,6 +75,17 @@ def find_final_state(
     return State.REJECTED, "the run ended before its turn"
 
 
+def forget_rejected(records: Iterable[Record]) -> list[Record]:
+    """Turn each rejected or skipped item into a phantom, and return those items.
+
+    Somebody may have moved it: the next look enters what it finds, without evidence from before.
+    """
+    left = [record for record in records if record.state in (State.REJECTED, State.SKIPPED)]
+    for record in left:
+        record.state, record.why = State.PHANTOM, "the run was resumed, and it is sought anew"
+    return left
+
+
 def count_states(records: Iterable[Record]) -> dict[str, int]:
     """Return the counts `seen, placed, rejected, skipped, lost, phantom`; phantoms are not among the seen."""
     states = Counter(record.state for record in records)

@@ -13,7 +13,7 @@ from executive.cell_config import LedgerConfig, TableConfig
 from executive.errors import Fault
 from executive.events import Emit
 from executive.geometry import Array
-from executive.ledger.accounts import Remarks, count_states, find_final_state
+from executive.ledger.accounts import Remarks, count_states, find_final_state, forget_rejected
 from executive.ledger.bins import Bins
 from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage
@@ -247,6 +247,11 @@ class ItemLedger:
             if final is not None:
                 record.why = final[1]
                 self._change(record.item, final[0])
+
+    def reopen(self) -> None:
+        """Forget the items that were left on the table; the next look enters those that still lie there."""
+        for record in forget_rejected(self._records.values()):
+            self._emit("item", **record.row)
 
     def balance(self) -> dict[str, int]:
         """Return the counts `seen, placed, rejected, skipped, lost, phantom`."""

@@ -36,8 +36,8 @@ MISTAKES = {
 EXIT_CODES = {"SUCCESS": 0, "FAILURE": 1, "FAULT": 3, "INCOMPLETE": 4, "HALTED": 130}
 """Exit code by the status of the run, unless the audit disagrees (`exit_code`)."""
 
-ENDED = ("SUCCESS", "INCOMPLETE", "FAILURE")
-"""Status of a run that cannot be taken up again: its tree has come to its end."""
+ENDED = ("SUCCESS", "FAILURE")
+"""Status of a run that cannot be resumed: its tree has come to its end, and nothing was rejected."""
 
 
 def result_of(

@@ -46,6 +46,9 @@ def resumed_run(
     meanwhile, the tool's sensor decides what is held, everything on the table is in doubt until it was seen
     again, and each skill that was under way begins anew.
 
+    A run that ended as INCOMPLETE is resumed as well: the tree begins again, and rejected and skipped items
+    are sought anew, wherever somebody has put them. Placed items stay placed and counted.
+
     Args:
         path: The run directory.
         skills: Installed skills by name.
@@ -58,8 +61,8 @@ def resumed_run(
         kind: Makes the work cell; by default the installed kind that the cell file names.
 
     Raises:
-        InputError: There is nothing to take up: the run goes on, has come to its end, left too little of a
-            record, or would be decided otherwise by what is installed now.
+        InputError: There is nothing to take up: the run goes on, has succeeded or failed, left too little of
+            a record, or would be decided otherwise by what is installed now.
         ExecutiveError: The result cannot be written.
     """
     from executive.runtime.run import Run
@@ -104,6 +107,11 @@ def _past(directory: RunDirectory) -> tuple[Past, Entry]:
     """
     entries = read_journal(directory.journal)
     ending = ending_of(entries)
+    if ending is not None and ending["status"] == "INCOMPLETE" and ending["holds"]:
+        raise InputError(
+            f'the run in "{directory.path}" ended with {ending["holds"]} in the tool and cannot be '
+            "resumed; take it out and run the mission anew"
+        )
     if ending is not None and ending["status"] in ENDED:
         raise InputError(
             f'the run in "{directory.path}" came to its end: {ending["status"]}; '

@@ -207,6 +207,9 @@ class Run:
                 if self.control.stopped or self._halted(before=False):
                     break
                 if self.root.status is not Status.RUNNING:
+                    if self._is_reopened():
+                        self._end_part()
+                        continue
                     return self._verdict()
                 self._plant.plan_ahead()
                 self._plant.advance()
@@ -230,16 +233,35 @@ class Run:
         if plant.tape.playing and plant.tick == self._live_from:
             assert self._past is not None
             ticked, intent = plant.tick, self._past.last_intent
+            while plant.workcell.steps < ticked:
+                plant.workcell.advance()
             plant.go_live()
             self._emit("resume", ticked=ticked, intent=intent, versions=versions())
         elif plant.tape.playing and self._past and plant.tick in self._past.resumes:
             entry = self._past.resumes[plant.tick]
-            plant.tick, intent = entry["tick"], entry["intent"]
+            ticked, intent = entry["ticked"], entry["intent"]
+            plant.tick = entry["tick"]
             plant.begin_tick()
         else:
             return
         begin_anew(self.root, self._rest)
+        if ticked - 1 in self._past.incomplete:
+            plant.workcell.accounts.reopen()
         reconcile(plant.cell, intent)
+
+    def _is_reopened(self) -> bool:
+        """Tell whether the run that is played, INCOMPLETE after this step, was resumed then, or is now."""
+        if self._past is None or not self._plant.tape.playing:
+            return False
+        return self._past.is_reopened(self.tick, self._live_from)
+
+    def _end_part(self) -> None:
+        """Do what was done at the end of the run that is resumed; the tree begins again at the next step."""
+        self._rest()
+        self._ask_tool()
+        self._note_whether_empty()
+        self._close_books(completed=True)
+        self._plant.tick += 1
 
     def _rest(self) -> None:
         if problem := self._plant.come_to_rest():

@@ -75,6 +75,11 @@ class Past:
         return next((entry for entry in self.entries if entry["kind"] == "run"), None)
 
     @property
+    def incomplete(self) -> Sequence[int]:
+        """Control steps after which it had ended as INCOMPLETE: the tree begins again when it is resumed."""
+        return [e["tick"] for e in self.entries if e["kind"] == "end" and e.get("status") == "INCOMPLETE"]
+
+    @property
     def step(self) -> float:
         """Length of a control step [s]."""
         assert self.start is not None, "a run that is played has begun"
@@ -94,9 +99,20 @@ class Past:
         """Return how many control steps count, of `steps` that the cell's world has made.
 
         What came after the last step that it tells of decided nothing. The step in which the run was halted
-        does not count, nor do those after it: the arm was only braked then.
+        does not count, nor do those after it: the arm was only braked then. A run that ended as INCOMPLETE
+        counts as a whole.
         """
+        if self.last_tick in self.incomplete:
+            return self.last_tick + 1
         return min(steps, self.last_tick + 1 if self.halt is None else int(self.halt["tick"]))
+
+    def is_reopened(self, tick: int, live_from: int | None) -> bool:
+        """Tell whether the run, once its tree ends in this control step, ends as INCOMPLETE and is resumed.
+
+        `live_from` is the control step at which it is resumed now; None: it is only played.
+        """
+        ended = next((end for end in self.incomplete if end >= tick), None)
+        return ended is not None and (ended + 1 == live_from or ended + 1 in self.resumes)
 
     def before(self, tick: int) -> Past:
         """Return what had happened before a control step; how it began always had."""

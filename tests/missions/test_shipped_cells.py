@@ -28,6 +28,7 @@ def config(path: Path) -> CellConfig:
 def test_there_are_cells() -> None:
     expected = {
         "overhead",
+        "overhead_large",
         "wrist",
         "two_detectors",
         "hosted",

@@ -220,3 +220,33 @@ def test_a_mission_that_is_decided_otherwise_now_is_not_gone_on_with(missions: P
     file.write_text(file.read_text().replace(old, new))
     with pytest.raises(InputError, match=r"cannot be taken up again: the record says at .* and now it is"):
         resumed(path)
+
+
+def unwilling(lets_go: bool) -> Any:
+    """Return a kind of fake cell whose first object cannot be sealed, or can now."""
+
+    class Unwilling(FakeCell):
+        def __init__(self, *args: Any, **options: Any) -> None:
+            super().__init__(*args, **options)
+            first = self.world.objects[0]
+            if not lets_go:
+                self.tool.seals = lambda: self.world.under(self.arm.tool_pose.position) is not first
+
+    return Unwilling
+
+
+def test_what_was_rejected_is_tried_again(missions: Path, tmp_path: Path) -> None:
+    loaded = load_mission(missions / "sort_overhead.yaml", discover(), {"attempts": "1"})
+    first = run_of(loaded, tmp_path, kind=unwilling(lets_go=False))
+    assert (first["status"], first["items"]["placed"], first["items"]["rejected"]) == ("INCOMPLETE", 5, 1)
+    path = Path(first["run"])
+    again = resumed(path, kind=unwilling(lets_go=False))
+    assert (again["status"], again["items"]["placed"], again["items"]["rejected"]) == ("INCOMPLETE", 5, 1)
+    assert redecided(path) == ""
+    result = resumed(path, kind=unwilling(lets_go=True))
+    assert (result["status"], result["items"]["placed"], result["items"]["seen"]) == ("SUCCESS", 6, 6)
+    assert result["audit"]["agrees"]
+    assert set(placed(path).values()) == {1}
+    assert redecided(path) == ""
+    with pytest.raises(InputError, match="came to its end: SUCCESS"):
+        resumed(path)

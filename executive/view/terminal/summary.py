@@ -44,6 +44,11 @@ def repeat_command(
     return shlex.join(words)
 
 
+def resume_command(run: str) -> str:
+    """Return the command line that resumes the run in a directory."""
+    return shlex.join(["executive", "run", "--resume", run])
+
+
 def verdict(result: Mapping[str, Any]) -> str:
     """Return how a run ended in one line: status, reason, node and sentence."""
     # The reason of a fault or a halt is the status once more.
@@ -73,6 +78,8 @@ def summary(result: Mapping[str, Any], items: ItemTable, repeat: str, report: st
     else:
         lines = [verdict(result), times, f"{result['run']}  (repeat: {repeat})", *fates]
         lines += [f"report: {report}"] if report else []
+        if result["status"] == "INCOMPLETE":
+            lines.append(f"after you have moved them: {resume_command(result['run'])}")
     return "\n".join([*warning, *lines]) + "\n"
 
 
@@ -91,7 +98,7 @@ def story_lines(story: Mapping[str, Any], run: str, repeat: str, report: str = "
         lines += _wrapped(text, f"{label:{_LABEL}}", " " * _LABEL, most=3)
     commands = {"record": run, "report": report, "repeat": repeat}
     if story["resumes"]:
-        commands["go on"] = shlex.join(["executive", "run", "--resume", run])
+        commands["go on"] = resume_command(run)
     return lines + [f"{label:{_LABEL}}{command}" for label, command in commands.items() if command]
 
 

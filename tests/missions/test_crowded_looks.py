@@ -1,0 +1,136 @@
+"""A detector that fills every look with boxes ends the mission at once, with a reason and a short record."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from executive.cell import Clock
+from executive.cell_config import CameraConfig, DetectorConfig
+from executive.discovery import discover
+from executive.messages import Detection, Frame
+from executive.mission.load import load_mission
+from executive.record.recorded_run import recorded_run
+from executive.runtime.cells import cell_kind
+from executive.sim.cell import SimCell
+from executive.testing.fake_cell import FakeCell
+from executive.vision.detectors.requests import Pending
+from executive.workcell import Workcell
+
+LABELS = ("cube", "sphere", "duck")
+MAX_WALL_TIME = 60.0
+"""Time within which the run must end, whatever the number of boxes [s]."""
+MAX_JOURNAL_ENTRIES = 150
+"""Maximum number of entries of the journal; the answer of the detector is in one of them."""
+
+
+class CrowdedDetector:
+    """Returns `count` boxes of known classes in every look; implements `executive.cell.Detector`.
+
+    Args:
+        count: Number of boxes.
+        confidence: Confidence of every box.
+        overlapping: Boxes of 30 pixels at random positions, instead of small ones side by side.
+        moving: Draw positions and classes anew for every look.
+    """
+
+    def __init__(
+        self, name: str, config: DetectorConfig, camera: CameraConfig, clock: Clock, *,
+        count: int, confidence: float = 0.9, overlapping: bool = False, moving: bool = False,
+    ) -> None:  # fmt: skip
+        self._name, self._config, self._camera, self._clock = name, config, camera, clock
+        self._count, self._confidence = count, confidence
+        self._overlapping, self._moving = overlapping, moving
+
+    def request(self, frame: Frame, view: str) -> Pending:
+        """Return boxes within the searched part of the image, whatever it shows."""
+        assert frame.id == 1, "the mission goes on with a look that cannot be right"
+        answer: Future[list[Detection]] = Future()
+        camera = self._camera
+        area = camera.table_view if view == "table" else (0, 0, camera.width, camera.height)
+        answer.set_result(self._boxes(area, np.random.default_rng(frame.id if self._moving else 0)))
+        due = self._clock.now + self._config.latency
+        return Pending(answer, due, self._clock, self._name, self._config.reliability)
+
+    def close(self) -> None:
+        """Have nothing to give back."""
+
+    def _boxes(self, area: tuple[int, int, int, int], random: np.random.Generator) -> list[Detection]:
+        corner, size = np.array(area[:2]), np.array(area[2:]) - area[:2]
+        columns = int(np.ceil(np.sqrt(self._count)))
+        if self._overlapping:
+            half = 15.0
+            centres = random.uniform(corner + half, corner + size - half, (self._count, 2))
+        else:
+            half = float(size.min() / columns * 0.45)
+            cells = random.permutation(columns * columns)[: self._count]
+            centres = corner + (np.stack(divmod(cells, columns), axis=1) + 0.5) * size / columns
+        return [
+            Detection(str(random.choice(LABELS)), self._confidence, (x - half, y - half, x + half, y + half))
+            for x, y in centres.tolist()
+        ]
+
+
+def _fake(config: Any, *, crowd: Mapping[str, Any], **given: Any) -> FakeCell:
+    fake = FakeCell(config, **given)
+    camera = next(iter(config.cameras.values()))
+    parts: dict[str, Any] = {
+        name: CrowdedDetector(name, detector, camera, fake.cell.clock, **crowd)
+        for name, detector in config.detectors.items()
+    }
+    fake.detectors.update(parts)
+    return fake
+
+
+def _crowded(
+    configs: Mapping[str, DetectorConfig], *, crowd: Mapping[str, Any], base: Path, seed: int, **given: Any
+) -> dict[str, CrowdedDetector]:
+    del base, seed
+    return {name: CrowdedDetector(name, config, **given, **crowd) for name, config in configs.items()}
+
+
+def run_crowded(
+    runs: Path, kind: Callable[..., Workcell], mission: str = "sort_overhead"
+) -> tuple[dict[str, Any], str]:
+    """Run a shipped mission and return its result and its journal."""
+    skills = discover()
+    loaded = load_mission(mission, skills, kinds=cell_kind)
+    result = recorded_run(loaded, skills, seed=1, runs=runs, keyboard=False, frames=False, kind=kind)
+    return result, (Path(result["run"]) / "journal.jsonl").read_text()
+
+
+def assert_ended_as_crowded(result: Mapping[str, Any], journal: str, count: int) -> None:
+    assert (result["status"], result["reason"]) == ("FAILURE", "Detect.crowded")
+    assert result["message"].startswith(f"detector embedded found {count} boxes in the view table")
+    assert "at most 100 are allowed" in result["message"]
+    assert result["wall_time_s"] < MAX_WALL_TIME
+    entries = [json.loads(line)["kind"] for line in journal.splitlines()]
+    assert len(entries) < MAX_JOURNAL_ENTRIES
+    assert not {"look", "item"} & set(entries)
+
+
+@pytest.mark.parametrize("moving", [False, True], ids=["fixed", "moving"])
+@pytest.mark.parametrize("overlapping", [False, True], ids=["disjoint", "overlapping"])
+@pytest.mark.parametrize("count", [101, 300, 1000, 3000])
+def test_the_run_ends_at_the_first_look(tmp_path: Path, count: int, overlapping: bool, moving: bool) -> None:
+    crowd = {"count": count, "overlapping": overlapping, "moving": moving}
+    assert_ended_as_crowded(*run_crowded(tmp_path, partial(_fake, crowd=crowd)), count)
+
+
+def test_doubtful_boxes_count_as_well(tmp_path: Path) -> None:
+    crowd = {"count": 300, "confidence": 0.3}
+    assert_ended_as_crowded(*run_crowded(tmp_path, partial(_fake, crowd=crowd)), 300)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [300, 1000, 3000])
+def test_the_run_ends_at_the_first_look_in_the_simulated_world(tmp_path: Path, count: int) -> None:
+    kind = partial(SimCell, detectors=partial(_crowded, crowd={"count": count}))
+    assert_ended_as_crowded(*run_crowded(tmp_path, kind), count)
