@@ -13,6 +13,8 @@ from executive.skill import Out, Skill, param, port
 
 IN_VIEW = 0.7
 """Share of a box that the arm must leave in view for the box to be believed."""
+CHECKED_FRAMES = 5
+"""Number of the first frames of a run in which the pose of the camera is checked."""
 MAX_RIVAL = 0.5
 """Largest ratio between the confidences of the second and the first class of a box."""
 
@@ -23,6 +25,7 @@ class Detect(Skill):
     Succeeds with each detection at or above the detector's threshold; a detection below it, or with a second
     class that is nearly as likely, is in doubt. An empty list is a result, not a failure.
     What the arm hides is not believed: neither that nothing is there, nor what is seen of it.
+    Fails with `camera_moved` if the first frames of a run show the bins beside their places.
     """
 
     detections: Out[Detections] = port(doc="what was found, with the frame it was found in")
@@ -40,7 +43,7 @@ class Detect(Skill):
         choices=("fail", "pass"),
         doc="where the arm hides part of the workspace: `fail` as hidden, or `pass` with a look at the rest",
     )
-    reasons: ClassVar = ("unsure", "hidden", "unavailable")
+    reasons: ClassVar = ("unsure", "hidden", "unavailable", "camera_moved")
     uses: ClassVar = ("camera",)
     senses: ClassVar = True
 
@@ -56,6 +59,8 @@ class Detect(Skill):
         name = self.detector or next(iter(cell.detectors))
         detector = cell.detectors[name]
         frame = cell.camera.capture()
+        if frame.id <= CHECKED_FRAMES and (displacement := cell.camera.displacement(frame)):
+            raise self.failed("camera_moved", displacement)
         request = detector.request(frame, self.view)
         while not request.ready:
             yield
