@@ -33,9 +33,11 @@ MIN_CONTRAST = 4.0
 NEAR_RANGES, FAR_RANGES, SUPPORT_RANGE = (8, 4, 3), (16, 8, 4, 3), 2
 """Distances beside an outline up to which edges are searched [pixel]: for each step of a fit that starts from
 the declared pose, or from a pose of the grid; and to find out whether an edge supports the outline."""
-EDGE_STD = 1.5
+EDGE_STD = 2.0
 """Standard deviation of the place of an edge [pixel]; neighbours err alike, so it is taken large."""
-PRIOR_STD = np.array([0.15, 0.15, 0.15, 0.1, 0.1, 0.1])
+MIN_OUTLIER = 0.5
+"""Smallest residual at which an edge can count as an outlier [pixel]."""
+PRIOR_STD = np.full(6, 0.1)
 """Standard deviations of a rotation [rad] and a shift [m] about which the image says nothing."""
 ROBUST_STEPS = 8
 """Number of the steps that find out which edges are outliers."""
@@ -239,7 +241,7 @@ def _solve(jacobian: Array, distances: Array, offset: Array, scale: float) -> tu
     change, covariance = np.zeros(6), np.zeros((6, 6))
     for _ in range(ROBUST_STEPS):
         residuals = distances - jacobian @ change
-        scale = max(EDGE_STD, min(scale, 1.5 * float(np.median(np.abs(residuals)))))
+        scale = max(MIN_OUTLIER, min(scale, 1.5 * float(np.median(np.abs(residuals)))))
         weighted = jacobian * ((1 + (residuals / scale) ** 2) ** -2)[:, None] / EDGE_STD**2
         covariance = np.asarray(np.linalg.inv(weighted.T @ jacobian + np.diag(PRIOR_STD**-2.0)), dtype=float)
         change = covariance @ (weighted.T @ distances - offset / PRIOR_STD**2)

@@ -81,7 +81,7 @@ def test_a_camera_in_its_place_is_believed_to_be_there(light: float) -> None:
 def test_a_shift_is_measured(shift: tuple[float, float, float]) -> None:
     offset = estimate_offset(draw(moved(shift)), BINS)
     assert offset is not None and offset.distance > MAX_DISTANCE
-    assert offset.shift == pytest.approx(shift, abs=0.012)
+    assert offset.shift == pytest.approx(shift, abs=0.015)
     assert np.all(np.abs(offset.shift - shift) < 3 * offset.shift_std + 0.001)
     assert offset.turn_deg < 1.0
 
