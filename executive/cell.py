@@ -93,6 +93,9 @@ class Camera(Protocol):
     def capture(self) -> Frame:
         """Return a fresh frame."""
 
+    def displacement(self, frame: Frame) -> str:
+        """Return in words how far a frame shows the camera beside its declared pose; "" if it does not."""
+
 
 class Request(Protocol):
     """A detection under way."""

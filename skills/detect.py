@@ -13,9 +13,11 @@ from executive.skill import Out, Skill, param, port
 
 IN_VIEW = 0.7
 """Share of a box that the arm must leave in view for the box to be believed."""
-MAX_BOXES = 100
+MAX_BOXES = 60
 """Maximum number of boxes in one look, doubtful ones and unknown labels included. Shipped cells hold at most
 20 objects, and the time to match boxes with items grows faster than their number."""
+CHECKED_FRAMES = 5
+"""Number of the first frames of a run in which the pose of the camera is checked."""
 MAX_RIVAL = 0.5
 """Largest ratio between the confidences of the second and the first class of a box."""
 
@@ -26,7 +28,8 @@ class Detect(Skill):
     Succeeds with each detection at or above the detector's threshold; a detection below it, or with a second
     class that is nearly as likely, is in doubt. An empty list is a result, not a failure.
     What the arm hides is not believed: neither that nothing is there, nor what is seen of it.
-    More than 100 boxes in one look are no objects: the look fails as crowded, whatever their confidence.
+    More than 60 boxes in one look are no objects: the look fails as crowded, whatever their confidence.
+    Fails with `camera_moved` if the first frames of a run show the bins beside their places.
     """
 
     detections: Out[Detections] = port(doc="what was found, with the frame it was found in")
@@ -44,7 +47,7 @@ class Detect(Skill):
         choices=("fail", "pass"),
         doc="where the arm hides part of the workspace: `fail` as hidden, or `pass` with a look at the rest",
     )
-    reasons: ClassVar = ("unsure", "hidden", "unavailable", "crowded")
+    reasons: ClassVar = ("unsure", "hidden", "unavailable", "crowded", "camera_moved")
     uses: ClassVar = ("camera",)
     senses: ClassVar = True
 
@@ -60,6 +63,8 @@ class Detect(Skill):
         name = self.detector or next(iter(cell.detectors))
         detector = cell.detectors[name]
         frame = cell.camera.capture()
+        if frame.id <= CHECKED_FRAMES and (displacement := cell.camera.displacement(frame)):
+            raise self.failed("camera_moved", displacement)
         request = detector.request(frame, self.view)
         while not request.ready:
             yield

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from executive.cell import Clock
 from executive.cell_config import CameraConfig, DepthConfig, NoiseConfig
 from executive.geometry import Array, Pose
-from executive.messages import Box, Frame
+from executive.messages import Bin, Box, Frame
 from executive.sim.view import ArmShadow
 from executive.sim.world import World
+from executive.vision.camera_check import describe_displacement
 from executive.vision.camera_model import FAR, NEAR, calibrated, projection_matrix, view_matrix
 
 Image = NDArray[np.uint8]
@@ -162,6 +163,7 @@ class SimCamera:
         epoch: Callable[[], int] = lambda: 0,
         light: Light = CELL_LIGHT,
         true: CameraConfig | None = None,
+        bins: Sequence[Bin] = (),
     ) -> None:
         """Mount the camera.
 
@@ -176,6 +178,7 @@ class SimCamera:
             light: How the scene is lit.
             true: The camera as it really is, if it differs from `config`: pose, lens and noise of the images.
                 Frames carry the matrix and the pose of `config`.
+            bins: The bins whose places in a frame show whether the camera is where `config` says.
         """
         self.name = name
         self.config = config
@@ -187,6 +190,7 @@ class SimCamera:
         self._shadow = shadow
         self._epoch = epoch
         self._light = light
+        self._bins = bins
         self._frames = 0
         self._turn = 0
 
@@ -227,6 +231,10 @@ class SimCamera:
             visible=self._visible(X_WC),
             epoch=self._epoch(),
         )
+
+    def displacement(self, frame: Frame) -> str:
+        """Return in words how far a frame shows the camera beside its declared pose; "" if it does not."""
+        return describe_displacement(frame, self._bins)
 
     def skip(self, frames: int, turns: int) -> None:
         """Go on as if so many frames had been taken and next poses been asked for."""

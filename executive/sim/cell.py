@@ -94,6 +94,7 @@ class SimCell:
             epoch=lambda: self._ledger.epoch,
             light=lamp(scene.light),
             true=self._world.config.cameras[name],
+            bins=tuple(self._bins.values()),
         )
         if options.past is not None:
             self._camera.skip(options.past.frames, options.past.turns)

@@ -45,6 +45,7 @@ INPUT_FORMATS: Mapping[str, InputFormat] = {
     "camera.area": InputFormat("camera.area.{0}", BOX),
     "camera.sees_table": InputFormat("camera.sees_table"),
     "camera.capture": InputFormat("camera.frame", FRAME),
+    "camera.displacement": InputFormat("camera.displacement"),
     "request.ready": InputFormat("detector.{detector}.ready"),
     "request.result": InputFormat("detector.{detector}", ANSWER),
     "operator.ask": InputFormat("operator"),

@@ -28,6 +28,7 @@ class FakeCamera:
         name: Its name in the cell file.
         sees: Tells whether the whole workspace is in view; the fake arm hides nothing.
         hides: Parts of the image [pixel] that a test wants hidden.
+        displaced: Displacement in words that a test wants its frames to show.
     """
 
     def __init__(
@@ -43,6 +44,7 @@ class FakeCamera:
         self.name = name
         self.sees: Callable[[], bool] = self._whole_table
         self.hides: list[Box] = []
+        self.displaced = ""
         self._config = config
         self._corners = np.array([(x, y, 0.0) for x in table.x for y in table.y])
         self._matrix, self._X_MC = calibrated(config)
@@ -87,6 +89,11 @@ class FakeCamera:
             visible=self._visible(size),
             epoch=self._epoch(),
         )
+
+    def displacement(self, frame: Frame) -> str:
+        """Return the text of `displaced`."""
+        del frame
+        return self.displaced
 
     def skip(self, frames: int, turns: int) -> None:
         """Go on as if so many frames had been taken and next poses been asked for."""

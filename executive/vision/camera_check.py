@@ -1,0 +1,93 @@
+"""Check of a camera's declared pose: do the bins appear in a frame where they should?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from executive.geometry import Array
+from executive.messages import Bin, Frame
+from executive.vision.outline_fit import Fit, OutlineFit
+
+MAX_DISTANCE = 0.005
+"""Largest average distance between the outlines of the bins and their places [m].
+
+Measured in 1254 frames of undisplaced cameras (eight cells; lamps, shadows and tables varied; bins full and
+empty): wrist camera at most 0.6 mm; fixed camera median 0.5 to 0.8 mm, 99 % below 3.2 mm, at most 3.6 mm,
+where the table has the colour of a bin.
+"""
+MIN_SUPPORT = 0.65
+"""Smallest share of the outlines with an edge beside them at a pose that can be believed."""
+MIN_GAIN = 0.15
+"""Smallest difference between the support of a displaced pose and that of the declared pose."""
+
+
+@dataclass(frozen=True, eq=False)
+class CameraOffset:
+    """Estimated displacement of a camera from its declared pose.
+
+    Attributes:
+        shift, shift_std: Displacement in the world `(3,)` [m], and its standard deviation.
+        turn_deg: Angle of the rotation [degree].
+        distance: Average distance between the outlines of the bins and their places [m].
+        pixels: The same in the image [pixel].
+        support: Share of the outlines (0 to 1) with an edge beside them, at the estimated pose.
+        bins: Names of the bins in view.
+    """
+
+    shift: Array
+    shift_std: Array
+    turn_deg: float
+    distance: float
+    pixels: float
+    support: float
+    bins: tuple[str, ...]
+
+
+def describe_displacement(frame: Frame, bins: Sequence[Bin]) -> str:
+    """Return in words how a camera is displaced; "" if it is not, or if the frame cannot show it."""
+    offset = estimate_offset(frame, bins)
+    if offset is None or offset.distance <= MAX_DISTANCE:
+        return ""
+    x, y, z = 1e3 * offset.shift
+    return (
+        f"camera {frame.camera} is not where the cell file says: the outlines of {', '.join(offset.bins)} "
+        f"appear {offset.pixels:.0f} pixels ({1e3 * offset.distance:.0f} mm) beside their places, as if the "
+        f"camera had moved by ({x:+.0f}, {y:+.0f}, {z:+.0f}) mm (standard deviation "
+        f"{1e3 * offset.shift_std.max():.0f} mm) and turned by {offset.turn_deg:.1f} degrees; limit "
+        f"{1e3 * MAX_DISTANCE:.0f} mm; mount camera and bins as declared, or measure the pose again"
+    )
+
+
+def estimate_offset(frame: Frame, bins: Sequence[Bin]) -> CameraOffset | None:
+    """Return how far a camera is from the pose of its frame; None if the frame shows too little."""
+    fitting = OutlineFit(frame, bins)
+    near = fitting.refine(np.zeros(6))
+    if near is not None and near.support >= MIN_SUPPORT:
+        offset = _offset(near, frame, bins)
+        if offset.distance <= MAX_DISTANCE:
+            return offset
+    # The nearest edges may belong to something else: search the pose that explains most of the outlines.
+    fits = [fit for fit in (near, *fitting.search()) if fit is not None]
+    best = max(fits, key=lambda fit: fit.support, default=None)
+    least = max(MIN_SUPPORT, fitting.support(np.zeros(6)) + MIN_GAIN)
+    return None if best is None or best.support < least else _offset(best, frame, bins)
+
+
+def _offset(fit: Fit, frame: Frame, bins: Sequence[Bin]) -> CameraOffset:
+    """Return a fit as an offset in the world."""
+    samples, R_WC = fit.samples, frame.X_WC.rotation
+    declared = frame.X_WC.inverse().apply(samples.points) @ frame.matrix.T
+    pixels = np.linalg.norm(samples.pixels - declared[:, :2] / declared[:, 2:], axis=1)
+    return CameraOffset(
+        shift=R_WC @ fit.offset[3:],
+        shift_std=np.sqrt(np.diag(R_WC @ fit.covariance[3:, 3:] @ R_WC.T)),
+        turn_deg=math.degrees(float(np.linalg.norm(fit.offset[:3]))),
+        distance=float((pixels * samples.in_camera[:, 2]).mean() / frame.matrix[0, 0]),
+        pixels=float(pixels.mean()),
+        support=fit.support,
+        bins=tuple(bins[index].name for index in np.unique(samples.bins)),
+    )
