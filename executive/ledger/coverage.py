@@ -73,8 +73,8 @@ class Coverage:
             searched &= np.hypot(*(self._points - place)[:, :2].T) > PITCH
         current = self._changed <= detections.frame.epoch
         now = searched & current
-        # Another view is another image for the detector: of 31 objects that the detector of the cell fasteners
-        # missed in the view `table`, it missed 4 in the view `full` of the same pose.
+        # Another view is another image for the detector: of 31 objects that the detector of the cell
+        # fasteners missed in the view `table`, it missed 4 in the view `full` of the same pose.
         viewpoint = f"{viewpoint_of(detections)} {detections.view}"
         misses, repeated = detections.reliability.misses, detections.reliability.repeated
         again = self._searched_from.setdefault(viewpoint, np.zeros(len(self._points), bool))

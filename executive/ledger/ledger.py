@@ -28,6 +28,9 @@ class ItemLedger:
     """Follows every object from its first look to its fate; implements `executive.cell.Ledger`.
 
     Every change is emitted as an `item` event, so that the record can be rebuilt from the journal.
+
+    Attributes:
+        unknown, doubts: See `Remarks`.
     """
 
     def __init__(
@@ -50,16 +53,7 @@ class ItemLedger:
         self._looks = Looks(config, self._coverage, self._freshness)
         self._frame = 0
         self._remarks = Remarks()
-
-    @property
-    def unknown(self) -> Mapping[str, int]:
-        """Largest number of boxes in one look for each label that the cell does not know."""
-        return self._remarks.unknown
-
-    @property
-    def doubts(self) -> Sequence[str]:
-        """Reasons why error rates of detectors were assumed and not measured, in the order of the looks."""
-        return self._remarks.doubts
+        self.unknown, self.doubts = self._remarks.unknown, self._remarks.doubts
 
     @property
     def records(self) -> Sequence[Record]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from executive.errors import Fault
+from executive.control.failure import Failure
+from executive.errors import ExecutiveError, Fault
 from executive.ledger.accounts import is_balanced
 from executive.workcell import Accounts
 
@@ -53,6 +55,22 @@ class Outcome:
     holds: str
     ticks: int
     robot_time: float
+
+
+def end_of_tree(failure: Failure | None) -> Ending:
+    """Return the end of a run whose tree ended with a failure or None; its items are not judged yet."""
+    if failure is None:
+        return Ending("SUCCESS")
+    return Ending("FAILURE", str(failure), failure.message, failure.path)
+
+
+def problems_of(do: Callable[[], None]) -> list[str]:
+    """Do one part of the end of a run and return its error, if any, so that the other parts are done, too."""
+    try:
+        do()
+    except Exception as error:
+        return [str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"]
+    return []
 
 
 def judge_items(accounts: Accounts) -> Ending:

@@ -12,7 +12,6 @@ from typing import Any
 from py_trees.common import Status
 
 from executive.cell import Operator
-from executive.control.failure import Failure
 from executive.control.halting import halt
 from executive.control.scope import Scope
 from executive.errors import ExecutiveError, Fault, Stopped
@@ -21,15 +20,23 @@ from executive.mission.build import build
 from executive.mission.load import LoadedMission
 from executive.runtime.cells import cell_kind
 from executive.runtime.operator import ScriptedOperator, TerminalOperator
-from executive.runtime.outcome import HALTED, Ending, Outcome, check_balance, judge_items
+from executive.runtime.outcome import (
+    HALTED,
+    Ending,
+    Outcome,
+    check_balance,
+    end_of_tree,
+    judge_items,
+    problems_of,
+)
 from executive.runtime.plant import Plant
 from executive.runtime.run_control import RunControl
 from executive.runtime.signals import stopped_by_signals
-from executive.runtime.take_up import begin_anew, reconcile
+from executive.runtime.take_up import begin_anew, cell_past, reconcile
 from executive.runtime.versions import versions
 from executive.skill import Skill
 from executive.tape.past import Past
-from executive.workcell import CellOptions, CellPast, Workcell
+from executive.workcell import CellOptions, Workcell
 
 
 class Run:
@@ -92,7 +99,7 @@ class Run:
         self._plant = Plant(observers)
         self._emit = self._plant.emit
         kind = kind or cell_kind(loaded.cell_config.kind)
-        left = _cell_past(past, takes_up) if past and takes_up else None
+        left = cell_past(past, takes_up) if past and takes_up else None
         options = CellOptions(self._operator(), loaded.cell_path.parent, gui, past=left, scene=scene)
         workcell = kind(
             loaded.cell_config, seed=seed, routes=loaded.routes, emit=self._plant.emit, options=options
@@ -139,16 +146,16 @@ class Run:
             problems = [*halt(self.root), *filter(None, [self._plant.come_to_rest()])]
         if ending.traceback:
             # Only now: a record that cannot be written must not keep the arm from braking.
-            problems += self._tried(lambda: self._emit("fault", traceback=ending.traceback))
-        problems += self._tried(self._ask_tool)
-        problems += self._tried(self._note_whether_empty)
-        problems += self._tried(lambda: self._close_books(completed=ending.status == "SUCCESS"))
+            problems += problems_of(lambda: self._emit("fault", traceback=ending.traceback))
+        problems += problems_of(self._ask_tool)
+        problems += problems_of(self._note_whether_empty)
+        problems += problems_of(lambda: self._close_books(completed=ending.status == "SUCCESS"))
         if problems and ending.status == "FAULT":
             ending = replace(ending, message="; ".join([ending.message, *problems]))
         elif problems:
             ending = Ending("FAULT", "fault", "; ".join(problems))
         outcome = self._outcome(ending)
-        if broken := self._tried(lambda: self._emit("end", **asdict(outcome))):
+        if broken := problems_of(lambda: self._emit("end", **asdict(outcome))):
             outcome = replace(outcome, status="FAULT", reason="fault", message=broken[0], node="")
         return outcome
 
@@ -210,7 +217,7 @@ class Run:
                     if self._is_reopened():
                         self._end_part()
                         continue
-                    return self._verdict()
+                    return end_of_tree(self.root.failure)
                 self._plant.plan_ahead()
                 self._plant.advance()
                 if self._realtime:
@@ -223,7 +230,7 @@ class Run:
             named = str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"
             node = error.node if isinstance(error, Fault) else ""
             ending = Ending("FAULT", "fault", named, node, traceback.format_exc())
-        if (broken := self._tried(lambda: self._emit("halt", ticked=ticked))) and ending.status != "FAULT":
+        if (broken := problems_of(lambda: self._emit("halt", ticked=ticked))) and ending.status != "FAULT":
             ending = Ending("FAULT", "fault", broken[0])
         return ending
 
@@ -276,20 +283,6 @@ class Run:
             return self.tick > self._past.last_tick
         return bool(entry["tick"] == self.tick and entry["ticked"] is not before)
 
-    def _verdict(self) -> Ending:
-        failure: Failure | None = self.root.failure
-        if failure is None:
-            return Ending("SUCCESS")
-        return Ending("FAILURE", str(failure), failure.message, failure.path)
-
-    def _tried(self, do: Callable[[], None]) -> list[str]:
-        """Do one thing of a run's end; return what went wrong, so that the others are done none the less."""
-        try:
-            do()
-        except Exception as error:
-            return [str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"]
-        return []
-
     def _close_books(self, *, completed: bool) -> None:
         """Have the ledger decide the final state of each item, and check the balance.
 
@@ -306,25 +299,11 @@ class Run:
     def _outcome(self, ending: Ending) -> Outcome:
         if ending.status == "SUCCESS":
             ending = judge_items(self.workcell.accounts)
-        now = round(self._plant.tape.now, 6)
-        return Outcome(
-            ending.status,
-            ending.reason,
-            ending.message,
-            ending.node,
-            self._empty,
-            self._holds,
-            self.tick,
-            now,
-        )
+        end = (self._empty, self._holds, self.tick, round(self._plant.tape.now, 6))
+        return Outcome(ending.status, ending.reason, ending.message, ending.node, *end)
 
     def _ask_tool(self) -> None:
         """Note what the tool holds: the item that the ledger believes there, or `something`."""
         cell = self._plant.cell
         if cell.tool.holding:
             self._holds = cell.ledger.in_tool() or "something"
-
-
-def _cell_past(past: Past, log: Path) -> CellPast:
-    frames, turns = (past.number_of_answers(f"camera.{name}") for name in ("frame", "next_pose"))
-    return CellPast(log, past.last_tick, frames, turns)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.cell import Cell
 from executive.control.skill_node import SkillNode
+from executive.tape.past import Past
+from executive.workcell import CellPast
 
 
 def reconcile(cell: Cell, last_intent: str) -> None:
@@ -30,6 +33,12 @@ def reconcile(cell: Cell, last_intent: str) -> None:
         cell.ledger.dropped(believed)
     # What the run itself had let go hangs nowhere: the skill that did begins anew and says where it is.
     cell.ledger.bumped()
+
+
+def cell_past(past: Past, log: Path) -> CellPast:
+    """Return the state of a cell at the end of a recorded run, from the record and the log of its world."""
+    frames, turns = (past.number_of_answers(f"camera.{name}") for name in ("frame", "next_pose"))
+    return CellPast(log, past.last_tick, frames, turns)
 
 
 def begin_anew(root: Behaviour, rest: Callable[[], None]) -> None:
