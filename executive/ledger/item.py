@@ -210,9 +210,12 @@ class Record:
         self.exists = self.exists or self.existence >= CONFIRMED
 
     def forget_answers(self) -> None:
-        """Take further looks as independent of earlier ones, because something may have moved the item."""
+        """Take further looks as independent of earlier ones, because something may have moved the item.
+
+        What the looks before contradicted may have been its place.
+        """
         self.answers.clear()
-        self.repeats = 0
+        self.repeats = self.contradictions = 0
 
     def locate(self, position: Array, spread: float, *, settled: bool) -> None:
         """Take a position `(3,)` [m] measured with a standard deviation of `spread` [m].

@@ -147,7 +147,9 @@ class Looks:
                 record.locate(place, spread, settled=True)
                 record.shown(frame, glimpse.detection)
             if record not in counted:
-                record.glimpsed(glimpse.contradiction)
+                # Evidence against another class says nothing against this one.
+                is_its_class = glimpse.detection.label == record.label
+                record.glimpsed(glimpse.contradiction if is_its_class else "")
                 counted.append(record)
         return counted
 

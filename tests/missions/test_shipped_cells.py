@@ -11,6 +11,7 @@ from executive.cell_config import CellConfig
 from executive.mission.parse.cell_file import load_cell
 from executive.runtime.cells import cell_kind
 from executive.testing.fake_cell import FakeCell
+from executive.vision.envelope.rated_detectors import find_unmeasured
 
 CELLS = sorted((Path(__file__).parents[2] / "missions" / "cells").glob("*.yaml"))
 
@@ -68,3 +69,13 @@ def test_the_most_objects_that_it_asks_for_find_room(config: CellConfig) -> None
     most = config.table.objects[1]
     crowded = config.model_copy(update={"table": config.table.model_copy(update={"objects": (most, most)})})
     assert len(FakeCell(crowded).world.objects) == most
+
+
+def test_every_shipped_detector_is_measured_but_those_behind_a_server(missions: Path) -> None:
+    folder = missions / "cells"
+    unmeasured = {
+        (file.stem, keys[1])
+        for file in sorted(folder.glob("*.yaml"))
+        for keys, _ in find_unmeasured(load_cell(file), folder, [folder])
+    }
+    assert unmeasured == {("hosted", "server"), ("roboflow", "server")}

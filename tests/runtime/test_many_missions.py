@@ -59,7 +59,8 @@ class Interleaved:
     def story(self) -> Story:
         self._fake.accounts.close(completed=self._root.status is Status.SUCCESS)
         accounts = self._fake.accounts
-        items = {**accounts.balance(), "unknown": accounts.unknown, "rows": accounts.rows()}
+        told = {"unknown": accounts.unknown, "doubts": accounts.doubts, "rows": accounts.rows()}
+        items = {**accounts.balance(), **told}
         return (
             self._root.status.value, self._plant.tick, self._trace.hexdigest(), variables(self._root), items,
             self._fake.audit(),
