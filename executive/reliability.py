@@ -12,7 +12,7 @@ class Reliability:
     Attributes:
         threshold: Confidence from which a detection counts.
         misses: Share of the objects in full view that one look overlooks.
-        confused: Share of the objects it finds that it gives a wrong class.
+        confused: Share of the found objects that are given a wrong class.
         invented: Number of false detections per look.
         jitter: Standard deviation of the random error of a box's centre, along each axis [pixel].
         repeated: Share of its errors that a second look from the same pose repeats.
@@ -34,7 +34,7 @@ def assume_rates(threshold: float, doubt: str) -> Reliability:
     """Return conservative error rates for a detector that was not measured under the present conditions.
 
     On 26 kinds of unusual scenes, the first embedded detector missed 4 % and confused 5 % of the objects on
-    average; an error was mostly the same in each look.
+    average, and repeated most errors in every look. The rates below are at least as high.
     """
     return Reliability(
         threshold, misses=0.15, confused=0.05, invented=0.2, jitter=2.0, repeated=0.8, bias=0.002, doubt=doubt

@@ -23,13 +23,13 @@ MAX_RIVAL = 0.5
 
 
 class Detect(Skill):
-    """Know which objects a fresh image shows, beside the running tick loop.
+    """Detect the objects in a new image without blocking the tick loop.
 
-    Succeeds with each detection at or above the detector's threshold; a detection below it, or with a second
-    class that is nearly as likely, is in doubt. An empty list is a result, not a failure.
-    What the arm hides is not believed: neither that nothing is there, nor what is seen of it.
-    More than 60 boxes in one look are no objects: the look fails as crowded, whatever their confidence.
-    Fails with `camera_moved` if the first frames of a run show the bins beside their places.
+    Succeeds with all detections at or above the detector's threshold. A detection is in doubt if it is below
+    the threshold or if its second class is nearly as likely. An empty list is a result, not a failure.
+    The area hidden by the arm counts neither as empty nor as occupied.
+    A look with more than 60 boxes fails with `crowded`, whatever their confidence.
+    Fails with `camera_moved` if the first frames of a run show the bins away from their expected positions.
     """
 
     detections: Out[Detections] = port(doc="what was found, with the frame it was found in")
@@ -40,7 +40,7 @@ class Detect(Skill):
     doubtful: str = param(
         "fail",
         choices=("fail", "pass"),
-        doc="boxes only below the threshold: `fail` as unsure, or `pass` with nothing found for sure",
+        doc="if all detections are in doubt: `fail` with `unsure`, or `pass` with no detections",
     )
     hidden: str = param(
         "fail",
@@ -76,13 +76,13 @@ class Detect(Skill):
             raise self.failed(
                 "crowded",
                 f"detector {answer.detector} found {len(answer.found)} boxes in the view {self.view}, which "
-                f"cannot all be objects; at most {MAX_BOXES} are allowed: raise its floor in the cell file, "
-                "or use another detector",
+                f"cannot all be objects; at most {MAX_BOXES} are allowed: raise `floor` of the detector in "
+                "the cell file, or use another detector",
             )
-        if wrong := next((one for one in answer.found if not _can_be(one)), None):
+        if wrong := next((one for one in answer.found if not _is_valid(one)), None):
             raise self.failed(
                 "unavailable",
-                f"detector {answer.detector} gave a box that cannot be: {wrong.label} {wrong.confidence:g} "
+                f"detector {answer.detector} gave an invalid box: {wrong.label} {wrong.confidence:g} "
                 f"at {wrong.box}",
             )
         shown = [detection for detection in answer.found if frame.shown(detection.box) >= IN_VIEW]
@@ -122,8 +122,8 @@ def _is_clear(detection: Detection, threshold: float) -> bool:
     return confidence >= threshold and detection.rival <= MAX_RIVAL * confidence
 
 
-def _can_be(detection: Detection) -> bool:
-    """Tell whether a detection has a box and a confidence that make sense."""
+def _is_valid(detection: Detection) -> bool:
+    """Return True if a detection has a possible box and a possible confidence."""
     left, top, right, bottom = detection.box
     finite = all(math.isfinite(edge) for edge in detection.box)
     return finite and left <= right and top <= bottom and 0.0 <= detection.confidence <= 1.0

@@ -11,10 +11,10 @@ from executive.record.whole_file import reason_of, write_whole
 from executive.vision.envelope.fingerprint import take_fingerprint
 from executive.vision.envelope.measurement import (
     SUFFIX,
-    GroupFigures,
+    ErrorCounts,
     Measurement,
-    add_measurement,
     read_measurements,
+    text_with_measurement,
 )
 from executive.vision.evaluation.figures import NOTHING, Evaluation
 
@@ -34,13 +34,13 @@ def store_evaluation(
         seconds: Duration of the evaluation [s].
 
     Raises:
-        InputError: The detector answered no image, or the file cannot be read or written.
+        InputError: The detector gave no answer for any image, or the file cannot be read or written.
     """
     assert subject.cell is not None
     path = out or subject.base / f"{subject.cell.cell}{SUFFIX}"
     measurement = _as_measurement(subject, evaluation, command, seconds)
     try:
-        write_whole(path, add_measurement(read_measurements(path), measurement))
+        write_whole(path, text_with_measurement(read_measurements(path), measurement))
     except OSError as error:
         raise InputError(
             f"the measurement {path} cannot be written: {reason_of(error)}; name another file with --out, "
@@ -53,7 +53,9 @@ def _as_measurement(subject: Subject, evaluation: Evaluation, command: str, seco
     """Return an evaluation of a detector in its cell in the form in which it is stored."""
     assert subject.cell is not None
     if evaluation.reliability is None:
-        raise InputError(f"detector {subject.name} answered no image: {evaluation.why}; nothing was measured")
+        raise InputError(
+            f"detector {subject.name} gave no answer for any image: {evaluation.why}; nothing was measured"
+        )
     table = evaluation.confusion
     return Measurement(
         detector=subject.name,
@@ -63,7 +65,7 @@ def _as_measurement(subject: Subject, evaluation: Evaluation, command: str, seco
         images=evaluation.images,
         rates=evaluation.reliability.rates,
         classes={
-            label: GroupFigures(
+            label: ErrorCounts(
                 objects=sum(row.values()),
                 missed=row.get(NOTHING, 0),
                 confused=sum(row.values()) - row.get(NOTHING, 0) - row.get(label, 0),
@@ -72,10 +74,12 @@ def _as_measurement(subject: Subject, evaluation: Evaluation, command: str, seco
             for label, row in table.items()
             if label != NOTHING
         },
-        counts={str(count): _figures(errors) for count, errors in sorted(evaluation.by_count.items())},
+        counts={
+            str(count): _as_error_counts(errors) for count, errors in sorted(evaluation.by_count.items())
+        },
         frames=evaluation.frames,
     )
 
 
-def _figures(errors: Mapping[str, int]) -> GroupFigures:
-    return GroupFigures(**{name: errors.get(name, 0) for name in GroupFigures.model_fields})
+def _as_error_counts(errors: Mapping[str, int]) -> ErrorCounts:
+    return ErrorCounts(**{name: errors.get(name, 0) for name in ErrorCounts.model_fields})

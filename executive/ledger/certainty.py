@@ -1,4 +1,4 @@
-"""Rules by which an item is certain enough to be sorted, or too uncertain to be looked at any longer."""
+"""Rules by which an item is certain enough to be sorted, or so uncertain that it is rejected."""
 
 from __future__ import annotations
 
@@ -9,27 +9,28 @@ from dataclasses import dataclass
 from executive.cell_config import LedgerConfig
 from executive.ledger.item import LIKELY, UNSURE, Record, State
 
-CREDIBLE, CONTRADICTED = 0.01, 0.001
-"""Chance of as much disagreement about its class, above which an item is sorted, and under which given up."""
-SHARPER = 2 / 3
-"""Factor on the standard error of its position that is allowed for another attempt at an item."""
-PRESENT = 0.1
-"""Chance of having been overlooked by the looks that missed it, down to which it is taken to be there."""
-ENOUGH = 40
-"""Looks after which an item whose class they contradict each other about is given up."""
+MIN_CONSISTENCY, REJECTED_CONSISTENCY = 0.01, 0.001
+"""p-values of the disagreement of the looks about an item's class: from the first on it may be sorted, below
+the second it is rejected."""
+RETRY_AIM_FACTOR = 2 / 3
+"""Factor on the allowed standard error of an item's position after a failed grasp."""
+MIN_OVERLOOKED = 0.1
+"""Smallest probability that later looks merely overlooked an item at which the item counts as present."""
+MIN_LOOKS_TO_REJECT = 40
+"""Number of looks from which an item is rejected if they disagree about its class."""
 MAX_CONTRADICTIONS = 3
-"""Looks that contradict its class after which an item is given up."""
+"""Number of looks contradicting an item's class from which it may be rejected."""
 MAX_REPEATS = 2
-"""Repeated answers from one pose after which only other evidence than further looks can help an item."""
+"""Number of repeated answers from one pose after which further looks from there add hardly any evidence."""
 MAX_MISJUDGED_BEFORE_TOUCH = 0.2
 """Probability of a wrong class up to which an item is touched, if a touch decides its class."""
-GLIMPSES = 20
-"""Looks with a detector unsure of it, since one was sure, after which an item not known well is given up."""
+MAX_UNSURE_LOOKS = 20
+"""Number of unsure looks since the last sure one after which an uncertain item is rejected."""
 
 
 @dataclass(frozen=True)
 class Certainty:
-    """Judges items.
+    """Decides which items are certain enough to be sorted, and which are rejected.
 
     Attributes:
         config: Limits of the cell file.
@@ -42,8 +43,8 @@ class Certainty:
     def is_sure(self, record: Record) -> bool:
         """Return True if there is enough evidence that an item exists, of which class it is, and where.
 
-        After a failed grasp the looks must agree better on where. If looks from one pose cannot prove its
-        class, but a touch can, the item is sure enough to be touched.
+        After a failed grasp, the position must be known more precisely. If looks from one pose cannot prove
+        its class, but a touch can, the item is sure enough to be touched.
         """
         limit = self.config.misjudged
         if record.repeats >= MAX_REPEATS and record.label in self.told_by_touch:
@@ -52,14 +53,14 @@ class Certainty:
         return (
             record.probability >= LIKELY
             and record.contradictions <= record.looks
-            and record.overlooked >= PRESENT
+            and record.overlooked >= MIN_OVERLOOKED
             and record.misjudged <= limit
-            and record.consistency >= CREDIBLE
-            and standard_error <= self.config.aim * (SHARPER if record.attempts else 1.0)
+            and record.consistency >= MIN_CONSISTENCY
+            and standard_error <= self.config.aim * (RETRY_AIM_FACTOR if record.attempts else 1.0)
         )
 
-    def review(self, record: Record, *, settled: bool) -> None:
-        """Reject an item whose class looks cannot prove or disagree on, or of which they are unsure.
+    def reject_if_uncertain(self, record: Record, *, settled: bool) -> None:
+        """Reject an item if looks cannot prove its class, disagree about it, or remain unsure of the item.
 
         Args:
             record: The item.
@@ -70,14 +71,14 @@ class Certainty:
             record.glimpses = 0
         if record.state is not State.SEEN:
             return
-        if record.looks >= ENOUGH and record.consistency < CONTRADICTED:
+        if record.looks >= MIN_LOOKS_TO_REJECT and record.consistency < REJECTED_CONSISTENCY:
             votes = ", ".join(f"{count} {label}" for label, count in record.tally.most_common())
             record.state, record.why = State.REJECTED, f"its class is in doubt: {votes}"
         elif self._lacks_second_evidence(record):
             chance = f"leave a chance of {record.misjudged:.1%} that it is no {record.label}"
             why = f"{record.looks} looks from one pose {chance}, allowed {self.config.misjudged:.1%}"
             record.state, record.why = State.REJECTED, why
-        elif not known and (record.glimpses >= GLIMPSES or _is_contradicted(record)):
+        elif not known and (record.glimpses >= MAX_UNSURE_LOOKS or _is_contradicted(record)):
             record.state = State.REJECTED
             record.why = f"{UNSURE}: {record.contradiction}" if record.contradiction else UNSURE
             record.existence = max(record.existence, 0.0)
@@ -93,5 +94,5 @@ class Certainty:
 
 
 def _is_contradicted(record: Record) -> bool:
-    """Return True if enough looks contradict the class of an item, and more than do not."""
+    """Return True if enough looks contradict the class of an item, and more contradict than support it."""
     return record.contradictions >= MAX_CONTRADICTIONS and record.contradictions > record.looks

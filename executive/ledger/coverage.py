@@ -9,43 +9,42 @@ from numpy.typing import NDArray
 
 from executive.cell_config import TableConfig
 from executive.geometry import Array
-from executive.ledger.independence import repeat, viewpoint_of
+from executive.ledger.independence import repeat_probability, viewpoint_of
 from executive.messages import Detections
 
 PITCH = 0.02
-"""Distance between the points that stand for the table [m]: less than the smallest object is wide."""
+"""Pitch of the grid of points on the table [m]; smaller than the smallest object."""
 MARGIN = 0.4
-"""How far around the workspace is watched [m]: as far as what is dropped or pushed gets."""
-ASTRAY = 0.02
-"""Chance that something lies beside the workspace before the robot has dropped or pushed anything."""
-STRAYED = 0.1
-"""Chance that something lies at a place beside the workspace after the robot has."""
-LEAST = 1e-4
-"""Chance that remains however often a place is searched: looks are not wholly independent of each other."""
-RECENT = 4
-"""Full images, from as many poses as a camera has, of which one must show a place that can be seen."""
+"""Width of the watched area around the workspace [m]; dropped or pushed objects stay within it."""
+PRIOR_OUTSIDE = 0.02
+"""Prior probability of an object at a place beside the workspace before anything was dropped or pushed."""
+PRIOR_OUTSIDE_AFTER_CHANGE = 0.1
+"""Probability of an object at a place beside the workspace after one was dropped or pushed."""
+MIN_PROBABILITY = 1e-4
+"""Smallest probability, however often a place is searched, because looks are not wholly independent."""
+RECENT_FULL_LOOKS = 4
+"""Number of latest full images that count; a place that none of them shows cannot be seen."""
 BORDER = 12.0
 """Width of the image's border in which a point does not count as shown [pixel]."""
-NEAR = 0.03
-"""How far beside the workspace the middle of what lies at its edge may be [m]."""
-OCCUPIED = 0.1
+EDGE_MARGIN = 0.03
+"""Distance outside the workspace up to which the centre of an object still counts as inside [m]."""
+PRIOR_INSIDE = 0.1
 """Prior probability that an object lies at a given place of the workspace: three objects of 6 cm x 6 cm on
 the 22 cm x 44 cm of the shipped cells."""
 HEIGHT = 0.025
-"""Height of the points over the table [m]: the middle of a usual object."""
+"""Height of the points over the table [m]: the centre of a usual object."""
 
 
 class Coverage:
-    """The chance, at every point of the table, that an object lies there which no look has shown.
+    """Probability, for every point of the table, that an object there has been overlooked.
 
-    It starts at one in the workspace, where it is the chance for an object that is there, and low beside it,
-    where it includes the chance that there is an object. A look that searches a point multiplies it by the
-    share of objects that its detector misses; whatever may have brought an object there sets it back to
-    one. What a look does not show, because the arm hides it, it lies outside the image or has been
-    disturbed since, stays as it was.
+    In the workspace it is conditional on an object being there, and starts at 1. Outside, it includes the
+    probability that there is an object, and starts low. A look that searches a point multiplies it by the
+    miss rate of the detector. A change that may have put an object there resets it. Points that a look does
+    not show keep their value: points hidden by the arm, outside the image, or disturbed since the image.
 
     Args:
-        table: Says where objects lie.
+        table: Declares the workspace.
     """
 
     def __init__(self, table: TableConfig) -> None:
@@ -55,18 +54,20 @@ class Coverage:
         self._points = np.array([(x, y, HEIGHT) for x in xs for y in ys])
         self._low, self._high = np.array([left, low]), np.array([right, high])
         self._workspace = self._within(self._points, 0.0)
-        self._prior = np.where(self._within(self._points, NEAR), OCCUPIED, 1.0)
-        self._overlooked = np.where(self._within(self._points, NEAR), 1.0, ASTRAY)
-        self._after_a_change = np.where(self._within(self._points, NEAR), 1.0, STRAYED)
+        self._prior = np.where(self._within(self._points, EDGE_MARGIN), PRIOR_INSIDE, 1.0)
+        self._overlooked = np.where(self._within(self._points, EDGE_MARGIN), 1.0, PRIOR_OUTSIDE)
+        self._after_a_change = np.where(
+            self._within(self._points, EDGE_MARGIN), 1.0, PRIOR_OUTSIDE_AFTER_CHANGE
+        )
         self._changed = np.zeros(len(self._points), dtype=int)
         self._searched_from: dict[str, NDArray[np.bool_]] = {}
         self._full_looks = 0
-        self._shown = np.full(len(self._points), -RECENT)
+        self._shown = np.full(len(self._points), -RECENT_FULL_LOOKS)
 
     def look(self, detections: Detections, unsure: Sequence[Array] = ()) -> None:
-        """Take account of a look: what it did find is known, and no longer overlooked, either.
+        """Update the probabilities after a look; places of objects that it found count as searched, too.
 
-        Where its detector is `unsure` `(3,)` [m] whether something is there, nothing was searched.
+        Points near the positions `unsure` `(3,)` [m], where the detector is in doubt, do not.
         """
         searched = detections.searched(self._points)
         for place in unsure:
@@ -78,12 +79,12 @@ class Coverage:
         viewpoint = f"{viewpoint_of(detections)} {detections.view}"
         misses, repeated = detections.reliability.misses, detections.reliability.repeated
         again = self._searched_from.setdefault(viewpoint, np.zeros(len(self._points), bool))
-        self._overlooked[now] *= np.where(again[now], repeat(misses, repeated), misses)
-        self._overlooked = self._overlooked.clip(LEAST)
+        self._overlooked[now] *= np.where(again[now], repeat_probability(misses, repeated), misses)
+        self._overlooked = self._overlooked.clip(MIN_PROBABILITY)
         again |= now
         if detections.view == "full":
             self._full_looks += 1
-            # What only just shows may not show again: nothing would ever be said about it.
+            # Points at the border of the image may never be seen again; they are not required.
             self._shown[searched & detections.shows(self._points, BORDER)] = self._full_looks
 
     def disturb(self, centre: Array, radius: float, epoch: int) -> None:
@@ -97,34 +98,34 @@ class Coverage:
         """Return the chance, 0 to 1, that an object at a place `(3,)` [m] has not been seen yet."""
         distances = np.hypot(*(self._points - position)[:, :2].T)
         nearest = int(np.argmin(distances))
-        return float(self._overlooked[nearest]) if distances[nearest] <= PITCH else ASTRAY
+        return float(self._overlooked[nearest]) if distances[nearest] <= PITCH else PRIOR_OUTSIDE
 
     def in_workspace(self, position: Array) -> bool:
         """Tell whether a place `(3,)` [m] is where objects are put to be sorted."""
-        return bool(self._within(position[None], NEAR)[0])
+        return bool(self._within(position[None], EDGE_MARGIN)[0])
 
     @property
     def worst(self) -> float:
-        """The largest chance, 0 to 1, that an object lies anywhere and has been overlooked.
+        """Largest probability, 0 to 1, that an object lies anywhere and has been overlooked.
 
-        Counted are the workspace and what else one of the last full images has shown: a place that none of
-        them does, though they were taken from several poses, cannot be seen. It is 1 before there was one.
+        It covers the workspace and every point shown in one of the last full images; other points cannot be
+        seen. It is 1 before the first full image.
         """
         if not self._full_looks:
             return 1.0
         return float((self._prior * self._overlooked)[self._in_sight].max())
 
     def in_sight(self, position: Array) -> bool:
-        """Tell whether a place `(3,)` [m] is one that `worst` counts, like all the points around it.
+        """Return True if a place `(3,)` [m] and all grid points around it can be seen.
 
-        At the edge of what the arm hides, a point may be shown and a place beside it never be.
+        At the edge of the area hidden by the arm, a point may be visible while a place beside it never is.
         """
         around = np.hypot(*(self._points - position)[:, :2].T) <= PITCH
         return bool(around.any() and self._in_sight[around].all())
 
     @property
     def _in_sight(self) -> NDArray[np.bool_]:
-        return self._workspace | (self._shown > self._full_looks - RECENT)
+        return self._workspace | (self._shown > self._full_looks - RECENT_FULL_LOOKS)
 
     def _within(self, points: Array, margin: float) -> NDArray[np.bool_]:
         """Tell `(N,)` which points lie in the workspace or at most `margin` [m] beside it."""

@@ -5,18 +5,20 @@ from __future__ import annotations
 from executive.messages import Detections
 
 GRID = 0.02
-"""Distance within which two positions of the camera count as one pose [m]."""
+"""Grid to which camera positions are rounded; equal rounded positions count as one pose [m]."""
 
 
 def viewpoint_of(look: Detections) -> str:
-    """Return a name for the detector and the camera pose of a look: looks of one name may repeat errors."""
+    """Return a key for detector and camera pose of a look; looks with the same key may repeat errors."""
     x, y, z = (round(float(value) / GRID) for value in look.frame.X_WC.position)
     return f"{look.detector} {x} {y} {z}"
 
 
-def repeat(share: float, repeated: float) -> float:
-    """Return the probability that a look gives an answer again which it gives with a `share` otherwise.
+def repeat_probability(independent: float, repeated: float) -> float:
+    """Return the probability that a look gives the answer of an earlier look from the same viewpoint again.
 
-    With the probability `repeated` the look is a copy of the earlier one, else it is independent of it.
+    Args:
+        independent: Probability of this answer in a look that is independent of the earlier one.
+        repeated: Probability that the look is a copy of the earlier one.
     """
-    return repeated + (1.0 - repeated) * share
+    return repeated + (1.0 - repeated) * independent

@@ -10,7 +10,7 @@ from enum import Enum
 import numpy as np
 
 from executive.geometry import Array
-from executive.ledger.independence import repeat
+from executive.ledger.independence import repeat_probability
 from executive.messages import Detection, Frame, Target
 from executive.reliability import Reliability
 
@@ -198,14 +198,18 @@ class Record:
         self.repeats += repeated > 0.0
         self.answers[viewpoint] = label
         self.bias = by.bias
-        self.votes[label] += math.log(repeat(1.0 - by.confused, repeated) / repeat(by.confused, repeated))
+        self.votes[label] += math.log(
+            repeat_probability(1.0 - by.confused, repeated) / repeat_probability(by.confused, repeated)
+        )
         self.tally[label] += 1
         self.expected = max(self.expected, by.confused)
         if not alone:
             self.existence = min(self.existence, DOUBTFUL) if not self.looks else self.existence
         elif self.looks or self.glimpses:
             false_detection = min(by.invented * NEARBY, 1.0)
-            self.existence += math.log(repeat(1.0 - by.misses, repeated) / repeat(false_detection, repeated))
+            self.existence += math.log(
+                repeat_probability(1.0 - by.misses, repeated) / repeat_probability(false_detection, repeated)
+            )
         self.looks, self.glimpses = self.looks + 1, 0
         self.exists = self.exists or self.existence >= CONFIRMED
 

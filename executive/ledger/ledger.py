@@ -268,7 +268,7 @@ class ItemLedger:
         places = [positions[number] for number in outside]
         unsure = [glimpse for glimpse in glimpses if bin_at(glimpse.position) is None]
         for record in self._looks.take(self._records, look, places, unsure):
-            self._certainty.review(record, settled=self._looks.settled(record))
+            self._certainty.reject_if_uncertain(record, settled=self._looks.settled(record))
             self._emit("item", **record.row)
         if detections.view == "full":
             for record, bin in self._in_bins.fallen(detections, positions, inside):

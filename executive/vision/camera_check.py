@@ -10,17 +10,17 @@ import numpy as np
 
 from executive.geometry import Array
 from executive.messages import Bin, Frame
-from executive.vision.outline_fit import Fit, OutlineFit
+from executive.vision.outline_fit import Fit, OutlineFitter
 
 MAX_DISTANCE = 0.005
-"""Largest average distance between the outlines of the bins and their places [m].
+"""Largest accepted mean distance between the outlines of the bins and their expected positions [m].
 
 Measured in 1254 frames of undisplaced cameras (eight cells; lamps, shadows and tables varied; bins full and
 empty): wrist camera at most 0.6 mm; fixed camera median 0.5 to 0.8 mm, 99 % below 3.2 mm, at most 3.6 mm,
 where the table has the colour of a bin.
 """
 MIN_SUPPORT = 0.65
-"""Smallest share of the outlines with an edge beside them at a pose that can be believed."""
+"""Smallest share of the outlines with an edge beside them at which an estimated pose is accepted."""
 MIN_GAIN = 0.15
 """Smallest difference between the support of a displaced pose and that of the declared pose."""
 
@@ -32,8 +32,8 @@ class CameraOffset:
     Attributes:
         shift, shift_std: Displacement in the world `(3,)` [m], and its standard deviation.
         turn_deg: Angle of the rotation [degree].
-        distance: Average distance between the outlines of the bins and their places [m].
-        pixels: The same in the image [pixel].
+        distance: Mean distance between the outlines of the bins and their expected positions [m].
+        pixels: Mean distance between the outlines and their expected positions in the image [pixel].
         support: Share of the outlines (0 to 1) with an edge beside them, at the estimated pose.
         bins: Names of the bins in view.
     """
@@ -55,8 +55,8 @@ def describe_displacement(frame: Frame, bins: Sequence[Bin]) -> str:
     x, y, z = 1e3 * offset.shift
     return (
         f"camera {frame.camera} is not where the cell file says: the outlines of {', '.join(offset.bins)} "
-        f"appear {offset.pixels:.0f} pixels ({1e3 * offset.distance:.0f} mm) beside their places, as if the "
-        f"camera had moved by ({x:+.0f}, {y:+.0f}, {z:+.0f}) mm (standard deviation "
+        f"appear {offset.pixels:.0f} pixels ({1e3 * offset.distance:.0f} mm) away from their expected "
+        f"positions, as if the camera had moved by ({x:+.0f}, {y:+.0f}, {z:+.0f}) mm (standard deviation "
         f"{1e3 * offset.shift_std.max():.0f} mm) and turned by {offset.turn_deg:.1f} degrees; limit "
         f"{1e3 * MAX_DISTANCE:.0f} mm; mount camera and bins as declared, or measure the pose again"
     )
@@ -64,7 +64,7 @@ def describe_displacement(frame: Frame, bins: Sequence[Bin]) -> str:
 
 def estimate_offset(frame: Frame, bins: Sequence[Bin]) -> CameraOffset | None:
     """Return how far a camera is from the pose of its frame; None if the frame shows too little."""
-    fitting = OutlineFit(frame, bins)
+    fitting = OutlineFitter(frame, bins)
     near = fitting.refine(np.zeros(6))
     if near is not None and near.support >= MIN_SUPPORT:
         offset = _offset(near, frame, bins)

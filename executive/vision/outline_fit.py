@@ -1,7 +1,7 @@
 """Fit of a camera pose to the outlines of the bins in an image.
 
-The outlines of a bin are the border of its outer box in the image and the outer edges of its rim. Edges of
-the image are searched along their normals; the pose is found by robust least squares.
+The outlines of a bin are the border of its outer box in the image and the outer edges of its rim. Image edges
+are searched along the normals of the outlines; robust least squares gives the pose.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from executive.vision.camera_model import NEAR
 
 MIN_SAMPLES = 60
 """Fewest samples in view from which a pose is estimated."""
-MIN_ACROSS = 0.12
-"""Smallest share of the samples (0 to 0.5) that must fix the image along its less certain direction."""
+MIN_NORMAL_EIGENVALUE = 0.12
+"""Smallest eigenvalue (0 to 0.5) of the mean outer product of the normals: they must span the image."""
 SPACING = 6.0
 """Distance between two samples of an outline [pixel]."""
 BORDER = 4.0
@@ -31,16 +31,16 @@ SMOOTHING = 1.0
 MIN_CONTRAST = 4.0
 """Smallest difference between neighbouring pixels of the smoothed image that is an edge [grey level]."""
 NEAR_RANGES, FAR_RANGES, SUPPORT_RANGE = (8, 4, 3), (16, 8, 4, 3), 2
-"""Distances beside an outline up to which edges are searched [pixel]: for each step of a fit that starts from
-the declared pose, or from a pose of the grid; and to find out whether an edge supports the outline."""
+"""Search distances beside an outline [pixel]: for each step of a fit from the declared pose, for each step of
+a fit from a pose of the grid, and for the support."""
 EDGE_STD = 2.0
-"""Standard deviation of the place of an edge [pixel]; neighbours err alike, so it is taken large."""
+"""Standard deviation of an edge position [pixel]; large, because errors of neighbours are correlated."""
 MIN_OUTLIER = 0.5
 """Smallest residual at which an edge can count as an outlier [pixel]."""
 PRIOR_STD = np.full(6, 0.1)
-"""Standard deviations of a rotation [rad] and a shift [m] about which the image says nothing."""
+"""Prior standard deviations of the rotation [rad] and the shift [m]."""
 ROBUST_STEPS = 8
-"""Number of the steps that find out which edges are outliers."""
+"""Number of iterations of the reweighted least squares."""
 TILTS_DEG, ROLLS_DEG = np.arange(-10.0, 11.0), np.arange(-8.0, 9.0, 4.0)
 """Rotations of the grid about the axes x and y of the camera, and about the optical axis [degree]."""
 ZOOMS = np.linspace(-0.21, 0.21, 7)
@@ -56,7 +56,7 @@ class Samples(NamedTuple):
 
     Attributes:
         points: Places in the world `(N, 3)` [m].
-        in_camera: The same in the camera's frame `(N, 3)` [m].
+        in_camera: Positions of the samples in the camera's frame `(N, 3)` [m].
         pixels, normals: Places and directions across the outline in the image `(N, 2)` [pixel].
         bins: Index of the bin of each sample `(N,)`.
     """
@@ -84,7 +84,7 @@ class Fit(NamedTuple):
     support: float
 
 
-class OutlineFit:
+class OutlineFitter:
     """Camera poses that fit the edges of one frame."""
 
     def __init__(self, frame: Frame, bins: Sequence[Bin]) -> None:
@@ -127,8 +127,8 @@ class OutlineFit:
             shift = np.array([0.0, 0.0, zoom * points[:, 2].mean()])
             turns = np.radians([(x, y, roll) for x in TILTS_DEG for y in TILTS_DEG])
             rotations = np.stack([cv2.Rodrigues(turn)[0] for turn in turns])
-            pixels = _on_image((points - shift) @ rotations, matrix)
-            normals = _across(_on_image((ahead - shift) @ rotations, matrix) - pixels)
+            pixels = _project((points - shift) @ rotations, matrix)
+            normals = _perpendicular(_project((ahead - shift) @ rotations, matrix) - pixels)
             cells = np.floor(pixels / SHRINK).astype(int)
             inside = ((cells >= 0) & (cells <= last)).all(axis=-1)
             columns, rows = np.moveaxis(cells.clip(0, last), -1, 0)
@@ -148,8 +148,8 @@ class OutlineFit:
         X_WC, visible = self._frame.X_WC @ Pose(rotation, offset[3:]), self._frame.visible
         points, ahead, bins = _outlines(self._bins, X_WC, self._frame.matrix)
         in_camera = X_WC.inverse().apply(points)
-        pixels = _on_image(in_camera, self._frame.matrix)
-        normals = _across(_on_image(X_WC.inverse().apply(ahead), self._frame.matrix) - pixels)
+        pixels = _project(in_camera, self._frame.matrix)
+        normals = _perpendicular(_project(X_WC.inverse().apply(ahead), self._frame.matrix) - pixels)
         size = np.array(visible.shape[::-1])
         shown = ((pixels >= BORDER) & (pixels < size - BORDER)).all(axis=1)
         columns, rows = pixels.clip(0, size - 1).astype(int).T
@@ -157,7 +157,7 @@ class OutlineFit:
         return Samples(points[shown], in_camera[shown], pixels[shown], normals[shown], bins[shown])
 
     def _edges(self, samples: Samples, reach: int) -> tuple[Array, NDArray[np.bool_]]:
-        """Return how far `(N,)` [pixel] along the normals the strongest edge is, and where there is one."""
+        """Return the distance `(N,)` [pixel] of the strongest edge along each normal, and if there is one."""
         n = samples.normals[:, None, None]
         across = np.arange(-reach - 1.5, reach + 2)[:, None, None]
         along = np.array([-2.0, 0.0, 2.0])[:, None] * n[..., ::-1] * (-1, 1)
@@ -182,7 +182,7 @@ class OutlineFit:
 
 
 def _outlines(bins: Sequence[Bin], X_WC: Pose, matrix: Array) -> tuple[Array, Array, NDArray[np.intp]]:
-    """Return samples `(N, 3)` [m] of the outlines of bins, places just ahead of them, and the bin of each."""
+    """Return samples `(N, 3)` [m] of the outlines, points slightly further along them, and their bins."""
     points, ahead, owners = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0, dtype=np.intp)]
     for index, bin in enumerate(bins):
         half = np.array([*(bin.size[:2] / 2 + BIN_THICKNESS), bin.size[2] / 2])
@@ -192,7 +192,7 @@ def _outlines(bins: Sequence[Bin], X_WC: Pose, matrix: Array) -> tuple[Array, Ar
         in_camera = X_WC.inverse().apply(corners)
         if np.any(in_camera[:, 2] < NEAR):
             continue
-        pixels = _on_image(in_camera, matrix)
+        pixels = _project(in_camera, matrix)
         border = cv2.convexHull(pixels.astype(np.float32), returnPoints=False)[:, 0].tolist()
         rings = (border, range(4))
         edges = {frozenset(pair) for ring in rings for pair in zip(ring, [*ring[1:], ring[0]], strict=True)}
@@ -205,28 +205,28 @@ def _outlines(bins: Sequence[Bin], X_WC: Pose, matrix: Array) -> tuple[Array, Ar
     return np.concatenate(points), np.concatenate(ahead), np.concatenate(owners)
 
 
-def _on_image(in_camera: Array, matrix: Array) -> Array:
+def _project(in_camera: Array, matrix: Array) -> Array:
     """Return where points `(..., 3)` [m] of a camera's frame appear `(..., 2)` [pixel]."""
     p = in_camera @ matrix.T
     return np.asarray(p[..., :2] / np.maximum(p[..., 2:], NEAR))
 
 
-def _across(directions: Array) -> Array:
+def _perpendicular(directions: Array) -> Array:
     """Return unit vectors `(..., 2)` at right angles to directions in the image."""
     turned = directions[..., ::-1] * (-1.0, 1.0)
     return np.asarray(turned / np.maximum(np.linalg.norm(turned, axis=-1, keepdims=True), 1e-9))
 
 
 def _is_enough(samples: Samples) -> bool:
-    """Return True if samples are many, and fix the image in both directions."""
+    """Return True if there are enough samples and their normals span both directions of the image."""
     count = len(samples.points)
     if count < MIN_SAMPLES:
         return False
-    return bool(np.linalg.eigvalsh(samples.normals.T @ samples.normals / count)[0] >= MIN_ACROSS)
+    return bool(np.linalg.eigvalsh(samples.normals.T @ samples.normals / count)[0] >= MIN_NORMAL_EIGENVALUE)
 
 
 def _jacobian(samples: Samples, matrix: Array) -> Array:
-    """Return how far each sample moves along its normal `(N, 6)` [pixel per rad, pixel per m]."""
+    """Return the derivative `(N, 6)` [pixel/rad, pixel/m] of each sample along its normal by the offset."""
     x, y, z = samples.in_camera.T
     u, v = (samples.normals * matrix.diagonal()[:2]).T
     toward = np.column_stack([u / z, v / z, -(u * x + v * y) / z**2])

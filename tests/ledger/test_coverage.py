@@ -9,7 +9,13 @@ import pytest
 from ledger_bench import area_of, take_frame
 
 from executive.cell_config import TableConfig
-from executive.ledger.coverage import ASTRAY, LEAST, OCCUPIED, STRAYED, Coverage
+from executive.ledger.coverage import (
+    MIN_PROBABILITY,
+    PRIOR_INSIDE,
+    PRIOR_OUTSIDE,
+    PRIOR_OUTSIDE_AFTER_CHANGE,
+    Coverage,
+)
 from executive.messages import Detections
 from executive.reliability import Reliability
 
@@ -32,20 +38,20 @@ def test_every_look_leaves_as_much_doubt_as_its_detector_misses(coverage: Covera
     for looks in range(1, 5):
         coverage.look(look())
         assert coverage.overlooked(MIDDLE) == pytest.approx(0.2**looks)
-        assert coverage.worst == pytest.approx(OCCUPIED * 0.2**looks)
+        assert coverage.worst == pytest.approx(PRIOR_INSIDE * 0.2**looks)
 
 
 def test_before_anything_was_dropped_hardly_anything_lies_beside_the_workspace(coverage: Coverage) -> None:
     beside = np.array([0.53, 0.40, 0.025])
-    assert coverage.overlooked(beside) == ASTRAY
+    assert coverage.overlooked(beside) == PRIOR_OUTSIDE
     coverage.disturb(MIDDLE, math.inf, epoch=1)
-    assert coverage.overlooked(beside) == STRAYED
+    assert coverage.overlooked(beside) == PRIOR_OUTSIDE_AFTER_CHANGE
 
 
 def test_looks_at_the_workspace_alone_never_show_that_nothing_lies_beside_it(coverage: Coverage) -> None:
     for _ in range(20):
         coverage.look(look(view="table"))
-    assert coverage.overlooked(MIDDLE) == LEAST, "looks are not wholly independent"
+    assert coverage.overlooked(MIDDLE) == MIN_PROBABILITY, "looks are not wholly independent"
     assert coverage.worst == 1.0
 
 
@@ -55,7 +61,7 @@ def test_what_the_arm_hides_is_not_believed_empty(coverage: Coverage) -> None:
         coverage.look(look(hidden=slice(320, 640)))
     sides = [coverage.overlooked(np.array([0.53, y, 0.025])) for y in (-0.15, 0.15)]
     assert sorted(sides) == [pytest.approx(0.2**5), 1.0]
-    assert coverage.worst == OCCUPIED
+    assert coverage.worst == PRIOR_INSIDE
 
 
 def test_a_place_is_searched_only_if_all_of_an_object_there_would_show(coverage: Coverage) -> None:
@@ -91,7 +97,7 @@ def test_a_place_beside_the_workspace_that_no_pose_shows_any_more_is_not_waited_
     for _ in range(8):
         coverage.look(look(epoch=1, hidden=slice(0, 180)))
         worst.append(coverage.worst)
-    assert worst[2] == STRAYED, "hidden on the left"
+    assert worst[2] == PRIOR_OUTSIDE_AFTER_CHANGE, "hidden on the left"
     assert worst[4] <= 0.2**5 * 1.01
 
 
@@ -108,5 +114,5 @@ def test_a_place_counts_if_all_places_around_it_do(coverage: Coverage, y: float,
 def test_a_place_beyond_the_table_or_near_something_unsure_does_not_count(coverage: Coverage) -> None:
     coverage.look(look(), [MIDDLE])
     assert not coverage.in_sight(np.array([0.53, 2.0, 0.025]))
-    assert coverage.overlooked(np.array([0.53, 2.0, 0.025])) == ASTRAY
+    assert coverage.overlooked(np.array([0.53, 2.0, 0.025])) == PRIOR_OUTSIDE
     assert [coverage.overlooked(np.add(MIDDLE, (x, 0, 0))) for x in (0.0, 0.04)] == [1.0, pytest.approx(0.2)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from ledger_bench import Bench
 
-from executive.ledger.certainty import GLIMPSES
+from executive.ledger.certainty import MAX_UNSURE_LOOKS
 
 THERE = ("cube", 0.5, 0.0)
 UNSURE = ("rejected", "no look is sure of it")
@@ -33,10 +33,10 @@ def test_a_table_with_something_in_doubt_is_not_believed_to_be_empty(bench: Benc
         (1, 2, False, PHANTOM),
         (1, 1, True, PHANTOM),
         (1, 0, True, UNSURE),
-        (GLIMPSES - 1, 0, False, ("seen", "")),
-        (GLIMPSES, 0, False, UNSURE),
-        (GLIMPSES, 0, True, UNSURE),
-        (GLIMPSES, 3, True, PHANTOM),
+        (MAX_UNSURE_LOOKS - 1, 0, False, ("seen", "")),
+        (MAX_UNSURE_LOOKS, 0, False, UNSURE),
+        (MAX_UNSURE_LOOKS, 0, True, UNSURE),
+        (MAX_UNSURE_LOOKS, 3, True, PHANTOM),
     ],
 )
 def test_what_no_look_is_sure_of_is_given_up_and_what_looks_miss_was_nothing(
@@ -51,7 +51,7 @@ def test_what_no_look_is_sure_of_is_given_up_and_what_looks_miss_was_nothing(
 
 
 def test_given_up_too_early_it_is_open_again_when_a_look_is_sure(bench: Bench) -> None:
-    for _ in range(GLIMPSES):
+    for _ in range(MAX_UNSURE_LOOKS):
         bench.look(unsure=[THERE])
     bench.look(THERE)
     assert bench.states() == {"cube-1": ("seen", "")}
@@ -89,7 +89,7 @@ def test_a_look_that_is_unsure_of_a_known_item_does_not_miss_it(bench: Bench) ->
 def test_a_known_item_that_waits_its_turn_is_not_given_up_for_glimpses(bench: Bench) -> None:
     for _ in range(3):
         bench.look(THERE, ("cube", 0.55, 0.0))
-    for _ in range(GLIMPSES + 5):
+    for _ in range(MAX_UNSURE_LOOKS + 5):
         bench.look(("cube", 0.55, 0.0), unsure=[THERE])
     assert bench.ledger.is_sure("cube-1")
     bench.ledger.held("cube-2")  # its neighbour

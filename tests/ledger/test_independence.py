@@ -1,4 +1,4 @@
-"""Looks from one pose repeat a share of their errors, so only the independent share adds up."""
+"""Looks from one pose repeat_probability a share of their errors, so only the independent share adds up."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from ledger_bench import EYE, Bench
 
 from executive.ledger.certainty import Certainty
-from executive.ledger.independence import repeat
+from executive.ledger.independence import repeat_probability
 
 DOUBTFUL = replace(EYE, confused=0.05, repeated=0.8)
 CUBE = ("cube", 0.5, 0.0)
@@ -20,8 +20,8 @@ def record_of(bench: Bench):
 
 
 def test_the_probability_of_the_same_answer_again_is_that_of_a_copy_or_of_another_such_answer():
-    assert (repeat(0.05, 0.0), repeat(0.05, 1.0)) == (0.05, 1.0)
-    assert repeat(0.05, 0.8) == pytest.approx(0.81)
+    assert (repeat_probability(0.05, 0.0), repeat_probability(0.05, 1.0)) == (0.05, 1.0)
+    assert repeat_probability(0.05, 0.8) == pytest.approx(0.81)
 
 
 def test_the_same_answer_from_the_same_pose_proves_a_class_only_a_little_more(bench):

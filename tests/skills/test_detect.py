@@ -50,7 +50,7 @@ def test_only_what_is_sure_is_found(
         ("no answer within 1.0 s", "unavailable", "detector embedded: no answer within 1.0 s"),
         *(
             ([Detection("duck", 0.9, box)], "unavailable",
-             "detector embedded gave a box that cannot be: duck 0.9 at (")
+             "detector embedded gave an invalid box: duck 0.9 at (")
             for box in ((math.nan, 0, 9, 9), (0, 0, math.inf, 9), (9, 0, 0, 9))
         ),
     ],

@@ -1,4 +1,4 @@
-"""Fingerprint of a detector in its cell: everything declared that its errors depend on."""
+"""Fingerprint of a detector in its cell: the declared properties on which its errors depend."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ from executive.vision.camera_model import calibrated
 from executive.vision.detectors.registry import installed
 
 Fingerprint = Mapping[str, str]
-"""Text of each property by its name; two measurements apply to each other if all texts are equal."""
+"""Text of each property by its name. A measurement applies to a detector if all texts are equal."""
 
 
 def take_fingerprint(config: CellConfig, detector: str, base: Path) -> Fingerprint:
     """Return the fingerprint of a detector in its cell.
 
-    It contains the weights and settings of the detector, the classes and their sizes, and the pose, lens and
-    image of the camera. Bins, the number of objects, light and colours are not part of it.
+    It contains the weights and settings of the detector, the classes and their sizes, and the pose,
+    intrinsics, image size and depth settings of the camera. Bins, the number of objects, light and colours
+    are not part of it.
 
     Args:
         config: The cell.
         detector: Name of one of its detectors.
-        base: Folder from which paths in the cell file start.
+        base: Folder to which paths in the cell file are relative.
 
     """
     section = config.detectors[detector]
@@ -42,10 +43,10 @@ def take_fingerprint(config: CellConfig, detector: str, base: Path) -> Fingerpri
     }
 
 
-def describe_change(measured: Fingerprint, present: Fingerprint) -> str:
+def describe_change(measured: Fingerprint, current: Fingerprint) -> str:
     """Return the names of the properties that have changed since a measurement, or ""."""
     return ", ".join(
-        name for name in dict.fromkeys([*measured, *present]) if measured.get(name) != present.get(name)
+        name for name in dict.fromkeys([*measured, *current]) if measured.get(name) != current.get(name)
     )
 
 

@@ -17,7 +17,7 @@ MIN_PIXELS = 400
 TOLERANCE = 6.0
 """Distance beyond the measured range that is accepted [grey level]."""
 RELATIVE_TOLERANCE = 0.08
-"""Distance beyond the measured range that is accepted, as a share of the limit of the range."""
+"""The same deviation as a share of the limit of the range; the larger of the two tolerances applies."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class FrameStatistics:
 
     Attributes:
         brightness: Median of the mean of the three colours.
-        contrast: Median distance from that median.
+        contrast: Median absolute deviation of the brightness.
         red, green, blue: Median of each colour.
     """
 
@@ -49,20 +49,20 @@ class FrameRange(Section):
     blue: tuple[float, float]
 
     @staticmethod
-    def of(frames: Sequence[FrameStatistics]) -> FrameRange | None:
-        """Return the ranges over some frames, None if there are none."""
-        if not frames:
+    def of(samples: Sequence[FrameStatistics]) -> FrameRange | None:
+        """Return the ranges over the statistics of some frames, None if there are none."""
+        if not samples:
             return None
-        values = {name: [asdict(frame)[name] for frame in frames] for name in FrameRange.model_fields}
+        values = {name: [asdict(sample)[name] for sample in samples] for name in FrameRange.model_fields}
         ranges = {name: (round(min(each), 1), round(max(each), 1)) for name, each in values.items()}
         return FrameRange.model_validate(ranges)
 
-    def describe_difference(self, frame: FrameStatistics) -> str:
-        """Return each statistic of a frame that lies outside its range, with both values, or ""."""
+    def describe_difference(self, statistics: FrameStatistics) -> str:
+        """Return each statistic outside its range as text, with its value and range; "" if there is none."""
         differences = []
-        for name, value in asdict(frame).items():
+        for name, value in asdict(statistics).items():
             low, high = getattr(self, name)
-            if not _lower(low) <= value <= _upper(high):
+            if not _lower_limit(low) <= value <= _upper_limit(high):
                 differences.append(f"{name} {value:.0f}, measured {low:.0f} to {high:.0f}")
         return "; ".join(differences)
 
@@ -87,9 +87,9 @@ def measure_frame(frame: Frame, table: TableConfig) -> FrameStatistics | None:
     return FrameStatistics(brightness, float(np.median(np.abs(grey - brightness))), red, green, blue)
 
 
-def _lower(limit: float) -> float:
+def _lower_limit(limit: float) -> float:
     return limit - max(TOLERANCE, RELATIVE_TOLERANCE * limit)
 
 
-def _upper(limit: float) -> float:
+def _upper_limit(limit: float) -> float:
     return limit + max(TOLERANCE, RELATIVE_TOLERANCE * limit)

@@ -15,7 +15,7 @@ from executive.reliability import Reliability
 from executive.vision.envelope.frame_statistics import FrameRange
 
 SUFFIX = ".measured.json"
-"""End of the name of a file with the measurements of a cell, after the name of the cell."""
+"""Suffix of a measurement file; the name of the cell comes before it."""
 MAX_FILE_SIZE = 1_000_000
 """Largest size of such a file [byte]."""
 
@@ -31,12 +31,12 @@ class Rates(Section):
     bias: float = Field(ge=0)
 
     def reliability(self, threshold: float) -> Reliability:
-        """Return the rates of a detector whose detections count from a confidence of `threshold`."""
+        """Return these rates together with the confidence from which detections count."""
         return Reliability(threshold, **self.model_dump())
 
 
-class GroupFigures(Section):
-    """Errors on the objects of one class, or in scenes with one number of objects."""
+class ErrorCounts(Section):
+    """Errors on the objects of one class, or in scenes with the same number of objects."""
 
     objects: int
     missed: int
@@ -57,10 +57,10 @@ class Measurement(Section):
     """Duration of the measurement [s]."""
     images: int
     rates: Rates
-    """Upper 95 % bounds of the shares, and standard deviations of the errors of a position."""
-    classes: dict[str, GroupFigures]
+    """Upper 95 % bounds of the error rates, and standard deviations of the position errors."""
+    classes: dict[str, ErrorCounts]
     """Errors by class; a false detection counts for the class that it was given."""
-    counts: dict[str, GroupFigures]
+    counts: dict[str, ErrorCounts]
     """Errors by the number of objects in the scene."""
     frames: FrameRange | None
     """Ranges of the statistics of the frames; None if no frame showed the whole workspace."""
@@ -83,7 +83,7 @@ def read_measurements(path: Path) -> tuple[Measurement, ...]:
         return ()
     try:
         if path.stat().st_size > MAX_FILE_SIZE:
-            raise InputError(f"{path} is larger than {MAX_FILE_SIZE} bytes; it is no file of measurements")
+            raise InputError(f"{path} is larger than {MAX_FILE_SIZE} bytes; it is not a measurement file")
         return MeasurementFile.model_validate_json(path.read_bytes()).measurements
     except (OSError, ValidationError) as error:
         raise InputError(
@@ -92,7 +92,7 @@ def read_measurements(path: Path) -> tuple[Measurement, ...]:
         ) from error
 
 
-def add_measurement(measurements: Iterable[Measurement], new: Measurement) -> str:
+def text_with_measurement(measurements: Iterable[Measurement], new: Measurement) -> str:
     """Return the text of a file with a new measurement, in place of an older one of the same detector."""
     others = [one for one in measurements if one.detector != new.detector]
     ordered = sorted((*others, new), key=lambda one: one.detector)

@@ -1,4 +1,4 @@
-"""Detectors of a cell whose answers carry measured error rates, or assumed ones outside the envelope."""
+"""Detectors of a cell that report their error rates: measured, or assumed if no measurement applies."""
 
 from __future__ import annotations
 
@@ -68,14 +68,14 @@ class RatedDetector:
 
 @dataclass(frozen=True, eq=False)
 class RatedRequest:
-    """Request whose answer carries other error rates; implements `executive.cell.Request`."""
+    """Request whose answer carries the given error rates; implements `executive.cell.Request`."""
 
     request: Request
     reliability: Reliability
 
     @property
     def ready(self) -> bool:
-        """True from the tick at which the answer is due on the run's clock."""
+        """True once the run's clock has reached the time of the answer."""
         return self.request.ready
 
     def result(self) -> Answer:
@@ -90,12 +90,12 @@ class RatedRequest:
 def build_rated_detectors(
     config: CellConfig, *, clock: Clock, base: Path, seed: int, folders: Sequence[Path]
 ) -> dict[str, ClosableDetector]:
-    """Return the detectors of a cell by name, in its order, each with its measured or assumed error rates.
+    """Return the detectors of a cell by name, in the order of the cell file, with their error rates.
 
     Args:
         config: The cell.
         clock: Clock of the run.
-        base: Folder from which paths in the cell file start.
+        base: Folder to which paths in the cell file are relative.
         seed: Seed of everything random in the detectors.
         folders: Folders with files `CELL.measured.json`.
 
@@ -112,27 +112,27 @@ def build_rated_detectors(
 
 
 def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> dict[str, DetectorEnvelope]:
-    """Return the envelope of each detector of a cell that is not fake, by name.
+    """Return the envelope of each measurable detector of a cell, by name.
 
     A measurement applies if its fingerprint is that of the detector, whichever cell it was made in.
 
     Args:
         config: The cell.
-        base: Folder from which paths in the cell file start.
+        base: Folder to which paths in the cell file are relative.
         folders: Folders with files `CELL.measured.json`.
     """
-    names = list(measured_detectors(config))
+    names = list(measurable_detectors(config))
     stored, problems = _read_all(folders) if names else ([], [])
     envelopes = {}
     for name in names:
         threshold = config.detectors[name].threshold
-        present = take_fingerprint(config, name, base)
-        match = next((one for _, one in stored if one.fingerprint == present), None)
+        current = take_fingerprint(config, name, base)
+        match = next((one for _, one in stored if one.fingerprint == current), None)
         if match is not None:
             envelopes[name] = DetectorEnvelope(match.rates.reliability(threshold), match.frames)
             continue
         older = next((one for cell, one in stored if (cell, one.detector) == (config.cell, name)), None)
-        change = describe_change(older.fingerprint, present) if older else ""
+        change = describe_change(older.fingerprint, current) if older else ""
         was = f"was measured before a change of {change}" if change else "was never measured in this cell"
         doubt = (
             f"detector {name} {was}, so high error rates are assumed; measure it with "
@@ -145,14 +145,14 @@ def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> d
 def find_unmeasured(
     config: CellConfig, base: Path, folders: Sequence[Path]
 ) -> Iterator[tuple[tuple[str, str], str]]:
-    """Yield the keys of each detector that no measurement applies to, and a sentence."""
+    """Yield each detector without a valid measurement: its keys in the cell file, and the reason."""
     for name, envelope in find_envelopes(config, base, folders).items():
         if envelope.reliability.doubt:
             yield ("detectors", name), envelope.reliability.doubt
 
 
-def measured_detectors(config: CellConfig) -> Iterator[str]:
-    """Yield the names of the detectors whose errors are measured: those that are installed and not fake."""
+def measurable_detectors(config: CellConfig) -> Iterator[str]:
+    """Yield the names of the detectors whose errors can be measured: those installed and not fake."""
     kinds = installed()
     for name, section in config.detectors.items():
         is_known = config.kind != FAKE and section.kind in kinds

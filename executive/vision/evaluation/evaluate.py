@@ -16,7 +16,7 @@ from executive.vision.evaluation.average_precision import AveragePrecision
 from executive.vision.evaluation.figures import Evaluation, Spread
 from executive.vision.evaluation.matching import is_ignored, match
 from executive.vision.evaluation.misses import WorstMisses
-from executive.vision.evaluation.repeats import Repeats
+from executive.vision.evaluation.repeats import RepeatedErrors
 from executive.vision.evaluation.tally import Tally
 from executive.vision.evaluation.truth import as_frame
 from executive.vision.samples import LabelledImage
@@ -41,7 +41,7 @@ def evaluate(
         worst: Gathers the worst mistakes.
         table: Declares the workspace whose brightness, contrast and colours are measured; None: they are not.
     """
-    tally, precision, repeats = Tally(localizer), AveragePrecision(), Repeats(localizer)
+    tally, precision, repeats = Tally(localizer), AveragePrecision(), RepeatedErrors(localizer)
     frames: list[FrameStatistics] = []
     latencies: list[float] = []
     answered: Counter[str] = Counter()

@@ -1,4 +1,4 @@
-"""Comparison of two looks at one scene from the same pose: repeated errors, random and systematic ones."""
+"""Comparison of two looks from one pose: repeated errors, random and systematic position errors."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from executive.vision.evaluation.matching import Match, offset_of, overlap
 from executive.vision.evaluation.truth import in_full_view, pixel_size
 from executive.vision.samples import LabelledImage
 
-SAME_PLACE = 0.5
+MIN_OVERLAP = 0.5
 """Overlap (intersection over union) from which two false detections are at the same place."""
 
 
-class Repeats:
-    """Counts the errors that a second look repeats, and separates random from systematic errors of a place.
+class RepeatedErrors:
+    """Counts the errors that a second look repeats, and separates random from systematic position errors.
 
-    The second look differs in the noise of the sensor only. Half the mean squared difference of two
-    measurements is the variance of the random error; their mean product is that of the systematic error.
+    The second look differs in the noise of the sensor only. Half the mean squared difference of the two
+    errors is the variance of the random error; their mean product is the variance of the systematic error.
 
     Args:
         localizer: Turns detections into positions; None: no systematic error of a position is measured.
 
     Attributes:
         errors: Number of errors of the first looks.
-        repeated: Number of these that the second look repeated.
+        repeated: Number of errors of the first looks that the second looks repeated.
     """
 
     def __init__(self, localizer: Localizer | None) -> None:
@@ -43,7 +43,7 @@ class Repeats:
     def add(
         self, first: Sequence[Match], second: Sequence[Match], sample: LabelledImage, frame: Frame
     ) -> None:
-        """Compare the answers to two images of a scene."""
+        """Count the errors in the answers to two images of one scene, and those that are repeated."""
         before = {one.number: one for one in first if one.number is not None}
         after = {one.number: one for one in second if one.number is not None}
         for number, label in enumerate(sample.labels):
@@ -59,7 +59,7 @@ class Repeats:
         for false in (one.detection for one in first if one.number is None):
             alike = [one.box for one in invented if one.label == false.label]
             self.errors += 1
-            self.repeated += bool(overlap([false.box], alike).max(initial=0.0) >= SAME_PLACE)
+            self.repeated += bool(overlap([false.box], alike).max(initial=0.0) >= MIN_OVERLAP)
 
     @property
     def share(self) -> float:

@@ -15,7 +15,7 @@ from executive.vision.camera_model import on_plane
 from executive.vision.evaluation.figures import NOTHING, ClassFigures
 from executive.vision.evaluation.matching import Match, offset_of
 from executive.vision.evaluation.reliability import MeasuredReliability
-from executive.vision.evaluation.repeats import Repeats
+from executive.vision.evaluation.repeats import RepeatedErrors
 from executive.vision.evaluation.truth import in_full_view, is_whole, pixel_size
 from executive.vision.samples import LabelledImage
 
@@ -98,7 +98,7 @@ class Tally:
         )
         return {true: {found: self.confusion[true, found] for found in columns} for true in rows}
 
-    def reliability(self, repeats: Repeats) -> MeasuredReliability | None:
+    def reliability(self, repeats: RepeatedErrors) -> MeasuredReliability | None:
         """Return the error rates on objects in full view, None where nothing was answered."""
         if not self._looks:
             return None

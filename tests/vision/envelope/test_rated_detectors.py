@@ -13,8 +13,8 @@ from executive.vision.envelope.frame_statistics import FrameRange
 from executive.vision.envelope.measurement import (
     Measurement,
     Rates,
-    add_measurement,
     read_measurements,
+    text_with_measurement,
 )
 from executive.vision.envelope.rated_detectors import (
     DetectorEnvelope,
@@ -39,7 +39,7 @@ def stored(tmp_path, overhead):
         detector="embedded", fingerprint=dict(take_fingerprint(overhead, "embedded", tmp_path)),
         command="", seconds=1.0, images=1, rates=RATES, classes={}, counts={}, frames=WOOD,
     )  # fmt: skip
-    (tmp_path / "overhead.measured.json").write_text(add_measurement((), one))
+    (tmp_path / "overhead.measured.json").write_text(text_with_measurement((), one))
     return tmp_path
 
 
@@ -109,7 +109,7 @@ def test_rates_are_assumed_for_frames_outside_the_measured_ranges(overhead, colo
 
 def test_measurements_of_other_detectors_in_a_file_are_kept(stored):
     (one,) = read_measurements(stored / "overhead.measured.json")
-    text = add_measurement((one,), one.model_copy(update={"detector": "second"}))
+    text = text_with_measurement((one,), one.model_copy(update={"detector": "second"}))
     (stored / "both.measured.json").write_text(text)
     assert [each.detector for each in read_measurements(stored / "both.measured.json")] == [
         "embedded",
