@@ -102,7 +102,8 @@ def test_the_words_say_where_the_bins_are_and_how_the_camera_has_moved() -> None
     words = describe_displacement(draw(moved((0.0, -0.03, 0.0))), BINS)
     assert re.fullmatch(
         r"camera top is not where the cell file says: the outlines of red, blue, yellow appear 12 pixels "
-        r"\((29|30|31) mm\) away from their expected positions, as if the camera had moved by \(\S+, -\d+, \S+\) mm "
+        r"\((29|30|31) mm\) away from their expected positions, as if the camera had moved by "
+        r"\(\S+, -\d+, \S+\) mm "
         r"\(standard deviation \d+ mm\) and turned by \S+ degrees; limit 5 mm; mount camera and bins as "
         r"declared, or measure the pose again",
         words,

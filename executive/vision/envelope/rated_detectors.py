@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from executive.cell import Clock, Request
-from executive.cell_config import CellConfig, TableConfig
+from executive.cell_config import CellConfig
 from executive.errors import InputError
 from executive.messages import Answer, Frame
 from executive.reliability import Reliability, assume_rates
@@ -43,22 +43,25 @@ class RatedDetector:
     Attributes:
         detector: The detector.
         envelope: Its error rates and the conditions for them.
-        table: Declares the workspace, whose image is compared with the measured frames.
+        config: Its cell; the image of the workspace is compared with the measured frames.
         name: Name of the detector.
     """
 
     detector: ClosableDetector
     envelope: DetectorEnvelope
-    table: TableConfig
+    config: CellConfig
     name: str
 
     def request(self, frame: Frame, view: str) -> RatedRequest:
         """Start to search `frame`; rates are assumed if the frame lies outside the measured ranges."""
         reliability, frames = self.envelope.reliability, self.envelope.frames
-        statistics = measure_frame(frame, self.table) if frames else None
+        statistics = measure_frame(frame, self.config.table) if frames else None
         if frames and statistics and (difference := frames.describe_difference(statistics)):
-            doubt = f"the workspace looks different from all images that detector {self.name} was measured on"
-            reliability = assume_rates(reliability.threshold, f"{doubt}: {difference}")
+            doubt = (
+                f"the workspace looks different from all images that detector {self.name} was measured on: "
+                f"{difference}; {remedy(self.config)}"
+            )
+            reliability = assume_rates(reliability.threshold, doubt)
         return RatedRequest(self.detector.request(frame, view), reliability)
 
     def close(self) -> None:
@@ -106,7 +109,7 @@ def build_rated_detectors(
     built = build_detectors(config.detectors, camera=camera, clock=clock, base=base, seed=seed)
     envelopes = find_envelopes(config, base, folders)
     return {
-        name: RatedDetector(one, envelopes[name], config.table, name) if name in envelopes else one
+        name: RatedDetector(one, envelopes[name], config, name) if name in envelopes else one
         for name, one in built.items()
     }
 
@@ -134,12 +137,14 @@ def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> d
         older = next((one for cell, one in stored if (cell, one.detector) == (config.cell, name)), None)
         change = describe_change(older.fingerprint, current) if older else ""
         was = f"was measured before a change of {change}" if change else "was never measured in this cell"
-        doubt = (
-            f"detector {name} {was}, so high error rates are assumed; measure it with "
-            f"`executive evaluate --cell {config.cell}` (about {MEASURING_MINUTES} min)"
-        )
+        doubt = f"detector {name} {was}, so high error rates are assumed; {remedy(config)}"
         envelopes[name] = DetectorEnvelope(assume_rates(threshold, "; ".join([doubt, *problems])))
     return envelopes
+
+
+def remedy(config: CellConfig) -> str:
+    """Return the command that measures the detectors of a cell, as a part of a sentence."""
+    return f"measure it with `executive evaluate --cell {config.cell}` (about {MEASURING_MINUTES} min)"
 
 
 def find_unmeasured(

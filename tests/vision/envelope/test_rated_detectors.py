@@ -99,12 +99,13 @@ class Silent:
 @pytest.mark.parametrize(("colour", "doubted"), [((220, 200, 160), False), ((60, 60, 60), True)])
 def test_rates_are_assumed_for_frames_outside_the_measured_ranges(overhead, colour, doubted):
     envelope = DetectorEnvelope(RATES.reliability(0.5), WOOD)
-    detector = RatedDetector(Silent(), envelope, overhead.table, "embedded")
+    detector = RatedDetector(Silent(), envelope, overhead, "embedded")
     answered = detector.request(frame_of(colour), "table").result().reliability
     doubt = answered.doubt
     assert answered == (assume_rates(0.5, doubt) if doubted else RATES.reliability(0.5))
     start = "the workspace looks different from all images that detector embedded was measured on: "
     assert doubt.startswith(f"{start}brightness 60, measured 180 to 195; red 60") == doubted
+    assert doubt.endswith("; measure it with `executive evaluate --cell overhead` (about 2 min)") == doubted
 
 
 def test_measurements_of_other_detectors_in_a_file_are_kept(stored):
