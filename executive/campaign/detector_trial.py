@@ -19,7 +19,6 @@ from executive.sim.scene_file import load_scene
 from executive.sim.spawn import count_that_fits
 from executive.vision.detectors.registry import wrong_detectors
 from executive.vision.evaluation.asking import CellDetector
-from executive.vision.evaluation.cores import only_cores
 from executive.vision.evaluation.evaluate import evaluate
 from executive.vision.evaluation.figures import Evaluation
 from executive.vision.evaluation.misses import WorstMisses
@@ -133,14 +132,13 @@ def measure(
     scenes: Scenes,
     *,
     threshold: float | None,
-    cores: int | None,
     worst: WorstMisses,
     progress: Progress,
 ) -> Evaluation:
     """Return how good a detector is on the dataset or, without one, on scenes of its cell."""
     config = subject.cell
     in_run = config is not None and dataset is None and not scenes.varied
-    with _images(subject, dataset, scenes, progress) as (samples, count), only_cores(cores):
+    with _images(subject, dataset, scenes, progress) as (samples, count):
         asked = CellDetector(
             subject.configs,
             subject.name,

@@ -56,7 +56,6 @@ PICTURES = (".png", ".jpg", ".jpeg")
     "--out", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
     help="File for the measurement that runs read; without it, CELL.measured.json beside the cell file.",
 )  # fmt: skip
-@click.option("--cores", type=click.IntRange(min=1), help="Processor cores the detector may use; else all.")
 @click.option(
     "--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Processes to render."
 )
@@ -79,7 +78,6 @@ def command(
     scene: Path | None,
     overrides: dict[str, str],
     out: Path | None,
-    cores: int | None,
     workers: int,
     sheet: Path | None,
     as_json: bool,
@@ -111,9 +109,7 @@ def command(
             check_subject(subject, rendered=dataset is None, scene=scene)
         for subject in asked:
             where, began = subject.place(dataset), time.monotonic()
-            evaluation = measure(
-                subject, dataset, scenes, threshold=threshold, cores=cores, worst=worst, progress=bar
-            )
+            evaluation = measure(subject, dataset, scenes, threshold=threshold, worst=worst, progress=bar)
             print_figures(where, subject.name, evaluation)
             kind = subject.configs[subject.name].kind
             measured[where] = {"detector": subject.name, "kind": kind, **evaluation.as_dict()}

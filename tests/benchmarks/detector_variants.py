@@ -113,9 +113,7 @@ def evaluate_scene(
     (subject,) = subjects({file: cell}, None, None, None)
     check_subject(subject, rendered=True, scene=scene)
     scenes = Scenes(images, seed, varied=False, view="table", workers=workers, scene=scene)
-    return measure_detector(
-        subject, None, scenes, threshold=THRESHOLD, cores=None, worst=WorstMisses(), progress=bar
-    )
+    return measure_detector(subject, None, scenes, threshold=THRESHOLD, worst=WorstMisses(), progress=bar)
 
 
 def describe_evaluation(name: str, evaluation: Evaluation) -> Figures:

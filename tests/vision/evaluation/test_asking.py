@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 
-import cv2
 import pytest
 
 from executive.cell_config import DetectorConfig
-from executive.errors import InputError, Unavailable
+from executive.errors import Unavailable
 from executive.messages import Answer, Detection
 from executive.vision.detectors.views import parts_of
 from executive.vision.evaluation import asking
 from executive.vision.evaluation.asking import WHOLE_IMAGE, CellDetector
-from executive.vision.evaluation.cores import only_cores
 from executive.vision.evaluation.truth import as_frame
 
 CONFIGS = {"eye": DetectorConfig(kind="embedded", threshold=0.6)}
@@ -107,13 +103,3 @@ def test_frames_of_a_camera_are_searched_as_in_a_run_and_other_images_as_a_whole
         assert parts_of("full", eye.camera.table_view, size) == [(0, 0, *size)]
     detector.close()
     assert eye.closed
-
-
-@pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="the system cannot limit cores")
-def test_threads_begun_meanwhile_run_on_so_many_cores_and_later_ones_on_all():
-    before, threads = os.sched_getaffinity(0), cv2.getNumThreads()
-    with only_cores(1), ThreadPoolExecutor(1) as thread, only_cores(None):
-        assert (cv2.getNumThreads(), len(thread.submit(os.sched_getaffinity, 0).result())) == (1, 1)
-    assert (os.sched_getaffinity(0), cv2.getNumThreads()) == (before, threads)
-    with pytest.raises(InputError, match=r"processor cores here, not 4096; ask for fewer"), only_cores(4096):
-        pass
