@@ -69,7 +69,8 @@ def in_time(event: Event) -> None:
 
 
 def assert_does_its_work(loaded: LoadedMission) -> None:
-    assert loaded.warnings == ()
+    # A detector behind a server cannot be measured here.
+    assert [one for one in loaded.warnings if one.code != "not-measured"] == []
     run = Run(loaded, discover(), seed=0, kind=FakeCell, requests=[*loaded.routes], observers=[in_time])
     try:
         outcome = run.execute()

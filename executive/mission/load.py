@@ -98,7 +98,6 @@ def load_mission(
         base = files.cell_path.parent
         wrong = [files.cell.finding(keys, "robot", text) for keys, text in kind.check(config, base)]
         findings += wrong
-        findings += _unmeasured(files.cell, base)
         labels = dict(kind.labels(config, base))
         least = None if wrong else kind.least_times(config)
     expanded = expand(mission, skills)
@@ -109,6 +108,10 @@ def load_mission(
     is_sound = expanded.tree is not None and all(finding.severity != "error" for finding in findings)
     if config is None or files.cell_path is None or not is_sound:
         raise MissionError(ordered)
+    if kind is not None and files.cell is not None:
+        ordered = in_file_order(
+            (*ordered, *_unmeasured(files.cell, files.cell_path.parent)), files.source.path
+        )
     return LoadedMission(
         mission, tree, config, files.source.text, file, files.cell_path, files.libraries,
         endings(case.flow), ordered, dict(overrides or {}),
