@@ -16,7 +16,7 @@ PITCH = 0.02
 """Pitch of the grid of points on the table [m]; smaller than the smallest object."""
 MARGIN = 0.4
 """Width of the watched area around the workspace [m]; dropped or pushed objects stay within it."""
-PRIOR_OUTSIDE = 0.02
+PRIOR_OUTSIDE = 0.01
 """Prior probability of an object at a place beside the workspace before anything was dropped or pushed."""
 PRIOR_OUTSIDE_AFTER_CHANGE = 0.1
 """Probability of an object at a place beside the workspace after one was dropped or pushed."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -12,12 +12,12 @@ import click
 
 from executive.campaign.pool import do_all
 from executive.cell import Clock, Request
-from executive.cell_config import CameraConfig, DetectorConfig
+from executive.cell_config import CellConfig
 from executive.cli.options import runs_option, workers_option
 from executive.cli.progress import bar, say_halting
 from executive.messages import Answer, Frame
-from executive.vision.detectors.registry import build_detectors
 from executive.vision.detectors.setting import ClosableDetector
+from executive.vision.envelope.rated_detectors import build_rated_detectors
 from tests.benchmarks.ground_truth import FAULT, AuditedRun, FoundObject, run_audited
 from tests.benchmarks.report import Figures, limit_option, run_command, write_json
 
@@ -89,16 +89,16 @@ class Server:
 
 
 def build_with_misclassifying(
-    configs: Mapping[str, DetectorConfig],
+    config: CellConfig,
     *,
-    camera: CameraConfig,
     clock: Clock,
     base: Path,
     seed: int,
+    folders: Sequence[Path],
     server: Server,
 ) -> dict[str, ClosableDetector]:
     """Return the detectors of a cell file, one of which misnames objects."""
-    built = build_detectors(configs, camera=camera, clock=clock, base=base, seed=seed)
+    built = build_rated_detectors(config, clock=clock, base=base, seed=seed, folders=folders)
     misnaming = MisclassifyingDetector(built[server.name], server.true_class, server.given_class)
     return {**built, server.name: misnaming}
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from functools import partial
 from pathlib import Path
@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from executive.cell import Clock
-from executive.cell_config import CameraConfig, DetectorConfig
+from executive.cell_config import CameraConfig, CellConfig, DetectorConfig
 from executive.discovery import discover
 from executive.messages import Detection, Frame
 from executive.mission.load import load_mission
@@ -90,10 +90,20 @@ def _fake(config: Any, *, crowd: Mapping[str, Any], **given: Any) -> FakeCell:
 
 
 def _crowded(
-    configs: Mapping[str, DetectorConfig], *, crowd: Mapping[str, Any], base: Path, seed: int, **given: Any
+    config: CellConfig,
+    *,
+    clock: Clock,
+    base: Path,
+    seed: int,
+    folders: Sequence[Path],
+    crowd: Mapping[str, Any],
 ) -> dict[str, CrowdedDetector]:
-    del base, seed
-    return {name: CrowdedDetector(name, config, **given, **crowd) for name, config in configs.items()}
+    del base, seed, folders
+    camera = next(iter(config.cameras.values()))
+    return {
+        name: CrowdedDetector(name, section, camera, clock, **crowd)
+        for name, section in config.detectors.items()
+    }
 
 
 def run_crowded(

@@ -12,6 +12,8 @@ from executive.geometry import Array
 from executive.messages import Box, Detection
 from executive.vision.samples import LabelledImage
 
+COVERED = 0.2
+"""Overlap (intersection over union) from which a box covers a part of another object."""
 MATCH = 0.5
 """Overlap (intersection over union) from which a box is the object's."""
 
@@ -51,6 +53,12 @@ def match(found: Sequence[Detection], sample: LabelledImage) -> list[Match]:
         Match(one, taken.get(rank), rank in taken and sample.labels[taken[rank]] == one.label)
         for rank, one in enumerate(ranked)
     ]
+
+
+def is_covered(number: int, matches: Sequence[Match], sample: LabelledImage) -> bool:
+    """Return True if a detection of another object overlaps an object: it is looked at again afterwards."""
+    others = [one.detection.box for one in matches if one.number not in (None, number)]
+    return bool(overlap([sample.boxes[number]], others).max(initial=0.0) >= COVERED)
 
 
 def is_ignored(detection: Detection, sample: LabelledImage) -> bool:

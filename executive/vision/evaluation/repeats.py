@@ -12,7 +12,7 @@ from executive.cell import Localizer
 from executive.errors import NoDepth
 from executive.geometry import Array
 from executive.messages import Frame
-from executive.vision.evaluation.matching import Match, offset_of, overlap
+from executive.vision.evaluation.matching import Match, is_covered, offset_of, overlap
 from executive.vision.evaluation.truth import in_full_view, pixel_size
 from executive.vision.samples import LabelledImage
 
@@ -50,6 +50,8 @@ class RepeatedErrors:
             if not in_full_view(sample, number):
                 continue
             one, other = before.get(number), after.get(number)
+            if one is None and is_covered(number, first, sample):
+                continue
             found, again = one and one.detection.label, other and other.detection.label
             self.errors += found != label
             self.repeated += found != label and found == again

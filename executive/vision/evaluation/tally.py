@@ -13,7 +13,7 @@ from executive.errors import NoDepth
 from executive.messages import Frame
 from executive.vision.camera_model import on_plane
 from executive.vision.evaluation.figures import NOTHING, ClassFigures
-from executive.vision.evaluation.matching import Match, offset_of
+from executive.vision.evaluation.matching import Match, is_covered, offset_of
 from executive.vision.evaluation.reliability import MeasuredReliability
 from executive.vision.evaluation.repeats import RepeatedErrors
 from executive.vision.evaluation.truth import in_full_view, is_whole, pixel_size
@@ -58,7 +58,7 @@ class Tally:
         for number, label in enumerate(sample.labels):
             one = taken.get(number)
             self.confusion[label, one.detection.label if one else NOTHING] += 1
-            if in_full_view(sample, number):
+            if in_full_view(sample, number) and (one or not is_covered(number, matches, sample)):
                 missed, confused = one is None, one is not None and not one.right
                 self._whole += 1
                 self._overlooked += missed
