@@ -23,8 +23,8 @@ from executive.runtime.cells import cell_kind
 from executive.sim.arrangements import UNKNOWN
 from executive.sim.audit import audit
 from executive.sim.cell import SimCell
-from executive.vision.detectors.registry import build_detectors
 from executive.vision.detectors.setting import ClosableDetector
+from executive.vision.envelope.rated_detectors import build_rated_detectors
 from executive.workcell import CellOptions
 from tests.benchmarks.forks import ForkRunner
 from tests.benchmarks.report import WALL_TIME_LIMIT
@@ -34,7 +34,7 @@ HUNG, FAULT = "HUNG", "FAULT"
 END_PLACES = ("wrong_bin", "right", "left", "elsewhere")
 """Keys of the audit of which a single object counts in one at most."""
 DetectorMaker = Callable[..., Mapping[str, ClosableDetector]]
-"""Makes the detectors of a cell, as `build_detectors` does."""
+"""Makes the detectors of a cell, as `build_rated_detectors` does."""
 
 
 @dataclass(frozen=True)
@@ -229,7 +229,7 @@ class AuditedCellMaker:
 
     made: AuditedCell
 
-    def __init__(self, detectors: DetectorMaker = build_detectors) -> None:
+    def __init__(self, detectors: DetectorMaker = build_rated_detectors) -> None:
         self._detectors = detectors
 
     def __call__(
@@ -247,7 +247,7 @@ def run_audited(
     seed: int,
     runs: Path,
     scene: Path | None = None,
-    detectors: DetectorMaker = build_detectors,
+    detectors: DetectorMaker = build_rated_detectors,
     wall_time_limit: float = WALL_TIME_LIMIT,
 ) -> AuditedRun:
     """Record a run below `runs` in a forked process, which is killed after `wall_time_limit` [s]."""

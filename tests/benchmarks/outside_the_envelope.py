@@ -150,15 +150,17 @@ def summarize(done: Sequence[Done]) -> Figures:
     rows = [_row(group, [one for one in done if one.case.group == group], usual) for group in present]
     outside = [one for one in done if one.case.group != DECLARED]
     unreported = [one for one in done if one.run.unreported]
+    broken = [
+        f"{one.case.name}, {one.run.mission}, seed {one.run.seed}: {one.run.status} {one.run.message}"
+        for one in done
+        if one.run.status in (FAULT, HUNG)
+    ]
     return {
         "groups": [*rows, _row("total outside", outside, usual)],
         "wrong bins": [_describe(one) for one in done if one.run.in_wrong_bin],
-        "broken": [
-            f"{one.case.name}, {one.run.mission}, seed {one.run.seed}: {one.run.status} {one.run.message}"
-            for one in done
-            if one.run.status in (FAULT, HUNG)
-        ],
-        "problems": [f"not reported: {_describe(one)}" for one in unreported],
+        "broken": broken,
+        # A campaign whose runs broke has shown nothing.
+        "problems": [*(f"not reported: {_describe(one)}" for one in unreported), *broken],
     }
 
 
