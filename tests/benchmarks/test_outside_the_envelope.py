@@ -78,7 +78,7 @@ def test_groups_are_compared_with_the_cell_as_declared() -> None:
     assert (group["runs"], group["objects"], group["HUNG"]) == (2, 2, 1)
     assert (group["wrong bin"], group["unreported"], group["times declared"]) == (1, 1, 3)
     assert {**group, "group": ""} == {**total, "group": ""}
-    assert len(figures["problems"]) == len(figures["broken"]) == 1
+    assert (len(figures["problems"]), len(figures["broken"])) == (2, 1)
 
 
 def test_objects_of_other_classes_must_be_in_their_bins() -> None:
