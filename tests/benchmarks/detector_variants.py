@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 
 import click
@@ -83,7 +82,7 @@ def measure(name_of_cell: str, images: int, seed: int, workers: int, out: Path) 
             path.write_text(yaml.safe_dump({"scene": name, **scene}), encoding="utf-8")
             evaluation = evaluate_scene(file, cell, images, seed, workers, path)
             rows.append(describe_evaluation(name, evaluation))
-            details[name] = {"scene": scene, **rows[-1], **asdict(evaluation)}
+            details[name] = {"scene": scene, **rows[-1], **evaluation.as_dict()}
     figures = {
         "cell": cell.cell,
         "seed": seed,

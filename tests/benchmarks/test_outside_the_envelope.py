@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from functools import partial
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 from executive.cli.cells import find_cell
 from executive.mission.parse.cell_file import load_cell
 from executive.vision.evaluation.figures import Evaluation
+from tests.benchmarks import detector_variants
 from tests.benchmarks.detector_variants import describe_evaluation, list_variants
 from tests.benchmarks.ground_truth import HUNG, AuditedRun, FoundObject, Report, run_audited
 from tests.benchmarks.misclassifying_server import Server, build_with_misclassifying
@@ -97,6 +99,19 @@ def test_a_variant_that_exceeds_a_limit_is_marked() -> None:
     assert (row["wrong class"], row["missed"], row["invented"], row["limits"]) == (7, 3, 2, "wrong classes")
     assert len(list_variants(load_cell(find_cell("overhead")))) == 26
     assert len(list_variants(load_cell(find_cell("wrist")))) == 23
+
+
+@pytest.mark.slow
+def test_the_variants_of_a_cell_are_measured_and_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(detector_variants, "VARIANTS", {"declared": {}})
+    monkeypatch.setattr(detector_variants, "FIXED_CAMERA_VARIANTS", {})
+    figures = detector_variants.measure(
+        "overhead", images=1, seed=1, workers=1, out=tmp_path / "variants.json"
+    )
+    assert figures["problems"] == ["declared: too few objects"]
+    assert json.loads((tmp_path / "variants.json").read_text())["details"]["declared"]["images"] == 1
 
 
 @pytest.mark.slow
