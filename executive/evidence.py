@@ -1,4 +1,4 @@
-"""Evidence about the class of an object besides the detector's score: height of a touch, size of a box."""
+"""Evidence about the class of an object besides the detector's score: heights, and the size of a box."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from executive.depth_image import measure_top
+from executive.errors import NoDepth
 from executive.geometry import Array
 from executive.messages import Box, Detection, Frame, ObjectClass
 
@@ -15,6 +17,19 @@ MAX_HEIGHT_ERROR = 0.003
 `sort_overhead` were at most 0.4 mm off."""
 OTHER_CLASS_TOLERANCE = 0.0025
 """Tolerance within which a touch that is too low for its class matches another class [m]."""
+TOP_TOLERANCE = 0.012
+"""Largest accepted difference between the measured and an expected height of a top in the depth image [m].
+
+In 480 scenes of the cell `depth`, 60 of them crowded and 60 with unknown objects, the tops of 1894 rightly
+detected objects were measured within 2.1 mm in the mean and 10.1 mm at worst: none contradicted its class.
+20 of the 26 boxes around unknown objects contradicted theirs.
+"""
+TOP_DISTANCE = 1.2
+"""Distance from the camera at which the above was measured [m].
+
+Beyond, the tolerance grows with the square of the distance, as the noise of a stereo camera does: seen from
+1.8 m, 160 tops were measured within 18.3 mm, and 27 mm are accepted.
+"""
 SIZE_TOLERANCE = 0.15
 """Largest relative difference between a box and the sizes that its class allows."""
 SIZE_MARGIN = 2.0
@@ -42,16 +57,54 @@ def describe_wrong_height(label: str, height: float, classes: Mapping[str, Objec
         classes: Classes of the cell by label.
     """
 
-    def error_of(kind: ObjectClass) -> float:
-        supports = (0.0, *(other.height for other in classes.values()))
-        return min((height - kind.height - support for support in supports), key=abs)
+    def error_of(label: str) -> float:
+        return min((height - top for top in _list_tops(label, classes)), key=abs)
 
-    error = error_of(classes[label])
-    others = [other for other, kind in classes.items() if abs(error_of(kind)) <= OTHER_CLASS_TOLERANCE]
+    error = error_of(label)
+    others = [other for other in classes if abs(error_of(other)) <= OTHER_CLASS_TOLERANCE]
     if abs(error) <= MAX_HEIGHT_ERROR or (error < 0 and not others):
         return ""
     measured = f"it was touched {height * 1000:.0f} mm above the table"
     return f"{measured}, and a {label} is {classes[label].height * 1000:.0f} mm high"
+
+
+def describe_wrong_top(
+    detection: Detection, position: Array, frame: Frame, area: Box, classes: Mapping[str, ObjectClass]
+) -> str:
+    """Return how the height of a top in the depth image contradicts a class, or "" if it does not.
+
+    The object lies on the table or on one object of any class. The box of the lower of two objects shows the
+    top of the upper one: the sum of both heights contradicts neither class.
+
+    Args:
+        detection: The box and its class.
+        position: Centre of the object `(3,)` [m].
+        frame: The image. Without a depth image, or with too little depth in the box, nothing is compared.
+        area: Searched part of the image [pixel]. Only boxes that show the whole object are compared.
+        classes: Classes of the cell by label.
+    """
+    if not _is_whole(detection, frame, area):
+        return ""
+    try:
+        top = measure_top(detection, frame)
+    except NoDepth:
+        return ""
+    expected = _list_tops(detection.label, classes)
+    tolerance = TOP_TOLERANCE * max(1.0, (_depth_of(position, frame) / TOP_DISTANCE) ** 2)
+    if min(abs(top - height) for height in expected) <= tolerance:
+        return ""
+    *lower, highest = [f"{height * 1000:.0f}" for height in expected]
+    measured = f"its top is {top * 1000:.0f} mm above the table"
+    return f"{measured}, and that of a {detection.label} {', '.join(lower)} or {highest} mm"
+
+
+def _list_tops(label: str, classes: Mapping[str, ObjectClass]) -> list[float]:
+    """Return the heights [m] above the table, ascending, at which the top of an object of a class may be.
+
+    The object lies on the table or on one object of any class.
+    """
+    supports = {0.0, *(other.height for other in classes.values())}
+    return sorted(classes[label].height + support for support in supports)
 
 
 def describe_wrong_size(
@@ -66,17 +119,14 @@ def describe_wrong_size(
         detection: The box and its class.
         position: Centre of the object `(3,)` [m].
         frame: The image.
-        area: Searched part of the image [pixel]. A box is not compared if it may be cut off at the border of
-            this part, or if the arm hides part of it.
+        area: Searched part of the image [pixel]. Only boxes that show the whole object are compared.
         kind: The class.
     """
-    left, top, right, bottom = detection.box
-    border_distance = min(left - area[0], top - area[1], area[2] - right, area[3] - bottom)
-    if border_distance < BORDER_DISTANCE or frame.shown(detection.box) < 1.0:
+    if not _is_whole(detection, frame, area):
         return ""
+    left, top, right, bottom = detection.box
     sides = _project_cylinder(position, frame, kind)
-    depth = float(frame.X_WC.inverse().apply(position)[2])
-    scale = float(frame.matrix[0, 0]) / depth
+    scale = float(frame.matrix[0, 0]) / _depth_of(position, frame)
     shortest = math.sqrt(2) * kind.radius * scale * (1 - SIZE_TOLERANCE) - SIZE_MARGIN
     longest = max(sides) * (1 + SIZE_TOLERANCE) + SIZE_MARGIN
     measured = max(right - left, bottom - top)
@@ -86,6 +136,18 @@ def describe_wrong_size(
         f"its box is {measured / scale * 1000:.0f} mm long, and that of a {detection.label} is "
         f"{shortest / scale * 1000:.0f} to {longest / scale * 1000:.0f} mm long"
     )
+
+
+def _is_whole(detection: Detection, frame: Frame, area: Box) -> bool:
+    """Return False if the border of the searched area may cut a box off, or the arm hides part of it."""
+    left, top, right, bottom = detection.box
+    border_distance = min(left - area[0], top - area[1], area[2] - right, area[3] - bottom)
+    return border_distance >= BORDER_DISTANCE and frame.shown(detection.box) >= 1.0
+
+
+def _depth_of(position: Array, frame: Frame) -> float:
+    """Return the distance [m] of a point `(3,)` [m] from the camera, along the optical axis."""
+    return float(frame.X_WC.inverse().apply(position)[2])
 
 
 def _project_cylinder(position: Array, frame: Frame, kind: ObjectClass) -> tuple[float, float]:

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from executive.cell import Cell
 from executive.errors import NoDepth
-from executive.evidence import describe_wrong_size
+from executive.evidence import describe_wrong_size, describe_wrong_top
 from executive.geometry import Array
 from executive.messages import BIN_THICKNESS, Detection, Detections, Glimpse, Target
 from executive.skill import In, Out, Skill, port
@@ -18,7 +18,9 @@ class Localize(Skill):
     """Know where every detected object is and which item it is.
 
     Uses the camera pose stored with the frame, so it holds wherever the camera is by now. The ledger
-    binds each detection to an item. A detection whose box has not the size of its class is in doubt.
+    binds each detection to an item. A detection is in doubt if its box has not the size of its class. If
+    the frame has a depth image, a detection is also in doubt if the height of its top fits neither an
+    object of its class on the table nor one on another object.
     """
 
     detections: In[Detections] = port(doc="what was found, with its frame")
@@ -51,11 +53,12 @@ class Localize(Skill):
         self.targets = list(cell.ledger.observe(look, positions, glimpses))
 
     def _contradiction(self, cell: Cell, detection: Detection, place: Array) -> str:
-        """Return how the size of a box contradicts its class, or ""; in a bin, objects lean and lie deep."""
+        """Return how its box or its top contradicts a class, or ""; in a bin, objects lean and lie deep."""
         if any(bin.contains(place, BIN_THICKNESS) for bin in cell.bins.values()):
             return ""
-        look = self.detections
-        return describe_wrong_size(detection, place, look.frame, look.area, cell.classes[detection.label])
+        frame, area, kind = self.detections.frame, self.detections.area, cell.classes[detection.label]
+        wrong_size = describe_wrong_size(detection, place, frame, area, kind)
+        return wrong_size or describe_wrong_top(detection, place, frame, area, cell.classes)
 
     def _glimpses(self, cell: Cell) -> Iterator[Glimpse]:
         """Yield where what is in doubt seems to be.

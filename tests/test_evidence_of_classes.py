@@ -7,8 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from executive.evidence import describe_unknown, describe_wrong_height, describe_wrong_size
-from executive.geometry import looking_down
+from executive.evidence import (
+    describe_unknown,
+    describe_wrong_height,
+    describe_wrong_size,
+    describe_wrong_top,
+)
+from executive.geometry import Array, looking_down
 from executive.messages import Box, Detection, Frame, ObjectClass
 
 CUBE, SPHERE = ObjectClass("cube", 0.05, 0.0354), ObjectClass("sphere", 0.06, 0.03)
@@ -69,6 +74,72 @@ def test_a_box_that_the_arm_hides_in_part_is_not_compared() -> None:
         describe_wrong_size(Detection("sphere", 0.9, box), np.array([0.5, 0.0, 0.03]), seen, AREA, SPHERE)
         == ""
     )
+
+
+BOX = (310.0, 230.0, 330.0, 250.0)
+
+
+def show_top(height: float, camera: float = 1.2) -> Frame:
+    """Return a frame whose depth image shows a plane; heights are over the table [m]."""
+    depth = np.full((480, 640), camera - height)
+    return replace(FRAME, depth=depth, X_WC=looking_down((0.5, 0.0, camera)))
+
+
+def describe_top(label: str, frame: Frame, box: Box = BOX) -> str:
+    """Return how the top in a box contradicts the class of an object on the table."""
+    place = np.array([0.5, 0.0, 0.025])
+    return describe_wrong_top(Detection(label, 0.9, box), place, frame, AREA, CLASSES)
+
+
+@pytest.mark.parametrize(
+    ("label", "height", "contradiction"),
+    [
+        ("cube", 0.05, ""),
+        ("cube", 0.061, ""),  # the error of a depth image
+        (
+            "cube",
+            0.08,
+            "its top is 80 mm above the table, and that of a cube 50, 100, 106 or 110 mm",
+        ),
+        (
+            "cube",
+            0.16,
+            "its top is 160 mm above the table, and that of a cube 50, 100, 106 or 110 mm",
+        ),
+        (
+            "duck",
+            0.02,
+            "its top is 20 mm above the table, and that of a duck 56, 106, 112 or 116 mm",
+        ),
+    ],
+)
+def test_the_height_of_a_top_in_the_depth_image_has_to_be_that_of_the_class(
+    label: str, height: float, contradiction: str
+) -> None:
+    assert describe_top(label, show_top(height)) == contradiction
+
+
+@pytest.mark.parametrize("upper", CLASSES)
+@pytest.mark.parametrize("lower", CLASSES)
+def test_the_top_of_two_stacked_objects_contradicts_the_class_of_neither(upper: str, lower: str) -> None:
+    frame = show_top(CLASSES[upper].height + CLASSES[lower].height)
+    for label in (upper, lower):
+        assert describe_top(label, frame) == ""
+
+
+@pytest.mark.parametrize("depth", [None, np.full((480, 640), np.nan)], ids=["no sensor", "no pixel"])
+def test_without_depth_no_top_is_compared(depth: Array | None) -> None:
+    assert describe_top("cube", replace(FRAME, depth=depth)) == ""
+
+
+def test_the_top_in_a_box_that_may_be_cut_off_is_not_compared() -> None:
+    assert describe_top("cube", show_top(0.3), box=(192.5, 230.0, 200.0, 240.0)) == ""
+
+
+def test_the_tolerance_of_a_top_grows_with_the_square_of_the_distance() -> None:
+    assert describe_top("cube", show_top(0.075, camera=1.225))
+    assert describe_top("cube", show_top(0.075, camera=1.825)) == ""
+    assert describe_top("cube", show_top(0.02, camera=1.825))
 
 
 def test_unknown_labels_are_listed_with_their_counts() -> None:

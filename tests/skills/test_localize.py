@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from executive.errors import NoDepth
-from executive.messages import Detection, Frame
+from executive.geometry import Array
+from executive.messages import Detection, Detections, Frame, Glimpse, Target
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.detect import Detect
@@ -38,6 +39,46 @@ def test_a_frame_stays_good_after_a_pick_elsewhere(fake: FakeCell, look) -> None
     old = run_skill(Detect(), fake).outputs["detections"]
     fake.ledger.held("cube-1")
     assert run_skill(Localize(detections=old), fake).status == "SUCCESS"
+
+
+def look_in_depth(fake: FakeCell, height: float, *, times: int = 1) -> None:
+    """Look and localize with a depth image that shows everything at one height over the table [m]."""
+    for _ in range(times):
+        detections = run_skill(Detect(view="full"), fake).outputs["detections"]
+        frame = detections.frame
+        depth = np.full(frame.image.shape[:2], frame.X_WC.position[2] - height)
+        seen = replace(detections, frame=replace(frame, depth=depth))
+        assert run_skill(Localize(detections=seen), fake).status == "SUCCESS"
+
+
+def test_an_object_too_high_for_its_class_in_the_depth_image_contradicts_it(fake: FakeCell) -> None:
+    fake.world.put("cube", 0.5, 0.0)
+    look_in_depth(fake, 0.08, times=3)
+    (row,) = fake.ledger.rows()
+    assert (row["state"], row["why"]) == (
+        "rejected",
+        "no look is sure of it: its top is 80 mm above the table, and that of a cube 50, 100, 106 or 110 mm",
+    )
+
+
+def test_a_cube_on_a_duck_in_the_depth_image_is_a_cube(fake: FakeCell) -> None:
+    fake.world.put("cube", 0.5, 0.0)
+    look_in_depth(fake, 0.106, times=3)
+    assert fake.ledger.is_sure("cube-1")
+
+
+def test_an_object_in_a_bin_may_lie_at_any_height(fake: FakeCell, monkeypatch: pytest.MonkeyPatch) -> None:
+    x, y, _ = fake.cell.bins["red_bin"].position
+    fake.world.put("cube", x, y)
+    observed: list[tuple[int, int]] = []
+
+    def observe(look: Detections, places: list[Array], glimpses: list[Glimpse]) -> list[Target]:
+        observed.append((len(look.found), len(glimpses)))
+        return []
+
+    monkeypatch.setattr(fake.ledger, "observe", observe)
+    look_in_depth(fake, 0.08)
+    assert observed == [(1, 0)]
 
 
 def unsure(fake: FakeCell):
