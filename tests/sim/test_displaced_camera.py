@@ -43,6 +43,8 @@ def displaced(tmp_path: Path) -> Callable[..., Callable[..., SimCell]]:
         ("sort_stacked", {"shift": [0.0, 0.03, 0.0]}, (0, 30, 0)),
         # Forwards along the flange's x axis is backwards in the world.
         ("sort_wrist", {"shift": [0.03, 0.0, 0.0]}, None),
+        # Other edges lie beside the outlines.
+        ("sort_wrist", {"shift": [0.02, 0.0, 0.0]}, None),
         ("inspect_then_sort", {"turn_deg": [0.0, 5.0, 0.0]}, None),
         ("pick_on_request", {"fov_factor": 1.1}, None),
         ("sort_by_priority", {"shift": [0.0, 0.0, -0.12]}, (0, 0, -120)),
