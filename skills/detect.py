@@ -16,8 +16,6 @@ IN_VIEW = 0.7
 MAX_BOXES = 60
 """Maximum number of boxes in one look, doubtful ones and unknown labels included. Shipped cells hold at most
 20 objects, and the time to match boxes with items grows faster than their number."""
-CHECKED_FRAMES = 5
-"""Number of the first frames of a run in which the pose of the camera is checked."""
 MAX_RIVAL = 0.5
 """Largest ratio between the confidences of the second and the first class of a box."""
 
@@ -29,7 +27,7 @@ class Detect(Skill):
     the threshold or if its second class is nearly as likely. An empty list is a result, not a failure.
     The area hidden by the arm counts neither as empty nor as occupied.
     A look with more than 60 boxes fails with `crowded`, whatever their confidence.
-    Fails with `camera_moved` if the first frames of a run show the bins away from their expected positions.
+    Fails with `camera_moved` if the image shows the bins away from their expected positions.
     """
 
     detections: Out[Detections] = port(doc="what was found, with the frame it was found in")
@@ -63,7 +61,7 @@ class Detect(Skill):
         name = self.detector or next(iter(cell.detectors))
         detector = cell.detectors[name]
         frame = cell.camera.capture()
-        if frame.id <= CHECKED_FRAMES and (displacement := cell.camera.displacement(frame)):
+        if displacement := cell.camera.displacement(frame):
             raise self.failed("camera_moved", displacement)
         request = detector.request(frame, self.view)
         while not request.ready:

@@ -250,3 +250,16 @@ def test_what_was_rejected_is_tried_again(missions: Path, tmp_path: Path) -> Non
     assert redecided(path) == ""
     with pytest.raises(InputError, match="came to its end: SUCCESS"):
         resumed(path)
+
+
+def test_a_camera_that_was_moved_before_a_run_is_resumed_ends_it(missions: Path, tmp_path: Path) -> None:
+    class Moved(FakeCell):
+        def __init__(self, *args: Any, **options: Any) -> None:
+            super().__init__(*args, **options)
+            self.camera.displaced = "camera overhead is not where the cell file says"
+
+    path = cut_off(load(missions, "sort_overhead"), tmp_path, 1200)
+    result = resumed(path, kind=Moved)
+    assert (result["status"], result["reason"]) == ("FAILURE", "Detect.camera_moved")
+    assert result["items"]["placed"] < result["items"]["seen"]
+    assert redecided(path) == ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import pytest
 import yaml
 
 from executive.sim.cell import SimCell
-from executive.testing.oracle import oracle_cell
+from executive.testing.oracle import TrueFrame, TruthCamera, oracle_cell
 from executive.testing.run_mission import run_mission
 from executive.workcell import CellOptions
 
@@ -42,6 +43,8 @@ def displaced(tmp_path: Path) -> Callable[..., Callable[..., SimCell]]:
         ("sort_stacked", {"shift": [0.0, 0.03, 0.0]}, (0, 30, 0)),
         # Forwards along the flange's x axis is backwards in the world.
         ("sort_wrist", {"shift": [0.03, 0.0, 0.0]}, None),
+        # Other edges lie beside the outlines.
+        ("sort_wrist", {"shift": [0.02, 0.0, 0.0]}, None),
         ("inspect_then_sort", {"turn_deg": [0.0, 5.0, 0.0]}, None),
         ("pick_on_request", {"fov_factor": 1.1}, None),
         ("sort_by_priority", {"shift": [0.0, 0.0, -0.12]}, (0, 0, -120)),
@@ -60,6 +63,24 @@ def test_a_moved_camera_ends_a_run_before_anything_is_touched(
     assert found is not None
     if shift is not None:
         assert np.array([float(text) for text in found.groups()]) == pytest.approx(shift, abs=10)
+
+
+@pytest.mark.slow
+def test_a_camera_that_is_moved_during_a_run_ends_it_once_the_tool_is_empty() -> None:
+    class Pushed(TruthCamera):
+        """A camera that is moved by 20 mm before its seventh frame."""
+
+        def capture(self) -> TrueFrame:
+            if self._frames == 6:
+                keys = ("position", "look_at")
+                moved = {key: tuple(np.add(getattr(self._true, key), (0.0, 0.02, 0.0))) for key in keys}
+                self._true = self._true.model_copy(update=moved)
+            return super().capture()
+
+    kind = partial(oracle_cell(), camera=partial(Pushed, rendered=True))
+    result = run_mission("sort_overhead", kind, seed=1)
+    assert (result.status, result.reason, result.holds) == ("FAILURE", "Detect.camera_moved", "")
+    assert result.agrees and result.items["placed"] > 0
 
 
 @pytest.mark.slow

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from executive.errors import Unavailable
 from executive.mission.model import nodes
@@ -12,6 +12,11 @@ from executive.record.story.case import Case
 from executive.record.story.chain import attempts, constant
 from executive.record.story.course import Sense
 from executive.record.story.items import ItemCourse
+
+REMEDIES: Mapping[str, str] = {
+    "camera_moved": "mount camera and bins as the cell file says, or measure the pose again"
+}
+"""Advice by the reason of a failure after which no mission can go on: every further look would mislead it."""
 
 
 def advice(case: Case, arm: str, reads: Sequence[Sense]) -> Iterator[str]:
@@ -41,7 +46,9 @@ def advice(case: Case, arm: str, reads: Sequence[Sense]) -> Iterator[str]:
         yield "free some space on the disk of the run directory, or name another place with --runs DIR"
     elif case.outcome.status == "FAULT":
         yield "mend what is broken, in the code or in the cell: a fault is never tried again"
-    if ways := list(_ways_on(case)):
+    if remedy := REMEDIES.get(case.outcome.reason.rpartition(".")[2]):
+        yield remedy
+    elif ways := list(_ways_on(case)):
         yield f"to let the mission go on after {case.outcome.reason}: {', or '.join(ways)}"
     for name, item in case.lost.items():
         yield f"look for {name} by hand, {_whereabouts(item)}"

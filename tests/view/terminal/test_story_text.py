@@ -114,6 +114,14 @@ def test_a_detector_that_gives_no_answer(at_home) -> None:
     ]
 
 
+def test_a_camera_that_was_moved_is_mounted_again_and_its_failure_not_caught(at_home) -> None:
+    run = FailedRun("sort_overhead", objects=CUBE)
+    run.fake.camera.displaced = "camera overhead is not where the cell file says"
+    story = run.tell()
+    assert story["reason"] == "Detect.camera_moved"
+    assert story["next"] == ["mount camera and bins as the cell file says, or measure the pose again"]
+
+
 def test_a_halt_while_something_hangs_on_the_tool(at_home) -> None:
     run = FailedRun("sort_overhead", objects=[*CUBE, *DUCK])
     run.at_every_step(lambda: run.run.control.stop() if run.fake.world.held and run.height > 0.1 else None)
