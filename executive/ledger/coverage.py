@@ -1,4 +1,4 @@
-"""Where on the table an object may still be overlooked, and how likely that is."""
+"""Probability, by place on the table, that an object there has been overlooked."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ PITCH = 0.02
 MARGIN = 0.4
 """Width of the watched area around the workspace [m]; dropped or pushed objects stay within it."""
 PRIOR_OUTSIDE = 0.01
-"""Prior probability of an object at a place beside the workspace before anything was dropped or pushed."""
+"""Prior probability of an object at a place outside the workspace before anything was dropped or pushed."""
 PRIOR_OUTSIDE_AFTER_CHANGE = 0.1
-"""Probability of an object at a place beside the workspace after one was dropped or pushed."""
+"""Probability of an object at a place outside the workspace after one was dropped or pushed."""
 MIN_PROBABILITY = 1e-4
-"""Smallest probability, however often a place is searched, because looks are not wholly independent."""
+"""Smallest probability after any number of looks, because looks are not wholly independent."""
 RECENT_FULL_LOOKS = 4
-"""Number of latest full images that count; a place that none of them shows cannot be seen."""
+"""Number of the latest full images; a place that none of them shows cannot be seen."""
 BORDER = 12.0
 """Width of the image's border in which a point does not count as shown [pixel]."""
 EDGE_MARGIN = 0.03
@@ -64,10 +64,10 @@ class Coverage:
         self._full_looks = 0
         self._shown = np.full(len(self._points), -RECENT_FULL_LOOKS)
 
-    def look(self, detections: Detections, unsure: Sequence[Array] = ()) -> None:
+    def update(self, detections: Detections, unsure: Sequence[Array] = ()) -> None:
         """Update the probabilities after a look; places of objects that it found count as searched, too.
 
-        Points near the positions `unsure` `(3,)` [m], where the detector is in doubt, do not.
+        Points near doubtful detections, `unsure` `(3,)` [m], do not count as searched.
         """
         searched = detections.searched(self._points)
         for place in unsure:
@@ -94,22 +94,22 @@ class Coverage:
         for searched in self._searched_from.values():
             searched[near] = False
 
-    def overlooked(self, position: Array) -> float:
-        """Return the chance, 0 to 1, that an object at a place `(3,)` [m] has not been seen yet."""
+    def find_miss_probability(self, position: Array) -> float:
+        """Return the probability that an object at `position` `(3,)` [m] has been overlooked."""
         distances = np.hypot(*(self._points - position)[:, :2].T)
         nearest = int(np.argmin(distances))
         return float(self._overlooked[nearest]) if distances[nearest] <= PITCH else PRIOR_OUTSIDE
 
     def in_workspace(self, position: Array) -> bool:
-        """Tell whether a place `(3,)` [m] is where objects are put to be sorted."""
+        """Return True if `position` `(3,)` [m] is at most `EDGE_MARGIN` outside the workspace."""
         return bool(self._within(position[None], EDGE_MARGIN)[0])
 
     @property
-    def worst(self) -> float:
-        """Largest probability, 0 to 1, that an object lies anywhere and has been overlooked.
+    def max_probability(self) -> float:
+        """Maximum over the points of the probability that an overlooked object lies there.
 
-        It covers the workspace and every point shown in one of the last full images; other points cannot be
-        seen. It is 1 before the first full image.
+        The points are those of the workspace and those shown in one of the last full images; others cannot
+        be seen. The maximum is 1 before the first full image.
         """
         if not self._full_looks:
             return 1.0
@@ -128,7 +128,7 @@ class Coverage:
         return self._workspace | (self._shown > self._full_looks - RECENT_FULL_LOOKS)
 
     def _within(self, points: Array, margin: float) -> NDArray[np.bool_]:
-        """Tell `(N,)` which points lie in the workspace or at most `margin` [m] beside it."""
+        """Return a mask `(N,)` of the points in the workspace or at most `margin` [m] outside it."""
         places = points[:, :2]
         inside = (self._low - margin <= places) & (places <= self._high + margin)
         return np.asarray(inside.all(axis=1))

@@ -80,7 +80,7 @@ class Looks:
             record = bound.get(index)
             if record is None:
                 # The less likely an object was overlooked there, the likelier it is invented.
-                odds = EXPECTED * self._coverage.overlooked(place) / by.invented
+                odds = EXPECTED * self._coverage.find_miss_probability(place) / by.invented
                 record = self._enter(records, detection.label, place, odds)
             if record.why.startswith(UNSURE):
                 record.state, record.why = State.SEEN, ""
@@ -94,7 +94,7 @@ class Looks:
         glimpsed = self._glimpsed(records, seen, detections, glimpses)
         missed = self._missed(known, [*seen, *glimpsed], detections)
         # Once it is given up, what lies there is known as well as it will ever be.
-        self._coverage.look(detections, [r.position for r in glimpsed if r.state is State.SEEN])
+        self._coverage.update(detections, [r.position for r in glimpsed if r.state is State.SEEN])
         recognized = self._recognize(records, seen)
         changed = [*seen, *glimpsed, *missed, *recognized, *self._one_of_two(records, seen)]
         return list({id(record): record for record in changed}.values())
@@ -140,7 +140,7 @@ class Looks:
             there = [record for record in lying if self._may_be_of([record], place, spread)]
             record = min(there, key=lambda r: float(np.linalg.norm(r.position - place)), default=None)
             if record is None:
-                odds = EXPECTED * NEARBY * self._coverage.overlooked(place)
+                odds = EXPECTED * NEARBY * self._coverage.find_miss_probability(place)
                 if odds <= self._config.overlooked:
                     continue
                 record = self._enter(records, glimpse.detection.label, place, odds)
