@@ -17,7 +17,7 @@ MIN_PIXELS = 400
 TOLERANCE = 6.0
 """Distance beyond the measured range that is accepted [grey level]."""
 RELATIVE_TOLERANCE = 0.08
-"""The same deviation as a share of the limit of the range; the larger of the two tolerances applies."""
+"""Accepted distance as a share of the limit of the range; the larger of the two tolerances applies."""
 
 
 @dataclass(frozen=True)

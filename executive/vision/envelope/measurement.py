@@ -17,7 +17,7 @@ from executive.vision.envelope.frame_statistics import FrameRange
 SUFFIX = ".measured.json"
 """Suffix of a measurement file; the name of the cell comes before it."""
 MAX_FILE_SIZE = 1_000_000
-"""Largest size of such a file [byte]."""
+"""Largest measurement file [byte]."""
 
 
 class Rates(Section):
@@ -57,7 +57,8 @@ class Measurement(Section):
     """Duration of the measurement [s]."""
     images: int
     rates: Rates
-    """Upper 95 % bounds of the error rates, and standard deviations of the position errors."""
+    """Upper 95 % bounds `misses`, `confused` and `invented`; Laplace estimate `repeated`; standard deviations
+    `jitter` and `bias`."""
     classes: dict[str, ErrorCounts]
     """Errors by class; a false detection counts for the class that it was given."""
     counts: dict[str, ErrorCounts]

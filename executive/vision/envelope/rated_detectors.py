@@ -29,11 +29,11 @@ class DetectorEnvelope:
 
     Attributes:
         reliability: Error rates: measured, or assumed if `reliability.doubt` is not "".
-        frames: Ranges of the measured frames, None if nothing was measured.
+        frame_range: Measured ranges of the frame statistics; None if unknown or if no measurement applies.
     """
 
     reliability: Reliability
-    frames: FrameRange | None = None
+    frame_range: FrameRange | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,9 +54,9 @@ class RatedDetector:
 
     def request(self, frame: Frame, view: str) -> RatedRequest:
         """Start to search `frame`; rates are assumed if the frame lies outside the measured ranges."""
-        reliability, frames = self.envelope.reliability, self.envelope.frames
-        statistics = measure_frame(frame, self.config.table) if frames else None
-        if frames and statistics and (difference := frames.describe_difference(statistics)):
+        reliability, frame_range = self.envelope.reliability, self.envelope.frame_range
+        statistics = measure_frame(frame, self.config.table) if frame_range else None
+        if frame_range and statistics and (difference := frame_range.describe_difference(statistics)):
             doubt = (
                 f"the workspace looks different from all images that detector {self.name} was measured on: "
                 f"{difference}; {remedy(self.config)}"

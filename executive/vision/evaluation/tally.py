@@ -104,13 +104,13 @@ class Tally:
             return None
         total = float(np.sqrt(np.mean(self._squares))) if self._squares else 0.0
         return MeasuredReliability.of(
-            whole=self._whole,
-            overlooked=self._overlooked,
+            in_full_view=self._whole,
+            missed=self._overlooked,
             confused=self._confused,
             invented=sum(count for (true, _), count in self.confusion.items() if true == NOTHING),
             looks=self._looks,
             jitter=total if repeats.jitter is None else repeats.jitter,
-            repeated=repeats.share,
+            repeated=repeats.repeated_share,
             bias=repeats.bias,
         )
 
