@@ -77,7 +77,7 @@ class Coverage:
         # Another view is another image for the detector: of 31 objects that the detector of the cell
         # fasteners missed in the view `table`, it missed 4 in the view `full` of the same pose.
         viewpoint = f"{viewpoint_of(detections)} {detections.view}"
-        misses, repeated = detections.reliability.misses, detections.reliability.repeated
+        misses, repeated = detections.error_rates.misses, detections.error_rates.repeated
         again = self._searched_from.setdefault(viewpoint, np.zeros(len(self._points), bool))
         self._overlooked[now] *= np.where(again[now], repeat_probability(misses, repeated), misses)
         self._overlooked = self._overlooked.clip(MIN_PROBABILITY)

@@ -256,7 +256,7 @@ class ItemLedger:
         return [record.row for record in self._records.values()]
 
     def _take(self, detections: Detections, positions: Sequence[Array], glimpses: Sequence[Glimpse]) -> None:
-        frame, by = detections.frame, detections.reliability
+        frame, by = detections.frame, detections.error_rates
 
         def bin_at(position: Array) -> str | None:
             error = math.hypot(spread_of(frame, position, by.jitter), by.bias)

@@ -62,7 +62,7 @@ class Looks:
             positions: Where `detections.found` are `(3,)` [m], one to one.
             glimpses: What the detector is not sure of.
         """
-        frame, by, viewpoint = detections.frame, detections.reliability, viewpoint_of(detections)
+        frame, by, viewpoint = detections.frame, detections.error_rates, viewpoint_of(detections)
         current = [i for i, p in enumerate(positions) if self._freshness.holds(p, frame.epoch)]
         found = [detections.found[i] for i in current]
         places = [positions[i] for i in current]
@@ -126,7 +126,7 @@ class Looks:
         It may be any item at that place, which the look did not miss then, or a new one, if something may
         have been overlooked there. A second, weaker box on what was seen for sure is nothing.
         """
-        frame, jitter = look.frame, look.reliability.jitter
+        frame, jitter = look.frame, look.error_rates.jitter
         counted: list[Record] = []
         for glimpse in glimpses:
             place, spread = glimpse.position, spread_of(look.frame, glimpse.position, jitter)
@@ -166,7 +166,7 @@ class Looks:
         searched = look.searched(np.array([record.position for record in unseen]))
         for record, there in zip(unseen, searched, strict=True):
             if there:
-                record.miss(look.reliability)
+                record.miss(look.error_rates)
             if there and not record.exists and record.probability <= self._config.overlooked:
                 record.state, record.why = State.PHANTOM, NOTHING
                 phantoms.append(record)

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from executive.cell_config import LedgerConfig, TableConfig
+from executive.error_rates import ErrorRates
 from executive.geometry import looking_down
 from executive.ledger.ledger import ItemLedger
 from executive.messages import Bin, Detection, Detections, Frame, Glimpse, Target
-from executive.reliability import Reliability
 
-EYE = Reliability(threshold=0.5, misses=0.03, confused=0.004, invented=0.02, jitter=1.0)
+EYE = ErrorRates(threshold=0.5, misses=0.03, confused=0.004, invented=0.02, jitter=1.0)
 
 Thing = tuple[str, float, float]
 
@@ -61,7 +61,7 @@ class Bench:
         *things: Thing,
         view: str = "table",
         epoch: int | None = None,
-        by: Reliability = EYE,
+        by: ErrorRates = EYE,
         hidden: slice = slice(0, 0),
         unsure: Sequence[Thing] = (),
         contradiction: str = "",

@@ -9,6 +9,7 @@ import pytest
 from ledger_bench import area_of, take_frame
 
 from executive.cell_config import TableConfig
+from executive.error_rates import ErrorRates
 from executive.ledger.coverage import (
     MIN_PROBABILITY,
     PRIOR_INSIDE,
@@ -17,11 +18,10 @@ from executive.ledger.coverage import (
     Coverage,
 )
 from executive.messages import Detections
-from executive.reliability import Reliability
 
 TABLE = TableConfig()
 MIDDLE, CORNER = np.array([0.53, 0.0, 0.025]), np.array([0.43, 0.21, 0.025])
-EYE = Reliability(threshold=0.5, misses=0.2, confused=0.1, invented=0.5, jitter=1.0)
+EYE = ErrorRates(threshold=0.5, misses=0.2, confused=0.1, invented=0.5, jitter=1.0)
 
 
 def look(*, view: str = "full", epoch: int = 0, hidden: slice = slice(0, 0)) -> Detections:

@@ -10,8 +10,8 @@ from typing import Literal
 from pydantic import Field, ValidationError
 
 from executive.cell_config import Section
+from executive.error_rates import ErrorRates
 from executive.errors import InputError
-from executive.reliability import Reliability
 from executive.vision.envelope.frame_statistics import FrameRange
 
 SUFFIX = ".measured.json"
@@ -21,7 +21,7 @@ MAX_FILE_SIZE = 1_000_000
 
 
 class Rates(Section):
-    """Error rates of a detector; see `executive.reliability.Reliability`."""
+    """Error rates of a detector; see `executive.error_rates.ErrorRates`."""
 
     misses: float = Field(gt=0, lt=1)
     confused: float = Field(gt=0, lt=1)
@@ -30,9 +30,9 @@ class Rates(Section):
     repeated: float = Field(ge=0, lt=1)
     bias: float = Field(ge=0)
 
-    def reliability(self, threshold: float) -> Reliability:
+    def build_error_rates(self, threshold: float) -> ErrorRates:
         """Return these rates together with the confidence from which detections count."""
-        return Reliability(threshold, **self.model_dump())
+        return ErrorRates(threshold, **self.model_dump())
 
 
 class ErrorCounts(Section):

@@ -9,10 +9,10 @@ import pytest
 
 from executive.errors import NoDepth
 from executive.vision.envelope.measurement import Rates
+from executive.vision.evaluation.error_rates import MeasuredErrorRates, round_up
 from executive.vision.evaluation.evaluate import evaluate
 from executive.vision.evaluation.figures import ClassFigures, Spread
 from executive.vision.evaluation.misses import WorstMisses
-from executive.vision.evaluation.reliability import MeasuredReliability, round_up
 
 
 @pytest.fixture
@@ -143,7 +143,7 @@ def test_a_spread_names_its_quantiles():
 
 
 def rates(in_full_view, missed, confused, invented, looks, jitter):
-    return MeasuredReliability.of(
+    return MeasuredErrorRates.of(
         in_full_view=in_full_view, missed=missed, confused=confused, invented=invented, looks=looks,
         jitter=jitter, repeated=0.751, bias=0.00112,
     )  # fmt: skip

@@ -37,8 +37,8 @@ class CountedRate:
 
 
 @dataclass(frozen=True)
-class MeasuredReliability:
-    """Measured error rates of a detector; `executive.reliability.Reliability` is made from them.
+class MeasuredErrorRates:
+    """Measured error rates of a detector on objects in full view.
 
     Attributes:
         misses: Rate of missed objects in full view.
@@ -67,9 +67,9 @@ class MeasuredReliability:
         jitter: float,
         repeated: float,
         bias: float,
-    ) -> MeasuredReliability:
+    ) -> MeasuredErrorRates:
         """Return the error rates; `in_full_view` counts objects, `looks` counts answers."""
-        return MeasuredReliability(
+        return MeasuredErrorRates(
             _count_share(missed, in_full_view), _count_share(confused, in_full_view - missed),
             CountedRate(invented, looks, float(gammaincinv(invented + 1, CONFIDENCE)) / looks), jitter,
             repeated, bias,
