@@ -38,10 +38,10 @@ HEIGHT = 0.025
 class Coverage:
     """Probability, for every point of the table, that an object there has been overlooked.
 
-    In the workspace it is conditional on an object being there, and starts at 1. Outside, it includes the
-    probability that there is an object, and starts low. A look that searches a point multiplies it by the
-    miss rate of the detector. A change that may have put an object there resets it. Points that a look does
-    not show keep their value: points hidden by the arm, outside the image, or disturbed since the image.
+    In the workspace, the probability is conditional on an object being there, and starts at 1. Outside, it
+    includes the probability of an object, and starts low. A look multiplies the value of each searched point
+    by the probability of another miss. A change that may have put an object there resets the value. Points
+    that a look does not show keep it: points hidden by the arm, outside the image, or disturbed since.
 
     Args:
         table: Declares the workspace.
@@ -65,7 +65,7 @@ class Coverage:
         self._shown = np.full(len(self._points), -RECENT_FULL_LOOKS)
 
     def update(self, detections: Detections, unsure: Sequence[Array] = ()) -> None:
-        """Update the probabilities after a look; places of objects that it found count as searched, too.
+        """Update the probabilities after a look; places of found objects count as searched.
 
         Points near doubtful detections, `unsure` `(3,)` [m], do not count as searched.
         """
@@ -88,7 +88,7 @@ class Coverage:
             self._shown[searched & detections.shows(self._points, BORDER)] = self._full_looks
 
     def disturb(self, centre: Array, radius: float, epoch: int) -> None:
-        """Take account of change `epoch`, which may have put an object within `radius` [m] of `centre`."""
+        """Reset the points within `radius` [m] of `centre`: change `epoch` may have put an object there."""
         near = np.hypot(*(self._points - centre)[:, :2].T) <= radius
         self._overlooked[near], self._changed[near] = self._after_a_change[near], epoch
         for searched in self._searched_from.values():
@@ -116,7 +116,7 @@ class Coverage:
         return float((self._prior * self._overlooked)[self._in_sight].max())
 
     def in_sight(self, position: Array) -> bool:
-        """Return True if a place `(3,)` [m] and all grid points around it can be seen.
+        """Return True if `position` `(3,)` [m] and all grid points around it can be seen.
 
         At the edge of the area hidden by the arm, a point may be visible while a place beside it never is.
         """
