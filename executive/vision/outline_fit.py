@@ -48,7 +48,7 @@ AXIAL_SHIFTS = np.linspace(-0.21, 0.21, 7)
 STARTS = 6
 """Number of the poses of the grid that are refined."""
 SHRINK, THINNING = 4, 4
-"""Factors by which the image is smaller, and the samples are fewer, for the grid."""
+"""Factors by which the image is reduced, and the samples are thinned, for the grid."""
 
 
 class Samples(NamedTuple):
@@ -157,7 +157,7 @@ class OutlineFitter:
         return Samples(points[shown], in_camera[shown], pixels[shown], normals[shown], bins[shown])
 
     def _edges(self, samples: Samples, reach: int) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the distance `(N,)` [pixel] of the strongest edge along each normal, and if there is one."""
+        """Return the distance `(N,)` [pixel] of the strongest edge along each normal, and a mask of them."""
         n = samples.normals[:, None, None]
         across = np.arange(-reach - 1.5, reach + 2)[:, None, None]
         along = np.array([-2.0, 0.0, 2.0])[:, None] * n[..., ::-1] * (-1, 1)

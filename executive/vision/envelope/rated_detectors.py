@@ -8,9 +8,9 @@ from pathlib import Path
 
 from executive.cell import Clock, Request
 from executive.cell_config import CellConfig
+from executive.error_rates import ErrorRates, assume_rates
 from executive.errors import InputError
 from executive.messages import Answer, Frame
-from executive.error_rates import ErrorRates, assume_rates
 from executive.vision.detectors.registry import build_detectors, installed
 from executive.vision.detectors.setting import ClosableDetector
 from executive.vision.envelope.fingerprint import describe_change, take_fingerprint
@@ -99,7 +99,7 @@ def build_rated_detectors(
         config: The cell.
         clock: Clock of the run.
         base: Folder to which paths in the cell file are relative.
-        seed: Seed of everything random in the detectors.
+        seed: Random seed of the detectors.
         folders: Folders with files `CELL.measured.json`.
 
     Raises:
@@ -117,7 +117,7 @@ def build_rated_detectors(
 def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> dict[str, DetectorEnvelope]:
     """Return the envelope of each measurable detector of a cell, by name.
 
-    A measurement applies if its fingerprint is that of the detector, whichever cell it was made in.
+    A measurement applies if its fingerprint equals that of the detector, even if made in another cell.
 
     Args:
         config: The cell.
