@@ -56,7 +56,7 @@ def object_classes(config: CellConfig) -> dict[str, ObjectClass]:
     return {label: object_class(label, kind) for label, kind in config.objects.items()}
 
 
-def classes_told_by_touch(config: CellConfig) -> frozenset[str]:
+def classes_distinct_by_touch(config: CellConfig) -> frozenset[str]:
     """Return the classes whose height differs from that of each other class by more than a touch may err."""
     heights = {label: kind.height for label, kind in config.objects.items()}
     return frozenset(

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from executive.error_rates import ErrorRates
 from executive.geometry import Array, Pose
-from executive.reliability import Reliability
 
 Box = tuple[float, float, float, float]
 """Left, top, right, bottom [pixel] in a frame's image; pixel i covers [i, i + 1)."""
@@ -124,12 +124,12 @@ class Answer:
     Attributes:
         detector: Name of the detector that gave it, as in the cell file.
         found: Everything at or above its floor, most confident first.
-        reliability: How that detector errs.
+        error_rates: Error rates of that detector.
     """
 
     detector: str
     found: tuple[Detection, ...]
-    reliability: Reliability
+    error_rates: ErrorRates
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +140,7 @@ class Detections:
         frame: The image looked at.
         found: Detections at or above the threshold, most confident first.
         detector: Name of the detector that answered.
-        reliability: How that detector errs.
+        error_rates: Error rates of that detector.
         view: Name of the part of the frame that was searched: `table` or `full`.
         area: That part [pixel].
         doubtful: Detections that are below the threshold or hardly more likely than another class.
@@ -150,7 +150,7 @@ class Detections:
     frame: Frame
     found: tuple[Detection, ...]
     detector: str
-    reliability: Reliability
+    error_rates: ErrorRates
     view: str
     area: Box
     doubtful: tuple[Detection, ...] = ()

@@ -85,7 +85,7 @@ class Detect(Skill):
             )
         shown = [detection for detection in answer.found if frame.shown(detection.box) >= IN_VIEW]
         known = [detection for detection in shown if detection.label in cell.classes]
-        threshold = answer.reliability.threshold
+        threshold = answer.error_rates.threshold
         unknown = tuple(
             detection
             for detection in shown
@@ -106,7 +106,7 @@ class Detect(Skill):
             frame,
             found,
             answer.detector,
-            answer.reliability,
+            answer.error_rates,
             self.view,
             cell.camera.area(self.view),
             doubtful,

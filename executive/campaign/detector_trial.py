@@ -1,4 +1,4 @@
-"""Measuring detectors: which ones, on which images."""
+"""Measurement of detectors on labelled images."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ from executive.vision.samples import LabelledImage, count_samples, read_samples
 MAX_OBJECTS = 20
 """Largest number of objects in a scene, if the workspace has room for so many."""
 Progress = Callable[[str], AbstractContextManager[Callable[[int, int], None]]]
-"""Opens a progress bar of a name, which is told (done, all)."""
+"""Opens a named progress bar, whose context yields `update(done, total)`."""
 
 
 @dataclass(frozen=True)
-class Scenes:
-    """How fresh scenes are rendered.
+class SceneSettings:
+    """Settings of rendered scenes.
 
     Attributes:
-        images: How many of each cell.
-        seed: What chance draws from.
-        varied: True for scenes varied as widely as in training; False for scenes as a run begins with, with 0
-            to `MAX_OBJECTS` objects as far as they fit, taken and searched as in a run.
-        view: The part of a run's frame that is searched.
-        workers: Processes that render.
-        scene: Scene file that changes the world of scenes as a run begins with; None: nothing does.
+        images: Number of images per cell.
+        seed: Random seed.
+        varied: True: scenes vary as in training. False: initial scenes of runs with at most `MAX_OBJECTS`
+            objects, searched as in a run.
+        view: Part of a run's frame that is searched, `table` or `full`.
+        workers: Number of processes that render.
+        scene: Scene file that changes initial scenes of runs; None: no change.
     """
 
     images: int
@@ -55,14 +55,14 @@ class Scenes:
 
 
 @dataclass(frozen=True, eq=False)
-class Subject:
+class DetectorUnderTest:
     """A detector to measure.
 
     Attributes:
-        cell: The cell that it is from, or None for one that stands alone.
-        configs: It and what it may rest on.
-        name: Its name among them.
-        base: Folder that paths in its options start from.
+        cell: Cell of the detector; None for a detector without a cell.
+        configs: Sections of the detector and of those that it may use, by name.
+        name: Key of the detector in `configs`.
+        base: Folder to which paths in its options are relative.
     """
 
     cell: CellConfig | None
@@ -70,24 +70,24 @@ class Subject:
     name: str
     base: Path
 
-    def place(self, dataset: Path | None) -> str:
-        """Return what to call a measurement of it, on its cell's scenes or on a data set."""
+    def name_measurement(self, dataset: Path | None) -> str:
+        """Return the name of a measurement on scenes of the cell or on a data set."""
         if dataset is None:
             assert self.cell is not None
             return self.cell.cell
         return f"{self.cell.cell} on {dataset}" if self.cell else str(dataset)
 
 
-def subjects(
+def list_detectors(
     cells: Mapping[Path, CellConfig], detector: str | None, weights: Path | None, labels: Path | None
-) -> Iterator[Subject]:
-    """Yield the detectors to measure, one for every cell, or the one that stands alone.
+) -> Iterator[DetectorUnderTest]:
+    """Yield the detectors to measure: one per cell, or one without a cell.
 
     Args:
-        cells: Cells by their file.
-        detector: Name of the detector in them; None: the first.
-        weights: A model file to measure instead.
-        labels: Its class names; None: the file beside it.
+        cells: Cells by the path of the cell file.
+        detector: Name of the detector in each cell; None: the first.
+        weights: Model file to measure instead.
+        labels: File with the class names of the model; None: the file in its folder.
 
     Raises:
         InputError: A cell has no detector of this name.
@@ -98,59 +98,59 @@ def subjects(
     elif not cells:
         alone = {"embedded": DetectorConfig(kind="embedded", floor=FLOOR)}
     if not cells:
-        yield Subject(None, alone, next(iter(alone)), Path())
+        yield DetectorUnderTest(None, alone, next(iter(alone)), Path())
     for file, config in cells.items():
         configs = alone or dict(config.detectors)
         name = detector or next(iter(configs))
         if name not in configs:
             hint = alternatives(name, configs, "Its detectors")
             raise InputError(f'the cell {config.cell} has no detector "{name}". {hint}')
-        yield Subject(config, configs, name, file.parent)
+        yield DetectorUnderTest(config, configs, name, file.parent)
 
 
-def check_subject(subject: Subject, *, rendered: bool, scene: Path | None = None) -> None:
-    """Refuse what cannot be rendered or built, which else would show after minutes of rendering.
+def check_detector(detector: DetectorUnderTest, *, renders_scenes: bool, scene: Path | None = None) -> None:
+    """Check that scenes can be rendered and detectors built, before minutes of rendering.
 
     Raises:
         InputError: The cell is not simulated, the scene file is wrong, or a detector cannot be built.
     """
-    cell = subject.cell
-    if rendered and cell and cell.kind != "sim":
+    cell = detector.cell
+    if renders_scenes and cell and cell.kind != "sim":
         raise InputError(
             f"scenes can be rendered of cells of kind sim, and {cell.cell} is of kind {cell.kind}; "
             "measure its detector on images of your own with --dataset"
         )
-    if rendered and cell:
+    if renders_scenes and cell:
         load_scene(scene, cell)
-    for (_, name, *_), sentence in wrong_detectors(subject.configs, subject.base):
+    for (_, name, *_), sentence in wrong_detectors(detector.configs, detector.base):
         raise InputError(f"detector {name}: {sentence}")
 
 
 def measure(
-    subject: Subject,
+    detector: DetectorUnderTest,
     dataset: Path | None,
-    scenes: Scenes,
+    scenes: SceneSettings,
     *,
     threshold: float | None,
     worst: WorstMisses,
     progress: Progress,
 ) -> Evaluation:
-    """Return how good a detector is on the dataset or, without one, on scenes of its cell."""
-    config = subject.cell
+    """Return an evaluation of a detector on `dataset`, or on scenes of its cell."""
+    config = detector.cell
     in_run = config is not None and dataset is None and not scenes.varied
-    with _images(subject, dataset, scenes, progress) as (samples, count):
+    with _images(detector, dataset, scenes, progress) as (samples, count):
         asked = CellDetector(
-            subject.configs,
-            subject.name,
-            base=subject.base,
+            detector.configs,
+            detector.name,
+            base=detector.base,
             camera=next(iter(config.cameras.values())) if config and in_run else None,
             view=scenes.view,
             classes=tuple(config.objects) if config else None,
         )
         with contextlib.closing(asked):
             localizer = _localizer(config) if config and in_run else None
-            with progress(f"asking {subject.name}") as told:
-                counted = _counted(samples, count, told)
+            with progress(f"asking {detector.name}") as update:
+                counted = _report_progress(samples, count, update)
                 return evaluate(
                     asked, counted, threshold=threshold, localizer=localizer, worst=worst,
                     table=config.table if config and in_run else None,
@@ -159,44 +159,44 @@ def measure(
 
 @contextlib.contextmanager
 def _images(
-    subject: Subject, dataset: Path | None, scenes: Scenes, progress: Progress
+    detector: DetectorUnderTest, dataset: Path | None, scenes: SceneSettings, progress: Progress
 ) -> Iterator[tuple[Iterator[LabelledImage], int]]:
-    """Provide the images that a detector is measured on, and how many they are."""
-    config = subject.cell
+    """Provide the images for the measurement of a detector, and their number."""
+    config = detector.cell
     if dataset is not None or config is None:
         assert dataset is not None
         yield read_samples(dataset), count_samples(dataset)
         return
     if not scenes.varied:
-        with progress(f"rendering {config.cell}") as told:
+        with progress(f"rendering {config.cell}") as update:
             table = {"objects": (0, count_that_fits(config, MAX_OBJECTS))}
             filled = config.model_copy(update={"table": config.table.model_copy(update=table)})
             frames = run_frames(
-                filled, images=scenes.images, seed=scenes.seed, workers=scenes.workers, progress=told,
+                filled, images=scenes.images, seed=scenes.seed, workers=scenes.workers, progress=update,
                 scene=load_scene(scenes.scene, config),
             )  # fmt: skip
         yield iter(frames), scenes.images
         return
     with tempfile.TemporaryDirectory() as folder:
-        with progress(f"rendering {config.cell}") as told:
+        with progress(f"rendering {config.cell}") as update:
             generate(
                 {config.cell: config}, Path(folder), images=scenes.images, seed=scenes.seed, layout="coco",
-                workers=scenes.workers, valid=1.0, progress=told,
+                workers=scenes.workers, valid=1.0, progress=update,
             )  # fmt: skip
         yield read_samples(Path(folder)), scenes.images
 
 
-def _counted(
-    samples: Iterator[LabelledImage], count: int, told: Callable[[int, int], None]
+def _report_progress(
+    samples: Iterator[LabelledImage], count: int, update_progress: Callable[[int, int], None]
 ) -> Iterator[LabelledImage]:
-    """Yield the images, and tell after each that so many of so many are done."""
+    """Yield the images and report the progress after each one."""
     for done, sample in enumerate(samples, 1):
         yield sample
-        told(done, count)
+        update_progress(done, count)
 
 
 def _localizer(config: CellConfig) -> Localizer | None:
-    """Return the cell's localizer; None for the ray, which needs the scene itself."""
+    """Return the cell's localizer; None for `ray`, which needs the simulated world."""
     if config.localization == "ray":
         return None
     classes = {label: object_class(label, kind) for label, kind in config.objects.items()}
@@ -204,6 +204,6 @@ def _localizer(config: CellConfig) -> Localizer | None:
 
 
 def _labels_beside(weights: Path) -> Path:
-    """Return the label file that belongs to a model; the first that exists, or else the usual one."""
+    """Return the label file of a model: `NAME.labels.txt` if it exists, else `labels.txt`."""
     own = weights.with_name(f"{weights.stem}.labels.txt")
     return own if own.is_file() else weights.with_name("labels.txt")

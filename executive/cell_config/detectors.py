@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import ConfigDict, Field, model_validator
 
 from executive.cell_config.section import Section
-from executive.reliability import Reliability
+from executive.error_rates import ErrorRates
 
 
 class DetectorConfig(Section):
@@ -40,9 +40,9 @@ class DetectorConfig(Section):
         return self
 
     @property
-    def reliability(self) -> Reliability:
-        """How it errs."""
-        return Reliability(self.threshold, self.misses, self.confused, self.invented, self.jitter)
+    def error_rates(self) -> ErrorRates:
+        """Error rates that the cell file declares."""
+        return ErrorRates(self.threshold, self.misses, self.confused, self.invented, self.jitter)
 
     @property
     def options(self) -> dict[str, Any]:

@@ -94,30 +94,30 @@ def command(
     as_declared = not (weights or varied or scene or threshold) and view == "table"
     stored = bool(cells) and as_declared and (out is not None or not overrides)
     with stdout_kept_clean():
-        from executive.campaign.detector_trial import Scenes, check_subject, measure, subjects
-        from executive.campaign.measuring import store_evaluation
+        from executive.campaign.detector_trial import SceneSettings, check_detector, list_detectors, measure
+        from executive.campaign.measurement_store import store_evaluation
         from executive.cli.cells import find_cell, load_cells
         from executive.cli.progress import bar
         from executive.view.figures.detector import print_figures
         from executive.vision.evaluation.misses import WorstMisses
 
-        worst, scenes = WorstMisses(), Scenes(images, seed, varied, view, workers, scene)
+        worst, scenes = WorstMisses(), SceneSettings(images, seed, varied, view, workers, scene)
         named = cells or (() if dataset else ("overhead",))
         files = dict(zip(map(find_cell, named), load_cells(named, overrides).values(), strict=True))
-        asked = list(subjects(files, detector, weights, labels))
-        for subject in asked:
-            check_subject(subject, rendered=dataset is None, scene=scene)
-        for subject in asked:
-            where, began = subject.place(dataset), time.monotonic()
-            evaluation = measure(subject, dataset, scenes, threshold=threshold, worst=worst, progress=bar)
-            print_figures(where, subject.name, evaluation)
-            kind = subject.configs[subject.name].kind
-            measured[where] = {"detector": subject.name, "kind": kind, **evaluation.as_dict()}
-            if stored and subject.cell is not None:
+        asked = list(list_detectors(files, detector, weights, labels))
+        for tested in asked:
+            check_detector(tested, renders_scenes=dataset is None, scene=scene)
+        for tested in asked:
+            where, began = tested.name_measurement(dataset), time.monotonic()
+            evaluation = measure(tested, dataset, scenes, threshold=threshold, worst=worst, progress=bar)
+            print_figures(where, tested.name, evaluation)
+            kind = tested.configs[tested.name].kind
+            measured[where] = {"detector": tested.name, "kind": kind, **evaluation.as_dict()}
+            if stored and tested.cell is not None:
                 source = f"--dataset {dataset}" if dataset else f"--images {images} --seed {seed}"
-                repeat = f"executive evaluate --cell {subject.cell.cell} --detector {subject.name} {source}"
+                repeat = f"executive evaluate --cell {tested.cell.cell} --detector {tested.name} {source}"
                 seconds = time.monotonic() - began
-                path = store_evaluation(subject, evaluation, out, command=repeat, seconds=seconds)
+                path = store_evaluation(tested, evaluation, out, command=repeat, seconds=seconds)
                 click.echo(f"stored in {path}", err=True)
         if sheet is not None:
             from executive.vision.evaluation.sheet import write_sheet

@@ -27,7 +27,7 @@ class Remarks:
     def add(self, look: Detections) -> None:
         """Take a look into account."""
         self.unknown |= Counter(detection.label for detection in look.unknown)
-        doubt = look.reliability.doubt
+        doubt = look.error_rates.doubt
         # The figures of each frame differ a little; the first frame stands for all of them.
         if doubt and not any(known.startswith(doubt.partition(":")[0]) for known in self.doubts):
             self.doubts.append(doubt)

@@ -99,7 +99,7 @@ class Bins:
                 there = sum(r.bin == bin and r.label == label for r in self._records.values())
                 more = shown[label, bin] > there
                 if more or self._is_searched(bin, look):
-                    record.fell(bin, more, look.reliability)
+                    record.fell(bin, more, look.error_rates)
                 if record.fallen[bin] >= -math.log(self._config.overlooked):
                     yield record, bin
                     break

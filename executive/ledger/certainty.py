@@ -9,17 +9,17 @@ from dataclasses import dataclass
 from executive.cell_config import LedgerConfig
 from executive.ledger.item import LIKELY, UNSURE, Record, State
 
-MIN_CONSISTENCY, REJECTED_CONSISTENCY = 0.01, 0.001
-"""p-values of the disagreement of the looks about an item's class: from the first on it may be sorted, below
-the second it is rejected."""
-RETRY_AIM_FACTOR = 2 / 3
+MIN_P_VALUE, REJECTION_P_VALUE = 0.01, 0.001
+"""p-values of a binomial test of the number of looks with another class: the smallest at which an item may be
+sorted, and the limit below which it is rejected."""
+RETRY_STANDARD_ERROR_FACTOR = 2 / 3
 """Factor on the allowed standard error of an item's position after a failed grasp."""
-MIN_OVERLOOKED = 0.1
-"""Smallest probability that later looks merely overlooked an item at which the item counts as present."""
+MIN_MISS_PROBABILITY = 0.1
+"""An item counts as present if the probability that later looks missed it is at least this."""
 MIN_LOOKS_TO_REJECT = 40
 """Number of looks from which an item is rejected if they disagree about its class."""
-MAX_CONTRADICTIONS = 3
-"""Number of looks contradicting an item's class from which it may be rejected."""
+MIN_CONTRADICTIONS_TO_REJECT = 3
+"""Number of contradicting looks from which an item may be rejected."""
 MAX_REPEATS = 2
 """Number of repeated answers from one pose after which further looks from there add hardly any evidence."""
 MAX_MISJUDGED_BEFORE_TOUCH = 0.2
@@ -34,29 +34,29 @@ class Certainty:
 
     Attributes:
         config: Limits of the cell file.
-        told_by_touch: Classes whose height distinguishes them from all others.
+        distinct_by_touch: Classes whose height distinguishes them from all others.
     """
 
     config: LedgerConfig
-    told_by_touch: Collection[str]
+    distinct_by_touch: Collection[str]
 
     def is_sure(self, record: Record) -> bool:
-        """Return True if there is enough evidence that an item exists, of which class it is, and where.
+        """Return True if an item's existence, class and position are certain enough.
 
         After a failed grasp, the position must be known more precisely. If looks from one pose cannot prove
-        its class, but a touch can, the item is sure enough to be touched.
+        the class, but a touch can, the item is certain enough to be touched.
         """
         limit = self.config.misjudged
-        if record.repeats >= MAX_REPEATS and record.label in self.told_by_touch:
+        if record.repeats >= MAX_REPEATS and record.label in self.distinct_by_touch:
             limit = MAX_MISJUDGED_BEFORE_TOUCH
         standard_error = math.hypot(record.spread, record.bias)
         return (
             record.probability >= LIKELY
             and record.contradictions <= record.looks
-            and record.overlooked >= MIN_OVERLOOKED
+            and record.overlooked >= MIN_MISS_PROBABILITY
             and record.misjudged <= limit
-            and record.consistency >= MIN_CONSISTENCY
-            and standard_error <= self.config.aim * (RETRY_AIM_FACTOR if record.attempts else 1.0)
+            and record.consistency >= MIN_P_VALUE
+            and standard_error <= self.config.aim * (RETRY_STANDARD_ERROR_FACTOR if record.attempts else 1.0)
         )
 
     def reject_if_uncertain(self, record: Record, *, settled: bool) -> None:
@@ -64,14 +64,14 @@ class Certainty:
 
         Args:
             record: The item.
-            settled: True if nothing has disturbed its place.
+            settled: True if nothing has disturbed its place since it was seen.
         """
         known = settled and self.is_sure(record)
         if known:
             record.glimpses = 0
         if record.state is not State.SEEN:
             return
-        if record.looks >= MIN_LOOKS_TO_REJECT and record.consistency < REJECTED_CONSISTENCY:
+        if record.looks >= MIN_LOOKS_TO_REJECT and record.consistency < REJECTION_P_VALUE:
             votes = ", ".join(f"{count} {label}" for label, count in record.tally.most_common())
             record.state, record.why = State.REJECTED, f"its class is in doubt: {votes}"
         elif self._lacks_second_evidence(record):
@@ -89,10 +89,10 @@ class Certainty:
             record.misjudged > self.config.misjudged
             and record.repeats >= MAX_REPEATS
             and len(record.answers) == 1
-            and record.label not in self.told_by_touch
+            and record.label not in self.distinct_by_touch
         )
 
 
 def _is_contradicted(record: Record) -> bool:
     """Return True if enough looks contradict the class of an item, and more contradict than support it."""
-    return record.contradictions >= MAX_CONTRADICTIONS and record.contradictions > record.looks
+    return record.contradictions >= MIN_CONTRADICTIONS_TO_REJECT and record.contradictions > record.looks

@@ -1,4 +1,4 @@
-"""Where on the table an object may still be overlooked, and how likely that is."""
+"""Probability, by place on the table, that an object there has been overlooked."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ PITCH = 0.02
 MARGIN = 0.4
 """Width of the watched area around the workspace [m]; dropped or pushed objects stay within it."""
 PRIOR_OUTSIDE = 0.01
-"""Prior probability of an object at a place beside the workspace before anything was dropped or pushed."""
+"""Prior probability of an object at a place outside the workspace before anything was dropped or pushed."""
 PRIOR_OUTSIDE_AFTER_CHANGE = 0.1
-"""Probability of an object at a place beside the workspace after one was dropped or pushed."""
+"""Probability of an object at a place outside the workspace after one was dropped or pushed."""
 MIN_PROBABILITY = 1e-4
-"""Smallest probability, however often a place is searched, because looks are not wholly independent."""
+"""Smallest probability after any number of looks, because looks are not wholly independent."""
 RECENT_FULL_LOOKS = 4
-"""Number of latest full images that count; a place that none of them shows cannot be seen."""
+"""Number of the latest full images; a place that none of them shows cannot be seen."""
 BORDER = 12.0
 """Width of the image's border in which a point does not count as shown [pixel]."""
 EDGE_MARGIN = 0.03
@@ -38,10 +38,10 @@ HEIGHT = 0.025
 class Coverage:
     """Probability, for every point of the table, that an object there has been overlooked.
 
-    In the workspace it is conditional on an object being there, and starts at 1. Outside, it includes the
-    probability that there is an object, and starts low. A look that searches a point multiplies it by the
-    miss rate of the detector. A change that may have put an object there resets it. Points that a look does
-    not show keep their value: points hidden by the arm, outside the image, or disturbed since the image.
+    In the workspace, the probability is conditional on an object being there, and starts at 1. Outside, it
+    includes the probability of an object, and starts low. A look multiplies the value of each searched point
+    by the probability of another miss. A change that may have put an object there resets the value. Points
+    that a look does not show keep it: points hidden by the arm, outside the image, or disturbed since.
 
     Args:
         table: Declares the workspace.
@@ -64,10 +64,10 @@ class Coverage:
         self._full_looks = 0
         self._shown = np.full(len(self._points), -RECENT_FULL_LOOKS)
 
-    def look(self, detections: Detections, unsure: Sequence[Array] = ()) -> None:
-        """Update the probabilities after a look; places of objects that it found count as searched, too.
+    def update(self, detections: Detections, unsure: Sequence[Array] = ()) -> None:
+        """Update the probabilities after a look; places of found objects count as searched.
 
-        Points near the positions `unsure` `(3,)` [m], where the detector is in doubt, do not.
+        Points near doubtful detections, `unsure` `(3,)` [m], do not count as searched.
         """
         searched = detections.searched(self._points)
         for place in unsure:
@@ -77,7 +77,7 @@ class Coverage:
         # Another view is another image for the detector: of 31 objects that the detector of the cell
         # fasteners missed in the view `table`, it missed 4 in the view `full` of the same pose.
         viewpoint = f"{viewpoint_of(detections)} {detections.view}"
-        misses, repeated = detections.reliability.misses, detections.reliability.repeated
+        misses, repeated = detections.error_rates.misses, detections.error_rates.repeated
         again = self._searched_from.setdefault(viewpoint, np.zeros(len(self._points), bool))
         self._overlooked[now] *= np.where(again[now], repeat_probability(misses, repeated), misses)
         self._overlooked = self._overlooked.clip(MIN_PROBABILITY)
@@ -88,35 +88,35 @@ class Coverage:
             self._shown[searched & detections.shows(self._points, BORDER)] = self._full_looks
 
     def disturb(self, centre: Array, radius: float, epoch: int) -> None:
-        """Take account of change `epoch`, which may have put an object within `radius` [m] of `centre`."""
+        """Reset the points within `radius` [m] of `centre`: change `epoch` may have put an object there."""
         near = np.hypot(*(self._points - centre)[:, :2].T) <= radius
         self._overlooked[near], self._changed[near] = self._after_a_change[near], epoch
         for searched in self._searched_from.values():
             searched[near] = False
 
-    def overlooked(self, position: Array) -> float:
-        """Return the chance, 0 to 1, that an object at a place `(3,)` [m] has not been seen yet."""
+    def find_miss_probability(self, position: Array) -> float:
+        """Return the probability that an object at `position` `(3,)` [m] has been overlooked."""
         distances = np.hypot(*(self._points - position)[:, :2].T)
         nearest = int(np.argmin(distances))
         return float(self._overlooked[nearest]) if distances[nearest] <= PITCH else PRIOR_OUTSIDE
 
     def in_workspace(self, position: Array) -> bool:
-        """Tell whether a place `(3,)` [m] is where objects are put to be sorted."""
+        """Return True if `position` `(3,)` [m] is at most `EDGE_MARGIN` outside the workspace."""
         return bool(self._within(position[None], EDGE_MARGIN)[0])
 
     @property
-    def worst(self) -> float:
-        """Largest probability, 0 to 1, that an object lies anywhere and has been overlooked.
+    def max_probability(self) -> float:
+        """Maximum over the points of the probability that an overlooked object lies there.
 
-        It covers the workspace and every point shown in one of the last full images; other points cannot be
-        seen. It is 1 before the first full image.
+        The points are those of the workspace and those shown in one of the last full images; others cannot
+        be seen. The maximum is 1 before the first full image.
         """
         if not self._full_looks:
             return 1.0
         return float((self._prior * self._overlooked)[self._in_sight].max())
 
     def in_sight(self, position: Array) -> bool:
-        """Return True if a place `(3,)` [m] and all grid points around it can be seen.
+        """Return True if `position` `(3,)` [m] and all grid points around it can be seen.
 
         At the edge of the area hidden by the arm, a point may be visible while a place beside it never is.
         """
@@ -128,7 +128,7 @@ class Coverage:
         return self._workspace | (self._shown > self._full_looks - RECENT_FULL_LOOKS)
 
     def _within(self, points: Array, margin: float) -> NDArray[np.bool_]:
-        """Tell `(N,)` which points lie in the workspace or at most `margin` [m] beside it."""
+        """Return a mask `(N,)` of the points in the workspace or at most `margin` [m] outside it."""
         places = points[:, :2]
         inside = (self._low - margin <= places) & (places <= self._high + margin)
         return np.asarray(inside.all(axis=1))

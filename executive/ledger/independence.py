@@ -1,21 +1,21 @@
-"""Looks that are not independent: from one pose, a detector repeats a share of its errors."""
+"""Looks that are not independent: from one viewpoint, a detector repeats a share of its errors."""
 
 from __future__ import annotations
 
 from executive.messages import Detections
 
 GRID = 0.02
-"""Grid to which camera positions are rounded; equal rounded positions count as one pose [m]."""
+"""Pitch of the grid to which camera positions are rounded [m]; equal rounded positions are one viewpoint."""
 
 
 def viewpoint_of(look: Detections) -> str:
-    """Return a key for detector and camera pose of a look; looks with the same key may repeat errors."""
+    """Return a key for detector and camera position of a look; looks with equal keys may repeat errors."""
     x, y, z = (round(float(value) / GRID) for value in look.frame.X_WC.position)
     return f"{look.detector} {x} {y} {z}"
 
 
 def repeat_probability(independent: float, repeated: float) -> float:
-    """Return the probability that a look gives the answer of an earlier look from the same viewpoint again.
+    """Return the probability that a look repeats the answer of an earlier look from the same viewpoint.
 
     Args:
         independent: Probability of this answer in a look that is independent of the earlier one.

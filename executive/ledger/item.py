@@ -9,10 +9,10 @@ from enum import Enum
 
 import numpy as np
 
+from executive.error_rates import ErrorRates
 from executive.geometry import Array
 from executive.ledger.independence import repeat_probability
 from executive.messages import Detection, Frame, Target
-from executive.reliability import Reliability
 
 LIKELY = 0.9
 """Probability of its existence from which an item is worth a grasp, and may be one missed elsewhere."""
@@ -188,7 +188,7 @@ class Record:
             "why": self.why,
         }
 
-    def vote(self, label: str, by: Reliability, viewpoint: str = "", *, alone: bool = True) -> None:
+    def vote(self, label: str, by: ErrorRates, viewpoint: str = "", *, alone: bool = True) -> None:
         """Count one detection as `label`: that much likelier than any other class, by a detector's errors.
 
         That it was seen proves that it exists only if it is `alone`: nothing else may have been seen there.
@@ -252,12 +252,12 @@ class Record:
             self.contradictions += 1
             self.contradiction = contradiction
 
-    def miss(self, by: Reliability) -> None:
+    def miss(self, by: ErrorRates) -> None:
         """Count one look that searched its place without seeing it."""
         self.overlooked *= by.misses
         self.existence += math.log(by.misses)
 
-    def fell(self, bin: str, shown: bool, by: Reliability) -> None:
+    def fell(self, bin: str, shown: bool, by: ErrorRates) -> None:
         """Count one look into a bin that showed, or did not, one object more than was let go there."""
         evidence = (1.0 - by.misses) / (by.invented * INSIDE) if shown else by.misses
         self.fallen[bin] = max(0.0, self.fallen[bin] + math.log(evidence))

@@ -40,10 +40,10 @@ class ItemLedger:
         bins: Mapping[str, Bin],
         routes: Routes,
         emit: Emit,
-        told_by_touch: Collection[str] = (),
+        distinct_by_touch: Collection[str] = (),
     ) -> None:
         self._config = config
-        self._certainty = Certainty(config, told_by_touch)
+        self._certainty = Certainty(config, distinct_by_touch)
         self._routes = routes
         self._emit = emit
         self._records: dict[Item, Record] = {}
@@ -126,7 +126,7 @@ class ItemLedger:
             and self._coverage.in_sight(record.position)
             for record in self._records.values()
         )
-        return not waiting and self._coverage.worst <= self._config.overlooked
+        return not waiting and self._coverage.max_probability <= self._config.overlooked
 
     def touched(self, item: Item) -> None:
         """Record that the tool touched the item at the height of its class, which proves that it exists."""
@@ -256,7 +256,7 @@ class ItemLedger:
         return [record.row for record in self._records.values()]
 
     def _take(self, detections: Detections, positions: Sequence[Array], glimpses: Sequence[Glimpse]) -> None:
-        frame, by = detections.frame, detections.reliability
+        frame, by = detections.frame, detections.error_rates
 
         def bin_at(position: Array) -> str | None:
             error = math.hypot(spread_of(frame, position, by.jitter), by.bias)

@@ -62,7 +62,7 @@ class Looks:
             positions: Where `detections.found` are `(3,)` [m], one to one.
             glimpses: What the detector is not sure of.
         """
-        frame, by, viewpoint = detections.frame, detections.reliability, viewpoint_of(detections)
+        frame, by, viewpoint = detections.frame, detections.error_rates, viewpoint_of(detections)
         current = [i for i, p in enumerate(positions) if self._freshness.holds(p, frame.epoch)]
         found = [detections.found[i] for i in current]
         places = [positions[i] for i in current]
@@ -80,7 +80,7 @@ class Looks:
             record = bound.get(index)
             if record is None:
                 # The less likely an object was overlooked there, the likelier it is invented.
-                odds = EXPECTED * self._coverage.overlooked(place) / by.invented
+                odds = EXPECTED * self._coverage.find_miss_probability(place) / by.invented
                 record = self._enter(records, detection.label, place, odds)
             if record.why.startswith(UNSURE):
                 record.state, record.why = State.SEEN, ""
@@ -94,7 +94,7 @@ class Looks:
         glimpsed = self._glimpsed(records, seen, detections, glimpses)
         missed = self._missed(known, [*seen, *glimpsed], detections)
         # Once it is given up, what lies there is known as well as it will ever be.
-        self._coverage.look(detections, [r.position for r in glimpsed if r.state is State.SEEN])
+        self._coverage.update(detections, [r.position for r in glimpsed if r.state is State.SEEN])
         recognized = self._recognize(records, seen)
         changed = [*seen, *glimpsed, *missed, *recognized, *self._one_of_two(records, seen)]
         return list({id(record): record for record in changed}.values())
@@ -126,7 +126,7 @@ class Looks:
         It may be any item at that place, which the look did not miss then, or a new one, if something may
         have been overlooked there. A second, weaker box on what was seen for sure is nothing.
         """
-        frame, jitter = look.frame, look.reliability.jitter
+        frame, jitter = look.frame, look.error_rates.jitter
         counted: list[Record] = []
         for glimpse in glimpses:
             place, spread = glimpse.position, spread_of(look.frame, glimpse.position, jitter)
@@ -140,7 +140,7 @@ class Looks:
             there = [record for record in lying if self._may_be_of([record], place, spread)]
             record = min(there, key=lambda r: float(np.linalg.norm(r.position - place)), default=None)
             if record is None:
-                odds = EXPECTED * NEARBY * self._coverage.overlooked(place)
+                odds = EXPECTED * NEARBY * self._coverage.find_miss_probability(place)
                 if odds <= self._config.overlooked:
                     continue
                 record = self._enter(records, glimpse.detection.label, place, odds)
@@ -166,7 +166,7 @@ class Looks:
         searched = look.searched(np.array([record.position for record in unseen]))
         for record, there in zip(unseen, searched, strict=True):
             if there:
-                record.miss(look.reliability)
+                record.miss(look.error_rates)
             if there and not record.exists and record.probability <= self._config.overlooked:
                 record.state, record.why = State.PHANTOM, NOTHING
                 phantoms.append(record)

@@ -20,33 +20,33 @@ from executive.sim.models import add_body, load_mesh, upright
 from executive.sim.variations import random_object_colour
 from executive.sim.world import World, add_bin
 
-FEW, MANY = 7, 20
-"""Largest number of objects in a scene with few of them, and in one with many."""
+MAX_OBJECTS_SPARSE, MAX_OBJECTS_DENSE = 7, 20
+"""Largest number of objects in a sparse scene and in a dense scene."""
 SCALES = (0.75, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.2, 1.3)
-"""Scale factors of objects that have another size than their class."""
+"""Scale factors of objects whose size differs from that of their class."""
 UNKNOWN = "unknown"
-"""Label of an object of no class."""
+"""Label of an object without a class."""
 UNKNOWN_COUNT, DAMAGED_MODEL = 1000, 168
-"""Number of shapes in pybullet_data's `random_urdfs`, and the number of the one whose mesh is damaged."""
+"""Count of the shapes in pybullet_data's `random_urdfs`, and number of the shape with a damaged mesh."""
 UNKNOWN_MODELS = tuple(number for number in range(800) if number != DAMAGED_MODEL)
-"""Numbers of those shapes that stand for unknown objects; the others are left for tests."""
+"""Numbers of the shapes used as unknown objects; the others are left for tests."""
 TABLE_X, TABLE_Y = (-0.05, 0.86), (-0.71, 0.71)
 """Part of the table top where objects may lie [m]."""
-FOOT = 0.16
-"""Radius around the arm's foot kept free [m]."""
-SETTLING = 360
-"""Physics steps after which a pile is taken as it is."""
+BASE_CLEARANCE = 0.16
+"""Radius around the arm's base kept free [m]."""
+SETTLING_STEPS = 360
+"""Number of physics steps in which objects settle."""
 
 
 @dataclass(frozen=True, eq=False)
-class Item:
+class SceneObject:
     """An object of a scene.
 
     Attributes:
-        label: Its class, or `UNKNOWN`.
-        model: Its model, already scaled.
-        X_WO: Its pose.
-        colour: Its colour.
+        label: Class of the object, or `UNKNOWN`.
+        model: Model of the object, already scaled.
+        X_WO: Pose of the object.
+        colour: Colour of the object.
     """
 
     label: str
@@ -55,8 +55,8 @@ class Item:
     colour: Colour
 
 
-def reach(world: World, camera: CameraConfig, rng: np.random.Generator) -> bool:
-    """Put the arm somewhere a run would have it, and tell whether it shall hold an object."""
+def move_arm(world: World, camera: CameraConfig, rng: np.random.Generator) -> bool:
+    """Move the arm to a random pose as in a run; return True if the arm is to hold an object."""
     poses = world.config.arm.poses_deg
     scans = camera.scan_poses
     scan = np.radians(poses[scans[0] if rng.random() < 0.6 else str(rng.choice(scans))])
@@ -69,15 +69,15 @@ def reach(world: World, camera: CameraConfig, rng: np.random.Generator) -> bool:
         offset = rng.uniform(-1, 1, 3) * spread
         tilt = Pose.of(np.zeros(3), [*rng.normal(0, math.radians(1.5), 2) / 2, 0, 1])
         turned = Pose(about_z(rng.uniform(-turn, turn)) @ X_WT.rotation, X_WT.position + offset)
-        _solve(world, turned @ tilt)
+        _move_tool(world, turned @ tilt)
         return bool(rng.random() < 0.08)
     if usual:
         return False
-    # From an arm stretched forwards, not from where the camera has it waiting, every reach is short.
+    # The inverse kinematics starts from a forward posture, nearer to all targets than a scan pose.
     position = rng.uniform((0.25, -0.50, 0.05), (0.72, 0.50, 0.40))
     bearing = math.atan2(position[1], position[0])
     world.set_arm([bearing, math.radians(30), 0, math.radians(-85), 0, math.radians(65), 0])
-    _solve(world, tool_down(position, bearing + rng.uniform(-1.2, 1.2)))
+    _move_tool(world, tool_down(position, bearing + rng.uniform(-1.2, 1.2)))
     return bool(rng.random() < 0.3)
 
 
@@ -91,7 +91,7 @@ def random_part(camera: CameraConfig, rng: np.random.Generator) -> tuple[int, in
     return x, y, x + right - left, y + bottom - top
 
 
-def random_items(config: CellConfig, count: int, table: Colour, rng: np.random.Generator) -> list[Item]:
+def draw_items(config: CellConfig, count: int, table: Colour, rng: np.random.Generator) -> list[SceneObject]:
     """Return `count` random objects at the origin; some scenes have unknown objects or other sizes."""
     share_unknown = rng.uniform(0.05, 0.4) if rng.random() < 0.35 else 0.0
     share_resized = rng.uniform(0.2, 1.0) if rng.random() < 0.35 else 0.0
@@ -104,7 +104,7 @@ def random_items(config: CellConfig, count: int, table: Colour, rng: np.random.G
             model = resized(model, rng.uniform(0.4, 1.0))
         elif rng.random() < share_resized:
             model = resized(model, float(rng.choice(SCALES)))
-        items.append(Item(label, model, Pose.identity(), colour))
+        items.append(SceneObject(label, model, Pose.identity(), colour))
     return items
 
 
@@ -123,24 +123,24 @@ def unknown_model(number: int) -> ObjectConfig:
 
 
 def arrange(
-    config: CellConfig, footprint: Array, plain_view: bool, table: Colour, rng: np.random.Generator
-) -> list[Item]:
-    """Return a random arrangement of 0 to 20 objects, unknown ones and stacks among them.
+    config: CellConfig, footprint: Array, shows_workspace: bool, table: Colour, rng: np.random.Generator
+) -> list[SceneObject]:
+    """Return a random arrangement of 0 to 20 objects; unknown objects and stacks may be among them.
 
     Args:
         config: The cell.
         footprint: Corners `(N, 2)` [m] of the part of the table in the image.
-        plain_view: True if the image shows the workspace: then most objects lie there.
+        shows_workspace: True if the image shows the workspace: then objects mostly lie in or near it.
         table: Mean colour of the table.
         rng: Random number generator.
     """
-    count = int(rng.integers(0, (FEW if rng.random() < 0.45 else MANY) + 1))
-    items = random_items(config, count, table, rng)
+    count = int(rng.integers(0, (MAX_OBJECTS_SPARSE if rng.random() < 0.45 else MAX_OBJECTS_DENSE) + 1))
+    items = draw_items(config, count, table, rng)
     low = np.maximum(footprint.min(axis=0), (TABLE_X[0], TABLE_Y[0]))
     high = np.minimum(footprint.max(axis=0), (TABLE_X[1], TABLE_Y[1]))
     if (high - low < 0.05).any():
         return []
-    if plain_view and rng.random() < 0.75:
+    if shows_workspace and rng.random() < 0.75:
         # The more objects, the more room around the workspace they get.
         margin = rng.uniform(0.0, 0.02 + 0.006 * count)
         low = np.maximum(low, np.array([config.table.x[0], config.table.y[0]]) - margin)
@@ -148,8 +148,8 @@ def arrange(
     in_view = [bin for bin in config.bins.values() if _overlaps(bin, low, high)]
     style = rng.random()
     if style < 0.15:
-        return settle(config, _heap(items[:FEW], low, high, in_view, rng))
-    items = _spread(config, items, low, high, in_view, rng)
+        return settle(config, _heap(items[:MAX_OBJECTS_SPARSE], low, high, in_view, rng))
+    items = _place_side_by_side(config, items, low, high, in_view, rng)
     if style < 0.23:
         return settle(config, [_lift_and_rotate(item, rng) for item in items])
     if style < 0.40:
@@ -157,22 +157,22 @@ def arrange(
     return items
 
 
-def _lift_and_rotate(item: Item, rng: np.random.Generator) -> Item:
-    """Return an object 4 cm above its place, randomly rotated."""
-    return replace(item, X_WO=Pose(_any_rotation(rng), item.X_WO.position + np.array([0, 0, 0.04])))
+def _lift_and_rotate(item: SceneObject, rng: np.random.Generator) -> SceneObject:
+    """Return an object lifted by 4 cm and randomly rotated."""
+    return replace(item, X_WO=Pose(_random_rotation(rng), item.X_WO.position + np.array([0, 0, 0.04])))
 
 
-def hanging(X_WT: Pose, config: CellConfig, rng: np.random.Generator) -> Item:
-    """Return a random object that hangs upright at the tool's tip."""
-    (item,) = random_items(config, 1, (0.5, 0.5, 0.5), rng)
+def make_held_object(X_WT: Pose, config: CellConfig, rng: np.random.Generator) -> SceneObject:
+    """Return a random object that hangs upright at the tip of the tool."""
+    (item,) = draw_items(config, 1, (0.5, 0.5, 0.5), rng)
     place = X_WT.position - [0, 0, load_mesh(item.model).top]
     return replace(item, X_WO=Pose(about_z(rng.uniform(0, math.tau)), place))
 
 
-def settle(config: CellConfig, items: Sequence[Item]) -> list[Item]:
-    """Return objects where they come to lie 1.5 s after they are let go.
+def settle(config: CellConfig, items: Sequence[SceneObject]) -> list[SceneObject]:
+    """Return objects at their poses 1.5 s after release.
 
-    A fresh world every time makes the outcome a function of the starting poses alone.
+    A new physics world for each call makes the result a function of the start poses alone.
     """
     client = BulletClient(pybullet.DIRECT)
     try:
@@ -184,7 +184,7 @@ def settle(config: CellConfig, items: Sequence[Item]) -> list[Item]:
         for bin in config.bins.values():
             add_bin(client, bin)
         bodies = [add_body(client, item.model, item.X_WO) for item in items]
-        for _ in range(SETTLING):
+        for _ in range(SETTLING_STEPS):
             client.stepSimulation()
         settled = zip(bodies, items, strict=True)
         return [replace(item, X_WO=_pose_of(client, body, item)) for body, item in settled]
@@ -192,28 +192,24 @@ def settle(config: CellConfig, items: Sequence[Item]) -> list[Item]:
         client.disconnect()
 
 
-def _pose_of(client: BulletClient, body: int, item: Item) -> Pose:
+def _pose_of(client: BulletClient, body: int, item: SceneObject) -> Pose:
     X_LI = Pose.of(*client.getDynamicsInfo(body, -1)[3:5])
     X_WI = Pose.of(*client.getBasePositionAndOrientation(body))
     return X_WI @ (upright(item.model) @ X_LI).inverse()
 
 
-def _solve(world: World, X_WT: Pose) -> None:
-    """Bring the tool near `X_WT`; a rest of error does no harm, the camera's pose is measured after."""
+def _move_tool(world: World, X_WT: Pose) -> None:
+    """Move the tool near `X_WT`; the residual error is harmless: the camera pose is read later."""
     X_WE = X_WT @ Pose.of([0, 0, -(FLANGE_OFFSET + world.config.tool.length)])
     for _ in range(3):
         q = world.client.calculateInverseKinematics(
-            world.arm,
-            world.flange,
-            X_WE.position,
-            X_WE.quaternion,
-            maxNumIterations=60,
-            residualThreshold=1e-4,
-        )
+            world.arm, world.flange, X_WE.position, X_WE.quaternion,
+            maxNumIterations=60, residualThreshold=1e-4,
+        )  # fmt: skip
         world.set_arm(q[:7])
 
 
-def _any_rotation(rng: np.random.Generator) -> Array:
+def _random_rotation(rng: np.random.Generator) -> Array:
     return rotation_from_quaternion(rng.normal(size=4))
 
 
@@ -228,8 +224,8 @@ def _inside(bin: BinConfig, point: Array, margin: float) -> bool:
 
 
 def _heap(
-    items: Sequence[Item], low: Array, high: Array, bins: list[BinConfig], rng: np.random.Generator
-) -> list[Item]:
+    items: Sequence[SceneObject], low: Array, high: Array, bins: list[BinConfig], rng: np.random.Generator
+) -> list[SceneObject]:
     """Return objects one above the other, over a point of the table or over a bin."""
     if bins and rng.random() < 0.6:
         centre = np.array(bins[int(rng.integers(len(bins)))].position[:2])
@@ -238,13 +234,13 @@ def _heap(
     spread = rng.uniform(0.01, 0.06)
     places = [[*(centre + rng.normal(0, spread, 2)), 0.05 + 0.055 * i] for i in range(len(items))]
     return [
-        replace(item, X_WO=Pose(_any_rotation(rng), np.array(place)))
+        replace(item, X_WO=Pose(_random_rotation(rng), np.array(place)))
         for item, place in zip(items, places, strict=True)
     ]
 
 
-def _stack(items: list[Item], rng: np.random.Generator) -> None:
-    """Put some objects on others, nearly over their middles: balanced or not, nothing is simulated."""
+def _stack(items: list[SceneObject], rng: np.random.Generator) -> None:
+    """Put some objects on others, nearly centred; the balance of the stacks is not simulated."""
     for _ in range(int(rng.integers(1, 1 + max(1, len(items) // 3)))):
         if len(items) < 2:
             return
@@ -260,17 +256,17 @@ def _stack(items: list[Item], rng: np.random.Generator) -> None:
         )
 
 
-def _spread(
+def _place_side_by_side(
     config: CellConfig,
-    items: Sequence[Item],
+    items: Sequence[SceneObject],
     low: Array,
     high: Array,
     bins: list[BinConfig],
     rng: np.random.Generator,
-) -> list[Item]:
-    """Return those objects that find a place side by side, standing on the table or in a bin."""
+) -> list[SceneObject]:
+    """Place objects side by side on the table or in bins; return those that find a place."""
     gap = rng.uniform(0.0, 0.02)
-    placed: list[Item] = []
+    placed: list[SceneObject] = []
     for item in items:
         radius = item.model.radius
         for _ in range(30):
@@ -288,7 +284,7 @@ def _spread(
                 np.linalg.norm(other.X_WO.position[:2] - point) > radius + other.model.radius + gap
                 for other in placed
             )
-            if free and np.linalg.norm(point) > FOOT:
+            if free and np.linalg.norm(point) > BASE_CLEARANCE:
                 place = np.array([*point, floor - load_mesh(item.model).bottom])
                 placed.append(replace(item, X_WO=Pose(about_z(rng.uniform(0, math.tau)), place)))
                 break

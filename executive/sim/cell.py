@@ -11,7 +11,7 @@ from executive.cell_config import CellConfig
 from executive.clock import STEP
 from executive.errors import InputError
 from executive.events import Emit
-from executive.layout import bins_of, cell_without_hardware, classes_told_by_touch
+from executive.layout import bins_of, cell_without_hardware, classes_distinct_by_touch
 from executive.ledger.ledger import ItemLedger
 from executive.mission.text.files import shipped_folder
 from executive.motion.planner import Planner
@@ -81,7 +81,7 @@ class SimCell:
         under_way = None if options.past is None else self._rebuilt(options.past.log)
         self._arm = SimArm(self._world, planner, config, clock, lambda: self._tool.held_body, emit, under_way)
         self._ledger = ItemLedger(
-            config.ledger, config.table, self._bins, routes, emit, classes_told_by_touch(config)
+            config.ledger, config.table, self._bins, routes, emit, classes_distinct_by_touch(config)
         )
         name, camera_config = next(iter(config.cameras.items()))
         self._camera = camera(

@@ -16,7 +16,7 @@ from executive.errors import InputError
 from executive.geometry import Array
 from executive.messages import Box
 from executive.sim.models import missing_models
-from executive.sim.scene_file import DECLARED, SceneConfig
+from executive.sim.scene_file import DECLARED_SCENE, SceneConfig
 from executive.sim.scenes import SIZE, Sample, SceneRenderer
 from executive.vision.dataset import Entry, image_path, save_image, write_annotations
 from executive.vision.samples import LabelledImage
@@ -79,7 +79,7 @@ def run_frames(
     seed: int,
     workers: int,
     progress: Progress,
-    scene: SceneConfig = DECLARED,
+    scene: SceneConfig = DECLARED_SCENE,
 ) -> list[LabelledImage]:
     """Return whole frames of a cell's camera, each of another scene that a run may begin with.
 

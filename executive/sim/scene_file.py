@@ -20,13 +20,13 @@ from executive.sim.table_top import PATTERN_COUNT, PLAIN, TEXTURES, WOOD
 from executive.vision.camera_model import calibrated, field_of_view
 
 ANY = "any"
-"""Key of `objects` that stands for every class without a section of its own."""
-MAX_FIELD_DEG = 178.0
+"""Key of `objects` for every class without a section."""
+MAX_FOV_DEG = 178.0
 """Largest vertical field of view of a camera [degree]."""
 
 
 def check_texture(name: str) -> str:
-    """Return the name of a texture as it is.
+    """Return the name of a texture unchanged.
 
     Raises:
         ValueError: There is no such texture.
@@ -38,7 +38,7 @@ def check_texture(name: str) -> str:
 
 
 def check_models(numbers: tuple[int, int]) -> tuple[int, int]:
-    """Return a range of model numbers as it is.
+    """Return a range of model numbers unchanged.
 
     Raises:
         ValueError: The range contains only the damaged model.
@@ -49,10 +49,10 @@ def check_models(numbers: tuple[int, int]) -> tuple[int, int]:
 
 
 def check_palette(colours: tuple[Colour, ...]) -> tuple[Colour, ...]:
-    """Return the colours of a palette as they are.
+    """Return the colours of a palette unchanged.
 
     Raises:
-        ValueError: There is none.
+        ValueError: The palette has no colour.
     """
     if not colours:
         raise ValueError("needs at least one colour [r, g, b], each 0 to 1")
@@ -60,39 +60,39 @@ def check_palette(colours: tuple[Colour, ...]) -> tuple[Colour, ...]:
 
 
 Share = Annotated[float, Field(ge=0, le=1)]
-Shade = tuple[Share, Share, Share]
+RgbColour = tuple[Share, Share, Share]
 Reflection = Annotated[float, Field(ge=0, le=3)]
 Shift = Annotated[float, Field(ge=-1, le=1)]
-Turn = Annotated[float, Field(ge=-90, le=90)]
+AngleDeg = Annotated[float, Field(ge=-90, le=90)]
 Counts = Annotated[tuple[Natural, Natural], AfterValidator(rising)]
-Model = Annotated[int, Field(ge=0, lt=UNKNOWN_COUNT)]
-Models = Annotated[tuple[Model, Model], AfterValidator(rising), AfterValidator(check_models)]
-Palette = Annotated[tuple[Shade, ...], AfterValidator(check_palette)]
+ModelNumber = Annotated[int, Field(ge=0, lt=UNKNOWN_COUNT)]
+Models = Annotated[tuple[ModelNumber, ModelNumber], AfterValidator(rising), AfterValidator(check_models)]
+Palette = Annotated[tuple[RgbColour, ...], AfterValidator(check_palette)]
 
 
 class LightConfig(Section):
-    """The lamp and the ambient light; the defaults are those of every simulated cell."""
+    """The lamp and the ambient light; the defaults apply to every simulated cell."""
 
     brightness: float = Field(1.0, ge=0, le=5)
     """Factor on `ambient`, `diffuse` and `specular`."""
     direction: tuple[float, float, Annotated[float, Field(gt=0)]] = (0.3, 0.2, 1.0)
     """Direction x, y, z in the world from the table to the lamp; z is above 0, the length is ignored."""
-    colour: Shade = (1.0, 1.0, 1.0)
+    colour: RgbColour = (1.0, 1.0, 1.0)
     """Colour of the lamp's light: r, g, b, each 0 to 1."""
     ambient: Reflection = 0.6
-    """Share of the light that comes from all directions, 0 to 3."""
+    """Ambient coefficient of the Phong model, 0 to 3."""
     diffuse: Reflection = 0.35
-    """Share of the lamp's light that surfaces scatter, 0 to 3."""
+    """Diffuse coefficient of the Phong model, 0 to 3."""
     specular: Reflection = 0.05
-    """Share of the lamp's light that surfaces mirror, 0 to 3."""
+    """Specular coefficient of the Phong model, 0 to 3."""
     shadow: bool = False
     """True if objects cast shadows."""
 
 
 class SceneTableConfig(Section):
-    """The surface of the table and the arrangement of the objects; None stands for the cell file's value."""
+    """The surface of the table and the arrangement of the objects; None: the value of the cell file."""
 
-    colour: Shade = (1.0, 1.0, 1.0)
+    colour: RgbColour = (1.0, 1.0, 1.0)
     """Factor on the brightness of the texture: r, g, b, each 0 to 1."""
     texture: Annotated[str, AfterValidator(check_texture)] = WOOD
     """`wood`, `plain` (white), or a generated texture, `pattern 0` to `pattern 23`."""
@@ -101,11 +101,11 @@ class SceneTableConfig(Section):
     gap: float | None = Field(None, ge=0, le=0.5)
     """Smallest distance between the outlines of two objects [m]; 0: outlines may touch."""
     stacked: Share | None = None
-    """Share of the objects that are put on top of another one, 0 to 1, as far as they stay there."""
+    """Share of the objects that are put on top of another one, 0 to 1; unstable stacks are undone."""
 
 
 class SceneObjectConfig(Section):
-    """The looks of the objects of one class."""
+    """Colours and size of one object class."""
 
     colours: Palette | None = None
     """Colours (r, g, b, each 0 to 1) of which each object gets one; None: those of the cell file."""
@@ -114,50 +114,50 @@ class SceneObjectConfig(Section):
 
 
 class UnknownConfig(Section):
-    """Objects of no class of the cell, beside the other objects; they are never stacked."""
+    """Objects without a class, in addition to the other objects; they are never stacked."""
 
     count: Counts
-    """Fewest and most of them."""
+    """Fewest and most objects."""
     models: Models = (800, 999)
     """First and last number of the random shapes in pybullet_data, 0 to 999; the shipped detector was
-    trained beside 0 to 799."""
+    trained with 0 to 799."""
     scale: float = Field(0.6, ge=0.1, le=2)
-    """Factor on their size; most of them are 0.12 m long at 1."""
+    """Factor on the size of the shapes; most shapes are 0.12 m long at 1."""
     colours: Palette = ((1.0, 1.0, 1.0),)
-    """Colours (r, g, b, each 0 to 1) of which each of them gets one."""
+    """Colours (r, g, b, each 0 to 1) of which each object gets one."""
 
 
 class SceneCameraConfig(Section):
     """Errors of the camera; its frames carry the matrix and the pose that the cell file declares."""
 
     shift: tuple[Shift, Shift, Shift] = (0.0, 0.0, 0.0)
-    """Displacement x, y, z [m], each -1 to 1: in the world, or in the flange's frame of a camera there."""
-    turn_deg: tuple[Turn, Turn, Turn] = (0.0, 0.0, 0.0)
+    """Displacement x, y, z [m], each -1 to 1: in the world, or for a wrist camera in the flange frame."""
+    turn_deg: tuple[AngleDeg, AngleDeg, AngleDeg] = (0.0, 0.0, 0.0)
     """Rotation vector about the optical centre [degree], each -90 to 90; axes of the camera: x to the
     right, y down, z forwards."""
-    orbit_deg: tuple[Turn, Turn, Turn] = (0.0, 0.0, 0.0)
+    orbit_deg: tuple[AngleDeg, AngleDeg, AngleDeg] = (0.0, 0.0, 0.0)
     """Rotation vector about the point where the optical axis meets the table top [degree], each -90 to 90;
-    axes of the world. Only of a fixed camera."""
+    axes of the world. Only for a fixed camera."""
     fov_factor: float = Field(1.0, ge=0.3, le=3)
     """Factor on the vertical field of view."""
     noise: NoiseConfig | None = None
-    """Its sensor noise; None: as in the cell file."""
+    """Sensor noise; None: the value of the cell file."""
 
 
 class SceneConfig(Section):
-    """A scene file: every key that is left out leaves the world as the cell file declares it."""
+    """A scene file; a missing key leaves the world as the cell file declares it."""
 
     scene: str = Field(min_length=1)
     """Name of the scene."""
     light: LightConfig = LightConfig()
     table: SceneTableConfig = SceneTableConfig()
     objects: dict[str, SceneObjectConfig] = Field(default_factory=dict)
-    """Looks by class; `any` stands for every class without a section of its own."""
+    """Colours and sizes by class; `any`: every class without a section."""
     unknown: UnknownConfig | None = None
     camera: SceneCameraConfig = SceneCameraConfig()
 
 
-DECLARED = SceneConfig(scene="as declared")
+DECLARED_SCENE = SceneConfig(scene="as declared")
 """The scene that changes nothing."""
 
 
@@ -165,15 +165,15 @@ def load_scene(path: Path | None, config: CellConfig) -> SceneConfig:
     """Return the content of a scene file, checked against the cell whose world it changes.
 
     Args:
-        path: The file; None: `DECLARED` is returned.
+        path: The file; None: `DECLARED_SCENE` is returned.
         config: The cell file.
 
     Raises:
-        MissionError: Something is wrong with it; every finding is in the text.
+        MissionError: The file is wrong; the text contains every finding.
         InputError: There is no such file, or the cell is not simulated.
     """
     if path is None:
-        return DECLARED
+        return DECLARED_SCENE
     if config.kind != "sim":
         raise InputError(
             f"the scene {path} changes the simulated world of a cell of kind sim, and the cell {config.cell} "
@@ -206,15 +206,15 @@ def _misfits(scene: SceneConfig, root: Node, config: CellConfig) -> Iterator[Fin
             f"camera.orbit_deg moves a fixed camera, and the camera {name} of the cell {config.cell} is "
             "mounted on the wrist; use shift and turn_deg",
         )  # fmt: skip
-    yield from _wide_field(scene, root, camera)
+    yield from _check_field_of_view(scene, root, camera)
 
 
-def _wide_field(scene: SceneConfig, root: Node, camera: CameraConfig) -> Iterator[Finding]:
-    """Yield a finding if no lens has the field of view that the scene asks for."""
+def _check_field_of_view(scene: SceneConfig, root: Node, camera: CameraConfig) -> Iterator[Finding]:
+    """Yield a finding if the field of view of the scene exceeds `MAX_FOV_DEG`."""
     declared = field_of_view(calibrated(camera)[0], camera.height)
-    if declared * scene.camera.fov_factor > MAX_FIELD_DEG:
+    if declared * scene.camera.fov_factor > MAX_FOV_DEG:
         yield error(
             mark_of(root, ("camera", "fov_factor")), "out-of-range",
-            f"camera.fov_factor must be at most {MAX_FIELD_DEG / declared:.2f}, for the declared field of "
-            f"view is {declared:.1f} degrees, and no lens has more than {MAX_FIELD_DEG:g}",
+            f"camera.fov_factor must be at most {MAX_FOV_DEG / declared:.2f}, for the declared field of "
+            f"view is {declared:.1f} degrees, and no lens has more than {MAX_FOV_DEG:g}",
         )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The simulated world as a scene file changes it: its true cell, its lamp, its unknown objects."""
+"""Changes of a scene file to the simulated world: cell, lamp, table and unknown objects."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from executive.vision.camera_model import calibrated, camera_matrix, field_of_vi
 
 
 def true_cell(config: CellConfig, scene: SceneConfig) -> CellConfig:
-    """Return the cell as it really is: a declared cell with the objects, table and camera of a scene."""
+    """Return the simulated cell: a declared cell with the objects, table and camera of a scene."""
     table = {key: getattr(scene.table, key) for key in ("objects", "gap", "stacked")}
     table = {key: value for key, value in table.items() if value is not None}
     name, camera = next(iter(config.cameras.items()))
@@ -60,7 +60,7 @@ def paint_table(world: World, scene: SceneConfig) -> None:
 
 
 def unknown_objects(unknown: UnknownConfig | None, rng: np.random.Generator) -> list[ObjectConfig]:
-    """Return the models of random objects of no class; none of them without a section of the scene."""
+    """Return random models of objects without a class; none if `unknown` is None."""
     if unknown is None:
         return []
     first, last = unknown.models
@@ -70,19 +70,19 @@ def unknown_objects(unknown: UnknownConfig | None, rng: np.random.Generator) -> 
     return [model.model_copy(update={"colours": unknown.colours}) for model in models]
 
 
-def _true_object(model: ObjectConfig, looks: SceneObjectConfig | None) -> ObjectConfig:
-    """Return a class of objects with the looks that a scene gives it."""
-    if looks is None:
+def _true_object(model: ObjectConfig, appearance: SceneObjectConfig | None) -> ObjectConfig:
+    """Return an object class with the colours and size of a scene."""
+    if appearance is None:
         return model
-    colours = looks.colours or model.colours
+    colours = appearance.colours or model.colours
     if len(colours) == 1:
-        # The choice among as many colours as declared draws the same random numbers: the same places.
+        # The choice of one colour draws no random number; later rotations and stacks would change.
         colours *= len(model.colours)
-    return resized(model, looks.scale).model_copy(update={"colours": colours})
+    return resized(model, appearance.scale).model_copy(update={"colours": colours})
 
 
 def _true_camera(camera: CameraConfig, error: SceneCameraConfig) -> CameraConfig:
-    """Return a camera with the errors of a scene; its pose and its lens become a calibration."""
+    """Return a camera with the errors of a scene, its pose and intrinsics as a calibration."""
     if error.noise is not None:
         camera = camera.model_copy(update={"noise": error.noise})
     if not any((*error.shift, *error.turn_deg, *error.orbit_deg)) and error.fov_factor == 1:
@@ -90,8 +90,8 @@ def _true_camera(camera: CameraConfig, error: SceneCameraConfig) -> CameraConfig
     matrix, X_MC = calibrated(camera)
     if any(error.orbit_deg):
         centre = on_plane(matrix, X_MC, matrix[:2, 2], 0.0)
-        X_MC = Pose.of(centre) @ _turned(error.orbit_deg) @ Pose.of(-centre) @ X_MC
-    X_MC = Pose.of(error.shift) @ X_MC @ _turned(error.turn_deg)
+        X_MC = Pose.of(centre) @ _make_rotation(error.orbit_deg) @ Pose.of(-centre) @ X_MC
+    X_MC = Pose.of(error.shift) @ X_MC @ _make_rotation(error.turn_deg)
     fov = field_of_view(matrix, camera.height) * error.fov_factor
     zoom = camera_matrix(camera.width, camera.height, fov)[1, 1] / matrix[1, 1]
     (fx, fy), (cx, cy) = zoom * matrix.diagonal()[:2], matrix[:2, 2] - 0.5
@@ -101,6 +101,6 @@ def _true_camera(camera: CameraConfig, error: SceneCameraConfig) -> CameraConfig
     return camera.model_copy(update={**dict.fromkeys(SET_UP_BY_HAND), "calibration": calibration})
 
 
-def _turned(vector_deg: ArrayLike) -> Pose:
-    """Return a rotation by a rotation vector `(3,)` [degree]."""
+def _make_rotation(vector_deg: ArrayLike) -> Pose:
+    """Return the rotation of a rotation vector `(3,)` [degree]."""
     return Pose(np.asarray(cv2.Rodrigues(np.radians(vector_deg))[0]), np.zeros(3))

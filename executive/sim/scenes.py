@@ -17,10 +17,10 @@ from executive.cell_config import CellConfig, NoiseConfig
 from executive.errors import InputError
 from executive.geometry import Array, Pose
 from executive.messages import Box
-from executive.sim.arrangements import UNKNOWN, Item, arrange, hanging, random_part, reach
+from executive.sim.arrangements import UNKNOWN, SceneObject, arrange, make_held_object, move_arm, random_part
 from executive.sim.camera import CELL_LIGHT, Image, add_noise, camera_pose, render, sense
 from executive.sim.models import load_mesh
-from executive.sim.scene_file import DECLARED, SceneConfig
+from executive.sim.scene_file import DECLARED_SCENE, SceneConfig
 from executive.sim.scene_world import lamp, paint_table, true_cell
 from executive.sim.silhouette import outline_box, visible_share
 from executive.sim.spawn import spawn
@@ -110,7 +110,7 @@ class SceneRenderer:
     """
 
     def __init__(
-        self, config: CellConfig, camera: str, *, randomized: bool = True, scene: SceneConfig = DECLARED
+        self, config: CellConfig, camera: str, *, randomized: bool = True, scene: SceneConfig = DECLARED_SCENE
     ) -> None:
         self._randomized = randomized
         self._scene = scene
@@ -147,7 +147,7 @@ class SceneRenderer:
 
     def _draw(self, rng: np.random.Generator) -> Sample | None:
         world = self._world
-        holds = reach(world, self._camera, rng)
+        holds = move_arm(world, self._camera, rng)
         matrix, X_WC = self._matrix, camera_pose(world, self._camera)
         (colour, texture), light, noise = ((1.0, 1.0, 1.0), WOOD), CELL_LIGHT, self._camera.noise
         if rng.random() >= DECLARED_SHARE:
@@ -160,7 +160,7 @@ class SceneRenderer:
         footprint = np.array([on_plane(matrix, X_WC, corner, 0.0)[:2] for corner in corners])
         items = arrange(self._config, footprint, part == self._camera.table_view, shown, rng)
         if holds:
-            items.append(hanging(world.tool_pose(), self._config, rng))
+            items.append(make_held_object(world.tool_pose(), self._config, rng))
         bodies = [world.add_object(item.label, item.X_WO, item.colour, item.model) for item in items]
         try:
             world.table_top.paint(colour, texture)
@@ -181,7 +181,7 @@ class SceneRenderer:
         try:
             X_WC, declared = camera_pose(world, camera), camera_pose(world, self._declared)
             items = [
-                Item(world.bodies[body], world.models[body], world.object_pose(body), (0.0, 0.0, 0.0))
+                SceneObject(world.bodies[body], world.models[body], world.object_pose(body), (0.0, 0.0, 0.0))
                 for body in bodies
             ]
             whole, light = (0, 0, camera.width, camera.height), lamp(self._scene.light)
@@ -204,7 +204,7 @@ class SceneRenderer:
         image = _resized(frame[top:bottom, left:right])
         return replace(sample, image=image, frame=frame, depth=depth, second=second)
 
-    def _label(self, view: View, bodies: Sequence[int], items: Sequence[Item]) -> Sample | None:
+    def _label(self, view: View, bodies: Sequence[int], items: Sequence[SceneObject]) -> Sample | None:
         """Label a render, or return None if too many objects are half hidden."""
         labels, boxes, shares, positions, centres, ignored, half_hidden = [], [], [], [], [], [], 0
         corner, scale = np.array(view.part[:2], dtype=float), SIZE / (view.part[2] - view.part[0])

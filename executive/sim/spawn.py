@@ -13,7 +13,7 @@ from executive.errors import InputError
 from executive.geometry import Array, Pose, about_z
 from executive.sim.arrangements import UNKNOWN
 from executive.sim.models import load_mesh
-from executive.sim.scene_file import DECLARED, SceneConfig, UnknownConfig
+from executive.sim.scene_file import DECLARED_SCENE, SceneConfig, UnknownConfig
 from executive.sim.scene_world import paint_table, true_cell, unknown_objects
 from executive.sim.world import World
 from executive.workcell import KeyPath
@@ -57,7 +57,9 @@ class PartSeeds:
         return PartSeeds(*(int(part.generate_state(1)[0]) for part in parts))
 
 
-def first_world(config: CellConfig, seed: int, *, gui: bool = False, scene: SceneConfig = DECLARED) -> World:
+def first_world(
+    config: CellConfig, seed: int, *, gui: bool = False, scene: SceneConfig = DECLARED_SCENE
+) -> World:
     """Return the world as a run of this seed finds it: arm at `home`, its objects at rest on the table.
 
     The attribute `config` of the world is the cell as the scene changes it.

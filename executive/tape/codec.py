@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.arm import Motion
+from executive.error_rates import ErrorRates
 from executive.geometry import Array, Pose
 from executive.messages import Answer, Detection, Frame
-from executive.reliability import Reliability
 
 
 class Codec(NamedTuple):
@@ -84,7 +84,7 @@ def read_frame(value: Any) -> Frame:
 
 def write_answer(answer: Answer) -> dict[str, Any]:
     """Return a detector's answer."""
-    sure = answer.reliability
+    sure = answer.error_rates
     return {
         "detector": answer.detector,
         "found": [
@@ -99,7 +99,7 @@ def read_answer(value: Any) -> Answer:
     """Return what `write_answer` was given."""
     # Journals of version 0.1.0 do not contain the confidence of the second class.
     found = tuple(Detection(label, sure, tuple(box), *rival) for label, sure, box, *rival in value["found"])
-    return Answer(value["detector"], found, Reliability(*value["reliability"]))
+    return Answer(value["detector"], found, ErrorRates(*value["reliability"]))
 
 
 def _packed(mask: NDArray[np.bool_]) -> str:

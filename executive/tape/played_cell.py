@@ -8,7 +8,7 @@ from pathlib import Path
 from executive.cell import Cell, Routes
 from executive.cell_config import CellConfig
 from executive.events import Emit
-from executive.layout import bins_of, cell_without_hardware, classes_told_by_touch
+from executive.layout import bins_of, cell_without_hardware, classes_distinct_by_touch
 from executive.ledger.ledger import ItemLedger
 from executive.workcell import CellOptions
 
@@ -30,7 +30,7 @@ class PlayedCell:
         del seed, options
         self._steps = 0
         self._ledger = ItemLedger(
-            config.ledger, config.table, bins_of(config), routes, emit, classes_told_by_touch(config)
+            config.ledger, config.table, bins_of(config), routes, emit, classes_distinct_by_touch(config)
         )
         self._cell = cell_without_hardware(config, routes, self._ledger, emit)
 

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from executive.cell import Clock, Request
 from executive.cell_config import CameraConfig, DetectorConfig, TableConfig
+from executive.error_rates import ErrorRates
 from executive.errors import Unavailable
 from executive.geometry import Pose
 from executive.messages import Answer, Box, Detection, Frame
-from executive.reliability import Reliability
 from executive.testing.fake_world import FakeWorld
 from executive.vision.camera_model import calibrated
 
@@ -123,7 +123,7 @@ class FakeRequest:
     clock: Clock
     answer: Sequence[Detection] | str
     detector: str
-    reliability: Reliability
+    error_rates: ErrorRates
 
     @property
     def ready(self) -> bool:
@@ -134,7 +134,7 @@ class FakeRequest:
         """Return the detections, or raise Unavailable with the sentence scripted."""
         if isinstance(self.answer, str):
             raise Unavailable(self.answer)
-        return Answer(self.detector, tuple(self.answer), self.reliability)
+        return Answer(self.detector, tuple(self.answer), self.error_rates)
 
 
 class FakeDetector:
@@ -177,7 +177,7 @@ class FakeDetector:
             self._clock,
             self.answers(self._looks, true),
             self._name,
-            self._config.reliability,
+            self._config.error_rates,
         )
 
     def close(self) -> None:

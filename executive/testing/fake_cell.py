@@ -15,7 +15,7 @@ from executive.clock import StepClock
 from executive.errors import InputError
 from executive.events import Emit, ignore
 from executive.geometry import Pose
-from executive.layout import bins_of, cell_without_hardware, classes_told_by_touch, object_classes
+from executive.layout import bins_of, cell_without_hardware, classes_distinct_by_touch, object_classes
 from executive.ledger.item import State
 from executive.ledger.ledger import ItemLedger
 from executive.messages import BIN_THICKNESS
@@ -92,7 +92,7 @@ class FakeCell:
         bins = bins_of(config)
         self.world.bins = tuple(bins.values())
         self.ledger = ItemLedger(
-            config.ledger, config.table, bins, self.routes, emit, classes_told_by_touch(config)
+            config.ledger, config.table, bins, self.routes, emit, classes_distinct_by_touch(config)
         )
         name, camera = next(iter(config.cameras.items()))
         X_TF = Pose.of((0.0, 0.0, -config.tool.length))

@@ -83,7 +83,7 @@ class NoisyDetector:
         found = [self._moved(self._confused(one, random), random) for one in kept]
         found += [self._invented(frame, view, random) for _ in range(random.poisson(self._config.invented))]
         found.sort(key=lambda detection: -detection.confidence)
-        return Answer(self._setting.name, tuple(found), self._config.reliability)
+        return Answer(self._setting.name, tuple(found), self._config.error_rates)
 
     def _confused(self, detection: Detection, random: np.random.Generator) -> Detection:
         if random.random() >= self._config.confused:

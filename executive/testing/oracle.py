@@ -129,7 +129,7 @@ class Oracle:
         answer: Future[list[Detection]] = Future()
         answer.set_result(found)
         due = self.clock.now + self.config.latency
-        return Pending(answer, due, self.clock, self.name, self.config.reliability)
+        return Pending(answer, due, self.clock, self.name, self.config.error_rates)
 
     def close(self) -> None:
         """Have nothing to give back."""

@@ -43,12 +43,12 @@ ROBUST_STEPS = 8
 """Number of iterations of the reweighted least squares."""
 TILTS_DEG, ROLLS_DEG = np.arange(-10.0, 11.0), np.arange(-8.0, 9.0, 4.0)
 """Rotations of the grid about the axes x and y of the camera, and about the optical axis [degree]."""
-ZOOMS = np.linspace(-0.21, 0.21, 7)
+AXIAL_SHIFTS = np.linspace(-0.21, 0.21, 7)
 """Shifts of the grid along the optical axis, as shares of the distance of the bins."""
 STARTS = 6
 """Number of the poses of the grid that are refined."""
 SHRINK, THINNING = 4, 4
-"""Factors by which the image is smaller, and the samples are fewer, for the grid."""
+"""Factors by which the image is reduced, and the samples are thinned, for the grid."""
 
 
 class Samples(NamedTuple):
@@ -85,7 +85,7 @@ class Fit(NamedTuple):
 
 
 class OutlineFitter:
-    """Camera poses that fit the edges of one frame."""
+    """Fits camera poses to the edges of one frame."""
 
     def __init__(self, frame: Frame, bins: Sequence[Bin]) -> None:
         self._frame, self._bins = frame, bins
@@ -123,8 +123,8 @@ class OutlineFitter:
             X_CW.apply(ends[::THINNING]) for ends in _outlines(self._bins, self._frame.X_WC, matrix)[:2]
         )
         scored: list[tuple[float, Array]] = []
-        for roll, zoom in itertools.product(ROLLS_DEG, ZOOMS):
-            shift = np.array([0.0, 0.0, zoom * points[:, 2].mean()])
+        for roll, axial_shift in itertools.product(ROLLS_DEG, AXIAL_SHIFTS):
+            shift = np.array([0.0, 0.0, axial_shift * points[:, 2].mean()])
             turns = np.radians([(x, y, roll) for x in TILTS_DEG for y in TILTS_DEG])
             rotations = np.stack([cv2.Rodrigues(turn)[0] for turn in turns])
             pixels = _project((points - shift) @ rotations, matrix)
@@ -157,7 +157,7 @@ class OutlineFitter:
         return Samples(points[shown], in_camera[shown], pixels[shown], normals[shown], bins[shown])
 
     def _edges(self, samples: Samples, reach: int) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the distance `(N,)` [pixel] of the strongest edge along each normal, and if there is one."""
+        """Return the distance `(N,)` [pixel] of the strongest edge along each normal, and a mask of them."""
         n = samples.normals[:, None, None]
         across = np.arange(-reach - 1.5, reach + 2)[:, None, None]
         along = np.array([-2.0, 0.0, 2.0])[:, None] * n[..., ::-1] * (-1, 1)
@@ -206,7 +206,7 @@ def _outlines(bins: Sequence[Bin], X_WC: Pose, matrix: Array) -> tuple[Array, Ar
 
 
 def _project(in_camera: Array, matrix: Array) -> Array:
-    """Return where points `(..., 3)` [m] of a camera's frame appear `(..., 2)` [pixel]."""
+    """Project points `(..., 3)` [m] in the camera frame to pixels `(..., 2)`."""
     p = in_camera @ matrix.T
     return np.asarray(p[..., :2] / np.maximum(p[..., 2:], NEAR))
 

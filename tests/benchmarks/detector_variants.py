@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 import yaml
 
-from executive.campaign.detector_trial import Scenes, check_subject, subjects
+from executive.campaign.detector_trial import SceneSettings, check_detector, list_detectors
 from executive.campaign.detector_trial import measure as measure_detector
 from executive.cell_config import CellConfig
 from executive.cli.cells import find_cell, load_cells
@@ -109,10 +109,10 @@ def evaluate_scene(
     file: Path, cell: CellConfig, images: int, seed: int, workers: int, scene: Path
 ) -> Evaluation:
     """Return the figures of the first detector of a cell in a scene, as `executive evaluate` does."""
-    (subject,) = subjects({file: cell}, None, None, None)
-    check_subject(subject, rendered=True, scene=scene)
-    scenes = Scenes(images, seed, varied=False, view="table", workers=workers, scene=scene)
-    return measure_detector(subject, None, scenes, threshold=THRESHOLD, worst=WorstMisses(), progress=bar)
+    (detector,) = list_detectors({file: cell}, None, None, None)
+    check_detector(detector, renders_scenes=True, scene=scene)
+    scenes = SceneSettings(images, seed, varied=False, view="table", workers=workers, scene=scene)
+    return measure_detector(detector, None, scenes, threshold=THRESHOLD, worst=WorstMisses(), progress=bar)
 
 
 def describe_evaluation(name: str, evaluation: Evaluation) -> Figures:

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from executive.cell_config import LedgerConfig, TableConfig
+from executive.error_rates import ErrorRates
 from executive.geometry import looking_down
 from executive.ledger.ledger import ItemLedger
 from executive.messages import Bin, Detection, Detections, Frame, Glimpse, Target
-from executive.reliability import Reliability
 
-EYE = Reliability(threshold=0.5, misses=0.03, confused=0.004, invented=0.02, jitter=1.0)
+EYE = ErrorRates(threshold=0.5, misses=0.03, confused=0.004, invented=0.02, jitter=1.0)
 
 Thing = tuple[str, float, float]
 
@@ -37,7 +37,7 @@ def area_of(view: str) -> tuple[float, float, float, float]:
 class Bench:
     """A ledger with a camera above it that sees exactly what a test says."""
 
-    def __init__(self, told_by_touch: Sequence[str] = ()) -> None:
+    def __init__(self, distinct_by_touch: Sequence[str] = ()) -> None:
         self.config = LedgerConfig()
         self.events: list[tuple[str, dict]] = []
         size, slots = np.array([0.22, 0.24, 0.06]), np.zeros((6, 2))
@@ -52,7 +52,7 @@ class Bench:
             bins,
             {"cube": ("red_bin", "pink_bin")},
             lambda kind, **data: self.events.append((kind, data)),
-            told_by_touch,
+            distinct_by_touch,
         )
         self.frames = 0
 
@@ -61,7 +61,7 @@ class Bench:
         *things: Thing,
         view: str = "table",
         epoch: int | None = None,
-        by: Reliability = EYE,
+        by: ErrorRates = EYE,
         hidden: slice = slice(0, 0),
         unsure: Sequence[Thing] = (),
         contradiction: str = "",
@@ -87,7 +87,7 @@ class Bench:
 
     def overlooked(self, x: float, y: float) -> float:
         """The chance that an object at a place has been overlooked."""
-        return self.ledger._coverage.overlooked(np.array([x, y, 0.025]))
+        return self.ledger._coverage.find_miss_probability(np.array([x, y, 0.025]))
 
     def drop(self, item: str, landing: np.ndarray | None = None) -> None:
         """Have the tool pick an item and lose it on the way."""

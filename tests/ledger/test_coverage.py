@@ -9,6 +9,7 @@ import pytest
 from ledger_bench import area_of, take_frame
 
 from executive.cell_config import TableConfig
+from executive.error_rates import ErrorRates
 from executive.ledger.coverage import (
     MIN_PROBABILITY,
     PRIOR_INSIDE,
@@ -17,11 +18,10 @@ from executive.ledger.coverage import (
     Coverage,
 )
 from executive.messages import Detections
-from executive.reliability import Reliability
 
 TABLE = TableConfig()
 MIDDLE, CORNER = np.array([0.53, 0.0, 0.025]), np.array([0.43, 0.21, 0.025])
-EYE = Reliability(threshold=0.5, misses=0.2, confused=0.1, invented=0.5, jitter=1.0)
+EYE = ErrorRates(threshold=0.5, misses=0.2, confused=0.1, invented=0.5, jitter=1.0)
 
 
 def look(*, view: str = "full", epoch: int = 0, hidden: slice = slice(0, 0)) -> Detections:
@@ -36,45 +36,45 @@ def coverage() -> Coverage:
 
 def test_every_look_leaves_as_much_doubt_as_its_detector_misses(coverage: Coverage) -> None:
     for looks in range(1, 5):
-        coverage.look(look())
-        assert coverage.overlooked(MIDDLE) == pytest.approx(0.2**looks)
-        assert coverage.worst == pytest.approx(PRIOR_INSIDE * 0.2**looks)
+        coverage.update(look())
+        assert coverage.find_miss_probability(MIDDLE) == pytest.approx(0.2**looks)
+        assert coverage.max_probability == pytest.approx(PRIOR_INSIDE * 0.2**looks)
 
 
 def test_before_anything_was_dropped_hardly_anything_lies_beside_the_workspace(coverage: Coverage) -> None:
     beside = np.array([0.53, 0.40, 0.025])
-    assert coverage.overlooked(beside) == PRIOR_OUTSIDE
+    assert coverage.find_miss_probability(beside) == PRIOR_OUTSIDE
     coverage.disturb(MIDDLE, math.inf, epoch=1)
-    assert coverage.overlooked(beside) == PRIOR_OUTSIDE_AFTER_CHANGE
+    assert coverage.find_miss_probability(beside) == PRIOR_OUTSIDE_AFTER_CHANGE
 
 
 def test_looks_at_the_workspace_alone_never_show_that_nothing_lies_beside_it(coverage: Coverage) -> None:
     for _ in range(20):
-        coverage.look(look(view="table"))
-    assert coverage.overlooked(MIDDLE) == MIN_PROBABILITY, "looks are not wholly independent"
-    assert coverage.worst == 1.0
+        coverage.update(look(view="table"))
+    assert coverage.find_miss_probability(MIDDLE) == MIN_PROBABILITY, "looks are not wholly independent"
+    assert coverage.max_probability == 1.0
 
 
 def test_what_the_arm_hides_is_not_believed_empty(coverage: Coverage) -> None:
     # Columns run against the world's y here: the right half of the image shows one side of the table.
     for _ in range(5):
-        coverage.look(look(hidden=slice(320, 640)))
-    sides = [coverage.overlooked(np.array([0.53, y, 0.025])) for y in (-0.15, 0.15)]
+        coverage.update(look(hidden=slice(320, 640)))
+    sides = [coverage.find_miss_probability(np.array([0.53, y, 0.025])) for y in (-0.15, 0.15)]
     assert sorted(sides) == [pytest.approx(0.2**5), 1.0]
-    assert coverage.worst == PRIOR_INSIDE
+    assert coverage.max_probability == PRIOR_INSIDE
 
 
 def test_a_place_is_searched_only_if_all_of_an_object_there_would_show(coverage: Coverage) -> None:
-    coverage.look(look(hidden=slice(323, 640)))
-    assert coverage.overlooked(np.array([0.5, 0.0, 0.025])) == 1.0
+    coverage.update(look(hidden=slice(323, 640)))
+    assert coverage.find_miss_probability(np.array([0.5, 0.0, 0.025])) == 1.0
 
 
 def test_a_change_brings_the_doubt_back_whatever_a_frame_from_before_shows(coverage: Coverage) -> None:
     for _ in range(2):
         coverage.disturb(CORNER, 0.07, epoch=1)
-        coverage.look(look(epoch=0))
-    assert coverage.overlooked(CORNER) == 1.0
-    assert coverage.overlooked(MIDDLE) == pytest.approx(0.2**2)
+        coverage.update(look(epoch=0))
+    assert coverage.find_miss_probability(CORNER) == 1.0
+    assert coverage.find_miss_probability(MIDDLE) == pytest.approx(0.2**2)
 
 
 @pytest.mark.parametrize(
@@ -90,13 +90,13 @@ def test_the_workspace_reaches_as_far_as_half_an_object_over_its_edge(
 def test_a_place_beside_the_workspace_that_no_pose_shows_any_more_is_not_waited_for(
     coverage: Coverage,
 ) -> None:
-    coverage.look(look())
+    coverage.update(look())
     coverage.disturb(MIDDLE, math.inf, epoch=1)
     # The workspace is in the middle columns; on the left the arm stays in the way from now on.
     worst = []
     for _ in range(8):
-        coverage.look(look(epoch=1, hidden=slice(0, 180)))
-        worst.append(coverage.worst)
+        coverage.update(look(epoch=1, hidden=slice(0, 180)))
+        worst.append(coverage.max_probability)
     assert worst[2] == PRIOR_OUTSIDE_AFTER_CHANGE, "hidden on the left"
     assert worst[4] <= 0.2**5 * 1.01
 
@@ -107,12 +107,13 @@ def test_a_place_beside_the_workspace_that_no_pose_shows_any_more_is_not_waited_
     ids=["workspace", "its rim", "beside it", "at the edge of what the arm hides", "hidden"],
 )
 def test_a_place_counts_if_all_places_around_it_do(coverage: Coverage, y: float, counts: bool) -> None:
-    coverage.look(look(hidden=slice(0, 174)))
+    coverage.update(look(hidden=slice(0, 174)))
     assert coverage.in_sight(np.array([0.53, y, 0.025])) is counts
 
 
 def test_a_place_beyond_the_table_or_near_something_unsure_does_not_count(coverage: Coverage) -> None:
-    coverage.look(look(), [MIDDLE])
+    coverage.update(look(), [MIDDLE])
     assert not coverage.in_sight(np.array([0.53, 2.0, 0.025]))
-    assert coverage.overlooked(np.array([0.53, 2.0, 0.025])) == PRIOR_OUTSIDE
-    assert [coverage.overlooked(np.add(MIDDLE, (x, 0, 0))) for x in (0.0, 0.04)] == [1.0, pytest.approx(0.2)]
+    assert coverage.find_miss_probability(np.array([0.53, 2.0, 0.025])) == PRIOR_OUTSIDE
+    missed = [coverage.find_miss_probability(np.add(MIDDLE, (x, 0, 0))) for x in (0.0, 0.04)]
+    assert missed == [1.0, pytest.approx(0.2)]

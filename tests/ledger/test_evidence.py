@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from executive.error_rates import ErrorRates
 from executive.ledger.item import Record
 from executive.ledger.looks import reach
-from executive.reliability import Reliability
 
-GOOD = Reliability(threshold=0.5, misses=0.02, confused=0.0025, invented=0.02, jitter=0.7)
-BAD = Reliability(threshold=0.5, misses=0.2, confused=0.1, invented=0.5, jitter=5.0)
+GOOD = ErrorRates(threshold=0.5, misses=0.02, confused=0.0025, invented=0.02, jitter=0.7)
+BAD = ErrorRates(threshold=0.5, misses=0.2, confused=0.1, invented=0.5, jitter=5.0)
 HERE = np.array([0.5, 0.0, 0.025])
 
 

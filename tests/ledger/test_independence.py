@@ -42,7 +42,7 @@ def test_after_three_looks_an_item_without_other_evidence_is_rejected_with_both_
 
 
 def test_an_item_whose_class_a_touch_can_prove_is_sure_enough_to_be_touched_after_three_looks():
-    bench = Bench(told_by_touch=("cube",))
+    bench = Bench(distinct_by_touch=("cube",))
     sure = []
     for _ in range(3):
         bench.look(CUBE, by=DOUBTFUL)

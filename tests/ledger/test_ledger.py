@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from ledger_bench import Bench, Thing
 
+from executive.error_rates import ErrorRates
 from executive.errors import Fault
 from executive.messages import Target
-from executive.reliability import Reliability
 
 CUBE: Thing = ("cube", 0.5, 0.0)
 FAR: Thing = ("cube", 0.6, 0.2)
@@ -244,7 +244,7 @@ def test_one_slip_about_the_class_costs_some_looks_and_no_more(bench: Bench) -> 
 
 
 def test_a_misread_object_is_nobody_who_is_missed_before_its_class_is_sure(bench: Bench) -> None:
-    bad = Reliability(threshold=0.5, misses=0.2, confused=0.1, invented=0.5, jitter=1.0)
+    bad = ErrorRates(threshold=0.5, misses=0.2, confused=0.1, invented=0.5, jitter=1.0)
     for _ in range(4):
         bench.look(CUBE, ("duck", 0.60, 0.15), by=bad)
     bench.drop("duck-1")
@@ -285,7 +285,7 @@ def test_what_is_put_down_stands_there_and_waits_for_a_look(bench: Bench) -> Non
 
 
 def test_what_is_likelier_an_invention_or_gone_stands_nowhere(bench: Bench) -> None:
-    wild = Reliability(threshold=0.5, misses=0.5, confused=0.004, invented=3.0, jitter=1.0)
+    wild = ErrorRates(threshold=0.5, misses=0.5, confused=0.004, invented=3.0, jitter=1.0)
     bench.look(CUBE, by=wild)
     bench.look(by=wild)
     assert bench.ledger.standing() == []

@@ -57,7 +57,7 @@ class CrowdedDetector:
         area = camera.table_view if view == "table" else (0, 0, camera.width, camera.height)
         answer.set_result(self._boxes(area, np.random.default_rng(frame.id if self._moving else 0)))
         due = self._clock.now + self._config.latency
-        return Pending(answer, due, self._clock, self._name, self._config.reliability)
+        return Pending(answer, due, self._clock, self._name, self._config.error_rates)
 
     def close(self) -> None:
         """Have nothing to give back."""

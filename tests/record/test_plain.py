@@ -14,11 +14,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from executive.error_rates import ErrorRates
 from executive.events import Exact
 from executive.geometry import Pose
 from executive.messages import Detection, Frame
 from executive.record.plain import LONGEST, plain
-from executive.reliability import Reliability
 
 
 class Corner(NamedTuple):
@@ -38,7 +38,7 @@ class Pair:
     right: tuple[int, ...]
 
 
-EYE = Reliability(threshold=0.5, misses=0.02, confused=0.0025, invented=0.02, jitter=0.6)
+EYE = ErrorRates(threshold=0.5, misses=0.02, confused=0.0025, invented=0.02, jitter=0.6)
 FRAME = Frame(
     7, "overhead", np.zeros((4, 4, 3), np.uint8), None, np.eye(3), Pose.identity(), 1 / 3,
     np.ones((4, 4), bool), 0,

@@ -13,7 +13,15 @@ import pytest
 from executive.cell_config import CellConfig, DepthConfig, ObjectConfig
 from executive.errors import InputError
 from executive.geometry import Pose
-from executive.sim.arrangements import UNKNOWN, Item, arrange, hanging, random_items, resized, settle
+from executive.sim.arrangements import (
+    UNKNOWN,
+    SceneObject,
+    arrange,
+    draw_items,
+    make_held_object,
+    resized,
+    settle,
+)
 from executive.sim.datasets import as_labelled_frame, generate, run_frames
 from executive.sim.models import load_mesh
 from executive.sim.scenes import SIZE, Sample, SceneRenderer
@@ -72,12 +80,12 @@ def test_an_arrangement_follows_from_its_generator(overhead: CellConfig) -> None
     total = sum(item.X_WO.position for item in items)
     # Piles settle a little differently on another kind of processor.
     assert (len(items), total) == (231, pytest.approx([115.338, 0.73359, 4.55237], abs=1e-3))
-    item = hanging(Pose.of([0.5, 0.1, 0.3]), overhead, np.random.default_rng(1))
+    item = make_held_object(Pose.of([0.5, 0.1, 0.3]), overhead, np.random.default_rng(1))
     assert item.X_WO.position == pytest.approx([0.5, 0.1, 0.3 - load_mesh(item.model).top])
 
 
 def test_some_scenes_have_objects_of_unknown_kinds_or_other_sizes(overhead: CellConfig) -> None:
-    scenes = [random_items(overhead, 20, (0.9, 0.8, 0.7), np.random.default_rng(seed)) for seed in range(20)]
+    scenes = [draw_items(overhead, 20, (0.9, 0.8, 0.7), np.random.default_rng(seed)) for seed in range(20)]
     unknown = [sum(item.label == UNKNOWN for item in scene) for scene in scenes]
     resized_ones = [
         sum(item.label != UNKNOWN and item.model != overhead.objects[item.label] for item in scene)
@@ -110,7 +118,7 @@ def test_a_silhouette_has_the_area_of_its_shape(overhead: CellConfig) -> None:
 def test_what_is_dropped_comes_to_lie_on_the_table_or_in_a_bin(overhead: CellConfig) -> None:
     tilted = Pose.of([0.5, 0.0, 0.06], [0.3, 0.1, 0.2, 0.9])
     starts = [("cube", tilted), ("duck", Pose.of([0.6, 0.1, 0.01])), ("cube", Pose.of([0.52, 0.46, 0.1]))]
-    items = [Item(label, overhead.objects[label], X_WO, (1.0, 1.0, 1.0)) for label, X_WO in starts]
+    items = [SceneObject(label, overhead.objects[label], X_WO, (1.0, 1.0, 1.0)) for label, X_WO in starts]
     cube, duck, above = (item.X_WO for item in settle(overhead, items))
     assert cube.position[2] == pytest.approx(0.025, abs=1e-3)
     assert duck.rotation[2, 2] == pytest.approx(1.0, abs=1e-2)

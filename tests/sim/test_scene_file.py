@@ -24,7 +24,7 @@ from executive.sim.arrangements import UNKNOWN
 from executive.sim.camera import CELL_LIGHT
 from executive.sim.cell import SimCell
 from executive.sim.models import load_mesh
-from executive.sim.scene_file import DECLARED, SceneConfig, load_scene
+from executive.sim.scene_file import DECLARED_SCENE, SceneConfig, load_scene
 from executive.sim.scene_world import lamp, true_cell
 from executive.sim.scenes import SceneRenderer
 from executive.sim.spawn import first_world
@@ -89,11 +89,11 @@ def placed(world: World) -> list[tuple[str, list[float]]]:
 
 def test_a_scene_without_changes_is_the_declared_world(world: Build, overhead: CellConfig) -> None:
     assert true_cell(overhead, scene()) == overhead
-    assert lamp(DECLARED.light) == CELL_LIGHT
+    assert lamp(DECLARED_SCENE.light) == CELL_LIGHT
     declared = first_world(overhead, SEED)
     assert placed(world()) == placed(declared)
     declared.close()
-    assert load_scene(None, overhead) == DECLARED
+    assert load_scene(None, overhead) == DECLARED_SCENE
 
 
 def test_the_lamp_changes_brightness_colour_and_shadows(cell: Callable[..., SimCell]) -> None:
@@ -256,7 +256,7 @@ def test_evaluated_frames_are_of_the_scene_and_say_what_the_cell_declares(overhe
         camera={"shift": [0.02, 0.0, 0.0]}, unknown={"count": [1, 1]}, objects={"any": {"colours": [BLACK]}}
     )
     usual, other = (
-        SceneRenderer(overhead, "overhead", randomized=False, scene=each) for each in (DECLARED, changed)
+        SceneRenderer(overhead, "overhead", randomized=False, scene=s) for s in (DECLARED_SCENE, changed)
     )
     one, sample = usual.sample(1), other.sample(1)
     assert (sample.X_WC.rounded(), UNKNOWN in sample.labels) == (one.X_WC.rounded(), False)

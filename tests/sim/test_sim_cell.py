@@ -54,7 +54,7 @@ def look(made: SimCell) -> None:
     found = answer.found
     positions = [cell.localizer.locate(detection, frame) for detection in found]
     detections = Detections(
-        frame, found, answer.detector, answer.reliability, "full", cell.camera.area("full")
+        frame, found, answer.detector, answer.error_rates, "full", cell.camera.area("full")
     )
     cell.ledger.observe(detections, positions)
 

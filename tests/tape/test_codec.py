@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from executive.error_rates import ErrorRates
 from executive.geometry import Pose, about_z
 from executive.messages import Answer, Detection, Frame
-from executive.reliability import Reliability
 from executive.tape.codec import ANSWER, ARRAY, BOX, FRAME, MOTION, POSE, Codec, PlayedMotion
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
@@ -56,7 +56,7 @@ def test_a_frame_comes_back_without_its_image(visible: np.ndarray, epoch: int) -
     finite,
 )
 def test_an_answer_comes_back(found: list[tuple], misses: float) -> None:
-    answer = Answer("eye", tuple(Detection(*one) for one in found), Reliability(0.5, misses, 0.1, 0.2, 0.7))
+    answer = Answer("eye", tuple(Detection(*one) for one in found), ErrorRates(0.5, misses, 0.1, 0.2, 0.7))
     assert back(ANSWER, answer) == answer
 
 

@@ -37,7 +37,7 @@ def answers(seed=1, view="table", **errors):
 
 def test_without_errors_it_says_what_the_other_says_in_its_own_name_with_its_own_figures():
     answer = answers()[0]
-    assert (answer.detector, answer.reliability.misses) == ("noisy", 1e-9)
+    assert (answer.detector, answer.error_rates.misses) == ("noisy", 1e-9)
     assert [one.label for one in answer.found] == list(CLASSES)
 
 

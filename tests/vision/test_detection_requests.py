@@ -8,13 +8,13 @@ from types import SimpleNamespace
 
 import pytest
 
+from executive.error_rates import ErrorRates
 from executive.errors import DeadlinePassed, Unavailable
 from executive.messages import Answer, Detection
-from executive.reliability import Reliability
 from executive.vision.detectors.requests import Pending
 
 FOUND = [Detection("cube", 0.9, (0.0, 0.0, 1.0, 1.0))]
-RELIABILITY = Reliability(threshold=0.5, misses=0.1, confused=0.1, invented=0.1, jitter=1.0)
+ERROR_RATES = ErrorRates(threshold=0.5, misses=0.1, confused=0.1, invented=0.1, jitter=1.0)
 
 
 @pytest.fixture
@@ -29,7 +29,7 @@ def ended(clock):
     def ended(result, **options):
         work = Future()
         (work.set_exception if isinstance(result, Exception) else work.set_result)(result)
-        return Pending(work, 0.05, clock, "eye", RELIABILITY, **options)
+        return Pending(work, 0.05, clock, "eye", ERROR_RATES, **options)
 
     return ended
 
@@ -41,14 +41,14 @@ def test_an_answer_that_is_in_early_shows_only_when_it_is_due(ended, clock):
         request.result()
     clock.now = 0.05 - 1e-12
     assert request.ready
-    assert request.result() == Answer("eye", tuple(FOUND), RELIABILITY)
+    assert request.result() == Answer("eye", tuple(FOUND), ERROR_RATES)
 
 
 def test_the_clock_waits_for_an_answer_that_is_late(clock):
     release = threading.Event()
     clock.now = 0.05
     with ThreadPoolExecutor(1) as thread:
-        request = Pending(thread.submit(release.wait), 0.05, clock, "eye", RELIABILITY)
+        request = Pending(thread.submit(release.wait), 0.05, clock, "eye", ERROR_RATES)
         threading.Timer(0.08, release.set).start()
         assert request.ready
         assert release.is_set()

@@ -101,7 +101,7 @@ def test_an_answer_shows_after_the_latency_with_its_detector_and_the_cells_names
     clock.now = 1.05
     answer = request.result()
     detector.close()
-    assert (answer.detector, answer.reliability) == ("eye", config.reliability)
+    assert (answer.detector, answer.error_rates) == ("eye", config.error_rates)
     assert [found.label for found in answer.found] == ["cube"]
 
 

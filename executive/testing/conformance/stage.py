@@ -70,7 +70,7 @@ def look(fake: FakeCell) -> tuple[Detections, list[Target]]:
     while not request.ready:
         fake.advance()
     answer = request.result()
-    detections = Detections(frame, answer.found, answer.detector, answer.reliability, view, camera.area(view))
+    detections = Detections(frame, answer.found, answer.detector, answer.error_rates, view, camera.area(view))
     positions = [fake.cell.localizer.locate(detection, frame) for detection in answer.found]
     return detections, list(fake.ledger.observe(detections, positions))
 

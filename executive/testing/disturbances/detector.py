@@ -33,7 +33,7 @@ def refuse(answer: Answer) -> Answer:
 
 def doubt(answer: Answer) -> Answer:
     """Return an answer whose confidences are below the threshold."""
-    most = DOUBT * answer.reliability.threshold
+    most = DOUBT * answer.error_rates.threshold
     found = tuple(replace(one, confidence=min(one.confidence, most)) for one in answer.found)
     return replace(answer, found=found)
 

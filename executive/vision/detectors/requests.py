@@ -7,9 +7,9 @@ from concurrent.futures import Future, TimeoutError
 from dataclasses import dataclass
 
 from executive.cell import Clock
+from executive.error_rates import ErrorRates
 from executive.errors import DeadlinePassed
 from executive.messages import Answer, Detection
-from executive.reliability import Reliability
 
 SLICE = 0.05
 """Longest time the caller is held at once while an answer is overdue [s]; a second Ctrl-C ends it."""
@@ -26,7 +26,7 @@ class Pending:
         due: Time on the run's clock from which the answer is visible [s].
         clock: The run's clock.
         detector: Name of the detector.
-        reliability: How it errs.
+        error_rates: Error rates of that detector.
         given_up: Time on the run's clock at which it shows that a deadline has passed [s].
     """
 
@@ -34,7 +34,7 @@ class Pending:
     due: float
     clock: Clock
     detector: str
-    reliability: Reliability
+    error_rates: ErrorRates
     given_up: float = -math.inf
 
     @property
@@ -66,4 +66,4 @@ class Pending:
                 f"the detection is due at {self.due:.3f} s and it is {self.clock.now:.3f} s; "
                 "wait until `ready` is true"
             )
-        return Answer(self.detector, tuple(self.work.result()), self.reliability)
+        return Answer(self.detector, tuple(self.work.result()), self.error_rates)

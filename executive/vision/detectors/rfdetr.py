@@ -126,7 +126,7 @@ class RfdetrDetector:
         work = self._thread.submit(lambda: search_parts(frame.image, parts, self._find, self._class_map))
         clock = self._setting.clock
         due = clock.now + self._config.latency
-        return Pending(work, due, clock, self._setting.name, self._config.reliability)
+        return Pending(work, due, clock, self._setting.name, self._config.error_rates)
 
     def close(self) -> None:
         """End the thread after the search under way; those not begun are dropped."""

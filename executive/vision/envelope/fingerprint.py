@@ -18,15 +18,14 @@ Fingerprint = Mapping[str, str]
 def take_fingerprint(config: CellConfig, detector: str, base: Path) -> Fingerprint:
     """Return the fingerprint of a detector in its cell.
 
-    It contains the weights and settings of the detector, the classes and their sizes, and the pose,
-    intrinsics, image size and depth settings of the camera. Bins, the number of objects, light and colours
-    are not part of it.
+    It contains the weights and settings of the detector, the localization method, the classes and their
+    sizes, and the pose, intrinsics, image size, `table_view` and depth settings of the camera. Bins, the
+    number of objects, light and colours are not part of it.
 
     Args:
         config: The cell.
         detector: Name of one of its detectors.
         base: Folder to which paths in the cell file are relative.
-
     """
     section = config.detectors[detector]
     options = {key: value for key, value in section.options.items() if key != "threads"}

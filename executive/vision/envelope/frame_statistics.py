@@ -15,9 +15,9 @@ from executive.vision.visibility import outline
 MIN_PIXELS = 400
 """Smallest number of visible pixels of the workspace from which statistics are computed."""
 TOLERANCE = 6.0
-"""Distance beyond the measured range that is accepted [grey level]."""
+"""Accepted distance from the measured range [grey level]."""
 RELATIVE_TOLERANCE = 0.08
-"""The same deviation as a share of the limit of the range; the larger of the two tolerances applies."""
+"""Accepted distance as a share of the limit of the range; the larger of the two tolerances applies."""
 
 
 @dataclass(frozen=True)

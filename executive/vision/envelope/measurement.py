@@ -10,18 +10,18 @@ from typing import Literal
 from pydantic import Field, ValidationError
 
 from executive.cell_config import Section
+from executive.error_rates import ErrorRates
 from executive.errors import InputError
-from executive.reliability import Reliability
 from executive.vision.envelope.frame_statistics import FrameRange
 
 SUFFIX = ".measured.json"
 """Suffix of a measurement file; the name of the cell comes before it."""
 MAX_FILE_SIZE = 1_000_000
-"""Largest size of such a file [byte]."""
+"""Largest measurement file [byte]."""
 
 
 class Rates(Section):
-    """Error rates of a detector; see `executive.reliability.Reliability`."""
+    """Error rates of a detector; see `executive.error_rates.ErrorRates`."""
 
     misses: float = Field(gt=0, lt=1)
     confused: float = Field(gt=0, lt=1)
@@ -30,9 +30,9 @@ class Rates(Section):
     repeated: float = Field(ge=0, lt=1)
     bias: float = Field(ge=0)
 
-    def reliability(self, threshold: float) -> Reliability:
+    def build_error_rates(self, threshold: float) -> ErrorRates:
         """Return these rates together with the confidence from which detections count."""
-        return Reliability(threshold, **self.model_dump())
+        return ErrorRates(threshold, **self.model_dump())
 
 
 class ErrorCounts(Section):
@@ -57,7 +57,8 @@ class Measurement(Section):
     """Duration of the measurement [s]."""
     images: int
     rates: Rates
-    """Upper 95 % bounds of the error rates, and standard deviations of the position errors."""
+    """Upper 95 % bounds `misses`, `confused` and `invented`; Laplace estimate `repeated`; standard deviations
+    `jitter` and `bias`."""
     classes: dict[str, ErrorCounts]
     """Errors by class; a false detection counts for the class that it was given."""
     counts: dict[str, ErrorCounts]

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from executive.cell import Clock, Request
 from executive.cell_config import CellConfig
+from executive.error_rates import ErrorRates, assume_rates
 from executive.errors import InputError
 from executive.messages import Answer, Frame
-from executive.reliability import Reliability, assume_rates
 from executive.vision.detectors.registry import build_detectors, installed
 from executive.vision.detectors.setting import ClosableDetector
 from executive.vision.envelope.fingerprint import describe_change, take_fingerprint
@@ -28,12 +28,12 @@ class DetectorEnvelope:
     """Error rates of one detector and the conditions for them.
 
     Attributes:
-        reliability: Error rates: measured, or assumed if `reliability.doubt` is not "".
-        frames: Ranges of the measured frames, None if nothing was measured.
+        error_rates: Measured error rates, or assumed ones if `error_rates.doubt` is not "".
+        frame_range: Measured ranges of the frame statistics; None if unknown or if no measurement applies.
     """
 
-    reliability: Reliability
-    frames: FrameRange | None = None
+    error_rates: ErrorRates
+    frame_range: FrameRange | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,15 +54,15 @@ class RatedDetector:
 
     def request(self, frame: Frame, view: str) -> RatedRequest:
         """Start to search `frame`; rates are assumed if the frame lies outside the measured ranges."""
-        reliability, frames = self.envelope.reliability, self.envelope.frames
-        statistics = measure_frame(frame, self.config.table) if frames else None
-        if frames and statistics and (difference := frames.describe_difference(statistics)):
+        error_rates, frame_range = self.envelope.error_rates, self.envelope.frame_range
+        statistics = measure_frame(frame, self.config.table) if frame_range else None
+        if frame_range and statistics and (difference := frame_range.describe_difference(statistics)):
             doubt = (
                 f"the workspace looks different from all images that detector {self.name} was measured on: "
                 f"{difference}; {remedy(self.config)}"
             )
-            reliability = assume_rates(reliability.threshold, doubt)
-        return RatedRequest(self.detector.request(frame, view), reliability)
+            error_rates = assume_rates(error_rates.threshold, doubt)
+        return RatedRequest(self.detector.request(frame, view), error_rates)
 
     def close(self) -> None:
         """Close the detector."""
@@ -74,7 +74,7 @@ class RatedRequest:
     """Request whose answer carries the given error rates; implements `executive.cell.Request`."""
 
     request: Request
-    reliability: Reliability
+    error_rates: ErrorRates
 
     @property
     def ready(self) -> bool:
@@ -87,7 +87,7 @@ class RatedRequest:
         Raises:
             Unavailable: The detector gave no usable answer.
         """
-        return replace(self.request.result(), reliability=self.reliability)
+        return replace(self.request.result(), error_rates=self.error_rates)
 
 
 def build_rated_detectors(
@@ -99,7 +99,7 @@ def build_rated_detectors(
         config: The cell.
         clock: Clock of the run.
         base: Folder to which paths in the cell file are relative.
-        seed: Seed of everything random in the detectors.
+        seed: Random seed of the detectors.
         folders: Folders with files `CELL.measured.json`.
 
     Raises:
@@ -117,7 +117,7 @@ def build_rated_detectors(
 def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> dict[str, DetectorEnvelope]:
     """Return the envelope of each measurable detector of a cell, by name.
 
-    A measurement applies if its fingerprint is that of the detector, whichever cell it was made in.
+    A measurement applies if its fingerprint equals that of the detector, even if made in another cell.
 
     Args:
         config: The cell.
@@ -132,7 +132,7 @@ def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> d
         current = take_fingerprint(config, name, base)
         match = next((one for _, one in stored if one.fingerprint == current), None)
         if match is not None:
-            envelopes[name] = DetectorEnvelope(match.rates.reliability(threshold), match.frames)
+            envelopes[name] = DetectorEnvelope(match.rates.build_error_rates(threshold), match.frames)
             continue
         older = next((one for cell, one in stored if (cell, one.detector) == (config.cell, name)), None)
         change = describe_change(older.fingerprint, current) if older else ""
@@ -152,8 +152,8 @@ def find_unmeasured(
 ) -> Iterator[tuple[tuple[str, str], str]]:
     """Yield each detector without a valid measurement: its keys in the cell file, and the reason."""
     for name, envelope in find_envelopes(config, base, folders).items():
-        if envelope.reliability.doubt:
-            yield ("detectors", name), envelope.reliability.doubt
+        if envelope.error_rates.doubt:
+            yield ("detectors", name), envelope.error_rates.doubt
 
 
 def measurable_detectors(config: CellConfig) -> Iterator[str]:

@@ -57,7 +57,7 @@ def evaluate(
         latencies.append(latency)
         found = [one for one in answer.found if not is_ignored(one, sample)]
         precision.add(found, sample)
-        least = answer.reliability.threshold if threshold is None else threshold
+        least = answer.error_rates.threshold if threshold is None else threshold
         matches = match([one for one in found if one.confidence >= least], sample)
         tally.add(matches, sample, frame)
         if sample.second is not None:
@@ -90,6 +90,6 @@ def evaluate(
         why=why,
         answered_by=dict(answered),
         by_count={count: dict(errors) for count, errors in tally.by_count.items()},
-        reliability=tally.reliability(repeats),
+        reliability=tally.estimate_error_rates(repeats),
         frames=FrameRange.of(frames),
     )

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from executive.vision.envelope.frame_statistics import FrameRange
-from executive.vision.evaluation.reliability import MeasuredReliability
+from executive.vision.evaluation.error_rates import MeasuredErrorRates
 
 NOTHING = "nothing"
 """What stands for the class of no object in a table of confusions."""
@@ -96,7 +96,7 @@ class Evaluation:
     why: str = ""
     answered_by: Mapping[str, int] = field(default_factory=dict)
     by_count: Mapping[int, Mapping[str, int]] = field(default_factory=dict)
-    reliability: MeasuredReliability | None = None
+    reliability: MeasuredErrorRates | None = None
     frames: FrameRange | None = None
 
     def as_dict(self) -> dict[str, Any]:

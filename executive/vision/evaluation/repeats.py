@@ -64,7 +64,7 @@ class RepeatedErrors:
             self.repeated += bool(overlap([false.box], alike).max(initial=0.0) >= MIN_OVERLAP)
 
     @property
-    def share(self) -> float:
+    def repeated_share(self) -> float:
         """Share of the errors that a second look repeats, estimated by Laplace's rule of succession."""
         return (self.repeated + 1) / (self.errors + 2)
 

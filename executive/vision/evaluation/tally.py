@@ -12,9 +12,9 @@ from executive.cell import Localizer
 from executive.errors import NoDepth
 from executive.messages import Frame
 from executive.vision.camera_model import on_plane
+from executive.vision.evaluation.error_rates import MeasuredErrorRates
 from executive.vision.evaluation.figures import NOTHING, ClassFigures
 from executive.vision.evaluation.matching import Match, is_covered, offset_of
-from executive.vision.evaluation.reliability import MeasuredReliability
 from executive.vision.evaluation.repeats import RepeatedErrors
 from executive.vision.evaluation.truth import in_full_view, is_whole, pixel_size
 from executive.vision.samples import LabelledImage
@@ -98,19 +98,19 @@ class Tally:
         )
         return {true: {found: self.confusion[true, found] for found in columns} for true in rows}
 
-    def reliability(self, repeats: RepeatedErrors) -> MeasuredReliability | None:
+    def estimate_error_rates(self, repeats: RepeatedErrors) -> MeasuredErrorRates | None:
         """Return the error rates on objects in full view, None where nothing was answered."""
         if not self._looks:
             return None
         total = float(np.sqrt(np.mean(self._squares))) if self._squares else 0.0
-        return MeasuredReliability.of(
-            whole=self._whole,
-            overlooked=self._overlooked,
+        return MeasuredErrorRates.of(
+            in_full_view=self._whole,
+            missed=self._overlooked,
             confused=self._confused,
             invented=sum(count for (true, _), count in self.confusion.items() if true == NOTHING),
             looks=self._looks,
             jitter=total if repeats.jitter is None else repeats.jitter,
-            repeated=repeats.share,
+            repeated=repeats.repeated_share,
             bias=repeats.bias,
         )
 

@@ -153,7 +153,7 @@ def test_an_unsure_detector_sees_everything_and_believes_nothing() -> None:
     answered(cell, request)
     answer = request.result()
     assert [one.label for one in answer.found] == list(PLACES)
-    threshold = answer.reliability.threshold
+    threshold = answer.error_rates.threshold
     assert [one.confidence for one in answer.found] == pytest.approx([0.9 * threshold] * 3)
 
 

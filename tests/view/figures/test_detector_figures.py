@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from executive.view.figures.detector import print_figures
+from executive.vision.evaluation.error_rates import MeasuredErrorRates
 from executive.vision.evaluation.figures import ClassFigures, Evaluation, Spread
-from executive.vision.evaluation.reliability import MeasuredReliability
 
 MEASURED = Evaluation(
     threshold=0.5, images=300, objects=900, precision=0.991, recall=0.98, map50=0.995, map50_95=0.8,
@@ -16,8 +16,8 @@ MEASURED = Evaluation(
     by_class={"cube": ClassFigures(900, 0.991, 0.98)},
     confusion={"cube": {"cube": 882, "nothing": 18}, "nothing": {"cube": 8, "nothing": 0}},
     answered_by={"eye": 300},
-    reliability=MeasuredReliability.of(
-        whole=800, overlooked=2, confused=0, invented=8, looks=300, jitter=0.5, repeated=0.8, bias=0.001
+    reliability=MeasuredErrorRates.of(
+        in_full_view=800, missed=2, confused=0, invented=8, looks=300, jitter=0.5, repeated=0.8, bias=0.001
     ),
 )  # fmt: skip
 

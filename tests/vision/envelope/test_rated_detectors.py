@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from plain_frames import frame_of
 
+from executive.error_rates import ErrorRates, assume_rates
 from executive.mission.parse.cell_file import load_cell
-from executive.reliability import Reliability, assume_rates
 from executive.vision.detectors.requests import Pending
 from executive.vision.envelope.fingerprint import describe_change, take_fingerprint
 from executive.vision.envelope.frame_statistics import FrameRange
@@ -48,7 +48,7 @@ def test_a_measurement_holds_for_other_bins_and_another_number_of_objects(overhe
     bins = {"red_bin": overhead.bins["red_bin"]}
     other = overhead.model_copy(update={"table": table, "bins": bins, "cell": "other"})
     envelope = find_envelopes(other, stored, [stored])["embedded"]
-    assert envelope == DetectorEnvelope(RATES.reliability(0.5), WOOD)
+    assert envelope == DetectorEnvelope(RATES.build_error_rates(0.5), WOOD)
     assert list(find_unmeasured(other, stored, [stored])) == []
 
 
@@ -65,10 +65,10 @@ def test_a_measurement_of_another_camera_pose_does_not_hold_and_the_change_is_na
 
 def test_a_damaged_file_is_named_and_the_rates_are_assumed(overhead, tmp_path):
     (tmp_path / "overhead.measured.json").write_text("{")
-    reliability = find_envelopes(overhead, tmp_path, [tmp_path])["embedded"].reliability
-    assert (reliability.misses, reliability.repeated) == (0.15, 0.8)
-    assert "was never measured in this cell" in reliability.doubt
-    assert f"the measurements in {tmp_path}/overhead.measured.json cannot be read" in reliability.doubt
+    error_rates = find_envelopes(overhead, tmp_path, [tmp_path])["embedded"].error_rates
+    assert (error_rates.misses, error_rates.repeated) == (0.15, 0.8)
+    assert "was never measured in this cell" in error_rates.doubt
+    assert f"the measurements in {tmp_path}/overhead.measured.json cannot be read" in error_rates.doubt
 
 
 def test_fake_cells_and_fake_detectors_are_not_measured(overhead, missions, tmp_path):
@@ -90,7 +90,7 @@ class Silent:
 
         work: Future = Future()
         work.set_result([])
-        return Pending(work, 0.0, Now(), "embedded", Reliability(0.5, 0.9, 0.9, 0.9, 9.0))
+        return Pending(work, 0.0, Now(), "embedded", ErrorRates(0.5, 0.9, 0.9, 0.9, 9.0))
 
     def close(self):
         """Close nothing."""
@@ -98,11 +98,11 @@ class Silent:
 
 @pytest.mark.parametrize(("colour", "doubted"), [((220, 200, 160), False), ((60, 60, 60), True)])
 def test_rates_are_assumed_for_frames_outside_the_measured_ranges(overhead, colour, doubted):
-    envelope = DetectorEnvelope(RATES.reliability(0.5), WOOD)
+    envelope = DetectorEnvelope(RATES.build_error_rates(0.5), WOOD)
     detector = RatedDetector(Silent(), envelope, overhead, "embedded")
-    answered = detector.request(frame_of(colour), "table").result().reliability
+    answered = detector.request(frame_of(colour), "table").result().error_rates
     doubt = answered.doubt
-    assert answered == (assume_rates(0.5, doubt) if doubted else RATES.reliability(0.5))
+    assert answered == (assume_rates(0.5, doubt) if doubted else RATES.build_error_rates(0.5))
     start = "the workspace looks different from all images that detector embedded was measured on: "
     assert doubt.startswith(f"{start}brightness 60, measured 180 to 195; red 60") == doubted
     assert doubt.endswith("; measure it with `executive evaluate --cell overhead` (about 2 min)") == doubted

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from executive.error_rates import ErrorRates
 from executive.errors import Unavailable
 from executive.messages import Answer, Detection
-from executive.reliability import Reliability
 from executive.vision.samples import LabelledImage
 
 CUBE, DUCK, HALF_HIDDEN = (10.0, 10.0, 40.0, 40.0), (100.0, 100.0, 140.0, 130.0), (200.0, 20.0, 230.0, 50.0)
 
 
-RELIABILITY = Reliability(threshold=0.5, misses=0.1, confused=0.1, invented=0.1, jitter=1.0)
+ERROR_RATES = ErrorRates(threshold=0.5, misses=0.1, confused=0.1, invented=0.1, jitter=1.0)
 
 
 class Scripted:
@@ -33,7 +33,7 @@ class Scripted:
         if isinstance(answer, str):
             raise Unavailable(answer)
         found = tuple(Detection(label, confidence, box) for label, confidence, box in answer)
-        return Answer("scripted", found, RELIABILITY), 10.0 * len(self.frames)
+        return Answer("scripted", found, ERROR_RATES), 10.0 * len(self.frames)
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from executive.vision.evaluation.truth import as_frame
 
 CONFIGS = {"eye": DetectorConfig(kind="embedded", threshold=0.6)}
 FOUND = tuple(Detection(label, 0.9, (1.0, 2.0, 3.0, 4.0)) for label in ("cube", "boat"))
-ANSWER = Answer("eye", FOUND, CONFIGS["eye"].reliability)
+ANSWER = Answer("eye", FOUND, CONFIGS["eye"].error_rates)
 
 
 class Delayed:

@@ -9,10 +9,10 @@ import pytest
 
 from executive.errors import NoDepth
 from executive.vision.envelope.measurement import Rates
+from executive.vision.evaluation.error_rates import MeasuredErrorRates, round_up
 from executive.vision.evaluation.evaluate import evaluate
 from executive.vision.evaluation.figures import ClassFigures, Spread
 from executive.vision.evaluation.misses import WorstMisses
-from executive.vision.evaluation.reliability import MeasuredReliability, round_up
 
 
 @pytest.fixture
@@ -142,10 +142,10 @@ def test_a_spread_names_its_quantiles():
     assert Spread.of(list(range(101))) == Spread(median=50, p95=95, p99=99, worst=100)
 
 
-def rates(whole, overlooked, confused, invented, looks, jitter):
-    return MeasuredReliability.of(
-        whole=whole, overlooked=overlooked, confused=confused, invented=invented, looks=looks, jitter=jitter,
-        repeated=0.751, bias=0.00112,
+def rates(in_full_view, missed, confused, invented, looks, jitter):
+    return MeasuredErrorRates.of(
+        in_full_view=in_full_view, missed=missed, confused=confused, invented=invented, looks=looks,
+        jitter=jitter, repeated=0.751, bias=0.00112,
     )  # fmt: skip
 
 
@@ -155,23 +155,23 @@ def test_the_rates_for_the_ledger_are_upper_bounds_rounded_up():
     )
 
 
-@pytest.mark.parametrize("whole", [0, 5])
-def test_no_rate_is_zero_or_one_even_if_nothing_was_counted(whole):
-    extreme = rates(whole, whole, 0, 0, 1, 0.0).rates
+@pytest.mark.parametrize("in_full_view", [0, 5])
+def test_no_rate_is_zero_or_one_even_if_nothing_was_counted(in_full_view):
+    extreme = rates(in_full_view, in_full_view, 0, 0, 1, 0.0).rates
     assert (extreme.misses, extreme.confused, extreme.invented, extreme.jitter) == (0.99, 0.99, 3.0, 0.01)
 
 
 @pytest.mark.parametrize(
-    ("whole", "overlooked", "invented", "expected"),
+    ("in_full_view", "missed", "invented", "expected"),
     [
         (1344, 0, 0, (1 - 0.05 ** (1 / 1344), 0.029957)),
         (13, 2, 10, (0.410099, 0.169622)),
         (5, 5, 400, (1.0, 4.344968)),
     ],
 )
-def test_the_bounds_are_those_of_the_tables(whole, overlooked, invented, expected):
+def test_the_bounds_are_those_of_the_tables(in_full_view, missed, invented, expected):
     """Clopper and Pearson's, and Garwood's: half the 95 % quantile of chi-squared with 2 k + 2 degrees."""
-    found = rates(whole, overlooked, 0, invented, 100, 0.1)
+    found = rates(in_full_view, missed, 0, invented, 100, 0.1)
     assert (found.misses.bound, found.invented.bound) == pytest.approx(expected, rel=1e-4)
 
 

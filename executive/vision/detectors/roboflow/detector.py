@@ -81,7 +81,7 @@ class RoboflowDetector:
         work = self._thread.submit(lambda: self._search(frame.image, parts))
         clock = self._setting.clock
         due, given_up = clock.now + self._config.latency, clock.now + self._options.deadline
-        return Pending(work, due, clock, self._setting.name, self._config.reliability, given_up)
+        return Pending(work, due, clock, self._setting.name, self._config.error_rates, given_up)
 
     def close(self) -> None:
         """End the helper process and the thread, whatever they are waiting for."""

@@ -1,4 +1,4 @@
-"""Error rates of a detector, by which the ledger weighs its looks."""
+"""Error rates of a detector, from which the ledger weights looks."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Reliability:
+class ErrorRates:
     """Error rates of a detector in its cell, measured by `executive evaluate` or assumed.
 
     Attributes:
         threshold: Confidence from which a detection counts.
-        misses: Share of the objects in full view that one look overlooks.
-        confused: Share of the found objects that are given a wrong class.
+        misses: Share of the objects in full view that one look misses.
+        confused: Share of the found objects that get a wrong class.
         invented: Number of false detections per look.
         jitter: Standard deviation of the random error of a box's centre, along each axis [pixel].
-        repeated: Share of its errors that a second look from the same pose repeats.
+        repeated: Share of the errors that a second look from the same pose repeats.
         bias: Standard deviation of the systematic error of a position, along each axis [m].
         doubt: Reason why the rates are assumed and not measured, or "".
     """
@@ -30,12 +30,12 @@ class Reliability:
     doubt: str = ""
 
 
-def assume_rates(threshold: float, doubt: str) -> Reliability:
+def assume_rates(threshold: float, doubt: str) -> ErrorRates:
     """Return conservative error rates for a detector that was not measured under the present conditions.
 
     On 26 kinds of unusual scenes, the first embedded detector missed 4 % and confused 5 % of the objects on
     average, and repeated most errors in every look. The rates below are at least as high.
     """
-    return Reliability(
+    return ErrorRates(
         threshold, misses=0.15, confused=0.05, invented=0.2, jitter=2.0, repeated=0.8, bias=0.002, doubt=doubt
     )

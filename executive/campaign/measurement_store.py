@@ -1,11 +1,11 @@
-"""Storing the measurement of a detector where runs find it."""
+"""Storage of measurements in the files from which runs take error rates."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
 
-from executive.campaign.detector_trial import Subject
+from executive.campaign.detector_trial import DetectorUnderTest
 from executive.errors import InputError
 from executive.record.whole_file import reason_of, write_whole
 from executive.vision.envelope.fingerprint import take_fingerprint
@@ -20,15 +20,15 @@ from executive.vision.evaluation.figures import NOTHING, Evaluation
 
 
 def store_evaluation(
-    subject: Subject, evaluation: Evaluation, out: Path | None, *, command: str, seconds: float
+    detector: DetectorUnderTest, evaluation: Evaluation, out: Path | None, *, command: str, seconds: float
 ) -> Path:
     """Write the errors of a detector in its cell into a file and return the path of the file.
 
     Measurements of other detectors in the file are kept.
 
     Args:
-        subject: The detector and its cell.
-        evaluation: Its errors.
+        detector: The detector and its cell.
+        evaluation: Errors of the detector.
         out: The file; None: `CELL.measured.json` beside the cell file.
         command: Command line that repeats the evaluation.
         seconds: Duration of the evaluation [s].
@@ -36,9 +36,9 @@ def store_evaluation(
     Raises:
         InputError: The detector gave no answer for any image, or the file cannot be read or written.
     """
-    assert subject.cell is not None
-    path = out or subject.base / f"{subject.cell.cell}{SUFFIX}"
-    measurement = _as_measurement(subject, evaluation, command, seconds)
+    assert detector.cell is not None
+    path = out or detector.base / f"{detector.cell.cell}{SUFFIX}"
+    measurement = _as_measurement(detector, evaluation, command, seconds)
     try:
         write_whole(path, text_with_measurement(read_measurements(path), measurement))
     except OSError as error:
@@ -49,17 +49,19 @@ def store_evaluation(
     return path
 
 
-def _as_measurement(subject: Subject, evaluation: Evaluation, command: str, seconds: float) -> Measurement:
-    """Return an evaluation of a detector in its cell in the form in which it is stored."""
-    assert subject.cell is not None
+def _as_measurement(
+    detector: DetectorUnderTest, evaluation: Evaluation, command: str, seconds: float
+) -> Measurement:
+    """Convert the evaluation of a detector in its cell to a measurement."""
+    assert detector.cell is not None
     if evaluation.reliability is None:
         raise InputError(
-            f"detector {subject.name} gave no answer for any image: {evaluation.why}; nothing was measured"
+            f"detector {detector.name} gave no answer for any image: {evaluation.why}; nothing was measured"
         )
     table = evaluation.confusion
     return Measurement(
-        detector=subject.name,
-        fingerprint=dict(take_fingerprint(subject.cell, subject.name, subject.base)),
+        detector=detector.name,
+        fingerprint=dict(take_fingerprint(detector.cell, detector.name, detector.base)),
         command=command,
         seconds=round(seconds, 1),
         images=evaluation.images,
@@ -74,9 +76,7 @@ def _as_measurement(subject: Subject, evaluation: Evaluation, command: str, seco
             for label, row in table.items()
             if label != NOTHING
         },
-        counts={
-            str(count): _as_error_counts(errors) for count, errors in sorted(evaluation.by_count.items())
-        },
+        counts={str(n): _as_error_counts(errors) for n, errors in sorted(evaluation.by_count.items())},
         frames=evaluation.frames,
     )
 

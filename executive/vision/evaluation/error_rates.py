@@ -1,7 +1,7 @@
 """Error rates of a detector with their bounds.
 
-The bounds are exact and one-sided: a worse rate would show so few events in at most one of twenty
-measurements (Clopper and Pearson, Biometrika 26 (1934), 404-413; Garwood, Biometrika 28 (1936), 437-442).
+The bounds are exact one-sided 95 % confidence limits (Clopper and Pearson, Biometrika 26 (1934), 404-413;
+Garwood, Biometrika 28 (1936), 437-442).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from scipy.special import betaincinv, gammaincinv
 from executive.vision.envelope.measurement import Rates
 
 CONFIDENCE = 0.95
-"""Probability with which the true rate lies below its bound."""
+"""Confidence level of the bounds."""
 MAX_SHARE = 0.99
 """Largest share that is stored: a share of 1 would make every look worthless."""
 MIN_JITTER = 0.01
@@ -22,12 +22,12 @@ MIN_JITTER = 0.01
 
 
 @dataclass(frozen=True)
-class Count:
+class CountedRate:
     """A rate that was measured by counting.
 
     Attributes:
-        events: How often it happened.
-        trials: Of how many.
+        events: Number of events.
+        trials: Number of trials.
         bound: Upper 95 % bound of the rate.
     """
 
@@ -37,21 +37,21 @@ class Count:
 
 
 @dataclass(frozen=True)
-class MeasuredReliability:
-    """How a detector errs on objects in full view, for `executive.messages.Reliability`.
+class MeasuredErrorRates:
+    """Measured error rates of a detector on objects in full view.
 
     Attributes:
-        misses: Objects that it overlooked, of those in full view.
-        confused: Objects that it gave a wrong class, of those it found.
-        invented: Objects that are not there, per look.
+        misses: Rate of missed objects in full view.
+        confused: Rate of wrong classes among the found objects in full view.
+        invented: Rate of false detections per look.
         jitter: Standard deviation of the random error of a box's centre, along each axis [pixel].
-        repeated: Share of the errors that a second look from the same pose repeats.
+        repeated: Laplace estimate of the share of the errors that a second look from the same pose repeats.
         bias: Standard deviation of the systematic error of a position, along each axis [m].
     """
 
-    misses: Count
-    confused: Count
-    invented: Count
+    misses: CountedRate
+    confused: CountedRate
+    invented: CountedRate
     jitter: float
     repeated: float
     bias: float
@@ -59,25 +59,25 @@ class MeasuredReliability:
     @staticmethod
     def of(
         *,
-        whole: int,
-        overlooked: int,
+        in_full_view: int,
+        missed: int,
         confused: int,
         invented: int,
         looks: int,
         jitter: float,
         repeated: float,
         bias: float,
-    ) -> MeasuredReliability:
-        """Return the figures; `whole` counts the objects in full view, `looks` the answers."""
-        return MeasuredReliability(
-            _count_share(overlooked, whole), _count_share(confused, whole - overlooked),
-            Count(invented, looks, float(gammaincinv(invented + 1, CONFIDENCE)) / looks), jitter,
+    ) -> MeasuredErrorRates:
+        """Return the error rates; `in_full_view` counts objects, `looks` counts answers."""
+        return MeasuredErrorRates(
+            _count_share(missed, in_full_view), _count_share(confused, in_full_view - missed),
+            CountedRate(invented, looks, float(gammaincinv(invented + 1, CONFIDENCE)) / looks), jitter,
             repeated, bias,
         )  # fmt: skip
 
     @property
     def rates(self) -> Rates:
-        """Rates for the ledger: upper bounds, rounded up."""
+        """Rates for the ledger, rounded up: the bounds, the repeated share and the standard deviations."""
         return Rates(
             misses=min(round_up(self.misses.bound), MAX_SHARE),
             confused=min(round_up(self.confused.bound), MAX_SHARE),
@@ -88,14 +88,14 @@ class MeasuredReliability:
         )
 
 
-def _count_share(events: int, trials: int) -> Count:
-    """Return a share with its bound, which is 1 where nothing contradicts the worst."""
+def _count_share(events: int, trials: int) -> CountedRate:
+    """Return a share with its upper bound, 1 if every trial is an event."""
     bound = float(betaincinv(events + 1, trials - events, CONFIDENCE)) if events < trials else 1.0
-    return Count(events, trials, bound)
+    return CountedRate(events, trials, bound)
 
 
 def round_up(value: float, digits: int = 2) -> float:
-    """Return `value` with so many significant digits, rounded up: a bound must not get smaller."""
+    """Return `value` rounded up to `digits` significant digits: a bound must not get smaller."""
     if value <= 0:
         return 0.0
     places = digits - 1 - math.floor(math.log10(value))
