@@ -12,7 +12,7 @@ from executive.cell import Routes
 from executive.cell_config import LedgerConfig
 from executive.geometry import Array
 from executive.ledger.item import Record, State
-from executive.ledger.looks import SURE
+from executive.ledger.looks import SURE, spread_of
 from executive.messages import BIN_THICKNESS, Bin, Detections, Item
 
 WALL = 0.035
@@ -49,13 +49,15 @@ class Bins:
         """Return how many objects were let go in `bin` so far, or must have fallen into it."""
         return sum(bin in (record.bin, self.believed(record)) for record in self._records.values())
 
-    def at(self, position: Array, spread: float) -> str | None:
-        """Return the bin that something measured with a standard deviation of `spread` [m] lies in, if any.
+    def at(self, position: Array, look: Detections) -> str | None:
+        """Return the bin that something lies in that a look showed at `position` `(3,)` [m], if any.
 
         What seems to lie just beside a bin is in it, if something was let go there.
         """
+        by = look.reliability
+        error = math.hypot(spread_of(look.frame, position, by.jitter), by.bias)
         for name, bin in self._bins.items():
-            if bin.contains(position, SURE * spread if self.objects_in(name) else 0.0):
+            if bin.contains(position, SURE * error if self.objects_in(name) else 0.0):
                 return name
         return None
 
