@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from executive.cli.options import (
+    COUNT,
     MISSION,
     json_option,
     overrides_option,
@@ -30,9 +31,7 @@ def fault_numbers(text: str) -> tuple[int, ...]:
 @click.command(name="faults")
 @MISSION
 @oracle_option
-@click.option(
-    "--pairs", type=click.IntRange(min=1), help="Instead, so many pairs of them, drawn by the seed."
-)
+@click.option("--pairs", type=COUNT, help="Instead, so many pairs of them, drawn by the seed.")
 @click.option(
     "--fault", "numbers", type=fault_numbers, metavar="N[+M]",
     help="One of them only, with a record of its run.",
