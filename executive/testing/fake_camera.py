@@ -15,17 +15,16 @@ from executive.geometry import Pose
 from executive.messages import Answer, Box, Detection, Frame
 from executive.reliability import Reliability
 from executive.testing.fake_world import FakeWorld
-from executive.vision.camera_model import calibrated
+from executive.vision.mounted_camera import MountedCamera
 
 CONFIDENCE = 0.9
 """What a fake detector says of what it sees, or its threshold where that is more."""
 
 
-class FakeCamera:
+class FakeCamera(MountedCamera):
     """A camera where the cell file says, whose images are blank.
 
     Attributes:
-        name: Its name in the cell file.
         sees: Tells whether the whole workspace is in view; the fake arm hides nothing.
         hides: Parts of the image [pixel] that a test wants hidden.
         displaced: Displacement in words that a test wants its frames to show.
@@ -41,34 +40,13 @@ class FakeCamera:
         flange: Callable[[], Pose],
         epoch: Callable[[], int],
     ) -> None:
-        self.name = name
+        super().__init__(name, config, flange)
         self.sees: Callable[[], bool] = self._whole_table
         self.hides: list[Box] = []
         self.displaced = ""
-        self._config = config
         self._corners = np.array([(x, y, 0.0) for x in table.x for y in table.y])
-        self._matrix, self._X_MC = calibrated(config)
         self._world = world
-        self._flange = flange
         self._epoch = epoch
-        self._count = 0
-        self._turn = 0
-
-    @property
-    def scan_poses(self) -> Sequence[str]:
-        """Names of the arm poses from which it sees the table."""
-        return self._config.scan_poses
-
-    def next_pose(self) -> str:
-        """Return the scan pose after the one this returned last."""
-        self._turn += 1
-        return self.scan_poses[self._turn % len(self.scan_poses)]
-
-    def area(self, view: str) -> Box:
-        """Return the part of the image [pixel] that `view` means."""
-        if view == "table":
-            return self._config.table_view
-        return 0, 0, self._config.width, self._config.height
 
     def sees_table(self) -> bool:
         """Tell what `sees` says."""
@@ -76,14 +54,14 @@ class FakeCamera:
 
     def capture(self) -> Frame:
         """Return a blank frame with a true pose."""
-        self._count += 1
-        size = self._config.height, self._config.width
+        self._frames += 1
+        size = self.config.height, self.config.width
         return Frame(
-            id=self._count,
+            id=self._frames,
             camera=self.name,
             image=np.zeros((*size, 3), dtype=np.uint8),
             depth=None,
-            matrix=self._matrix,
+            matrix=self.matrix,
             X_WC=self._pose(),
             stamp=self._world.now,
             visible=self._visible(size),
@@ -95,23 +73,16 @@ class FakeCamera:
         del frame
         return self.displaced
 
-    def skip(self, frames: int, turns: int) -> None:
-        """Go on as if so many frames had been taken and next poses been asked for."""
-        self._count, self._turn = frames, turns
-
     def _visible(self, size: tuple[int, int]) -> NDArray[np.bool_]:
         visible = np.ones(size, dtype=bool)
         for left, top, right, bottom in self.hides:
             visible[int(top) : int(bottom), int(left) : int(right)] = False
         return visible
 
-    def _pose(self) -> Pose:
-        return self._X_MC if self._config.mount == "fixed" else self._flange() @ self._X_MC
-
     def _whole_table(self) -> bool:
-        corners = self._pose().inverse().apply(self._corners) @ self._matrix.T
+        corners = self._pose().inverse().apply(self._corners) @ self.matrix.T
         pixels = corners[:, :2] / corners[:, 2:]
-        inside = (pixels >= 0) & (pixels < (self._config.width, self._config.height))
+        inside = (pixels >= 0) & (pixels < (self.config.width, self.config.height))
         return bool(np.all(corners[:, 2] > 0) and np.all(inside))
 
 
