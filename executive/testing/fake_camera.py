@@ -108,47 +108,52 @@ class FakeRequest:
         return Answer(self.detector, tuple(self.answer), self.reliability)
 
 
+def _truthful(look: int, true: Sequence[Detection]) -> Sequence[Detection]:
+    del look
+    return true
+
+
+@dataclass(eq=False)
 class FakeDetector:
     """A detector that sees every object before the lens, unless `answers` says otherwise for a look.
 
-    `answers` gets the number of the look (from 1) and the true detections, and returns detections, or a
-    sentence to be unavailable with.
+    Attributes:
+        name: Its name in the cell file.
+        config: Its section of the cell file.
+        world: What it sees.
+        clock: The run's clock.
+        area: Returns the part of the image [pixel] that a view means.
+        answers: Gets the number of the look (from 1) and the true detections, and returns detections, or a
+            sentence to be unavailable with.
+        looks: Looks so far.
     """
 
-    def __init__(
-        self,
-        name: str,
-        config: DetectorConfig,
-        world: FakeWorld,
-        clock: Clock,
-        area: Callable[[str], Box],
-    ) -> None:
-        self._name = name
-        self._config = config
-        self._world = world
-        self._clock = clock
-        self._area = area
-        self._looks = 0
-        self.answers: Callable[[int, Sequence[Detection]], Sequence[Detection] | str] = _truthful
+    name: str
+    config: DetectorConfig
+    world: FakeWorld
+    clock: Clock
+    area: Callable[[str], Box]
+    answers: Callable[[int, Sequence[Detection]], Sequence[Detection] | str] = _truthful
+    looks: int = 0
 
     def request(self, frame: Frame, view: str) -> Request:
         """Answer with what the searched part of the frame would show, as late as the cell file says."""
-        self._looks += 1
-        left, top, right, bottom = self._area(view)
+        self.looks += 1
+        left, top, right, bottom = self.area(view)
         true = []
-        for thing in self._world.objects:
+        for thing in self.world.objects:
             x, y, depth = frame.matrix @ frame.X_WC.inverse().apply(thing.position)
-            if depth <= 0 or thing is self._world.held:
+            if depth <= 0 or thing is self.world.held:
                 continue
             column, row = x / depth, y / depth
             if left <= column < right and top <= row < bottom:
                 true.append(self._detection(thing.label, column, row, frame.matrix[0, 0] / depth))
         return FakeRequest(
-            self._clock.now + self._config.latency,
-            self._clock,
-            self.answers(self._looks, true),
-            self._name,
-            self._config.reliability,
+            self.clock.now + self.config.latency,
+            self.clock,
+            self.answers(self.looks, true),
+            self.name,
+            self.config.reliability,
         )
 
     def close(self) -> None:
@@ -156,11 +161,6 @@ class FakeDetector:
 
     def _detection(self, label: str, column: float, row: float, scale: float) -> Detection:
         """Return the box around an object whose centre is at a pixel, at a `scale` [pixel/m]."""
-        size = scale * self._world.classes[label].radius
+        size = scale * self.world.classes[label].radius
         box = (column - size, row - size, column + size, row + size)
-        return Detection(label, max(CONFIDENCE, self._config.threshold), box)
-
-
-def _truthful(look: int, true: Sequence[Detection]) -> Sequence[Detection]:
-    del look
-    return true
+        return Detection(label, max(CONFIDENCE, self.config.threshold), box)
