@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from executive.evidence import describe_unknown, describe_wrong_height, describe_wrong_size
-from executive.geometry import looking_down
 from executive.messages import Box, Detection, Frame, ObjectClass
+from tests.camera_poses import looking_down
 
 CUBE, SPHERE = ObjectClass("cube", 0.05, 0.0354), ObjectClass("sphere", 0.06, 0.03)
 CLASSES = {

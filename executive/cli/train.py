@@ -31,18 +31,10 @@ def command(dataset: Path, out: Path, start: Path | None, rate: float | None, ep
     with stdout_kept_clean():
         from executive.cli.progress import bar
         from executive.vision.train import train
+        from executive.vision.training.settings import Settings
 
         with bar("training") as batches:
-            train(
-                dataset,
-                out,
-                start=start,
-                rate=rate,
-                epochs=epochs,
-                seed=seed,
-                progress=_tell,
-                batches=batches,
-            )
+            train(dataset, out, Settings(start, rate, epochs, seed), _tell, batches)
 
 
 def _tell(epoch: int, metrics: dict[str, float]) -> None:
