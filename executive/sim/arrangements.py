@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 import pybullet
+from numpy.random import Generator
 from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell_config import BinConfig, CameraConfig, CellConfig, Colour, ObjectConfig
@@ -55,7 +56,7 @@ class Item:
     colour: Colour
 
 
-def reach(world: World, camera: CameraConfig, rng: np.random.Generator) -> bool:
+def reach(world: World, camera: CameraConfig, rng: Generator) -> bool:
     """Put the arm somewhere a run would have it, and tell whether it shall hold an object."""
     poses = world.config.arm.poses_deg
     scans = camera.scan_poses
@@ -81,7 +82,7 @@ def reach(world: World, camera: CameraConfig, rng: np.random.Generator) -> bool:
     return bool(rng.random() < 0.3)
 
 
-def random_part(camera: CameraConfig, rng: np.random.Generator) -> tuple[int, int, int, int]:
+def random_part(camera: CameraConfig, rng: Generator) -> tuple[int, int, int, int]:
     """Return the part of the image to show: mostly `table_view`, else another of the same size."""
     left, top, right, bottom = camera.table_view
     if rng.random() < 0.65:
@@ -91,7 +92,7 @@ def random_part(camera: CameraConfig, rng: np.random.Generator) -> tuple[int, in
     return x, y, x + right - left, y + bottom - top
 
 
-def random_items(config: CellConfig, count: int, table: Colour, rng: np.random.Generator) -> list[Item]:
+def random_items(config: CellConfig, count: int, table: Colour, rng: Generator) -> list[Item]:
     """Return `count` random objects at the origin; some scenes have unknown objects or other sizes."""
     share_unknown = rng.uniform(0.05, 0.4) if rng.random() < 0.35 else 0.0
     share_resized = rng.uniform(0.2, 1.0) if rng.random() < 0.35 else 0.0
@@ -123,7 +124,7 @@ def unknown_model(number: int) -> ObjectConfig:
 
 
 def arrange(
-    config: CellConfig, footprint: Array, plain_view: bool, table: Colour, rng: np.random.Generator
+    config: CellConfig, footprint: Array, plain_view: bool, table: Colour, rng: Generator
 ) -> list[Item]:
     """Return a random arrangement of 0 to 20 objects, unknown ones and stacks among them.
 
@@ -157,12 +158,12 @@ def arrange(
     return items
 
 
-def _lift_and_rotate(item: Item, rng: np.random.Generator) -> Item:
+def _lift_and_rotate(item: Item, rng: Generator) -> Item:
     """Return an object 4 cm above its place, randomly rotated."""
     return replace(item, X_WO=Pose(_any_rotation(rng), item.X_WO.position + np.array([0, 0, 0.04])))
 
 
-def hanging(X_WT: Pose, config: CellConfig, rng: np.random.Generator) -> Item:
+def hanging(X_WT: Pose, config: CellConfig, rng: Generator) -> Item:
     """Return a random object that hangs upright at the tool's tip."""
     (item,) = random_items(config, 1, (0.5, 0.5, 0.5), rng)
     place = X_WT.position - [0, 0, load_mesh(item.model).top]
@@ -213,7 +214,7 @@ def _solve(world: World, X_WT: Pose) -> None:
         world.set_arm(q[:7])
 
 
-def _any_rotation(rng: np.random.Generator) -> Array:
+def _any_rotation(rng: Generator) -> Array:
     return rotation_from_quaternion(rng.normal(size=4))
 
 
@@ -228,7 +229,7 @@ def _inside(bin: BinConfig, point: Array, margin: float) -> bool:
 
 
 def _heap(
-    items: Sequence[Item], low: Array, high: Array, bins: list[BinConfig], rng: np.random.Generator
+    items: Sequence[Item], low: Array, high: Array, bins: list[BinConfig], rng: Generator
 ) -> list[Item]:
     """Return objects one above the other, over a point of the table or over a bin."""
     if bins and rng.random() < 0.6:
@@ -243,7 +244,7 @@ def _heap(
     ]
 
 
-def _stack(items: list[Item], rng: np.random.Generator) -> None:
+def _stack(items: list[Item], rng: Generator) -> None:
     """Put some objects on others, nearly over their middles: balanced or not, nothing is simulated."""
     for _ in range(int(rng.integers(1, 1 + max(1, len(items) // 3)))):
         if len(items) < 2:
@@ -261,12 +262,7 @@ def _stack(items: list[Item], rng: np.random.Generator) -> None:
 
 
 def _spread(
-    config: CellConfig,
-    items: Sequence[Item],
-    low: Array,
-    high: Array,
-    bins: list[BinConfig],
-    rng: np.random.Generator,
+    config: CellConfig, items: Sequence[Item], low: Array, high: Array, bins: list[BinConfig], rng: Generator
 ) -> list[Item]:
     """Return those objects that find a place side by side, standing on the table or in a bin."""
     gap = rng.uniform(0.0, 0.02)

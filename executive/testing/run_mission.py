@@ -132,11 +132,7 @@ def run_mission(
         run.observe(workcell.hear)
         outcome = run.execute()
         return MissionResult(
-            **asdict(outcome),
-            events=events,
-            items=run.items(),
-            audit=run.audit(),
-            cell=innermost(workcell),
+            **asdict(outcome), events=events, items=run.items(), audit=run.audit(), cell=innermost(workcell)
         )
     finally:
         run.close()

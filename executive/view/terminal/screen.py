@@ -53,10 +53,7 @@ class Terminal:
         self._lock = threading.Lock()
         self.items = ItemTable()
         self._live = Live(
-            console=console,
-            get_renderable=self.render,
-            refresh_per_second=REDRAWS_PER_SECOND,
-            transient=True,
+            console=console, get_renderable=self.render, refresh_per_second=REDRAWS_PER_SECOND, transient=True
         )
 
     def open(self, run: Run) -> None:
