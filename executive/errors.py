@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 class ExecutiveError(Exception):
     """Base of every error this project raises on purpose; `exit_code` is what the command ends with."""
@@ -56,3 +59,23 @@ class Stopped(BaseException):
 
     No `except Exception` of a skill catches it: the run is halted, and nothing failed.
     """
+
+
+def reason_of(error: OSError) -> str:
+    """Return why the operating system refused something, in lower case as within a sentence."""
+    return (error.strerror or str(error)).lower()
+
+
+@contextmanager
+def explained(kind: type[ExecutiveError], what: str, then: str = "") -> Iterator[None]:
+    """Raise what the operating system refuses as an error of a kind.
+
+    Args:
+        kind: The kind.
+        what: What could not be done.
+        then: What follows from that, or what to do; "" for nothing.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise kind(f"{what}: {reason_of(error)}" + (f"; {then}" if then else "")) from error

@@ -7,7 +7,6 @@ Names follow the monogram notation: `X_WC` is the pose of frame C in frame W, so
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -115,14 +114,3 @@ def tool_down(position: ArrayLike, yaw: float = 0.0) -> Pose:
     orientation an iiwa reaches with its natural elbow and joint 7 near zero.
     """
     return Pose(about_z(yaw) @ np.diag([-1.0, 1.0, -1.0]), np.asarray(position, dtype=float))
-
-
-def looking_down(position: ArrayLike, up: Sequence[float] = (1.0, 0.0, 0.0)) -> Pose:
-    """Return the camera pose `X_WC` at `position` looking straight down.
-
-    OpenCV's convention: z along the optical axis, x to the image's right, y to its bottom. `up` is
-    the world direction that the top of the image shows.
-    """
-    z = np.array([0.0, 0.0, -1.0])
-    y = -np.asarray(up, dtype=float) / np.linalg.norm(up)
-    return Pose(np.column_stack([np.cross(y, z), y, z]), np.asarray(position, dtype=float))

@@ -31,10 +31,7 @@ GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 
 
 def approach(
-    cell: Cell,
-    target: Target,
-    overtravel: float = OVERTRAVEL,
-    spacing: float = SPACING,
+    cell: Cell, target: Target, overtravel: float = OVERTRAVEL, spacing: float = SPACING
 ) -> tuple[Goal, Task]:
     """Return goal and task of an approach: through the surface of `target`, felt for on the last part.
 

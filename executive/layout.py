@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from executive.cell import Cell, Ledger, Routes
 from executive.cell_config import BinConfig, CellConfig, ObjectConfig
+from executive.errors import Unreachable
 from executive.events import Emit
 from executive.evidence import MAX_HEIGHT_ERROR
-from executive.messages import Bin, ObjectClass, Target
+from executive.geometry import Array
+from executive.messages import BIN_THICKNESS, Bin, ObjectClass, Target
+from executive.workcell import KeyPath
+
+Triple = tuple[float, float, float]
 
 TOOL_RADIUS = 0.012
 """Radius of the tool's body [m]."""
@@ -44,6 +50,39 @@ def pile_height(config: CellConfig) -> float:
     """Return the greatest height [m] of a pile on the table: the tallest object, doubled if stacked."""
     tallest = max(kind.height for kind in config.objects.values())
     return 2 * tallest if config.table.stacked else tallest
+
+
+def bin_walls(size: tuple[float, float, float]) -> Sequence[tuple[Triple, Triple]]:
+    """Return half the extents of a bin's floor and walls and their middles, above the bin's position [m]."""
+    (length, width, height), t = size, BIN_THICKNESS
+    across, along = (t / 2, width / 2 + t, height / 2), (length / 2, t / 2, height / 2)
+    x, y, z = (length + t) / 2, (width + t) / 2, height / 2
+    floor = (length / 2 + t, width / 2 + t, t / 2), (0.0, 0.0, t / 2)
+    sides = (across, (x, 0.0, z)), (across, (-x, 0.0, z)), (along, (0.0, y, z)), (along, (0.0, -y, z))
+    return floor, *sides
+
+
+def places_out_of_reach(
+    config: CellConfig, require: Callable[[Array, float], None]
+) -> Iterator[tuple[KeyPath, str]]:
+    """Yield a key of the cell file and a sentence for each bin, and the safe place, out of reach.
+
+    Args:
+        config: The cell file.
+        require: Raises `Unreachable` for a place `(2,)` on a floor of this height [m].
+    """
+    places: list[tuple[KeyPath, str, Array, float]] = [
+        (("bins", name, "position"), f'the bin "{name}"', as_bin(name, bin).slots, bin.position[2])
+        for name, bin in config.bins.items()
+    ]
+    safe_place = np.array([config.safe_place[:2]])
+    places.append((("safe_place",), "the safe place", safe_place, config.safe_place[2]))
+    for keys, what, slots, floor in places:
+        try:
+            for slot in slots:
+                require(slot, floor)
+        except Unreachable as error:
+            yield keys, f"{what} is out of reach: {error}"
 
 
 def bins_of(config: CellConfig) -> dict[str, Bin]:

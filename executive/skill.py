@@ -149,6 +149,7 @@ class Skill:
         tool_state: What the tool must hold before (ANY: no matter), and holds after success (ANY: as before).
         tool_left: What it holds after a failure, by reason, or after a `halt`, where that is not what it
             held before; ANY where it may be either.
+        waits: Param whose time [s] passes before every success; "" for none.
     """
 
     params: ClassVar[Mapping[str, Param]] = {}
@@ -159,6 +160,7 @@ class Skill:
     moves: ClassVar[bool] = False
     tool_state: ClassVar[tuple[ToolState, ToolState]] = (ANY, ANY)
     tool_left: ClassVar[Mapping[str, ToolState]] = {}
+    waits: ClassVar[str] = ""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -208,12 +210,12 @@ class Skill:
 
     @classmethod
     def shortest(cls, least: LeastTimes, given: Mapping[str, Any]) -> float:
-        """Return the least time in which this skill can succeed [s]; 0 where nothing is known.
+        """Return the least time in which this skill can succeed [s]; by default the one that it `waits`.
 
         `given` are the params, and the inputs whose value stands in the mission.
         """
-        del least, given
-        return 0.0
+        del least
+        return float(given.get(cls.waits, 0.0))
 
     def failed(self, reason: str, message: str) -> SkillFailed:
         """Return the failure to raise.

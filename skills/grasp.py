@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
-from executive.cell import Cell, LeastTimes, Steps
+from executive.cell import Cell, Steps
 from executive.messages import Item, Target
 from executive.skill import EMPTY, HOLDING, In, Out, Seconds, Skill, param, port
 
@@ -22,12 +21,7 @@ class Grasp(Skill):
     reasons: ClassVar = ("missed",)
     uses: ClassVar = ("tool",)
     tool_state: ClassVar = (EMPTY, HOLDING)
-
-    @classmethod
-    def shortest(cls, least: LeastTimes, given: Mapping[str, Any]) -> float:
-        """Return `settle` [s]."""
-        del least
-        return float(given["settle"])
+    waits: ClassVar = "settle"
 
     def run(self, cell: Cell) -> Steps:
         """Switch the vacuum on and ask the sensor."""

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from executive.cell import Cell, LeastTimes, Steps
+from executive.cell import Cell, Steps
 from executive.goals import aside
 from executive.messages import Item
 from executive.moving import carry, let_go
@@ -32,12 +31,7 @@ class PutDown(Skill):
     moves: ClassVar = True
     tool_state: ClassVar = (HOLDING, EMPTY)
     tool_left: ClassVar = {"dropped": EMPTY, "halt": ANY}
-
-    @classmethod
-    def shortest(cls, least: LeastTimes, given: Mapping[str, Any]) -> float:
-        """Return `settle` [s]; the item may hang over the safe place already."""
-        del least
-        return float(given["settle"])
+    waits: ClassVar = "settle"
 
     def run(self, cell: Cell) -> Steps:
         """Carry it there, come down, let go."""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
-from executive.cell import Cell, LeastTimes, Steps
+from executive.cell import Cell, Steps
 from executive.messages import Item
 from executive.moving import let_go
 from executive.skill import ANY, EMPTY, HOLDING, In, Out, Seconds, Skill, param, port
@@ -25,12 +24,7 @@ class Release(Skill):
     uses: ClassVar = ("tool",)
     tool_state: ClassVar = (HOLDING, EMPTY)
     tool_left: ClassVar = {"dropped": EMPTY, "halt": ANY}
-
-    @classmethod
-    def shortest(cls, least: LeastTimes, given: Mapping[str, Any]) -> float:
-        """Return `settle` [s]."""
-        del least
-        return float(given["settle"])
+    waits: ClassVar = "settle"
 
     def run(self, cell: Cell) -> Steps:
         """Switch the vacuum off and ask the sensor."""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
-from executive.cell import Cell, LeastTimes, Steps
+from executive.cell import Cell, Steps
 from executive.skill import Seconds, Skill, param
 
 
@@ -14,12 +13,7 @@ class Wait(Skill):
 
     seconds: Seconds = param(ge=0, le=3600, doc="how long")
     reasons: ClassVar = ()
-
-    @classmethod
-    def shortest(cls, least: LeastTimes, given: Mapping[str, Any]) -> float:
-        """Return `seconds`."""
-        del least
-        return float(given.get("seconds", 0.0))
+    waits: ClassVar = "seconds"
 
     def run(self, cell: Cell) -> Steps:
         """Sleep on the clock."""

@@ -13,8 +13,9 @@ from executive.evidence import (
     describe_wrong_size,
     describe_wrong_top,
 )
-from executive.geometry import Array, looking_down
+from executive.geometry import Array
 from executive.messages import Box, Detection, Frame, ObjectClass
+from tests.camera_poses import looking_down
 
 CUBE, SPHERE = ObjectClass("cube", 0.05, 0.0354), ObjectClass("sphere", 0.06, 0.03)
 CLASSES = {

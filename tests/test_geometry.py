@@ -4,7 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.geometry import Pose, about_z, looking_down, tool_down
+from executive.geometry import Pose, about_z, tool_down
+from tests.camera_poses import looking_down
 
 unit = st.floats(-1, 1, allow_nan=False)
 quaternions = st.tuples(unit, unit, unit, unit).filter(lambda q: np.linalg.norm(q) > 0.1)

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from executive.campaign.detector_trial import DetectorUnderTest
-from executive.errors import InputError
-from executive.record.whole_file import reason_of, write_whole
+from executive.errors import InputError, explained
+from executive.record.whole_file import write_whole
 from executive.vision.envelope.fingerprint import take_fingerprint
 from executive.vision.envelope.measurement import (
     SUFFIX,
@@ -39,13 +39,9 @@ def store_evaluation(
     assert detector.cell is not None
     path = out or detector.base / f"{detector.cell.cell}{SUFFIX}"
     measurement = _as_measurement(detector, evaluation, command, seconds)
-    try:
+    instead = "name another file with --out, and copy it into the folder of your cell file"
+    with explained(InputError, f"the measurement {path} cannot be written", instead):
         write_whole(path, text_with_measurement(read_measurements(path), measurement))
-    except OSError as error:
-        raise InputError(
-            f"the measurement {path} cannot be written: {reason_of(error)}; name another file with --out, "
-            "and copy it into the folder of your cell file"
-        ) from error
     return path
 
 

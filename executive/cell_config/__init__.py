@@ -17,27 +17,10 @@ from executive.cell_config.cameras import (
 from executive.cell_config.cell import CellConfig, LedgerConfig
 from executive.cell_config.detectors import DetectorConfig
 from executive.cell_config.objects import BinConfig, ObjectConfig, TableConfig
-from executive.cell_config.section import Colour, Joints, Range, Section, Vector
+from executive.cell_config.section import Colour, Section
 
 __all__ = [
-    "ArmConfig",
-    "BinConfig",
-    "CalibrationConfig",
-    "CameraConfig",
-    "CellConfig",
-    "Colour",
-    "DepthConfig",
-    "DetectorConfig",
-    "Joints",
-    "LedgerConfig",
-    "LimitsConfig",
-    "MotionConfig",
-    "NoiseConfig",
-    "ObjectConfig",
-    "Range",
-    "Section",
-    "TableConfig",
-    "ToolConfig",
-    "TransformConfig",
-    "Vector",
-]
+    "ArmConfig", "BinConfig", "CalibrationConfig", "CameraConfig", "CellConfig", "Colour", "DepthConfig",
+    "DetectorConfig", "LedgerConfig", "LimitsConfig", "MotionConfig", "NoiseConfig", "ObjectConfig",
+    "Section", "TableConfig", "ToolConfig", "TransformConfig",
+]  # fmt: skip

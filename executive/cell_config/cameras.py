@@ -117,6 +117,10 @@ class CameraConfig(Section):
     depth: DepthConfig | None = None
     """Its depth sensor; none by default. `depth: {}` is one with the usual noise."""
 
+    def area(self, view: str) -> tuple[int, int, int, int]:
+        """Return the part of the image [pixel] that `view` (`table` or `full`) means."""
+        return self.table_view if view == "table" else (0, 0, self.width, self.height)
+
     @model_validator(mode="after")
     def _can_be_set_up(self) -> CameraConfig:
         left, top, right, bottom = self.table_view

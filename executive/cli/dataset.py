@@ -6,25 +6,21 @@ from pathlib import Path
 
 import click
 
-from executive.cli.options import seed_option
+from executive.cli.options import COUNT, FOLDER, seed_option
 from executive.cli.output import stdout_kept_clean
 
 
 @click.command(name="dataset")
 @click.argument("cells", metavar="CELL...", nargs=-1, required=True)
-@click.option(
-    "--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to fill."
-)
-@click.option("--images", type=click.IntRange(min=1), default=1000, show_default=True, help="How many.")
+@click.option("--out", type=FOLDER, required=True, help="Folder to fill.")
+@click.option("--images", type=COUNT, default=1000, help="How many.")
 @seed_option
 @click.option(
-    "--format", "layout", type=click.Choice(["coco", "yolo"]), default="coco", show_default=True,
+    "--format", "layout", type=click.Choice(["coco", "yolo"]), default="coco",
     help="Layout of the folder, as Roboflow exports it.",
 )  # fmt: skip
-@click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Processes.")
-@click.option(
-    "--valid", type=click.FloatRange(0, 1), default=0.1, show_default=True, help="Share kept for validation."
-)
+@click.option("--workers", type=COUNT, default=2, help="Processes.")
+@click.option("--valid", type=click.FloatRange(0, 1), default=0.1, help="Share kept for validation.")
 def command(
     cells: tuple[str, ...], out: Path, images: int, seed: int, layout: str, workers: int, valid: float
 ) -> None:

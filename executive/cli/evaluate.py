@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from executive.cli.options import json_option, overrides_option, scene_option, seed_option
+from executive.cli import options
 from executive.cli.output import print_json, stdout_kept_clean
 
 PICTURES = (".png", ".jpg", ".jpeg")
@@ -23,21 +23,19 @@ PICTURES = (".png", ".jpg", ".jpeg")
 )  # fmt: skip
 @click.option("--detector", metavar="NAME", help="Which of the cell's detectors; without it, the first.")
 @click.option(
-    "--dataset", type=click.Path(path_type=Path, file_okay=False), metavar="FOLDER",
+    "--dataset", type=options.FOLDER, metavar="FOLDER",
     help="COCO or YOLO folder of labelled images to measure on, instead of fresh scenes.",
 )  # fmt: skip
 @click.option(
-    "--weights", type=click.Path(path_type=Path, dir_okay=False), metavar="ONNX",
+    "--weights", type=options.FILE, metavar="ONNX",
     help="Exported RF-DETR to measure instead of a cell's detector.",
 )  # fmt: skip
 @click.option(
-    "--labels", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+    "--labels", type=options.FILE, metavar="FILE",
     help="Its class names, one a line; without it, labels.txt or NAME.labels.txt beside it.",
 )  # fmt: skip
-@click.option(
-    "--images", type=click.IntRange(min=1), default=200, show_default=True, help="Scenes to render of a cell."
-)
-@seed_option
+@click.option("--images", type=options.COUNT, default=200, help="Scenes to render of a cell.")
+@options.seed_option
 @click.option(
     "--threshold", type=click.FloatRange(0, 1),
     help="Confidence from which a detection counts; without it, the detector's own.",
@@ -47,23 +45,18 @@ PICTURES = (".png", ".jpg", ".jpeg")
     help="Scenes varied as widely as in training; else scenes as a run begins with, searched as in a run.",
 )  # fmt: skip
 @click.option(
-    "--view", type=click.Choice(["table", "full"]), default="table", show_default=True,
+    "--view", type=click.Choice(["table", "full"]), default="table",
     help="The part of a run's frame to search.",
 )  # fmt: skip
-@scene_option
-@overrides_option
+@options.scene_option
+@options.overrides_option
 @click.option(
-    "--out", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+    "--out", type=options.FILE, metavar="FILE",
     help="File for the measurement that runs read; without it, CELL.measured.json beside the cell file.",
 )  # fmt: skip
-@click.option(
-    "--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Processes to render."
-)
-@click.option(
-    "--sheet", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE.png",
-    help="Picture of the worst misses to write.",
-)  # fmt: skip
-@json_option
+@click.option("--workers", type=options.COUNT, default=2, help="Processes to render.")
+@click.option("--sheet", type=options.FILE, metavar="FILE.png", help="Picture of the worst misses to write.")
+@options.json_option
 def command(
     cells: tuple[str, ...],
     detector: str | None,

@@ -8,14 +8,7 @@ from typing import Any
 
 import click
 
-from executive.cli.options import (
-    MISSION,
-    json_option,
-    overrides_option,
-    runs_option,
-    seed_option,
-    workers_option,
-)
+from executive.cli import options
 from executive.cli.output import print_json, stdout_kept_clean
 from executive.cli.subject import load_subject, oracle_option
 
@@ -28,11 +21,9 @@ def fault_numbers(text: str) -> tuple[int, ...]:
 
 
 @click.command(name="faults")
-@MISSION
+@options.MISSION
 @oracle_option
-@click.option(
-    "--pairs", type=click.IntRange(min=1), help="Instead, so many pairs of them, drawn by the seed."
-)
+@click.option("--pairs", type=options.COUNT, help="Instead, so many pairs of them, drawn by the seed.")
 @click.option(
     "--fault", "numbers", type=fault_numbers, metavar="N[+M]",
     help="One of them only, with a record of its run.",
@@ -40,11 +31,11 @@ def fault_numbers(text: str) -> tuple[int, ...]:
 @click.option(
     "--list", "listed", is_flag=True, help="Print them, and run nothing but the undisturbed mission."
 )
-@workers_option
-@seed_option
-@overrides_option
-@runs_option
-@json_option
+@options.workers_option
+@options.seed_option
+@options.overrides_option
+@options.runs_option
+@options.json_option
 @click.pass_context
 def command(
     ctx: click.Context,

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import click
 
-from executive.cli.options import json_option, runs_option, workers_option
+from executive.cli.options import FILE, json_option, runs_option, workers_option
 from executive.cli.output import print_json, stdout_kept_clean
 
 
 @click.command(name="film")
 @click.argument("run", metavar="RUN")
 @click.option(
-    "-o", "--output", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+    "-o", "--output", type=FILE, metavar="FILE",
     help="The file to write, .mp4 or .gif; by default film.mp4 in the run directory.",
 )  # fmt: skip
 @click.option("--gif", is_flag=True, help="Make an animated GIF, as a README shows it.")

@@ -117,7 +117,7 @@ def _apology(error: Exception) -> str:
     )
 
 
-@click.group(cls=Executive, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=Executive, context_settings={"help_option_names": ["-h", "--help"], "show_default": True})
 @click.version_option(package_name="executive")
 @click.option("--debug", is_flag=True, help="Show the traceback of an error.")
 def main(debug: bool) -> None:

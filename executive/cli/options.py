@@ -21,24 +21,20 @@ def _by_key(ctx: click.Context, param: click.Parameter, values: tuple[str, ...])
     return overrides
 
 
+FILE = click.Path(path_type=Path, dir_okay=False)
+FOLDER = click.Path(path_type=Path, file_okay=False)
+COUNT = click.IntRange(min=1)
 MISSION = click.argument("mission", metavar="MISSION")
 
 overrides_option = click.option(
     "--set", "overrides", metavar="KEY=VALUE", multiple=True, callback=_by_key,
     help="Give a param another value, or with cell.KEY.KEY the cell; repeatable.",
 )  # fmt: skip
-runs_option = click.option(
-    "--runs", type=click.Path(path_type=Path, file_okay=False), default=Path("runs"), show_default=True,
-    help="Folder of the run directories.",
-)  # fmt: skip
+runs_option = click.option("--runs", type=FOLDER, default=Path("runs"), help="Folder of the run directories.")
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on stdout.")
-seed_option = click.option(
-    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="What chance draws from."
-)
+seed_option = click.option("--seed", type=click.IntRange(min=0), default=0, help="What chance draws from.")
 scene_option = click.option(
-    "--scene", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+    "--scene", type=FILE, metavar="FILE",
     help="Change the simulated world without the executive's knowledge: light, table, objects, camera.",
 )  # fmt: skip
-workers_option = click.option(
-    "--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Runs at a time."
-)
+workers_option = click.option("--workers", type=COUNT, default=2, help="Runs at a time.")

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import click
 
-from executive.cli.options import json_option, runs_option
+from executive.cli.options import FILE, json_option, runs_option
 from executive.cli.output import print_json, stdout_kept_clean
 
 
 @click.command(name="replay")
 @click.argument("run", metavar="RUN")
 @click.option(
-    "--mission", "edited", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+    "--mission", "edited", type=FILE, metavar="FILE",
     help="Decide by another mission file than the one that was run.",
 )  # fmt: skip
 @runs_option

@@ -84,19 +84,15 @@ def command(
             }
             if mission is None:
                 assert resume is not None
-                result, repeat = _resumed(resume, runs, skills, options)
+                result, start = _resumed(resume, runs, skills, options)
             else:
                 asked = requests or None
                 options |= {"seed": seed, "runs": runs, "requests": asked, "scene": scene}
                 result = _fresh(mission, skills, overrides, options)
-                # What was asked for by a person is asked for again.
-                repeat = repeat_command(
-                    mission,
-                    seed=seed,
-                    overrides=overrides,
-                    requests=requests or result["requests"],
-                    scene=RunDirectory(Path(result["run"])).scene,
-                )
+                start = {"seed": seed, "overrides": overrides}
+            # What was asked for by a person is asked for again.
+            asked_for, used_scene = requests or result["requests"], RunDirectory(Path(result["run"])).scene
+            repeat = repeat_command(mission or start["file"], start, asked_for, used_scene)
             report, problem = leave_report(result)
             if page is not None:
                 page.finish(result, report and str(Path(report).resolve()))
@@ -149,24 +145,16 @@ def _fresh(
 
 def _resumed(
     name: str, runs: Path, skills: Mapping[str, type[Skill]], options: dict[str, Any]
-) -> tuple[dict[str, Any], str]:
-    """Take up a run again and return the result, and the command that would repeat it."""
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Take up a run again and return the result, and how the run began."""
     from executive.record.find_run import find_run
     from executive.record.journal import read_journal
     from executive.record.resumed_run import resumed_run
-    from executive.record.run_directory import RunDirectory
-    from executive.view.terminal.summary import repeat_command
 
     path = find_run(name, runs)
     result = resumed_run(path, skills, **options)
     start, *_ = read_journal(path / "journal.jsonl")
-    return result, repeat_command(
-        start["file"],
-        seed=start["seed"],
-        overrides=start["overrides"],
-        requests=result["requests"],
-        scene=RunDirectory(path).scene,
-    )
+    return result, start
 
 
 @contextlib.contextmanager

@@ -8,14 +8,7 @@ from typing import Any
 
 import click
 
-from executive.cli.options import (
-    MISSION,
-    json_option,
-    overrides_option,
-    runs_option,
-    scene_option,
-    workers_option,
-)
+from executive.cli import options
 from executive.cli.output import print_json, stdout_kept_clean
 
 
@@ -31,16 +24,16 @@ def seed_range(text: str) -> range:
 
 
 @click.command(name="sweep")
-@MISSION
+@options.MISSION
 @click.option(
     "--seeds", type=seed_range, metavar="A-B", required=True, help="First and last seed, for instance 0-99."
 )
-@workers_option
+@options.workers_option
 @click.option("--frames", is_flag=True, help="Save the pictures behind every decision.")
-@overrides_option
-@scene_option
-@runs_option
-@json_option
+@options.overrides_option
+@options.scene_option
+@options.runs_option
+@options.json_option
 @click.pass_context
 def command(
     ctx: click.Context,

@@ -6,46 +6,35 @@ from pathlib import Path
 
 import click
 
-from executive.cli.options import seed_option
+from executive.cli.options import COUNT, FILE, FOLDER, seed_option
 from executive.cli.output import stdout_kept_clean
 
 
 @click.command(name="train")
 @click.option(
-    "--dataset", type=click.Path(path_type=Path, file_okay=False), required=True,
+    "--dataset", type=FOLDER, required=True,
     help="COCO or YOLO folder, from `executive dataset` or a Roboflow export.",
 )  # fmt: skip
+@click.option("--out", type=FOLDER, required=True, help="Folder for checkpoints and figures.")
 @click.option(
-    "--out", type=click.Path(path_type=Path, file_okay=False), required=True,
-    help="Folder for checkpoints and figures.",
-)  # fmt: skip
-@click.option(
-    "--from", "start", type=click.Path(path_type=Path, dir_okay=False), metavar="MODEL",
+    "--from", "start", type=FILE, metavar="MODEL",
     help="Model of an earlier training to fine-tune, .onnx or .pth; without it, random weights.",
 )  # fmt: skip
 @click.option(
     "--rate", type=click.FloatRange(min=0, min_open=True),
     help="Learning rate; by default 1e-4 for a model that knows the same classes, else 3e-4.",
 )  # fmt: skip
-@click.option("--epochs", type=click.IntRange(min=1), default=20, show_default=True, help="Passes over it.")
+@click.option("--epochs", type=COUNT, default=20, help="Passes over it.")
 @seed_option
 def command(dataset: Path, out: Path, start: Path | None, rate: float | None, epochs: int, seed: int) -> None:
     """Train the small RF-DETR; needs the extra `train`."""
     with stdout_kept_clean():
         from executive.cli.progress import bar
         from executive.vision.train import train
+        from executive.vision.training.settings import Settings
 
         with bar("training") as batches:
-            train(
-                dataset,
-                out,
-                start=start,
-                rate=rate,
-                epochs=epochs,
-                seed=seed,
-                progress=_tell,
-                batches=batches,
-            )
+            train(dataset, out, Settings(start, rate, epochs, seed), _tell, batches)
 
 
 def _tell(epoch: int, metrics: dict[str, float]) -> None:

@@ -24,11 +24,7 @@ class Try(ControlNode):
     word = "try"
 
     def __init__(
-        self,
-        site: Site,
-        body: Behaviour,
-        handlers: Sequence[Handler] = (),
-        finish: Behaviour | None = None,
+        self, site: Site, body: Behaviour, handlers: Sequence[Handler] = (), finish: Behaviour | None = None
     ) -> None:
         behaviours = [behaviour for _, behaviour in handlers]
         super().__init__(site, [body, *behaviours, *([finish] if finish else [])])

@@ -146,15 +146,8 @@ class ControlNode(Composite):
     def _end(self, status: Status) -> None:
         self.status = status
         self.clean_up()
+        why: dict[str, str] = {}
         if self.failure is not None and status is Status.FAILURE:
             failure = self.failure
-            self._emit(
-                "status",
-                node=self.path,
-                status="FAILURE",
-                reason=str(failure),
-                message=failure.message,
-                origin=failure.path,
-            )
-        else:
-            self._emit("status", node=self.path, status=status.value)
+            why = {"reason": str(failure), "message": failure.message, "origin": failure.path}
+        self._emit("status", node=self.path, status=status.value, **why)

@@ -32,11 +32,7 @@ class Parallel(ControlNode):
     word = "parallel"
 
     def __init__(
-        self,
-        site: Site,
-        children: Sequence[Behaviour],
-        wait_for: int | None = None,
-        halt: bool = False,
+        self, site: Site, children: Sequence[Behaviour], wait_for: int | None = None, halt: bool = False
     ) -> None:
         if wait_for is not None and not 1 <= wait_for <= len(children):
             raise InputError(

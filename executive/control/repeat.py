@@ -25,11 +25,7 @@ class Repeat(Rounds):
     word = "repeat"
 
     def __init__(
-        self,
-        site: Site,
-        body: Behaviour,
-        times: int | None = None,
-        until: Sequence[tuple[str, str]] = (),
+        self, site: Site, body: Behaviour, times: int | None = None, until: Sequence[tuple[str, str]] = ()
     ) -> None:
         if times is not None and times < 0:
             raise InputError(f"{site.path}: a body can be repeated 0 times or more, not {times} times")

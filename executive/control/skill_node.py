@@ -169,13 +169,7 @@ class SkillNode(Behaviour):
 
     def _tell(self, status: str, reason: str = "", message: str = "", **more: Any) -> None:
         self._emit(
-            "status",
-            node=self.path,
-            status=status,
-            reason=reason,
-            message=message,
-            item=self._item,
-            **more,
+            "status", node=self.path, status=status, reason=reason, message=message, item=self._item, **more
         )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from executive.cell import Routes
 from executive.cell_config import LedgerConfig
 from executive.geometry import Array
 from executive.ledger.item import Record, State
-from executive.ledger.looks import SURE
+from executive.ledger.looks import SURE, spread_of
 from executive.messages import BIN_THICKNESS, Bin, Detections, Item
 
 WALL = 0.035
@@ -23,47 +24,43 @@ CORNERS = np.array([(0, 0, 0), (1, 1, 0), (1, -1, 0), (-1, 1, 0), (-1, -1, 0)])
 """Places on a bin's floor that a look has to search, in halves of its length and width."""
 
 
+@dataclass(frozen=True, eq=False)
 class Bins:
     """Tells what lies in which bin, by the items that were let go there.
 
-    Args:
+    Attributes:
         config: When what is believed.
         bins: By name.
         routes: Class label to the bins that are right for it.
         records: All items by name, as they are at any time.
     """
 
-    def __init__(
-        self,
-        config: LedgerConfig,
-        bins: Mapping[str, Bin],
-        routes: Routes,
-        records: Mapping[Item, Record],
-    ) -> None:
-        self._config = config
-        self._bins = bins
-        self._routes = routes
-        self._records = records
+    config: LedgerConfig
+    bins: Mapping[str, Bin]
+    routes: Routes
+    records: Mapping[Item, Record]
 
     def objects_in(self, bin: str) -> int:
         """Return how many objects were let go in `bin` so far, or must have fallen into it."""
-        return sum(bin in (record.bin, self.believed(record)) for record in self._records.values())
+        return sum(bin in (record.bin, self.believed(record)) for record in self.records.values())
 
-    def at(self, position: Array, spread: float) -> str | None:
-        """Return the bin that something measured with a standard deviation of `spread` [m] lies in, if any.
+    def at(self, position: Array, look: Detections) -> str | None:
+        """Return the bin that something lies in that a look showed at `position` `(3,)` [m], if any.
 
         What seems to lie just beside a bin is in it, if something was let go there.
         """
-        for name, bin in self._bins.items():
-            if bin.contains(position, SURE * spread if self.objects_in(name) else 0.0):
+        by = look.error_rates
+        error = math.hypot(spread_of(look.frame, position, by.jitter), by.bias)
+        for name, bin in self.bins.items():
+            if bin.contains(position, SURE * error if self.objects_in(name) else 0.0):
                 return name
         return None
 
     def let_fall(self, record: Record, landing: Array | None) -> None:
         """Note where something fell that the tool lost; None: nobody knows."""
         record.fallen.clear()
-        for bin in self._routes.get(record.label, ()):
-            if landing is not None and self._bins[bin].contains(landing, -WALL):
+        for bin in self.routes.get(record.label, ()):
+            if landing is not None and self.bins[bin].contains(landing, -WALL):
                 record.fallen[bin] = FELL
 
     def believed(self, record: Record) -> str | None:
@@ -89,23 +86,23 @@ class Bins:
         shown = Counter(
             (detection.label, bin)
             for detection, bin, position in zip(look.found, inside, positions, strict=True)
-            if bin is not None and self._bins[bin].contains(position, BIN_THICKNESS)
+            if bin is not None and self.bins[bin].contains(position, BIN_THICKNESS)
         )
-        for record in self._records.values():
+        for record in self.records.values():
             if record.state is not State.DROPPED:
                 continue
             label = record.label
-            for bin in self._routes.get(label, ()):
-                there = sum(r.bin == bin and r.label == label for r in self._records.values())
+            for bin in self.routes.get(label, ()):
+                there = sum(r.bin == bin and r.label == label for r in self.records.values())
                 more = shown[label, bin] > there
                 if more or self._is_searched(bin, look):
                     record.fell(bin, more, look.error_rates)
-                if record.fallen[bin] >= -math.log(self._config.overlooked):
+                if record.fallen[bin] >= -math.log(self.config.overlooked):
                     yield record, bin
                     break
 
     def _is_searched(self, name: str, look: Detections) -> bool:
         """Tell whether a look shows the whole floor of a bin."""
-        bin = self._bins[name]
+        bin = self.bins[name]
         reach = np.append(bin.size[:2] / 2 - WALL, 0.0)
         return bool(look.searched(bin.position + reach * CORNERS).all())

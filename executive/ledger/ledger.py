@@ -20,7 +20,7 @@ from executive.ledger.coverage import Coverage
 from executive.ledger.freshness import Freshness
 from executive.ledger.item import LYING, OPEN, Record, State
 from executive.ledger.look_event import describe_look
-from executive.ledger.looks import Looks, spread_of
+from executive.ledger.looks import Looks
 from executive.messages import Bin, Detections, Frame, Glimpse, Item, Target
 
 
@@ -256,17 +256,11 @@ class ItemLedger:
         return [record.row for record in self._records.values()]
 
     def _take(self, detections: Detections, positions: Sequence[Array], glimpses: Sequence[Glimpse]) -> None:
-        frame, by = detections.frame, detections.error_rates
-
-        def bin_at(position: Array) -> str | None:
-            error = math.hypot(spread_of(frame, position, by.jitter), by.bias)
-            return self._in_bins.at(position, error)
-
-        inside = [bin_at(position) for position in positions]
+        inside = [self._in_bins.at(position, detections) for position in positions]
         outside = [number for number, bin in enumerate(inside) if bin is None]
         look = replace(detections, found=tuple(detections.found[number] for number in outside))
         places = [positions[number] for number in outside]
-        unsure = [glimpse for glimpse in glimpses if bin_at(glimpse.position) is None]
+        unsure = [glimpse for glimpse in glimpses if self._in_bins.at(glimpse.position, detections) is None]
         for record in self._looks.take(self._records, look, places, unsure):
             self._certainty.reject_if_uncertain(record, settled=self._looks.settled(record))
             self._emit("item", **record.row)

@@ -27,6 +27,9 @@ NUDGED = 0.12
 GONE = 0.05
 """Chance of having been overlooked under which an item that may have been pushed is sought elsewhere."""
 
+Items = dict[Item, Record]
+"""All items by name."""
+
 
 class Looks:
     """Binds detections to items and weighs what they and their absence say.
@@ -48,11 +51,7 @@ class Looks:
         return self._freshness.holds(record.position, record.epoch)
 
     def take(
-        self,
-        records: dict[Item, Record],
-        detections: Detections,
-        positions: Sequence[Array],
-        glimpses: Sequence[Glimpse],
+        self, records: Items, detections: Detections, positions: Sequence[Array], glimpses: Sequence[Glimpse]
     ) -> list[Record]:
         """Take a look into the books and return the items that changed by it.
 
@@ -107,7 +106,7 @@ class Looks:
             for record in records
         )
 
-    def _enter(self, records: dict[Item, Record], label: str, place: Array, odds: float) -> Record:
+    def _enter(self, records: Items, label: str, place: Array, odds: float) -> Record:
         """Enter something new, with the odds that it is an object."""
         self._counts[label] += 1
         record = Record(f"{label}-{self._counts[label]}", label, place, math.log(odds))
@@ -115,11 +114,7 @@ class Looks:
         return record
 
     def _glimpsed(
-        self,
-        records: dict[Item, Record],
-        seen: Sequence[Record],
-        look: Detections,
-        glimpses: Sequence[Glimpse],
+        self, records: Items, seen: Sequence[Record], look: Detections, glimpses: Sequence[Glimpse]
     ) -> list[Record]:
         """Count what the detector is not sure of, and return the items that it may be.
 
@@ -172,7 +167,7 @@ class Looks:
                 phantoms.append(record)
         return phantoms
 
-    def _recognize(self, records: dict[Item, Record], seen: list[Record]) -> list[Record]:
+    def _recognize(self, records: Items, seen: list[Record]) -> list[Record]:
         """Recognize items that were dropped or pushed away in new ones of their class, the nearest first.
 
         They take the places of the new ones in `seen`; the new ones that were known before are returned.
@@ -196,7 +191,7 @@ class Looks:
                     doubles.append(new)
         return doubles
 
-    def _one_of_two(self, records: dict[Item, Record], seen: list[Record]) -> list[Record]:
+    def _one_of_two(self, records: Items, seen: list[Record]) -> list[Record]:
         """Make one of every two items closer than two objects can be; return those that were none."""
         doubles = []
         for record in list(seen):

@@ -71,11 +71,7 @@ def _profile(s: float, duration: float, ramp: float, step: float) -> tuple[Array
 
 
 def _load(
-    trajectory: Trajectory,
-    s: float,
-    stop: tuple[Array, Array, Array],
-    limits: JointLimits,
-    step: float,
+    trajectory: Trajectory, s: float, stop: tuple[Array, Array, Array], limits: JointLimits, step: float
 ) -> float:
     """Return the largest joint acceleration or jerk of a stop as a share of its stop limit."""
     accelerations = [trajectory.at(s)[2]]

@@ -86,6 +86,12 @@ class Prisms(NamedTuple):
     flat: NDArray[np.bool_]
     names: tuple[str, ...]
 
+    def chosen(self, numbers: NDArray[np.intp]) -> Prisms:
+        """Return the prism of each of the numbers `(N,)`, shaped `(N, 1)`."""
+        at = numbers, None
+        sizes = self.low[at], self.high[at], self.radius[at], self.top[at]
+        return Prisms(*sizes, self.open[at], self.flat[at], self.names)
+
 
 class Surroundings:
     """The prisms of a cell, and how near a motion comes to them.
@@ -134,12 +140,8 @@ class Surroundings:
         number, count = np.arange(len(tips)), near.shape[2]
         disc, prism = np.divmod(near.reshape(len(tips), near.shape[1] * count).argmin(axis=1), count)
         before, required = near[number, disc, prism], required[number, prism]
-        p = self._prisms
-        after = self._distance(
-            moved[0], moved[1], discs.offset[disc, None], discs.radius[disc, None],
-            p.low[prism, None], p.high[prism, None], p.radius[prism, None], p.top[prism, None],
-            p.open[prism, None],
-        ) - required[:, None]  # fmt: skip
+        nearest = Discs(discs.offset[disc, None], discs.radius[disc, None], discs.upright)
+        after = self._distance(*moved, nearest, self._prisms.chosen(prism)) - required[:, None]
         upright, tilted = _uprightness(axes, discs), _uprightness(moved[1], discs)
         return np.where((upright < before)[:, None], tilted - upright[:, None], after - before[:, None])
 
@@ -170,35 +172,23 @@ class Surroundings:
 
     def _distances(self, tips: Array, axes: Array, discs: Discs) -> Array:
         """Return the distance of each disc to each prism `(N, P, K)` [m], negative inside."""
-        p = self._prisms
-        return self._distance(
-            tips[:, None, None], axes[:, None, None], discs.offset[:, None], discs.radius[:, None],
-            p.low, p.high, p.radius, p.top, p.open,
-        )  # fmt: skip
+        each = Discs(discs.offset[:, None], discs.radius[:, None], discs.upright)
+        return self._distance(tips[:, None, None], axes[:, None, None], each, self._prisms)
 
-    def _distance(
-        self,
-        tips: Array,
-        axes: Array,
-        offset: Array,
-        disc: Array,
-        low: Array,
-        high: Array,
-        radius: Array,
-        top: Array,
-        open: NDArray[np.bool_],
-    ) -> Array:
+    def _distance(self, tips: Array, axes: Array, discs: Discs, prisms: Prisms) -> Array:
         """Return the distance between discs and prisms [m], negative inside; shapes broadcast."""
-        centres = tips + offset[..., None] * axes
+        low, high = prisms.low, prisms.high
+        centres = tips + discs.offset[..., None] * axes
         x, y = centres[..., 0], centres[..., 1]
         # What is not known to be empty is a funnel around the ends.
         away = np.sqrt(np.min([(x - ex) ** 2 + (y - ey) ** 2 for ex, ey in self._ends], axis=0))
-        top = np.where(open, np.clip(STEEPNESS * (away - LOOKED_AT), 0.0, top), top)
+        funnel = np.clip(STEEPNESS * (away - LOOKED_AT), 0.0, prisms.top)
+        top = np.where(prisms.open, funnel, prisms.top)
         tilt = np.sqrt(np.maximum(0.0, 1 - axes[..., 2] ** 2))
-        above = centres[..., 2] - disc * tilt - top
+        above = centres[..., 2] - discs.radius * tilt - top
         across_x = np.maximum(np.maximum(low[..., 0] - x, x - high[..., 0]), 0.0)
         across_y = np.maximum(np.maximum(low[..., 1] - y, y - high[..., 1]), 0.0)
-        across = np.sqrt(across_x**2 + across_y**2) - radius - disc
+        across = np.sqrt(across_x**2 + across_y**2) - prisms.radius - discs.radius
         outside = np.sqrt(np.maximum(across, 0.0) ** 2 + np.maximum(above, 0.0) ** 2)
         return np.where(outside > 0, outside, np.maximum(across, above))
 

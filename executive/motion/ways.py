@@ -42,11 +42,7 @@ class Way:
 
 
 def ways_down(
-    kinematics: Kinematics,
-    limits: JointLimits,
-    start: State,
-    goal: Goal,
-    length: float,
+    kinematics: Kinematics, limits: JointLimits, start: State, goal: Goal, length: float
 ) -> Iterator[Way]:
     """Yield ways from a state to a goal, the last `length` [m] straight, each unlike those before it.
 

@@ -10,11 +10,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from executive.errors import Fault, InputError, RecordLost
+from executive.errors import Fault, InputError, RecordLost, explained, reason_of
 from executive.events import Event
 from executive.record.entry import Entry, entry_of
 from executive.record.lock import lock
-from executive.record.whole_file import reason_of
 
 _ENCODER = json.JSONEncoder(ensure_ascii=False, allow_nan=False, check_circular=False)
 
@@ -39,7 +38,7 @@ class Journal:
         self._path = path
         self._broken = False
         self._unsynced = False
-        try:
+        with explained(InputError, f'cannot open the journal "{path}"'):
             file = os.open(path, os.O_RDWR | os.O_APPEND | (0 if again else os.O_CREAT), 0o644)
             try:
                 lock(file, path)
@@ -47,8 +46,6 @@ class Journal:
             except BaseException:
                 os.close(file)
                 raise
-        except OSError as error:
-            raise InputError(f'cannot open the journal "{path}": {reason_of(error)}') from error
         self._file: int | None = file
 
     def __call__(self, event: Event) -> None:
@@ -89,14 +86,11 @@ class Journal:
         if self._file is None:
             return
         file, self._file = self._file, None
+        believe = "believe what you see in the cell rather than the record"
         try:
-            if self._unsynced and not self._broken:
-                self._sync(file)
-        except OSError as error:
-            raise Fault(
-                f'the journal "{self._path}" may lack its last lines: {reason_of(error)}; '
-                "believe what you see in the cell rather than the record"
-            ) from error
+            with explained(Fault, f'the journal "{self._path}" may lack its last lines', believe):
+                if self._unsynced and not self._broken:
+                    self._sync(file)
         finally:
             # What it could say, the sync has said.
             with contextlib.suppress(OSError):
@@ -137,10 +131,8 @@ def read_journal(path: Path) -> list[Entry]:
     Raises:
         InputError: The file cannot be read, or another line than the last is broken.
     """
-    try:
+    with explained(InputError, f'cannot read the journal "{path}"'):
         content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f'cannot read the journal "{path}": {reason_of(error)}') from error
     entries = []
     for number, line in enumerate(content[: _whole(content)].splitlines(), start=1):
         try:

@@ -8,14 +8,8 @@ from typing import Any
 
 from executive.events import Event
 
-_FATES = {
-    "held": "in the tool",
-    "dropped": "dropped",
-    "rejected": "rejected",
-    "skipped": "skipped",
-    "lost": "lost",
-}
-"""What is said of items that are in no bin; those on the table go without saying."""
+_OPEN_FATES = ("held", "dropped", "rejected", "skipped", "lost")
+"""States that are told of items in no bin; those on the table go without saying."""
 
 
 class Progress:
@@ -68,8 +62,8 @@ class Progress:
             state = item.get("state")
             if state == "placed":
                 placed[item["bin"]].append(name)
-            elif state in _FATES:
-                others[_FATES[state]].append(name)
+            elif state in _OPEN_FATES:
+                others["in the tool" if state == "held" else state].append(name)
         return {fate: tuple(names) for fate, names in (placed | others).items()}
 
 

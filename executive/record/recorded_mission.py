@@ -11,10 +11,9 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import to_json
 
 from executive.cell_config import CellConfig
-from executive.errors import InputError
+from executive.errors import InputError, explained
 from executive.mission.outline import OutlineNode
 from executive.mission.parse.read_mission import GivenCell
-from executive.record.whole_file import reason_of
 from executive.skill import Skill
 from executive.tape.past import Entry
 
@@ -69,12 +68,10 @@ def read_tree(path: Path) -> list[OutlineNode]:
     Raises:
         InputError: There is no such file, or something else is in it.
     """
+    since = "every run leaves one beside its journal since version 0.1"
+    with explained(InputError, f'cannot read the tree "{path}"', since):
+        content = path.read_bytes()
     try:
-        return _NODES.validate_json(path.read_bytes())
-    except OSError as error:
-        raise InputError(
-            f'cannot read the tree "{path}": {reason_of(error)}; '
-            "every run leaves one beside its journal since version 0.1"
-        ) from error
+        return _NODES.validate_json(content)
     except ValidationError as error:
         raise InputError(f'"{path}" holds no tree of a run: {error.errors()[0]["msg"].lower()}') from error

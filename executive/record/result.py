@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from executive.errors import ExecutiveError
+from executive.errors import ExecutiveError, explained
 from executive.record.journal import ending_of
 from executive.record.plain import plain
 from executive.record.run_directory import RunDirectory
-from executive.record.whole_file import reason_of, write_whole
+from executive.record.whole_file import write_whole
 from executive.workcell import PLACES
 
 if TYPE_CHECKING:
@@ -90,13 +90,9 @@ def write_result(path: Path, result: Mapping[str, Any]) -> None:
     Raises:
         ExecutiveError: The disk does not take it.
     """
-    try:
+    elsewhere = "the journal beside it tells how the run ended, and so does what --json prints"
+    with explained(ExecutiveError, f'cannot write the result "{path}"', elsewhere):
         write_whole(path, json.dumps(result, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
-    except OSError as error:
-        raise ExecutiveError(
-            f'cannot write the result "{path}": {reason_of(error)}; '
-            "the journal beside it tells how the run ended, and so does what --json prints"
-        ) from error
 
 
 def read_result(directory: RunDirectory, entries: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:

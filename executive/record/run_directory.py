@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from datetime import datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,12 +13,13 @@ from typing import Any
 
 import yaml
 
-from executive.errors import InputError
-from executive.record.whole_file import reason_of, write_whole
+from executive.errors import InputError, reason_of
+from executive.record.whole_file import write_whole
 
 NO_ROOM = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
 """What the system says where more space would help."""
 SCENE = "scene.yaml"
+_ELSEWHERE = "name another place with --runs DIR"
 """Name of the copy of the scene file."""
 
 
@@ -61,11 +62,9 @@ class RunDirectory:
         """
         day = runs / started.strftime("%Y-%m-%d")
         name = f"{started.strftime('%H-%M-%S')}_{mission}_s{seed}"
-        try:
+        with refusing(f'make a run directory below "{runs}"'):
             day.mkdir(parents=True, exist_ok=True)
             path = _make_unique(day, name)
-        except OSError as error:
-            raise refused(f'make a run directory below "{runs}"', error) from error
         return RunDirectory(path)
 
     def save_inputs(
@@ -88,7 +87,7 @@ class RunDirectory:
         Raises:
             InputError: The directory cannot be written to; no file in it is half-written.
         """
-        try:
+        with refusing(f'write to the run directory "{self.path}"'):
             # First, and under no name of the record's own.
             for reference, text in (libraries or {}).items():
                 library = self.path / reference
@@ -103,8 +102,6 @@ class RunDirectory:
                 write_whole(self.tree, tree)
             if scene:
                 write_whole(self.path / SCENE, scene)
-        except OSError as error:
-            raise refused(f'write to the run directory "{self.path}"', error) from error
         _point_latest(self.path.parents[1], self.path)
 
 
@@ -114,16 +111,23 @@ def check_place(runs: Path) -> None:
     Raises:
         InputError: Nothing can.
     """
-    try:
+    with refusing(f'make a run directory below "{runs}"'):
         runs.mkdir(parents=True, exist_ok=True)
         # Trying tells more than the permissions do: the whole file system may be read-only.
         with TemporaryDirectory(prefix=".try-", dir=runs):
             pass
+
+
+@contextlib.contextmanager
+def refusing(what: str, instead: str = _ELSEWHERE) -> Iterator[None]:
+    """Raise what the file system refuses as an InputError: what was tried, and what to do instead."""
+    try:
+        yield
     except OSError as error:
-        raise refused(f'make a run directory below "{runs}"', error) from error
+        raise refused(what, error, instead) from error
 
 
-def refused(what: str, error: OSError, instead: str = "name another place with --runs DIR") -> InputError:
+def refused(what: str, error: OSError, instead: str = _ELSEWHERE) -> InputError:
     """Return the sentence for an act that the file system refused, with what to do instead."""
     space = "free some space or " if error.errno in NO_ROOM else ""
     return InputError(f"cannot {what}: {reason_of(error)}; {space}{instead}")

@@ -36,8 +36,3 @@ def write_whole(path: Path, text: str) -> None:
         file.write(text)
         file.flush()
         os.fsync(file.fileno())
-
-
-def reason_of(error: OSError) -> str:
-    """Return the words of the system for an error, as a part of a sentence."""
-    return (error.strerror or str(error)).lower()

@@ -6,6 +6,7 @@ import select
 import sys
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from executive.errors import InputError, Stopped
 from executive.events import Emit
@@ -42,28 +43,21 @@ class ScriptedOperator:
         return answer
 
 
+@dataclass(eq=False)
 class TerminalOperator:
     """Asks at the terminal; the run's clock stands still meanwhile, Ctrl-C works.
 
-    Args:
+    Attributes:
         emit: Takes the `asking` and `request` events.
         interrupted: Tells whether the run is to end.
         requested: Returns a word that was asked for elsewhere than at the terminal, once, or None.
         keyboard: Whether somebody can type; otherwise only what is asked for elsewhere is heard.
     """
 
-    def __init__(
-        self,
-        emit: Emit,
-        interrupted: Callable[[], bool],
-        requested: Callable[[], str | None] = lambda: None,
-        *,
-        keyboard: bool = True,
-    ) -> None:
-        self._emit = emit
-        self._interrupted = interrupted
-        self._requested = requested
-        self._keyboard = keyboard
+    emit: Emit
+    interrupted: Callable[[], bool]
+    requested: Callable[[], str | None] = lambda: None
+    keyboard: bool = True
 
     def ask(self, choices: Sequence[str]) -> str | None:
         """Return the class typed, `rescan`, or None for `q` or the end of the input.
@@ -72,27 +66,27 @@ class TerminalOperator:
             Stopped: The run is to end.
         """
         # An answer to no question, such as a second click, must not pick something later.
-        while self._requested() is not None:
+        while self.requested() is not None:
             pass
-        self._emit("asking", choices=list(choices))
+        self.emit("asking", choices=list(choices))
         numbered = "  ".join(f"{number} {label}" for number, label in enumerate(choices))
         while True:
-            if self._keyboard:
+            if self.keyboard:
                 sys.stderr.write(f"pick what?  {numbered}  s rescan  q quit > ")
                 sys.stderr.flush()
             line = self._line()
             answer = understood(line.strip(), choices) if line else None
             if answer != "":
-                self._emit("request", wanted=answer)
+                self.emit("request", wanted=answer)
                 return answer
             sys.stderr.write(f'cannot pick "{line.strip()}"\n')
 
     def _line(self) -> str:
-        while not self._interrupted():
-            if (word := self._requested()) is not None:
-                sys.stderr.write("\n" if self._keyboard else "")
+        while not self.interrupted():
+            if (word := self.requested()) is not None:
+                sys.stderr.write("\n" if self.keyboard else "")
                 return word or "?"
-            if not self._keyboard:
+            if not self.keyboard:
                 time.sleep(SLICE)
             elif select.select([sys.stdin], [], [], SLICE)[0]:
                 return sys.stdin.readline()

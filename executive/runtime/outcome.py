@@ -86,12 +86,13 @@ def judge_items(accounts: Accounts) -> Ending:
     return Ending("SUCCESS")
 
 
-def check_balance(accounts: Accounts) -> None:
-    """Check that the number of items seen is the sum of those placed, rejected, skipped and lost.
+def close_books(accounts: Accounts, *, completed: bool) -> None:
+    """Have the ledger decide the final state of each item, and check the balance.
 
     Raises:
-        Fault: The counts do not add up.
+        Fault: The number of items seen is not the sum of those placed, rejected, skipped and lost.
     """
+    accounts.close(completed=completed)
     counts = accounts.balance()
     if not is_balanced(counts):
         listed = ", ".join(f"{number} {state}" for state, number in counts.items())

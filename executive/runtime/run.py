@@ -24,7 +24,7 @@ from executive.runtime.outcome import (
     HALTED,
     Ending,
     Outcome,
-    check_balance,
+    close_books,
     end_of_tree,
     judge_items,
     problems_of,
@@ -149,7 +149,8 @@ class Run:
             problems += problems_of(lambda: self._emit("fault", traceback=ending.traceback))
         problems += problems_of(self._ask_tool)
         problems += problems_of(self._note_whether_empty)
-        problems += problems_of(lambda: self._close_books(completed=ending.status == "SUCCESS"))
+        succeeded = ending.status == "SUCCESS"
+        problems += problems_of(lambda: close_books(self.workcell.accounts, completed=succeeded))
         if problems and ending.status == "FAULT":
             ending = replace(ending, message="; ".join([ending.message, *problems]))
         elif problems:
@@ -267,7 +268,7 @@ class Run:
         self._rest()
         self._ask_tool()
         self._note_whether_empty()
-        self._close_books(completed=True)
+        close_books(self.workcell.accounts, completed=True)
         self._plant.tick += 1
 
     def _rest(self) -> None:
@@ -278,19 +279,7 @@ class Run:
         """Tell whether the run that is played was halted here, before or after the tree was ticked."""
         if self._past is None or not self._plant.tape.playing or self._live_from is not None:
             return False
-        entry = self._past.halt
-        if entry is None:
-            return self.tick > self._past.last_tick
-        return bool(entry["tick"] == self.tick and entry["ticked"] is not before)
-
-    def _close_books(self, *, completed: bool) -> None:
-        """Have the ledger decide the final state of each item, and check the balance.
-
-        Raises:
-            Fault: The number of items seen is not the sum of those placed, rejected, skipped and lost.
-        """
-        self.workcell.accounts.close(completed=completed)
-        check_balance(self.workcell.accounts)
+        return self._past.is_halted(self.tick, before=before)
 
     def _note_whether_empty(self) -> None:
         ledger = self._plant.cell.ledger

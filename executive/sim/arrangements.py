@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 import pybullet
+from numpy.random import Generator
 from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell_config import BinConfig, CameraConfig, CellConfig, Colour, ObjectConfig
@@ -55,7 +56,7 @@ class SceneObject:
     colour: Colour
 
 
-def move_arm(world: World, camera: CameraConfig, rng: np.random.Generator) -> bool:
+def move_arm(world: World, camera: CameraConfig, rng: Generator) -> bool:
     """Move the arm to a random pose as in a run; return True if the arm is to hold an object."""
     poses = world.config.arm.poses_deg
     scans = camera.scan_poses
@@ -81,7 +82,7 @@ def move_arm(world: World, camera: CameraConfig, rng: np.random.Generator) -> bo
     return bool(rng.random() < 0.3)
 
 
-def random_part(camera: CameraConfig, rng: np.random.Generator) -> tuple[int, int, int, int]:
+def random_part(camera: CameraConfig, rng: Generator) -> tuple[int, int, int, int]:
     """Return the part of the image to show: mostly `table_view`, else another of the same size."""
     left, top, right, bottom = camera.table_view
     if rng.random() < 0.65:
@@ -91,7 +92,7 @@ def random_part(camera: CameraConfig, rng: np.random.Generator) -> tuple[int, in
     return x, y, x + right - left, y + bottom - top
 
 
-def draw_items(config: CellConfig, count: int, table: Colour, rng: np.random.Generator) -> list[SceneObject]:
+def draw_items(config: CellConfig, count: int, table: Colour, rng: Generator) -> list[SceneObject]:
     """Return `count` random objects at the origin; some scenes have unknown objects or other sizes."""
     share_unknown = rng.uniform(0.05, 0.4) if rng.random() < 0.35 else 0.0
     share_resized = rng.uniform(0.2, 1.0) if rng.random() < 0.35 else 0.0
@@ -123,7 +124,7 @@ def unknown_model(number: int) -> ObjectConfig:
 
 
 def arrange(
-    config: CellConfig, footprint: Array, shows_workspace: bool, table: Colour, rng: np.random.Generator
+    config: CellConfig, footprint: Array, shows_workspace: bool, table: Colour, rng: Generator
 ) -> list[SceneObject]:
     """Return a random arrangement of 0 to 20 objects; unknown objects and stacks may be among them.
 
@@ -157,12 +158,12 @@ def arrange(
     return items
 
 
-def _lift_and_rotate(item: SceneObject, rng: np.random.Generator) -> SceneObject:
+def _lift_and_rotate(item: SceneObject, rng: Generator) -> SceneObject:
     """Return an object lifted by 4 cm and randomly rotated."""
     return replace(item, X_WO=Pose(_random_rotation(rng), item.X_WO.position + np.array([0, 0, 0.04])))
 
 
-def make_held_object(X_WT: Pose, config: CellConfig, rng: np.random.Generator) -> SceneObject:
+def make_held_object(X_WT: Pose, config: CellConfig, rng: Generator) -> SceneObject:
     """Return a random object that hangs upright at the tip of the tool."""
     (item,) = draw_items(config, 1, (0.5, 0.5, 0.5), rng)
     place = X_WT.position - [0, 0, load_mesh(item.model).top]
@@ -209,7 +210,7 @@ def _move_tool(world: World, X_WT: Pose) -> None:
         world.set_arm(q[:7])
 
 
-def _random_rotation(rng: np.random.Generator) -> Array:
+def _random_rotation(rng: Generator) -> Array:
     return rotation_from_quaternion(rng.normal(size=4))
 
 
@@ -224,7 +225,7 @@ def _inside(bin: BinConfig, point: Array, margin: float) -> bool:
 
 
 def _heap(
-    items: Sequence[SceneObject], low: Array, high: Array, bins: list[BinConfig], rng: np.random.Generator
+    items: Sequence[SceneObject], low: Array, high: Array, bins: list[BinConfig], rng: Generator
 ) -> list[SceneObject]:
     """Return objects one above the other, over a point of the table or over a bin."""
     if bins and rng.random() < 0.6:
@@ -239,7 +240,7 @@ def _heap(
     ]
 
 
-def _stack(items: list[SceneObject], rng: np.random.Generator) -> None:
+def _stack(items: list[SceneObject], rng: Generator) -> None:
     """Put some objects on others, nearly centred; the balance of the stacks is not simulated."""
     for _ in range(int(rng.integers(1, 1 + max(1, len(items) // 3)))):
         if len(items) < 2:
@@ -262,7 +263,7 @@ def _place_side_by_side(
     low: Array,
     high: Array,
     bins: list[BinConfig],
-    rng: np.random.Generator,
+    rng: Generator,
 ) -> list[SceneObject]:
     """Place objects side by side on the table or in bins; return those that find a place."""
     gap = rng.uniform(0.0, 0.02)

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from executive.cell import Clock
 from executive.cell_config import CameraConfig, DepthConfig, NoiseConfig
 from executive.geometry import Array, Pose
-from executive.messages import Bin, Box, Frame
+from executive.messages import Bin, Frame
 from executive.sim.view import ArmShadow
 from executive.sim.world import World
 from executive.vision.camera_check import describe_displacement
 from executive.vision.camera_model import FAR, NEAR, calibrated, projection_matrix, view_matrix
+from executive.vision.mounted_camera import MountedCamera
 
 Image = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
@@ -139,16 +140,11 @@ def _edges(true: Array, config: DepthConfig) -> Mask:
     return cv2.dilate(jumps, np.ones((width, width), np.uint8)).astype(bool)
 
 
-class SimCamera:
+class SimCamera(MountedCamera):
     """A camera of the simulated world; satisfies `executive.cell.Camera`.
 
-    Frames are numbered from 1. The noise of frame n depends on the seed and n alone, and that of its image
+    The noise of frame n depends on the seed and n alone, and that of its image
     not on whether there is a depth sensor.
-
-    Attributes:
-        name: Its name in the cell file.
-        config: Its section of the cell file.
-        matrix: Camera matrix `(3, 3)` [pixel].
     """
 
     def __init__(
@@ -180,9 +176,7 @@ class SimCamera:
                 Frames carry the matrix and the pose of `config`.
             bins: The bins whose places in a frame show whether the camera is where `config` says.
         """
-        self.name = name
-        self.config = config
-        self.matrix, _ = calibrated(config)
+        super().__init__(name, config, world.flange_pose)
         self._true = true or config
         self._world = world
         self._clock = clock
@@ -191,25 +185,6 @@ class SimCamera:
         self._epoch = epoch
         self._light = light
         self._bins = bins
-        self._frames = 0
-        self._turn = 0
-
-    @property
-    def scan_poses(self) -> Sequence[str]:
-        """Names of the arm poses from which it sees the table, best first."""
-        return self.config.scan_poses
-
-    def next_pose(self) -> str:
-        """Return the scan pose after the one this returned last, for a look from elsewhere."""
-        self._turn += 1
-        return self.scan_poses[self._turn % len(self.scan_poses)]
-
-    def area(self, view: str) -> Box:
-        """Return the part of the image [pixel] that `view` (`table` or `full`) means."""
-        if view == "table":
-            left, top, right, bottom = self.config.table_view
-            return left, top, right, bottom
-        return 0, 0, *self._size
 
     def sees_table(self) -> bool:
         """Tell whether the whole workspace is in view now, the arm not in front of it."""
@@ -236,16 +211,9 @@ class SimCamera:
         """Return in words how far a frame shows the camera beside its declared pose; "" if it does not."""
         return describe_displacement(frame, self._bins)
 
-    def skip(self, frames: int, turns: int) -> None:
-        """Go on as if so many frames had been taken and next poses been asked for."""
-        self._frames, self._turn = frames, turns
-
     @property
     def _size(self) -> tuple[int, int]:
         return self.config.width, self.config.height
-
-    def _pose(self) -> Pose:
-        return camera_pose(self._world, self.config)
 
     def _true_view(self) -> tuple[Array, Pose]:
         """Return the camera matrix and the pose `X_WC` that the images really have."""

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from executive.errors import Fault, InputError
+from executive.errors import Fault, InputError, explained, reason_of
 from executive.geometry import Array
 from executive.motion.state import JOINTS, State
 from executive.motion.trajectory import Trajectory
@@ -57,13 +57,11 @@ class CommandLog:
         if path is None:
             return
         length = max((end for _, end in _commands(path)), default=len(MAGIC)) if again else 0
-        try:
+        with explained(InputError, f'cannot write "{path}"'):
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
             os.ftruncate(self._file, length)
             if not again:
                 os.write(self._file, MAGIC)
-        except OSError as error:
-            raise InputError(f'cannot write "{path}": {(error.strerror or str(error)).lower()}') from error
 
     def note(self, kind: int, *numbers: float) -> None:
         """Append a command."""
@@ -98,7 +96,7 @@ class CommandLog:
         except OSError as error:
             self.close()
             raise Fault(
-                f'the log of the world "{self._path}" cannot be written: {(error.strerror or "").lower()}; '
+                f'the log of the world "{self._path}" cannot be written: {reason_of(error)}; '
                 "the run stops because it could not be taken up again"
             ) from error
 
@@ -146,13 +144,9 @@ def _commands(path: Path) -> Iterator[tuple[Command, int]]:
 
 
 def _content(path: Path) -> bytes:
-    try:
+    without = "without it a simulated run can neither be taken up again nor filmed"
+    with explained(InputError, f'cannot read the log of the world "{path}"', without):
         return path.read_bytes()
-    except OSError as error:
-        raise InputError(
-            f'cannot read the log of the world "{path}": {(error.strerror or str(error)).lower()}; '
-            "without it a simulated run can neither be taken up again nor filmed"
-        ) from error
 
 
 def states_of(command: Command) -> State:

@@ -11,9 +11,8 @@ import pybullet
 from executive.arm import Goal
 from executive.cell_config import CellConfig
 from executive.clock import STEP
-from executive.errors import Unreachable
 from executive.geometry import Array
-from executive.layout import as_bin
+from executive.layout import places_out_of_reach
 from executive.motion.planner import Planner
 from executive.sim.arm import SimArm
 from executive.sim.camera import camera_pose
@@ -37,12 +36,8 @@ def out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     planner = Planner(config)
     load = max(kind.height for kind in config.objects.values())
 
-    def problem(place: Array, floor: float) -> str | None:
-        try:
-            planner.require_reachable(Goal((float(place[0]), float(place[1]), floor + load)))
-        except Unreachable as error:
-            return str(error)
-        return None
+    def require(place: Array, floor: float) -> None:
+        planner.require_reachable(Goal((float(place[0]), float(place[1]), floor + load)))
 
     for name, pose in config.arm.poses_deg.items():
         for joint, (angle, limit) in enumerate(
@@ -53,16 +48,7 @@ def out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
                     ("arm", "poses_deg", name),
                     f'joint {joint} of the pose "{name}" is at {angle:g} degrees; its limit is {limit:g}',
                 )
-    for name, section in config.bins.items():
-        bin = as_bin(name, section)
-        for slot in bin.slots:
-            sentence = problem(slot, float(bin.position[2]))
-            if sentence:
-                yield ("bins", name, "position"), f'the bin "{name}" is out of reach: {sentence}'
-                break
-    sentence = problem(np.array(config.safe_place[:2]), config.safe_place[2])
-    if sentence:
-        yield ("safe_place",), f"the safe place is out of reach: {sentence}"
+    yield from places_out_of_reach(config, require)
 
 
 def unfit_poses(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:

@@ -87,16 +87,12 @@ class Rebuilding:
             self._motion, self._time = sampled(states_of(command), duration, guarded), 0.0
         elif kind == log.DONE:
             self._motion = None
-        elif kind == log.CLOSE:
-            tool.close()
-        elif kind == log.OPEN:
-            tool.open()
         elif kind == log.PLACE:
             world.place_object(int(numbers[0]), Pose.of(numbers[1:4], numbers[4:]))
         elif kind == log.REMOVE:
             world.remove_object(int(numbers[0]))
-        elif kind == log.PART:
-            tool.part()
+        else:
+            {log.CLOSE: tool.close, log.OPEN: tool.open, log.PART: tool.part}[kind]()
 
 
 def rebuild(world: World, tool: SuctionTool, commands: Iterable[Command]) -> UnderWay:

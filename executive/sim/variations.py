@@ -88,11 +88,7 @@ def random_object_colour(palette: Sequence[Colour], table: Colour, rng: np.rando
 
 
 def random_hsv_colour(
-    rng: np.random.Generator,
-    min_saturation: float,
-    max_saturation: float,
-    min_value: float,
-    max_value: float,
+    rng: np.random.Generator, min_saturation: float, max_saturation: float, min_value: float, max_value: float
 ) -> Colour:
     """Return a colour of any hue, with saturation and value in the given ranges, all 0 to 1."""
     return colorsys.hsv_to_rgb(

@@ -17,8 +17,7 @@ from pybullet_utils.bullet_client import BulletClient
 from executive.cell_config import BinConfig, CellConfig, ObjectConfig
 from executive.clock import STEP
 from executive.geometry import Array, Pose
-from executive.layout import NECK_LENGTH, TOOL_RADIUS
-from executive.messages import BIN_THICKNESS
+from executive.layout import NECK_LENGTH, TOOL_RADIUS, bin_walls
 from executive.motion.kinematics import FLANGE_OFFSET
 from executive.motion.state import JOINTS
 from executive.sim import command_log
@@ -208,25 +207,14 @@ def held_part(label: str) -> str:
 
 def add_bin(client: BulletClient, bin: BinConfig) -> int:
     """Build floor and walls as one static body standing at the bin's position, and return it."""
-    (length, width, height), t = bin.size, BIN_THICKNESS
-    boxes = [
-        ((length / 2 + t, width / 2 + t, t / 2), (0, 0, t / 2)),
-        ((t / 2, width / 2 + t, height / 2), ((length + t) / 2, 0, height / 2)),
-        ((t / 2, width / 2 + t, height / 2), (-(length + t) / 2, 0, height / 2)),
-        ((length / 2, t / 2, height / 2), (0, (width + t) / 2, height / 2)),
-        ((length / 2, t / 2, height / 2), (0, -(width + t) / 2, height / 2)),
-    ]
-    shape = {
-        "shapeTypes": [pybullet.GEOM_BOX] * len(boxes),
-        "halfExtents": [half for half, _ in boxes],
-    }
-    places = [place for _, place in boxes]
+    halves, places = map(list, zip(*bin_walls(bin.size), strict=True))
+    shape = {"shapeTypes": [pybullet.GEOM_BOX] * len(halves), "halfExtents": halves}
     return int(
         client.createMultiBody(
             baseMass=0,
             baseCollisionShapeIndex=client.createCollisionShapeArray(**shape, collisionFramePositions=places),
             baseVisualShapeIndex=client.createVisualShapeArray(
-                **shape, visualFramePositions=places, rgbaColors=[[*bin.colour, 1]] * len(boxes)
+                **shape, visualFramePositions=places, rgbaColors=[[*bin.colour, 1]] * len(halves)
             ),
             basePosition=bin.position,
         )

@@ -114,6 +114,12 @@ class Past:
         ended = next((end for end in self.incomplete if end >= tick), None)
         return ended is not None and (ended + 1 == live_from or ended + 1 in self.resumes)
 
+    def is_halted(self, tick: int, *, before: bool) -> bool:
+        """Return True if the run was halted in this control step, before or after its tree was ticked."""
+        if self.halt is None:
+            return tick > self.last_tick
+        return bool(self.halt["tick"] == tick and self.halt["ticked"] is not before)
+
     def before(self, tick: int) -> Past:
         """Return what had happened before a control step; how it began always had."""
         return Past.of(e for e in self.entries if e["tick"] < tick or e["kind"] == "run")

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-
 from executive.cell import Cell, Routes
 from executive.cell_config import CellConfig
 from executive.events import Emit
 from executive.layout import bins_of, cell_without_hardware, classes_distinct_by_touch
 from executive.ledger.ledger import ItemLedger
-from executive.workcell import CellOptions
+from executive.workcell import CellOptions, Workcell
 
 
-class PlayedCell:
-    """What decisions rest on beside a cell's answers; implements `executive.workcell.Workcell`.
+class PlayedCell(Workcell):
+    """What decisions rest on beside a cell's answers: nothing to log, to be seen, to audit or to close.
 
     Args:
         config: The cell file.
@@ -49,19 +46,6 @@ class PlayedCell:
         """Control steps made so far."""
         return self._steps
 
-    def log_to(self, path: Path) -> None:
-        """Have nothing to keep."""
-
     def advance(self) -> None:
         """Let one control step pass."""
         self._steps += 1
-
-    def scenery(self) -> None:
-        """Return None: there is nothing to be seen."""
-
-    def audit(self) -> Mapping[str, int] | None:
-        """Return None: nobody can know."""
-        return None
-
-    def close(self) -> None:
-        """Have nothing to give back."""

@@ -18,7 +18,7 @@ class BoundedCell(CellWrapper):
     """
 
     def __init__(self, inner: Workcell, longest: float) -> None:
-        super().__init__(inner, after=self._check)
+        super().__init__(inner, self._check)
         self._longest = longest
         self._expired = False
 

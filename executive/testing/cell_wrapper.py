@@ -1,8 +1,9 @@
-"""Decorator of a work cell that adds callbacks before and after every control step."""
+"""Decorator of a work cell that adds a callback after every control step."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from executive.cell import Cell
@@ -14,27 +15,17 @@ def _do_nothing() -> None:
     """Do nothing."""
 
 
+@dataclass(eq=False)
 class CellWrapper:
     """Forwards everything to another work cell, unless a subclass overrides it; implements `Workcell`.
 
-    Args:
-        inner: The work cell inside this wrapper.
-        before: Called before every control step.
-        after: Called after every control step.
-
     Attributes:
         inner: The work cell inside this wrapper.
+        after: Called after every control step.
     """
 
-    def __init__(
-        self,
-        inner: Workcell,
-        *,
-        before: Callable[[], None] = _do_nothing,
-        after: Callable[[], None] = _do_nothing,
-    ) -> None:
-        self.inner = inner
-        self._before, self._after = before, after
+    inner: Workcell
+    after: Callable[[], None] = _do_nothing
 
     @property
     def cell(self) -> Cell:
@@ -56,10 +47,9 @@ class CellWrapper:
         self.inner.log_to(path)
 
     def advance(self) -> None:
-        """Let one control step pass, with the calls before and after it."""
-        self._before()
+        """Let one control step pass, with the call after it."""
         self.inner.advance()
-        self._after()
+        self.after()
 
     def scenery(self) -> Scenery | None:
         """Return the scene for viewers, or None if the cell has none."""

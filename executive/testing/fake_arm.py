@@ -16,7 +16,7 @@ from executive.clock import STEP
 from executive.errors import Fault, Unreachable
 from executive.events import Emit, ignore
 from executive.geometry import Array, Pose, tool_down
-from executive.layout import as_bin, travel_height
+from executive.layout import places_out_of_reach, travel_height
 from executive.motion.kinematics import Kinematics
 from executive.motion.plans import Plan, Plans
 from executive.testing.fake_world import FakeWorld
@@ -250,20 +250,7 @@ def require_reachable(place: Array) -> None:
 def out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield a key of the cell file and a sentence for every bin, and the safe place, beyond `REACH`."""
     high = travel_height(config)
-
-    def sentence(*places: Array) -> str | None:
-        try:
-            for place in places:
-                require_reachable(np.array([*place[:2], high]))
-        except Unreachable as error:
-            return str(error)
-        return None
-
-    for name, section in config.bins.items():
-        if problem := sentence(*as_bin(name, section).slots):
-            yield ("bins", name, "position"), f'the bin "{name}" is out of reach: {problem}'
-    if problem := sentence(np.array(config.safe_place)):
-        yield ("safe_place",), f"the safe place is out of reach: {problem}"
+    return places_out_of_reach(config, lambda place, _: require_reachable(np.array([*place, high])))
 
 
 def _line(start: Array, end: Array, rotation: Array, speed: float) -> list[Pose]:

@@ -15,17 +15,16 @@ from executive.errors import Unavailable
 from executive.geometry import Pose
 from executive.messages import Answer, Box, Detection, Frame
 from executive.testing.fake_world import FakeWorld
-from executive.vision.camera_model import calibrated
+from executive.vision.mounted_camera import MountedCamera
 
 CONFIDENCE = 0.9
 """What a fake detector says of what it sees, or its threshold where that is more."""
 
 
-class FakeCamera:
+class FakeCamera(MountedCamera):
     """A camera where the cell file says, whose images are blank.
 
     Attributes:
-        name: Its name in the cell file.
         sees: Tells whether the whole workspace is in view; the fake arm hides nothing.
         hides: Parts of the image [pixel] that a test wants hidden.
         displaced: Displacement in words that a test wants its frames to show.
@@ -41,34 +40,13 @@ class FakeCamera:
         flange: Callable[[], Pose],
         epoch: Callable[[], int],
     ) -> None:
-        self.name = name
+        super().__init__(name, config, flange)
         self.sees: Callable[[], bool] = self._whole_table
         self.hides: list[Box] = []
         self.displaced = ""
-        self._config = config
         self._corners = np.array([(x, y, 0.0) for x in table.x for y in table.y])
-        self._matrix, self._X_MC = calibrated(config)
         self._world = world
-        self._flange = flange
         self._epoch = epoch
-        self._count = 0
-        self._turn = 0
-
-    @property
-    def scan_poses(self) -> Sequence[str]:
-        """Names of the arm poses from which it sees the table."""
-        return self._config.scan_poses
-
-    def next_pose(self) -> str:
-        """Return the scan pose after the one this returned last."""
-        self._turn += 1
-        return self.scan_poses[self._turn % len(self.scan_poses)]
-
-    def area(self, view: str) -> Box:
-        """Return the part of the image [pixel] that `view` means."""
-        if view == "table":
-            return self._config.table_view
-        return 0, 0, self._config.width, self._config.height
 
     def sees_table(self) -> bool:
         """Tell what `sees` says."""
@@ -76,14 +54,14 @@ class FakeCamera:
 
     def capture(self) -> Frame:
         """Return a blank frame with a true pose."""
-        self._count += 1
-        size = self._config.height, self._config.width
+        self._frames += 1
+        size = self.config.height, self.config.width
         return Frame(
-            id=self._count,
+            id=self._frames,
             camera=self.name,
             image=np.zeros((*size, 3), dtype=np.uint8),
             depth=None,
-            matrix=self._matrix,
+            matrix=self.matrix,
             X_WC=self._pose(),
             stamp=self._world.now,
             visible=self._visible(size),
@@ -95,23 +73,16 @@ class FakeCamera:
         del frame
         return self.displaced
 
-    def skip(self, frames: int, turns: int) -> None:
-        """Go on as if so many frames had been taken and next poses been asked for."""
-        self._count, self._turn = frames, turns
-
     def _visible(self, size: tuple[int, int]) -> NDArray[np.bool_]:
         visible = np.ones(size, dtype=bool)
         for left, top, right, bottom in self.hides:
             visible[int(top) : int(bottom), int(left) : int(right)] = False
         return visible
 
-    def _pose(self) -> Pose:
-        return self._X_MC if self._config.mount == "fixed" else self._flange() @ self._X_MC
-
     def _whole_table(self) -> bool:
-        corners = self._pose().inverse().apply(self._corners) @ self._matrix.T
+        corners = self._pose().inverse().apply(self._corners) @ self.matrix.T
         pixels = corners[:, :2] / corners[:, 2:]
-        inside = (pixels >= 0) & (pixels < (self._config.width, self._config.height))
+        inside = (pixels >= 0) & (pixels < (self.config.width, self.config.height))
         return bool(np.all(corners[:, 2] > 0) and np.all(inside))
 
 
@@ -137,47 +108,52 @@ class FakeRequest:
         return Answer(self.detector, tuple(self.answer), self.error_rates)
 
 
+def _truthful(look: int, true: Sequence[Detection]) -> Sequence[Detection]:
+    del look
+    return true
+
+
+@dataclass(eq=False)
 class FakeDetector:
     """A detector that sees every object before the lens, unless `answers` says otherwise for a look.
 
-    `answers` gets the number of the look (from 1) and the true detections, and returns detections, or a
-    sentence to be unavailable with.
+    Attributes:
+        name: Its name in the cell file.
+        config: Its section of the cell file.
+        world: What it sees.
+        clock: The run's clock.
+        area: Returns the part of the image [pixel] that a view means.
+        answers: Gets the number of the look (from 1) and the true detections, and returns detections, or a
+            sentence to be unavailable with.
+        looks: Looks so far.
     """
 
-    def __init__(
-        self,
-        name: str,
-        config: DetectorConfig,
-        world: FakeWorld,
-        clock: Clock,
-        area: Callable[[str], Box],
-    ) -> None:
-        self._name = name
-        self._config = config
-        self._world = world
-        self._clock = clock
-        self._area = area
-        self._looks = 0
-        self.answers: Callable[[int, Sequence[Detection]], Sequence[Detection] | str] = _truthful
+    name: str
+    config: DetectorConfig
+    world: FakeWorld
+    clock: Clock
+    area: Callable[[str], Box]
+    answers: Callable[[int, Sequence[Detection]], Sequence[Detection] | str] = _truthful
+    looks: int = 0
 
     def request(self, frame: Frame, view: str) -> Request:
         """Answer with what the searched part of the frame would show, as late as the cell file says."""
-        self._looks += 1
-        left, top, right, bottom = self._area(view)
+        self.looks += 1
+        left, top, right, bottom = self.area(view)
         true = []
-        for thing in self._world.objects:
+        for thing in self.world.objects:
             x, y, depth = frame.matrix @ frame.X_WC.inverse().apply(thing.position)
-            if depth <= 0 or thing is self._world.held:
+            if depth <= 0 or thing is self.world.held:
                 continue
             column, row = x / depth, y / depth
             if left <= column < right and top <= row < bottom:
                 true.append(self._detection(thing.label, column, row, frame.matrix[0, 0] / depth))
         return FakeRequest(
-            self._clock.now + self._config.latency,
-            self._clock,
-            self.answers(self._looks, true),
-            self._name,
-            self._config.error_rates,
+            self.clock.now + self.config.latency,
+            self.clock,
+            self.answers(self.looks, true),
+            self.name,
+            self.config.error_rates,
         )
 
     def close(self) -> None:
@@ -185,11 +161,6 @@ class FakeDetector:
 
     def _detection(self, label: str, column: float, row: float, scale: float) -> Detection:
         """Return the box around an object whose centre is at a pixel, at a `scale` [pixel/m]."""
-        size = scale * self._world.classes[label].radius
+        size = scale * self.world.classes[label].radius
         box = (column - size, row - size, column + size, row + size)
-        return Detection(label, max(CONFIDENCE, self._config.threshold), box)
-
-
-def _truthful(look: int, true: Sequence[Detection]) -> Sequence[Detection]:
-    del look
-    return true
+        return Detection(label, max(CONFIDENCE, self.config.threshold), box)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from executive.errors import Fault, InputError
+from executive.errors import Fault, InputError, reason_of
 from executive.geometry import Pose
 from executive.testing.fake_arm import FakeArm
 from executive.testing.fake_world import FakeObject, FakeWorld
@@ -34,7 +34,7 @@ class FakeLog:
             self._file: int | None = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
             self.write(world, arm)
         except OSError as error:
-            raise InputError(f'cannot write "{path}": {(error.strerror or str(error)).lower()}') from error
+            raise InputError(f'cannot write "{path}": {reason_of(error)}') from error
         except Fault as fault:
             raise InputError(str(fault)) from fault
 
@@ -63,7 +63,7 @@ class FakeLog:
         except OSError as error:
             self.close()
             raise Fault(
-                f'the state of the world "{self._path}" cannot be written: {(error.strerror or "").lower()}; '
+                f'the state of the world "{self._path}" cannot be written: {reason_of(error)}; '
                 "the run stops because it could not be taken up again"
             ) from error
 

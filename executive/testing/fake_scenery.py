@@ -8,8 +8,7 @@ import numpy as np
 
 from executive.cell_config import CellConfig
 from executive.geometry import Pose
-from executive.layout import TOOL_RADIUS
-from executive.messages import BIN_THICKNESS
+from executive.layout import TOOL_RADIUS, bin_walls
 from executive.scenery import Shape
 from executive.testing.fake_world import FakeObject, FakeWorld
 
@@ -62,15 +61,8 @@ def _fixed(config: CellConfig) -> Iterator[Shape]:
     middle = Pose.of(((left + right) / 2, (near + far) / 2, -TABLE_THICKNESS / 2))
     yield Shape("", "box", size, middle, TABLE_COLOUR)
     for bin in config.bins.values():
-        (length, width, height), t = bin.size, BIN_THICKNESS
-        parts = [
-            ((length + 2 * t, width + 2 * t, t), (0.0, 0.0, t / 2)),
-            ((t, width + 2 * t, height), ((length + t) / 2, 0.0, height / 2)),
-            ((t, width + 2 * t, height), (-(length + t) / 2, 0.0, height / 2)),
-            ((length, t, height), (0.0, (width + t) / 2, height / 2)),
-            ((length, t, height), (0.0, -(width + t) / 2, height / 2)),
-        ]
-        for size, place in parts:
+        for (x, y, z), place in bin_walls(bin.size):
+            size = 2 * x, 2 * y, 2 * z
             yield Shape("", "box", size, Pose.of(np.add(bin.position, place)), bin.colour)
 
 

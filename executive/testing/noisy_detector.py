@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from executive.cell import Detector, Request
+from executive.cell import Detector
 from executive.cell_config import DetectorConfig, Section
 from executive.messages import Answer, Detection, Frame
-from executive.vision.detectors.options import read_options, wrong_options
+from executive.vision.detectors.options import OptionFaults, read_options, wrong_options
+from executive.vision.detectors.requests import ChangedRequest
 from executive.vision.detectors.setting import Setting
 
 LOW = 0.75
@@ -59,9 +60,7 @@ class NoisyDetector:
         return cls(config, read_options(NoisyOptions, config), setting)
 
     @staticmethod
-    def check(
-        config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]
-    ) -> Iterator[tuple[str, str]]:
+    def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionFaults:
         """Yield every option because of which it could not be built, with a sentence."""
         del base
         wrong = list(wrong_options(NoisyOptions, config))
@@ -69,14 +68,15 @@ class NoisyDetector:
         if not wrong and config.options["of"] not in others:
             yield "of", f'the cell has no detector "{config.options["of"]}"; it has: {", ".join(others)}'
 
-    def request(self, frame: Frame, view: str) -> NoisyRequest:
+    def request(self, frame: Frame, view: str) -> ChangedRequest:
         """Ask the other detector about `frame`."""
-        return NoisyRequest(self, self._other.request(frame, view), frame, view)
+        asked = self._other.request(frame, view)
+        return ChangedRequest(asked, lambda answer: self._spoilt(answer, frame, view))
 
     def close(self) -> None:
         """Have nothing to give back."""
 
-    def spoil(self, answer: Answer, frame: Frame, view: str) -> Answer:
+    def _spoilt(self, answer: Answer, frame: Frame, view: str) -> Answer:
         """Return an answer with errors, drawn from the seed and the number of the frame."""
         random = np.random.default_rng([self._setting.seed, frame.id, len(view)])
         kept = [one for one in answer.found if random.random() >= self._config.misses]
@@ -108,26 +108,3 @@ class NoisyDetector:
 
     def _confidence(self, most: float, random: np.random.Generator) -> float:
         return float(random.uniform(self._config.floor, most))
-
-
-@dataclass(frozen=True, eq=False)
-class NoisyRequest:
-    """A request to the other detector whose answer will be spoilt; implements `executive.cell.Request`."""
-
-    detector: NoisyDetector
-    request: Request
-    frame: Frame
-    view: str
-
-    @property
-    def ready(self) -> bool:
-        """True once the other detector's answer is due."""
-        return self.request.ready
-
-    def result(self) -> Answer:
-        """Return the spoilt answer.
-
-        Raises:
-            Unavailable: The other detector gave no usable answer.
-        """
-        return self.detector.spoil(self.request.result(), self.frame, self.view)

@@ -135,8 +135,7 @@ class Oracle:
         """Have nothing to give back."""
 
     def _shows(self, frame: Frame, view: str, pixel: Array) -> bool:
-        height, width = frame.visible.shape
-        area = np.array(self.camera.table_view if view == "table" else (0, 0, width, height))
+        area = np.array(self.camera.area(view))
         if np.any(pixel < area[:2]) or np.any(pixel >= area[2:]):
             return False
         column, row = pixel.astype(int)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -51,28 +51,22 @@ class MissionResult(Outcome):
 
     def entered(self, pattern: str) -> list[str]:
         """Return the path of every node that was activated and whose path fits a pattern, in order."""
-        return [
-            event.data["node"]
-            for event in self.events
-            if event.kind == "status"
-            and event.data["status"] == "RUNNING"
-            and fnmatchcase(event.data["node"], pattern)
-        ]
+        return [data["node"] for data in self._statuses("RUNNING", pattern)]
 
     def reasons(self, pattern: str = "*") -> list[str]:
         """Return the reason of every failure of a skill whose node fits a pattern, in order."""
-        return [
-            event.data["reason"]
-            for event in self.events
-            if event.kind == "status"
-            and event.data["status"] == "FAILURE"
-            and "origin" not in event.data
-            and fnmatchcase(event.data["node"], pattern)
-        ]
+        failures = self._statuses("FAILURE", pattern)
+        return [data["reason"] for data in failures if "origin" not in data]
 
     def disturbances(self) -> list[Mapping[str, Any]]:
         """Return what was done to the cell, in order: the data of every `disturbance`."""
         return [event.data for event in self.events if event.kind == "disturbance"]
+
+    def _statuses(self, status: str, pattern: str) -> Iterator[Mapping[str, Any]]:
+        for event in self.events:
+            data = event.data
+            if event.kind == "status" and data["status"] == status and fnmatchcase(data["node"], pattern):
+                yield data
 
 
 def run_mission(
@@ -138,11 +132,7 @@ def run_mission(
         run.observe(workcell.hear)
         outcome = run.execute()
         return MissionResult(
-            **asdict(outcome),
-            events=events,
-            items=run.items(),
-            audit=run.audit(),
-            cell=innermost(workcell),
+            **asdict(outcome), events=events, items=run.items(), audit=run.audit(), cell=innermost(workcell)
         )
     finally:
         run.close()

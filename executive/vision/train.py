@@ -9,6 +9,7 @@ from executive.errors import InputError
 from executive.vision.detectors.onnx_model import read_labels
 from executive.vision.evaluation.model_file import evaluate_folder
 from executive.vision.model_card import ModelCard, read_epochs
+from executive.vision.training.settings import Settings
 
 Progress = Callable[[int, dict[str, float]], None]
 Batches = Callable[[int, int], None]
@@ -20,11 +21,7 @@ CARD_THRESHOLD = 0.5
 def train(
     dataset: Path,
     out: Path,
-    *,
-    start: Path | None = None,
-    rate: float | None = None,
-    epochs: int = 20,
-    seed: int = 0,
+    settings: Settings,
     progress: Progress = lambda _epoch, _metrics: None,
     batches: Batches = lambda _done, _all: None,
 ) -> None:
@@ -38,11 +35,7 @@ def train(
         dataset: Folder as Roboflow exports it: `train/` and `valid/`, each with `_annotations.coco.json`, or
             a `data.yaml` for YOLO.
         out: Folder to fill; made if missing.
-        start: Checkpoint (`.pth`) or exported model (`.onnx`) of this architecture to fine-tune, whatever its
-            classes; a `labels.txt` beside it names them. None trains from random weights.
-        rate: Learning rate; by default 1e-4 if `start` has the same classes, else 3e-4.
-        epochs: Number of passes over the data.
-        seed: Seed of weights, order and augmentation.
+        settings: How to train.
         progress: Called after every epoch with its number, from 1, and its figures.
         batches: Called after every batch with how many of how many are done, all epochs together.
 
@@ -50,6 +43,7 @@ def train(
         InputError: The folder is no data set, `start` is missing or no checkpoint, or the training packages
             are not installed.
     """
+    start, rate = settings.start, settings.rate
     _check(dataset, start)
     try:
         from executive.vision.training.torchvision_ops import declare_missing
@@ -63,7 +57,7 @@ def train(
             f'training needs the package "{error.name}"; install the extra: uv sync --extra train'
         ) from error
     out.mkdir(parents=True, exist_ok=True)
-    fit(dataset, out, start=start, rate=rate, epochs=epochs, seed=seed, progress=progress, batches=batches)
+    fit(dataset, out, settings, progress, batches)
     model, labels = out / "model.onnx", out / "labels.txt"
     export_onnx(out / "checkpoint_best_total.pth", len(read_labels(labels)), model)
     card = ModelCard(
@@ -73,8 +67,8 @@ def train(
             **describe(),
             "start": "random weights" if start is None else start.name,
             **({} if rate is None else {"learning rate": f"{rate:g}"}),
-            "epochs": str(epochs),
-            "seed": str(seed),
+            "epochs": str(settings.epochs),
+            "seed": str(settings.seed),
             "weights stored as": "int8",
         },
         epochs=read_epochs(out / "metrics.csv"),

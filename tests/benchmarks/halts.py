@@ -12,7 +12,7 @@ import shutil
 import tempfile
 import traceback
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,7 @@ from executive.runtime.outcome import Outcome
 from executive.runtime.run import Run
 from executive.sim.arm import SimArm
 from executive.testing.cell_wrapper import CellWrapper
+from executive.workcell import Workcell
 from tests.benchmarks.forks import ForkRunner
 from tests.benchmarks.report import Figures, describe, record_run, run_mission_command
 
@@ -145,6 +146,18 @@ def measure_distance(q: Array, trajectory: Trajectory) -> float:
     return float(np.abs(trajectory.at((low + high) / 2).q - q).max())
 
 
+class _WatchedCell(CellWrapper):
+    """A work cell with a call before every control step, too."""
+
+    def __init__(self, inner: Workcell, before: Callable[[], None], after: Callable[[], None]) -> None:
+        super().__init__(inner, after)
+        self._before = before
+
+    def advance(self) -> None:
+        self._before()
+        super().advance()
+
+
 class _RunWithHalts:
     """The run, and the results of its children so far."""
 
@@ -164,7 +177,7 @@ class _RunWithHalts:
         kind = subject.kind or cell_kind(config.kind)
 
         def make_cell(*args: Any, **options: Any) -> CellWrapper:
-            return CellWrapper(
+            return _WatchedCell(
                 kind(*args, **options), before=self._fork_and_halt_if_due, after=self._keep_command
             )
 

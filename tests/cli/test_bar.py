@@ -86,9 +86,9 @@ def test_dataset_shows_how_many_images_were_rendered(
 def test_train_shows_batches_and_a_line_per_epoch(
     at_terminal: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def train(dataset, out, *, start, rate, epochs, seed, progress, batches):
-        for done in range(1, 2 * epochs + 1):
-            batches(done, 2 * epochs)
+    def train(dataset, out, settings, progress, batches):
+        for done in range(1, 2 * settings.epochs + 1):
+            batches(done, 2 * settings.epochs)
             if done % 2 == 0:
                 progress(done // 2, {"loss": 0.51234})
 

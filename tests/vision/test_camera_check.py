@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from executive.cell_config import BinConfig
-from executive.geometry import Array, Pose, looking_down
+from executive.geometry import Array, Pose
 from executive.layout import as_bin
 from executive.messages import BIN_THICKNESS, Bin, Frame
 from executive.vision.camera_check import MAX_DISTANCE, describe_displacement, estimate_offset
 from executive.vision.camera_model import camera_matrix, project
+from tests.camera_poses import looking_down
 
 MATRIX = camera_matrix(640, 480, 55.0)
 DECLARED = looking_down([0.5, 0.0, 1.2])

@@ -12,7 +12,6 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from executive.cell_config import CameraConfig
-from executive.geometry import looking_down
 from executive.messages import Frame
 from executive.vision.camera_model import (
     NEAR,
@@ -26,6 +25,7 @@ from executive.vision.camera_model import (
     projection_matrix,
     view_matrix,
 )
+from tests.camera_poses import looking_down
 
 K = camera_matrix(640, 480, 55)
 GIVEN = [[461.0, 0, 310.0], [0, 470.0, 250.0], [0, 0, 1]]

@@ -13,6 +13,7 @@ from executive.errors import InputError
 from executive.vision.evaluation.figures import Evaluation, Spread
 from executive.vision.model_card import ModelCard, read_epochs
 from executive.vision.train import train
+from executive.vision.training.settings import Settings
 from executive.vision.training.start import learning_rate
 
 
@@ -25,7 +26,7 @@ from executive.vision.training.start import learning_rate
 )
 def test_a_training_that_cannot_start_is_refused(tmp_path, start, text):
     with pytest.raises(InputError, match=text):
-        train(tmp_path, tmp_path / "out", start=start and tmp_path / start)
+        train(tmp_path, tmp_path / "out", Settings(start and tmp_path / start))
 
 
 def test_a_training_goes_on_in_smaller_steps_if_the_checkpoint_knows_its_labels(tmp_path):
@@ -39,7 +40,7 @@ def test_a_training_goes_on_in_smaller_steps_if_the_checkpoint_knows_its_labels(
 def test_training_without_the_extra_says_how_to_install_it(tmp_path):
     (tmp_path / "data.yaml").write_text("names: [cube]\n")
     with pytest.raises(InputError, match='package "torch"; install the extra: uv sync --extra train'):
-        train(tmp_path, tmp_path / "out")
+        train(tmp_path, tmp_path / "out", Settings())
     assert not (tmp_path / "out").exists()
 
 

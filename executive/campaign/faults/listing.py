@@ -105,10 +105,8 @@ class _Listing:
                 yield _detector(f"slow by {by:g} s", when, after(start, effects.detector_slow(by)))
             for lasts in (SHORT, LONG):
                 end = start + lasts
-                hangs, dead = (
-                    between(start, end, effects.detector_hangs()),
-                    between(start, end, effects.detector_dead()),
-                )
+                hangs = between(start, end, effects.detector_hangs())
+                dead = between(start, end, effects.detector_dead())
                 unsure = between(start, end, effects.detector_unsure())
                 yield _detector(f"hangs for {lasts:g} s", when, hangs)
                 yield _detector(f"unsure for {lasts:g} s", when, unsure, "unsure")

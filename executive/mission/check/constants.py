@@ -10,7 +10,6 @@ from executive.mission.findings import Finding, error
 from executive.mission.model import grammar, nodes
 from executive.mission.model.grammar import Key
 from executive.mission.model.nodes import Node
-from executive.mission.model.paths import WORDS
 from executive.mission.model.typed import WrongType, convert
 from executive.mission.model.values import Literal, Reference, Value
 from executive.mission.words import describe
@@ -30,7 +29,7 @@ def constants(case: Case) -> Iterator[Finding]:
 
 def _constants(node: Node) -> Iterator[tuple[str, Key, Value | None]]:
     """Yield every constant of a node: its name in the file, what is declared of it, its value."""
-    word = WORDS.get(type(node), "")
+    word = node.word
     keys = grammar.CONTROL[word].keys if word in grammar.CONTROL else {}
     for name, key in keys.items():
         if key.kind in _KINDS or key.kind == "count":

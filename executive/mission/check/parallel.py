@@ -7,16 +7,7 @@ from itertools import combinations, permutations
 
 from executive.mission.check.case import Case
 from executive.mission.findings import Finding, error
-from executive.mission.model.nodes import (
-    ForEachNode,
-    Node,
-    ParallelNode,
-    SequenceNode,
-    SkillNode,
-    TimeoutNode,
-    TryNode,
-    UseNode,
-)
+from executive.mission.model import nodes
 from executive.mission.model.values import Reference
 from executive.mission.source import Mark
 from executive.skill import Direction
@@ -73,24 +64,25 @@ def racing_reads(case: Case) -> Iterator[Finding]:
                     yield error(mark, "shared-variable", message, hint)
 
 
-def _parallels(case: Case) -> Iterator[ParallelNode]:
-    return (node for node in case.nodes() if isinstance(node, ParallelNode))
+def _parallels(case: Case) -> Iterator[nodes.ParallelNode]:
+    return (node for node in case.nodes() if isinstance(node, nodes.ParallelNode))
 
 
-def _first(node: Node) -> Node:
+def _first(node: nodes.Node) -> nodes.Node:
     """Return the node with which another begins in its first tick."""
-    if isinstance(node, SequenceNode | UseNode | TryNode | TimeoutNode) and node.children:
+    of_first_child = nodes.SequenceNode | nodes.UseNode | nodes.TryNode | nodes.TimeoutNode
+    if isinstance(node, of_first_child) and node.children:
         return _first(node.children[0])
     return node
 
 
-def _reads(case: Case, branch: Node) -> Iterator[tuple[Node, str, str, Mark]]:
+def _reads(case: Case, branch: nodes.Node) -> Iterator[tuple[nodes.Node, str, str, Mark]]:
     """Yield everything below `branch` that reads a variable which is or may be written before it."""
     for node in branch.walk():
         entry = case.flow.entry.get(node.path)
         if entry is None:
             continue
-        if isinstance(node, ForEachNode) and isinstance(node.source, Reference):
+        if isinstance(node, nodes.ForEachNode) and isinstance(node.source, Reference):
             yield node, "for_each", node.source.name, node.source.mark
         for wire in case.wires(node, Direction.IN):
             # What is surely not written yet is told as unwritten.
@@ -98,12 +90,12 @@ def _reads(case: Case, branch: Node) -> Iterator[tuple[Node, str, str, Mark]]:
                 yield node, str(wire), wire.variable, wire.mark
 
 
-def _uses(case: Case, branch: Node) -> dict[str, SkillNode]:
+def _uses(case: Case, branch: nodes.Node) -> dict[str, nodes.SkillNode]:
     """Return the first user of every part of the cell below `branch`."""
-    users: dict[str, SkillNode] = {}
+    users: dict[str, nodes.SkillNode] = {}
     on_wrist = case.cell is not None and any(c.mount == "wrist" for c in case.cell.cameras.values())
     for node in branch.walk():
-        if not isinstance(node, SkillNode) or node.skill not in case.skills:
+        if not isinstance(node, nodes.SkillNode) or node.skill not in case.skills:
             continue
         for resource in case.skills[node.skill].uses:
             # A camera on the wrist sees from where the arm is: to look is to use the arm.
@@ -112,11 +104,11 @@ def _uses(case: Case, branch: Node) -> dict[str, SkillNode]:
     return users
 
 
-def _writes(case: Case, branch: Node) -> dict[str, tuple[str, Mark, str]]:
+def _writes(case: Case, branch: nodes.Node) -> dict[str, tuple[str, Mark, str]]:
     """Return the first writer of every variable below `branch`, its place, and how to call it otherwise."""
     writers: dict[str, tuple[str, Mark, str]] = {}
     for node in branch.walk():
-        if isinstance(node, ForEachNode):
+        if isinstance(node, nodes.ForEachNode):
             hint = "Write to another variable there, as each: other."
             writers.setdefault(node.each.name, ("for_each", node.each.mark, hint))
         for wire in case.wires(node, Direction.OUT):

@@ -67,11 +67,11 @@ class Analysis:
         self.entry[node.path] = state.join(self.entry.get(node.path, state))
         key = node.path, state
         if key not in self._known:
-            flow = _TRANSFER[type(node)](self, node, state).labelled(node.label)
+            flow: Flow = getattr(self, f"_{node.word}")(node, state).labelled(node.label)
             self._known[key] = self.flows[node.path] = flow
         return self._known[key]
 
-    def _skill_node(self, node: Any, state: State) -> Flow:
+    def _skill(self, node: Any, state: State) -> Flow:
         skill = self.skill(node.skill)
         if skill is None:
             return Flow(UNKNOWN, {Raise(node.skill, ANYTHING, node.path): UNKNOWN}, UNKNOWN)
@@ -274,21 +274,3 @@ def _tried_again(node: nodes.RetryNode, failure: Raise) -> bool:
 def _constant(value: Value) -> Any:
     """Return the value if it is known, else None."""
     return value.value if isinstance(value, Literal) else None
-
-
-_TRANSFER: Mapping[type[Node], Callable[[Analysis, Any, State], Flow]] = {
-    nodes.SkillNode: Analysis._skill_node,
-    nodes.SequenceNode: Analysis._sequence,
-    nodes.FallbackNode: Analysis._fallback,
-    nodes.ParallelNode: Analysis._parallel,
-    nodes.RetryNode: Analysis._retry,
-    nodes.RepeatNode: Analysis._repeat,
-    nodes.WhileNode: Analysis._while,
-    nodes.ForEachNode: Analysis._for_each,
-    nodes.TryNode: Analysis._try,
-    nodes.TimeoutNode: Analysis._timeout,
-    nodes.InvertNode: Analysis._invert,
-    nodes.SucceedNode: Analysis._succeed,
-    nodes.UseNode: Analysis._use,
-    nodes.UnknownNode: Analysis._unknown,
-}

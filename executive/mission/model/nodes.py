@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 
 from executive.mission.model.values import Match, Named, Setting, Value
 from executive.mission.source import Mark
+
+_LATER_CAPITAL = re.compile(r"(?<!^)(?=[A-Z])")
 
 
 @dataclass(frozen=True)
@@ -25,6 +28,11 @@ class Node:
     label: str
     label_mark: Mark | None = field(default=None, kw_only=True)
     path: str = field(default="", kw_only=True)
+
+    @property
+    def word(self) -> str:
+        """Word for it in the file, by the name of its class: `for_each` for a `ForEachNode`."""
+        return _LATER_CAPITAL.sub("_", type(self).__name__.removesuffix("Node")).lower()
 
     @cached_property
     def children(self) -> tuple[Node, ...]:

@@ -7,28 +7,12 @@ label; in a list, control nodes and whatever stands there twice carry their numb
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import Any
 
 from executive.mission.model import nodes
 from executive.mission.model.nodes import Node
-
-WORDS: Mapping[type[Node], str] = {
-    nodes.SequenceNode: "sequence",
-    nodes.FallbackNode: "fallback",
-    nodes.ParallelNode: "parallel",
-    nodes.RetryNode: "retry",
-    nodes.RepeatNode: "repeat",
-    nodes.WhileNode: "while",
-    nodes.ForEachNode: "for_each",
-    nodes.TryNode: "try",
-    nodes.TimeoutNode: "timeout",
-    nodes.InvertNode: "invert",
-    nodes.SucceedNode: "succeed",
-    nodes.UnknownNode: "unknown",
-}
-"""What each control node is called in a mission."""
 
 
 def with_paths(root: Node) -> Node:
@@ -42,7 +26,7 @@ def name_of(node: Node) -> str:
         return node.label
     if isinstance(node, nodes.SkillNode):
         return node.skill
-    return node.name if isinstance(node, nodes.UseNode) else WORDS[type(node)]
+    return node.name if isinstance(node, nodes.UseNode) else node.word
 
 
 def _placed(node: Node, parent: str, slot: str, name: str | None = None) -> Node:

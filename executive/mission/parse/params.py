@@ -18,13 +18,7 @@ from executive.mission.source import Mark
 from executive.mission.text.yaml_text import Mapping, Node, plain
 from executive.mission.words import describe
 
-TYPES: Mapped[str, Any] = {
-    "text": str,
-    "integer": int,
-    "number": float,
-    "boolean": bool,
-    "list": list[Any],
-}
+TYPES: Mapped[str, Any] = {"text": str, "integer": int, "number": float, "boolean": bool, "list": list[Any]}
 """The types a param may have, by the word for them."""
 
 

@@ -6,10 +6,10 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import wait as wait_for
 from pathlib import Path
 
-from executive.errors import ExecutiveError
+from executive.errors import ExecutiveError, explained
 from executive.record.pictures.draw import draw
 from executive.record.pictures.scene import Scene
-from executive.record.whole_file import reason_of, replacing
+from executive.record.whole_file import replacing
 
 MAX_WAITING = 64
 """Pictures that may wait for the thread [about 1.2 MB each]; beyond that they are dropped."""
@@ -67,8 +67,5 @@ def save(path: Path, scene: Scene) -> None:
         raise ExecutiveError(f'cannot make the folder "{path.parent}": {error.strerror}') from error
     image = cv2.cvtColor(draw(scene), cv2.COLOR_RGB2BGR)
     _, data = cv2.imencode(path.suffix, image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
-    try:
-        with replacing(path) as part:
-            part.write_bytes(data.tobytes())
-    except OSError as error:
-        raise ExecutiveError(f'cannot write the picture "{path}": {reason_of(error)}') from error
+    with explained(ExecutiveError, f'cannot write the picture "{path}"'), replacing(path) as part:
+        part.write_bytes(data.tobytes())

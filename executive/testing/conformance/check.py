@@ -16,25 +16,13 @@ from executive.testing.conformance.stage import Stage
 Rule = Callable[[SkillRuns], Iterator[str]]
 """Yields what is wrong with a skill: what happened, where, what to do. Its docstring states the rule."""
 
-RULES: tuple[Rule, ...] = (
-    declarations.documented,
-    declarations.defaults_allowed,
-    declarations.reasons_declared,
-    declarations.resources_declared,
-    declarations.imports_allowed,
-    declarations.calls_take_effect,
-    conduct.arranged,
-    conduct.comes_to_an_end,
-    conduct.ends_as_declared,
-    conduct.outputs_fit,
-    conduct.inputs_unchanged,
-    conduct.uses_only_what_it_declares,
-    conduct.tool_left_as_declared,
-    conduct.arm_left_at_rest,
-    conduct.halts_at_once,
-    conduct.repeats_itself,
-    conduct.ticks_are_quick,
+RULES: tuple[Rule, ...] = tuple(
+    rule
+    for module in (declarations, conduct)
+    for name, rule in vars(module).items()
+    if inspect.isfunction(rule) and rule.__module__ == module.__name__ and not name.startswith("_")
 )
+"""The public functions of the two modules, in the order in which they stand there."""
 
 
 class NotConforming(AssertionError):

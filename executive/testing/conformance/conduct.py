@@ -16,14 +16,8 @@ from executive.testing.conformance.skill_runs import GotStuck, SkillRuns
 MAX_TICK_TIME = 0.05
 """Computing time that a tick may take [s]; a control step is 1/240 s of the run's time."""
 
-_PARTS: Mapping[str, str] = {
-    "arm.start": "arm",
-    "arm.stop": "arm",
-    "tool.open": "tool",
-    "tool.close": "tool",
-    "camera.capture": "camera",
-}
-"""Part that a skill uses by a call."""
+_ACTS = ("arm.start", "arm.stop", "tool.open", "tool.close", "camera.capture")
+"""Calls that act by a part of the cell, which the skill must use."""
 _SENSES = ("camera.capture", "operator.ask")
 """Calls by which a skill takes in something new."""
 
@@ -99,8 +93,8 @@ def uses_only_what_it_declares(runs: SkillRuns) -> Iterator[str]:
     """It commands only what it says it uses, moves only if it moves, and senses only if it senses."""
     skill = runs.skill
     for name in dict.fromkeys(call.name for rehearsal in runs.complete_runs for call in rehearsal.calls):
-        part = _PARTS.get(name)
-        if part is not None and part not in skill.uses:
+        part = name.partition(".")[0]
+        if name in _ACTS and part not in skill.uses:
             yield f'{runs.name} calls cell.{name} and does not use the {part}. Add "{part}" to uses.'
         if name == "arm.start" and not skill.moves:
             yield f"{runs.name} calls cell.{name} and does not say that it moves. Add moves = True."

@@ -8,14 +8,8 @@ from collections.abc import Iterator, Sequence
 
 from executive.mission.model.typed import WrongType, convert
 from executive.skill import Param, Port
+from executive.testing.conformance import source
 from executive.testing.conformance.skill_runs import SkillRuns
-from executive.testing.conformance.source import (
-    Written,
-    files_of,
-    functions_reached,
-    returns_failure,
-    returns_steps,
-)
 
 RESOURCES = ("arm", "tool", "camera")
 FOREIGN = (
@@ -58,7 +52,7 @@ def reasons_declared(runs: SkillRuns) -> Iterator[str]:
     if isinstance(reasons, str):
         yield f'{runs.name}.reasons is the text "{reasons}". Write a tuple: ("{reasons}",).'
         return
-    for written in functions_reached(runs.skill):
+    for written in source.functions_reached(runs.skill):
         for reason, node in _raised(written.tree):
             if reason not in reasons:
                 yield (
@@ -83,7 +77,7 @@ def resources_declared(runs: SkillRuns) -> Iterator[str]:
 
 def imports_allowed(runs: SkillRuns) -> Iterator[str]:
     """Its file imports nothing that has another clock, other threads, or one sort of cell only."""
-    for path in filter(lambda path: path.is_file(), files_of(runs.skill)):
+    for path in filter(lambda path: path.is_file(), source.files_of(runs.skill)):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             for package in FOREIGN:
                 if package in _imported(node):
@@ -95,16 +89,16 @@ def imports_allowed(runs: SkillRuns) -> Iterator[str]:
 
 def calls_take_effect(runs: SkillRuns) -> Iterator[str]:
     """No call is without effect: steps are yielded from, and failures are raised."""
-    for written in functions_reached(runs.skill):
+    for written in source.functions_reached(runs.skill):
         for call in _dropped(written):
             callee, text = written.called(call), f"{ast.unparse(call.func)}(...)"
             where = written.place(call)
-            if returns_steps(callee):
+            if source.returns_steps(callee):
                 yield (
                     f"{where} calls {text} and makes none of its steps, so it does nothing. "
                     f'Write "yield from {text}".'
                 )
-            elif returns_failure(callee):
+            elif source.returns_failure(callee):
                 yield f'{where} calls {text} and does not raise it, so nothing fails. Write "raise {text}".'
 
 
@@ -144,7 +138,7 @@ def _imported(node: ast.AST) -> Sequence[str]:
     return []
 
 
-def _dropped(written: Written) -> Iterator[ast.Call]:
+def _dropped(written: source.Written) -> Iterator[ast.Call]:
     """Yield the calls in a function of which the value is not used."""
     nodes = list(ast.walk(written.tree))
     read = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}

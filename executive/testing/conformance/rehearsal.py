@@ -68,14 +68,14 @@ class Rehearsal:
         watch = Watch(cell.cell)
         self.where = " ".join(filter(None, (situation.name, adversity.name if adversity else "")))
         self.reason = self.message = ""
-        self.ticks = 0
+        self.ticks, self._skill, self._halt_at = 0, skill, halt_at
         self.outputs: Mapping[str, Any] = {}
         self.calls, self.durations = watch.calls, list[float]()
         disturbed_at = adversity.tick if adversity else 0
         self.held = fake.tool.holding
         try:
             with patience(skill, lambda: self.ticks):
-                self.status = self._act(skill, values, cell, watch, disturbed_at, halt_at)
+                self.status = self._act(values, cell, watch, disturbed_at)
         except Stuck as stuck:
             self.status, self.message = "STUCK", str(stuck)
         self.changed = [name for name in values if not is_same(values[name], before[name])]
@@ -98,20 +98,13 @@ class Rehearsal:
         """True if it started the arm."""
         return any(call.name == "arm.start" for call in self.calls)
 
-    def _act(
-        self,
-        skill: type[Skill],
-        values: Mapping[str, Any],
-        cell: DisturbedCell,
-        watch: Watch,
-        disturbed_at: int,
-        halt_at: int | None,
-    ) -> str:
+    def _act(self, values: Mapping[str, Any], cell: DisturbedCell, watch: Watch, disturbed_at: int) -> str:
         """Run the skill and return its status at the end."""
+        skill = self._skill
         run: SkillRun | None = None
         try:
             while self.ticks < MAX_TIME / STEP:
-                if run is not None and self.ticks == halt_at:
+                if run is not None and self.ticks == self._halt_at:
                     run.halt()
                     return "HALTED"
                 if self.ticks == disturbed_at:

@@ -17,12 +17,7 @@ from executive.testing.disturbances.detector import (
     detector_unsure,
 )
 from executive.testing.disturbances.disturbed_cell import DisturbedCell, disturbed
-from executive.testing.disturbances.objects import (
-    object_bumped,
-    object_moved,
-    object_refuses,
-    object_removed,
-)
+from executive.testing.disturbances.objects import object_bumped, object_moved, object_refuses, object_removed
 from executive.testing.disturbances.robot import (
     arm_runs_into,
     no_depth,

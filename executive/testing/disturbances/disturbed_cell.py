@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Any
 
 from executive.cell import Cell
@@ -115,15 +114,8 @@ def disturbed(
         disturbances: The script.
         hand: Returns what reaches into the world of a cell of that kind.
     """
-    return partial(_disturbed, kind, tuple(disturbances), hand)
 
+    def make(*args: Any, emit: Emit = ignore, **options: Any) -> DisturbedCell:
+        return DisturbedCell(kind(*args, emit=emit, **options), disturbances, emit, hand)
 
-def _disturbed(
-    kind: Callable[..., Workcell],
-    disturbances: Sequence[Disturbance],
-    hand: Callable[[Workcell], Hand],
-    *args: Any,
-    emit: Emit = ignore,
-    **options: Any,
-) -> DisturbedCell:
-    return DisturbedCell(kind(*args, emit=emit, **options), disturbances, emit, hand)
+    return make

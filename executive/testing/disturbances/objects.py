@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -26,7 +27,7 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class ObjectDisturbed(Effect):
-    """Something is done to an object, once; a subclass says what.
+    """An object is taken or put elsewhere, once; a subclass says how.
 
     Attributes:
         which: The object.
@@ -36,15 +37,19 @@ class ObjectDisturbed(Effect):
     which: Which
     share: float
 
-    def disturb(self, now: Occasion, thing: Thing) -> bool:
-        """Emit the disturbance and do it to an object; return False as long as it cannot be done."""
+    def change(self, scene: Scene, thing: Thing) -> Callable[[], None] | None:
+        """Return what does it to an object, or None as long as it cannot be done."""
         raise NotImplementedError
 
     def act(self, now: Occasion) -> bool:
         """Do it, as soon as the arm is so far and there is such an object."""
         if now.scene.progress < self.share or (thing := now.scene.find(self.which, now.item)) is None:
             return False
-        return self.disturb(now, thing)
+        if (change := self.change(now.scene, thing)) is None:
+            return False
+        now.tell(thing)
+        change()
+        return True
 
 
 @dataclass(frozen=True)
@@ -53,11 +58,9 @@ class ObjectRemoved(ObjectDisturbed):
 
     name = "object_removed"
 
-    def disturb(self, now: Occasion, thing: Thing) -> bool:
-        """Take it away."""
-        now.tell(thing)
-        now.scene.hand.remove(thing)
-        return True
+    def change(self, scene: Scene, thing: Thing) -> Callable[[], None]:
+        """Return what takes it away."""
+        return partial(scene.hand.remove, thing)
 
 
 @dataclass(frozen=True)
@@ -67,11 +70,9 @@ class ObjectMoved(ObjectDisturbed):
     name = "object_moved"
     by: tuple[float, float]
 
-    def disturb(self, now: Occasion, thing: Thing) -> bool:
-        """Move it."""
-        now.tell(thing)
-        now.scene.hand.move(thing, self.by)
-        return True
+    def change(self, scene: Scene, thing: Thing) -> Callable[[], None]:
+        """Return what moves it."""
+        return partial(scene.hand.move, thing, self.by)
 
 
 @dataclass(frozen=True)
@@ -86,14 +87,10 @@ class ObjectBumped(ObjectDisturbed):
     x: Range
     y: Range
 
-    def disturb(self, now: Occasion, thing: Thing) -> bool:
-        """Bump it, if there is room beside it."""
-        by = self._free_way(now.scene, thing)
-        if by is None:
-            return False
-        now.tell(thing)
-        now.scene.hand.move(thing, by)
-        return True
+    def change(self, scene: Scene, thing: Thing) -> Callable[[], None] | None:
+        """Return what bumps it, if there is room beside it."""
+        by = self._free_way(scene, thing)
+        return None if by is None else partial(scene.hand.move, thing, by)
 
     def _free_way(self, scene: Scene, thing: Thing) -> tuple[float, float] | None:
         radius = scene.cell.classes[thing.label].radius

@@ -12,8 +12,8 @@ import av
 import numpy as np
 from PIL import Image, ImageColor
 
-from executive.errors import InputError
-from executive.record.whole_file import reason_of, replacing
+from executive.errors import InputError, explained
+from executive.record.whole_file import replacing
 from executive.view.film.ink import FAILURE, RUNNING, SUCCESS
 
 GIF_SIZE = (960, 540)
@@ -121,10 +121,6 @@ def file_for(path: Path, *, force: bool) -> Iterator[Path]:
         raise InputError(
             f'"{path}" is there already; name another file with -o, or write over it with --force'
         )
-    try:
-        with replacing(path) as part:
-            yield part
-    except OSError as error:
-        raise InputError(
-            f'cannot write the film "{path}": {reason_of(error)}; name another place with -o'
-        ) from error
+    instead = "name another place with -o"
+    with explained(InputError, f'cannot write the film "{path}"', instead), replacing(path) as part:
+        yield part

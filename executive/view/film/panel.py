@@ -8,20 +8,9 @@ from PIL import Image, ImageDraw
 
 from executive.messages import Box
 from executive.mission.outline import OutlineNode
+from executive.view.film import ink
 from executive.view.film.course import Course
-from executive.view.film.ink import (
-    DIM,
-    FAILURE,
-    FAINT,
-    INK,
-    RULE,
-    RUNNING,
-    STATUS,
-    SUCCESS,
-    clipped,
-    font,
-    put_mark,
-)  # fmt: skip
+from executive.view.film.ink import DIM, FAILURE, FAINT, INK, RULE, RUNNING, STATUS, SUCCESS
 from executive.view.items import Row
 from executive.view.tree.outline import branches, opened
 
@@ -57,16 +46,16 @@ def draw_branch(image: Image.Image, box: Box, nodes: Sequence[OutlineNode], cour
         _draw_lines(draw, branch, left, middle)
         now = course.status.get(node.path, "")
         x = left + INDENT * (len(branch) // _CELL)
-        put_mark(image, now, (x + MARK / 2, middle), MARK)
+        ink.put_mark(image, now, (x + MARK / 2, middle), MARK)
         x += MARK + 8
         colour = DIM if now in ("SUCCESS", "FAILURE") else FAINT
         if now == "RUNNING":
             colour = RUNNING if node.skill else INK
-        name = clipped(node.name, TYPE, right - x)
-        draw.text((x, middle), name, colour, font(TYPE), "lm")
-        x += font(TYPE).getlength(name) + 10
-        why = clipped(course.beside.get(node.path, ""), TYPE, right - x)
-        draw.text((x, middle), why, FAILURE if now == "FAILURE" else DIM, font(TYPE), "lm")
+        name = ink.clipped(node.name, TYPE, right - x)
+        draw.text((x, middle), name, colour, ink.font(TYPE), "lm")
+        x += ink.font(TYPE).getlength(name) + 10
+        why = ink.clipped(course.beside.get(node.path, ""), TYPE, right - x)
+        draw.text((x, middle), why, FAILURE if now == "FAILURE" else DIM, ink.font(TYPE), "lm")
 
 
 def fitted(nodes: Sequence[OutlineNode], course: Course, rows: int) -> list[OutlineNode]:
@@ -104,15 +93,15 @@ def draw_items(image: Image.Image, box: Box, rows: Sequence[Row], bins: Mapping[
     starts = [left + share * (right - left) for share in _COLUMNS.values()]
     ends = [start - 8 for start in starts[1:]] + [right]
     for title, start in zip(_COLUMNS, starts, strict=True):
-        draw.text((start, top + ITEM_ROW / 2), title, FAINT, font(HEAD), "lm")
+        draw.text((start, top + ITEM_ROW / 2), title, FAINT, ink.font(HEAD), "lm")
     for number, row in enumerate(kept(rows), start=1):
         middle = top + ITEM_ROW * (number + 0.5)
         cells = (row.item, row.label, row.state, row.bin)
         colours = (DIM if row.state in _SETTLED else INK, DIM, _STATES.get(row.state, DIM), DIM)
         shifts = (0, 0, 0, _SWATCH + 6)
         for cell, colour, shift, start, end in zip(cells, colours, shifts, starts, ends, strict=True):
-            text = clipped(cell, TYPE, end - start - shift)
-            draw.text((start + shift, middle), text, colour, font(TYPE), "lm")
+            text = ink.clipped(cell, TYPE, end - start - shift)
+            draw.text((start + shift, middle), text, colour, ink.font(TYPE), "lm")
         if row.bin:
             x, y = starts[-1], round(middle) - _SWATCH // 2
             draw.rectangle((x, y, x + _SWATCH - 1, y + _SWATCH - 1), bins.get(row.bin, DIM))

@@ -73,13 +73,7 @@ class Facts:
         ]
         file = Path(start["file"])
         mission = file.stem if file.parent == shipped_folder() else str(file)
-        self.repeat = repeat_command(
-            mission,
-            seed=start["seed"],
-            overrides=start["overrides"],
-            requests=self.requests,
-            scene=directory.scene,
-        )
+        self.repeat = repeat_command(mission, start, self.requests, directory.scene)
         ended = self.status in ENDED
         self.resume = "" if ended else shlex.join(["executive", "run", "--resume", str(path)])
         self.replay = shlex.join(["executive", "replay", str(path)])

@@ -14,7 +14,7 @@ from executive.errors import ExecutiveError
 from executive.evidence import describe_unknown
 from executive.record.pictures.palette import PALETTE
 from executive.record.result import disagreement
-from executive.record.run_directory import RunDirectory, refused
+from executive.record.run_directory import RunDirectory, refusing
 from executive.record.whole_file import write_whole
 from executive.view.report.course import by_node, counts, last_failure
 from executive.view.report.facts import Facts
@@ -52,11 +52,9 @@ def write_report(path: Path) -> Path:
     """
     file = RunDirectory(path).report
     text = report(Facts(path))
-    try:
+    instead = "copy the run directory to where you may write, and have the report of the copy made"
+    with refusing(f'write the report "{file}"', instead):
         write_whole(file, text)
-    except OSError as error:
-        instead = "copy the run directory to where you may write, and have the report of the copy made"
-        raise refused(f'write the report "{file}"', error, instead) from error
     return file
 
 

@@ -53,10 +53,7 @@ class Terminal:
         self._lock = threading.Lock()
         self.items = ItemTable()
         self._live = Live(
-            console=console,
-            get_renderable=self.render,
-            refresh_per_second=REDRAWS_PER_SECOND,
-            transient=True,
+            console=console, get_renderable=self.render, refresh_per_second=REDRAWS_PER_SECOND, transient=True
         )
 
     def open(self, run: Run) -> None:
@@ -104,15 +101,9 @@ class Terminal:
 
     def _show(self, wanted: bool) -> None:
         """Take the terminal and its keyboard, or leave them to others who want to write and read there."""
-        if wanted:
-            self._live.start()
-        else:
-            self._live.stop()
+        (self._live.start if wanted else self._live.stop)()
         if self._keys is not None:
-            if wanted:
-                self._keys.listen()
-            else:
-                self._keys.leave()
+            (self._keys.listen if wanted else self._keys.leave)()
 
     def _tree(self) -> RenderableType:
         """Return the running path and its surroundings: a whole mission is taller than a terminal."""

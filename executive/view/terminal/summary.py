@@ -27,16 +27,18 @@ _JOINED = "\N{NO-BREAK SPACE}"
 
 
 def repeat_command(
-    mission: str,
-    *,
-    seed: int,
-    overrides: Mapping[str, str],
-    requests: Iterable[str] = (),
-    scene: Path | None = None,
+    mission: str, start: Mapping[str, Any], requests: Iterable[str] = (), scene: Path | None = None
 ) -> str:
-    """Return the command line that repeats a run exactly; `scene` is its scene file, or None."""
-    words = ["executive", "run", mission, "--seed", str(seed)]
-    for key, value in overrides.items():
+    """Return the command line that repeats a run exactly.
+
+    Args:
+        mission: Its name or file.
+        start: Its `seed` and `overrides`, as in its event `run`.
+        requests: What the operator asked for.
+        scene: Its scene file, or None.
+    """
+    words = ["executive", "run", mission, "--seed", str(start["seed"])]
+    for key, value in start["overrides"].items():
         words += ["--set", f"{key}={value}"]
     for request in requests:
         words += ["--request", request]

@@ -13,10 +13,7 @@ SHAPES: Mapping[str, str] = {
     "sequence": "box",
     "fallback": "octagon",
     "parallel": "parallelogram",
-    "retry": "hexagon",
-    "repeat": "hexagon",
-    "while": "hexagon",
-    "for_each": "hexagon",
+    **dict.fromkeys(("retry", "repeat", "while", "for_each"), "hexagon"),
 }
 """Shapes by kind; others are ellipses."""
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from executive.cell_config import DetectorConfig, Section
 from executive.vision.detectors.onnx_model import OnnxModel, read_labels
-from executive.vision.detectors.options import read_options, wrong_options
+from executive.vision.detectors.options import OptionFaults, read_options, wrong_options
 from executive.vision.detectors.rfdetr import RfdetrDetector
 from executive.vision.detectors.setting import Setting
 
@@ -30,9 +30,7 @@ class EmbeddedDetector(RfdetrDetector):
         return cls(OnnxModel(MODEL, read_labels(LABELS)), config, setting)
 
     @staticmethod
-    def check(
-        config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]
-    ) -> Iterator[tuple[str, str]]:
+    def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionFaults:
         """Yield every option that was given, with a sentence: there are none."""
         del base, others
         yield from wrong_options(Section, config)

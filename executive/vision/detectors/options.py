@@ -10,10 +10,12 @@ from pydantic import ValidationError
 from executive.cell_config import DetectorConfig, Section
 from executive.errors import InputError
 
+OptionFaults = Iterator[tuple[str, str]]
+"""Options of a detector because of which it cannot be built, each with a sentence."""
 OptionsT = TypeVar("OptionsT", bound=Section)
 
 
-def wrong_options(options: type[Section], config: DetectorConfig) -> Iterator[tuple[str, str]]:
+def wrong_options(options: type[Section], config: DetectorConfig) -> OptionFaults:
     """Yield every option of a kind of detector that is missing, unknown or wrong, with a sentence."""
     try:
         options.model_validate(config.options)
@@ -46,7 +48,7 @@ def read_options(options: type[OptionsT], config: DetectorConfig) -> OptionsT:
 
 def wrong_class_map(
     config: DetectorConfig, class_map: Mapping[str, str], labels: Collection[str]
-) -> Iterator[tuple[str, str]]:
+) -> OptionFaults:
     """Yield the option `class_map` and a sentence if it names a class that the model does not know."""
     strangers = [name for name in class_map if name not in labels]
     if strangers:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from concurrent.futures import Future, TimeoutError
 from dataclasses import dataclass
 
-from executive.cell import Clock
+from executive.cell import Clock, Request
 from executive.error_rates import ErrorRates
 from executive.errors import DeadlinePassed
 from executive.messages import Answer, Detection
@@ -15,6 +16,32 @@ SLICE = 0.05
 """Longest time the caller is held at once while an answer is overdue [s]; a second Ctrl-C ends it."""
 EARLY = 1e-9
 """Rounding allowed when two times on the clock are compared [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ChangedRequest:
+    """A request whose answer is changed before it is read; implements `executive.cell.Request`.
+
+    Attributes:
+        request: The request.
+        change: Returns what is read instead of its answer.
+    """
+
+    request: Request
+    change: Callable[[Answer], Answer]
+
+    @property
+    def ready(self) -> bool:
+        """True once the answer can be read."""
+        return self.request.ready
+
+    def result(self) -> Answer:
+        """Return the changed answer.
+
+        Raises:
+            Unavailable: The detector gave no usable answer.
+        """
+        return self.change(self.request.result())
 
 
 @dataclass(eq=False)

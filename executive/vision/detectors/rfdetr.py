@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +16,7 @@ from executive.cell_config import DetectorConfig, Section
 from executive.errors import InputError
 from executive.messages import Detection, Frame
 from executive.vision.detectors.onnx_model import OnnxModel, no_model, read_labels
-from executive.vision.detectors.options import read_options, wrong_class_map, wrong_options
+from executive.vision.detectors.options import OptionFaults, read_options, wrong_class_map, wrong_options
 from executive.vision.detectors.requests import Pending
 from executive.vision.detectors.setting import Setting
 from executive.vision.detectors.views import parts_of, search_parts
@@ -80,9 +80,7 @@ class RfdetrDetector:
         return cls(model, config, setting, options.class_map)
 
     @staticmethod
-    def check(
-        config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]
-    ) -> Iterator[tuple[str, str]]:
+    def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionFaults:
         """Yield every option because of which the detector could not be built, with a sentence.
 
         The model is not loaded.

@@ -62,7 +62,7 @@ class FrameRange(Section):
         differences = []
         for name, value in asdict(statistics).items():
             low, high = getattr(self, name)
-            if not _lower_limit(low) <= value <= _upper_limit(high):
+            if not low - _tolerance(low) <= value <= high + _tolerance(high):
                 differences.append(f"{name} {value:.0f}, measured {low:.0f} to {high:.0f}")
         return "; ".join(differences)
 
@@ -87,9 +87,5 @@ def measure_frame(frame: Frame, table: TableConfig) -> FrameStatistics | None:
     return FrameStatistics(brightness, float(np.median(np.abs(grey - brightness))), red, green, blue)
 
 
-def _lower_limit(limit: float) -> float:
-    return limit - max(TOLERANCE, RELATIVE_TOLERANCE * limit)
-
-
-def _upper_limit(limit: float) -> float:
-    return limit + max(TOLERANCE, RELATIVE_TOLERANCE * limit)
+def _tolerance(limit: float) -> float:
+    return max(TOLERANCE, RELATIVE_TOLERANCE * limit)

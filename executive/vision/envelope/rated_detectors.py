@@ -6,12 +6,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from executive.cell import Clock, Request
+from executive.cell import Clock
 from executive.cell_config import CellConfig
 from executive.error_rates import ErrorRates, assume_rates
 from executive.errors import InputError
-from executive.messages import Answer, Frame
+from executive.messages import Frame
 from executive.vision.detectors.registry import build_detectors, installed
+from executive.vision.detectors.requests import ChangedRequest
 from executive.vision.detectors.setting import ClosableDetector
 from executive.vision.envelope.fingerprint import describe_change, take_fingerprint
 from executive.vision.envelope.frame_statistics import FrameRange, measure_frame
@@ -52,7 +53,7 @@ class RatedDetector:
     config: CellConfig
     name: str
 
-    def request(self, frame: Frame, view: str) -> RatedRequest:
+    def request(self, frame: Frame, view: str) -> ChangedRequest:
         """Start to search `frame`; rates are assumed if the frame lies outside the measured ranges."""
         error_rates, frame_range = self.envelope.error_rates, self.envelope.frame_range
         statistics = measure_frame(frame, self.config.table) if frame_range else None
@@ -62,32 +63,12 @@ class RatedDetector:
                 f"{difference}; {remedy(self.config)}"
             )
             error_rates = assume_rates(error_rates.threshold, doubt)
-        return RatedRequest(self.detector.request(frame, view), error_rates)
+        asked = self.detector.request(frame, view)
+        return ChangedRequest(asked, lambda answer: replace(answer, error_rates=error_rates))
 
     def close(self) -> None:
         """Close the detector."""
         self.detector.close()
-
-
-@dataclass(frozen=True, eq=False)
-class RatedRequest:
-    """Request whose answer carries the given error rates; implements `executive.cell.Request`."""
-
-    request: Request
-    error_rates: ErrorRates
-
-    @property
-    def ready(self) -> bool:
-        """True once the run's clock has reached the time of the answer."""
-        return self.request.ready
-
-    def result(self) -> Answer:
-        """Return the answer.
-
-        Raises:
-            Unavailable: The detector gave no usable answer.
-        """
-        return replace(self.request.result(), error_rates=self.error_rates)
 
 
 def build_rated_detectors(

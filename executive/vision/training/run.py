@@ -12,37 +12,29 @@ from executive.vision.training.architecture import create
 from executive.vision.training.lightning import Model, SymmetricData
 from executive.vision.training.report import Batches, Progress, Report
 from executive.vision.training.restore import restore
+from executive.vision.training.settings import Settings
 from executive.vision.training.start import learning_rate
 
 BATCH = 16
 THREADS = 2
 
 
-def fit(
-    dataset: Path,
-    out: Path,
-    *,
-    start: Path | None,
-    rate: float | None,
-    epochs: int,
-    seed: int,
-    progress: Progress,
-    batches: Batches,
-) -> None:
+def fit(dataset: Path, out: Path, settings: Settings, progress: Progress, batches: Batches) -> None:
     """Train and leave checkpoints, `labels.txt` and `metrics.csv` in `out`."""
+    start = settings.start
     cuda = torch.cuda.is_available()
     if not cuda:
         torch.set_num_threads(THREADS)
-    pytorch_lightning.seed_everything(seed, workers=True, verbose=False)
+    pytorch_lightning.seed_everything(settings.seed, workers=True, verbose=False)
     labels = class_names(dataset)
-    rate = rate or learning_rate(start, labels)
+    rate = settings.rate or learning_rate(start, labels)
     if start is not None and start.suffix == ".onnx":
         start = _as_checkpoint(start, out)
     detector = create(len(labels), start, "cuda" if cuda else "cpu")
     config = detector.get_train_config(
         dataset_dir=str(dataset),
         output_dir=str(out),
-        epochs=epochs,
+        epochs=settings.epochs,
         batch_size=BATCH,
         lr=rate,
         # The stock settings slow the encoder down to spare pretrained weights. Here there are none.
@@ -52,7 +44,7 @@ def fit(
         lr_scheduler="cosine",
         warmup_epochs=0.5,
         # `last.ckpt` is renewed every epoch; an archive of each would fill the disk.
-        checkpoint_interval=epochs + 1,
+        checkpoint_interval=settings.epochs + 1,
         use_ema=False,
         # Boxes must stay exact to a fraction of a pixel: no resampling, no crops.
         multi_scale=False,
@@ -62,7 +54,7 @@ def fit(
         pack_targets=False,
         num_workers=0,
         tensorboard=False,
-        seed=seed,
+        seed=settings.seed,
     )
     model = Model(detector.model_config, config, reduced=not cuda and has_bfloat16())
     data = SymmetricData(detector.model_config, config)

@@ -130,7 +130,7 @@ def test_the_summary_says_how_it_ended_how_long_it_took_and_how_to_repeat_it_in_
         item("rejected", item="duck-1", why="three misses"),
     ):  # fmt: skip
         items(event)
-    repeat = repeat_command("my mission.yaml", seed=7, overrides={"attempts": "a b"}, requests=["cube"])
+    repeat = repeat_command("my mission.yaml", {"seed": 7, "overrides": {"attempts": "a b"}}, ["cube"])
     lines = [
         "FAILURE Transit.dropped at sort/0/3: lost at 1.2 m/s",
         "34.2 s on the robot's clock, 6.8 s by the wall clock",

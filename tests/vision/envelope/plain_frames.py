@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from executive.geometry import looking_down
 from executive.messages import Frame
+from tests.camera_poses import looking_down
 
 
 def frame_of(colour: tuple[int, int, int]) -> Frame:

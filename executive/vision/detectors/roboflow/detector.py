@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from executive.cell_config import DetectorConfig
 from executive.errors import DeadlinePassed, InputError, Unavailable
 from executive.messages import Detection, Frame
+from executive.vision.detectors.options import OptionFaults
 from executive.vision.detectors.requests import Pending
 from executive.vision.detectors.roboflow.answers import read_answer, read_output
 from executive.vision.detectors.roboflow.complaints import failed, late, unbelievable
@@ -56,9 +57,7 @@ class RoboflowDetector:
         return cls(config, RoboflowOptions.model_validate(config.options), setting, ApiKey())
 
     @staticmethod
-    def check(
-        config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]
-    ) -> Iterator[tuple[str, str]]:
+    def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionFaults:
         """Yield every option because of which the detector could not be built, with a sentence."""
         del base, others
         yield from wrong_roboflow(config)

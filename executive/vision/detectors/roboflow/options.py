@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Literal
 from urllib.parse import urlsplit
 
 from pydantic import Field
 
 from executive.cell_config import DetectorConfig, Section
-from executive.vision.detectors.options import wrong_class_map, wrong_options
+from executive.vision.detectors.options import OptionFaults, wrong_class_map, wrong_options
 from executive.vision.detectors.roboflow.key import VARIABLE
 
 HOSTED = "https://serverless.roboflow.com"
@@ -74,7 +73,7 @@ class RoboflowOptions(Section):
         return "workspace and workflow_id" if self.api == "workflow" else "model_id"
 
 
-def wrong_roboflow(config: DetectorConfig) -> Iterator[tuple[str, str]]:
+def wrong_roboflow(config: DetectorConfig) -> OptionFaults:
     """Yield every option because of which the detector could not be built, with a sentence."""
     wrong = list(wrong_options(RoboflowOptions, config))
     for option, sentence in wrong:
@@ -93,7 +92,7 @@ def wrong_roboflow(config: DetectorConfig) -> Iterator[tuple[str, str]]:
         yield from wrong_class_map(config, options.class_map, options.labels)
 
 
-def _wrong_model(options: RoboflowOptions) -> Iterator[tuple[str, str]]:
+def _wrong_model(options: RoboflowOptions) -> OptionFaults:
     """Yield the option because of which no model can be asked, with a sentence."""
     given = [name for name in WORKFLOW if name in options.model_fields_set]
     parts = options.model_id.split("/")
@@ -112,7 +111,7 @@ def _wrong_model(options: RoboflowOptions) -> Iterator[tuple[str, str]]:
         )
 
 
-def _wrong_workflow(options: RoboflowOptions) -> Iterator[tuple[str, str]]:
+def _wrong_workflow(options: RoboflowOptions) -> OptionFaults:
     """Yield the option because of which no workflow can be run, with a sentence."""
     names = {"workspace": options.workspace, "workflow_id": options.workflow_id}
     for option, name in names.items():
@@ -122,7 +121,7 @@ def _wrong_workflow(options: RoboflowOptions) -> Iterator[tuple[str, str]]:
             yield option, f"{option} must be a name alone, without /, ?, &, #, = or a space"
 
 
-def _wrong_url(url: str) -> Iterator[tuple[str, str]]:
+def _wrong_url(url: str) -> OptionFaults:
     """Yield a sentence if `url` is no address of a server alone."""
     try:
         parts = urlsplit(url)
