@@ -171,14 +171,14 @@ class Ledger(Protocol):
     def unknown(self) -> Mapping[str, int]:
         """Largest number of boxes in one look for each label that the cell does not know."""
 
-    def touched(self, item: Item) -> None:
-        """Record that the tool touched the item at the height of its class."""
+    def touched(self, item: Item, contradiction: str = "", *, beside_top: bool = False) -> bool:
+        """Record that the tool touched an item, and return True if it may be of its class.
 
-    def was_touched(self, item: Item) -> bool:
-        """Return True if the tool has touched the item before, at the height of its class."""
-
-    def contradicted(self, item: Item, why: str) -> None:
-        """Record evidence against the class of the item, which a rejection will report."""
+        Args:
+            item: The item.
+            contradiction: How the height of the touch contradicts the class, or ""; a rejection reports it.
+            beside_top: True if the touch may have missed the top of the object.
+        """
 
     def missed(self, item: Item) -> None:
         """Record a grasp that did not hold; where things lie nearby is in doubt now."""

@@ -47,25 +47,31 @@ def describe_unknown(counts: Mapping[str, int]) -> str:
 def describe_wrong_height(label: str, height: float, classes: Mapping[str, ObjectClass]) -> str:
     """Return how the height of a touch contradicts a class, or "" if it does not.
 
-    The object stands on the table or on an object of any class. A touch that is too high contradicts the
-    class. A touch that is too low contradicts the class only at the height of another class; at other heights
-    it may have missed the top of the object.
+    The object stands on the table or on an object of any class.
 
     Args:
         label: Class that the object is believed to be of.
         height: Height of the touch above the table [m].
         classes: Classes of the cell by label.
     """
-
-    def error_of(label: str) -> float:
-        return min((height - top for top in _list_tops(label, classes)), key=abs)
-
-    error = error_of(label)
-    others = [other for other in classes if abs(error_of(other)) <= OTHER_CLASS_TOLERANCE]
-    if abs(error) <= MAX_HEIGHT_ERROR or (error < 0 and not others):
+    if abs(_height_error(label, height, classes)) <= MAX_HEIGHT_ERROR:
         return ""
     measured = f"it was touched {height * 1000:.0f} mm above the table"
     return f"{measured}, and a {label} is {classes[label].height * 1000:.0f} mm high"
+
+
+def may_miss_top(label: str, height: float, classes: Mapping[str, ObjectClass]) -> bool:
+    """Return True if a touch is too low for a class and at the height of no other one.
+
+    It may have missed the top of the object. The arguments are those of `describe_wrong_height`.
+    """
+    errors = {other: _height_error(other, height, classes) for other in classes}
+    return errors[label] < 0 and all(abs(error) > OTHER_CLASS_TOLERANCE for error in errors.values())
+
+
+def _height_error(label: str, height: float, classes: Mapping[str, ObjectClass]) -> float:
+    """Return the difference [m] between a height and the nearest height of a top of a class."""
+    return min((height - top for top in _list_tops(label, classes)), key=abs)
 
 
 def describe_wrong_top(

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from executive.arm import Goal, Task
 from executive.cell import Cell, LeastTimes, Steps, Tool
-from executive.evidence import describe_wrong_height
+from executive.evidence import describe_wrong_height, may_miss_top
 from executive.goals import OVERTRAVEL, SPACING, approach
 from executive.messages import Target
 from executive.moving import follow, planned
@@ -23,7 +23,8 @@ class Approach(Skill):
     One motion: over the target and down, fast, then feeling its way through the last part, since the surface
     may be higher or lower than a camera can tell. Succeeds on contact near the expected height. Every attempt
     after a failed one comes down a little beside the last: on a spiral, or further round the ring of a part
-    with a hole. A touch at a height that the target's class does not have is a contradiction.
+    with a hole. A touch at a height that the target's class does not have is a contradiction;
+    a lower touch at the height of no class is one if it is the second, or if looks do not prove the class.
     """
 
     target: In[Target] = port(doc="where to go")
@@ -64,11 +65,9 @@ class Approach(Skill):
             met = f"the tool met something at {height * 1000:.0f} mm"
             raise self.failed("blocked", f"{met}, on its way to {item}, which was {expected}")
         doubt = describe_wrong_height(self.target.label, height, cell.classes)
-        # An object that has fallen since may lie on its side.
-        if doubt and not cell.ledger.was_touched(item):
-            cell.ledger.contradicted(item, doubt)
+        beside_top = may_miss_top(self.target.label, height, cell.classes)
+        if not cell.ledger.touched(item, doubt, beside_top=beside_top):
             raise self.failed("contradicted", f"{item} may be no {self.target.label}: {doubt}")
-        cell.ledger.touched(item)
 
 
 def _landing(tool: Tool) -> Callable[[], bool]:

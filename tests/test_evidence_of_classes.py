@@ -12,6 +12,7 @@ from executive.evidence import (
     describe_wrong_height,
     describe_wrong_size,
     describe_wrong_top,
+    may_miss_top,
 )
 from executive.geometry import Array
 from executive.messages import Box, Detection, Frame, ObjectClass
@@ -37,7 +38,7 @@ AREA: Box = (192.0, 100.0, 448.0, 356.0)
         ("cube", 0.06, "it was touched 60 mm above the table, and a cube is 50 mm high"),
         ("sphere", 0.05, "it was touched 50 mm above the table, and a sphere is 60 mm high"),
         ("sphere", 0.056, "it was touched 56 mm above the table, and a sphere is 60 mm high"),
-        ("sphere", 0.04, ""),  # beside its top, or a small one: no other class is as low
+        ("sphere", 0.04, "it was touched 40 mm above the table, and a sphere is 60 mm high"),
         ("duck", 0.08, "it was touched 80 mm above the table, and a duck is 56 mm high"),
     ],
 )
@@ -45,6 +46,16 @@ def test_the_height_of_a_touch_has_to_be_that_of_the_class(
     label: str, height: float, contradiction: str
 ) -> None:
     assert describe_wrong_height(label, height, CLASSES) == contradiction
+
+
+@pytest.mark.parametrize(
+    ("label", "height", "is_possible"),
+    [("sphere", 0.04, True), ("sphere", 0.05, False), ("sphere", 0.065, False), ("cube", 0.035, True)],
+)
+def test_a_touch_that_is_too_low_for_all_classes_may_have_missed_the_top(
+    label: str, height: float, is_possible: bool
+) -> None:
+    assert may_miss_top(label, height, CLASSES) is is_possible
 
 
 @pytest.mark.parametrize(

@@ -83,6 +83,14 @@ class Certainty:
             record.why = f"{UNSURE}: {record.contradiction}" if record.contradiction else UNSURE
             record.existence = max(record.existence, 0.0)
 
+    def allow_low_touch(self, record: Record) -> bool:
+        """Count a touch that is too low for the class; return True if it may have missed the top.
+
+        That may happen once, and only to an item whose class the looks prove without a touch.
+        """
+        record.low_touches += 1
+        return record.low_touches == 1 and record.misjudged <= self.config.misjudged
+
     def _lacks_second_evidence(self, record: Record) -> bool:
         """Return True if all looks came from one viewpoint, and neither they nor a touch prove its class."""
         return (

@@ -86,6 +86,7 @@ class Record:
         moved: True once it has been seen again after something may have moved it.
         exists: True once it is known to exist: enough looks agree, or the tool has touched it.
         touched: Class at whose height the tool has touched it last, or "".
+        low_touches: Number of touches too low for its class since the last one at the height of its class.
         attempts: Failed grasps so far.
         bin: Where it was placed, or "".
         why: Why it was rejected, is lost, a phantom or believed to be in its bin, or "".
@@ -120,6 +121,7 @@ class Record:
     moved: bool = False
     exists: bool = False
     touched: str = ""
+    low_touches: int = 0
     attempts: int = 0
     bin: str = ""
     why: str = ""

@@ -128,21 +128,22 @@ class ItemLedger:
         )
         return not waiting and self._coverage.max_probability <= self._config.overlooked
 
-    def touched(self, item: Item) -> None:
-        """Record that the tool touched the item at the height of its class, which proves that it exists."""
-        record = self._record(item)
-        record.exists, record.touched = True, record.label
+    def touched(self, item: Item, contradiction: str = "", *, beside_top: bool = False) -> bool:
+        """Record a touch, which proves that an item exists; return True if it may be of its class.
 
-    def was_touched(self, item: Item) -> bool:
-        """Return True if the tool has touched the item before, at the height of its class."""
-        return (record := self._record(item)).touched == record.label
-
-    def contradicted(self, item: Item, why: str) -> None:
-        """Record evidence against the class of an item that the tool touched; its place is in doubt now."""
+        `contradiction` and `beside_top` are as in `executive.cell.Ledger`. An item that was touched at the
+        height of its class before may have fallen since: then no height contradicts its class.
+        """
         record = self._record(item)
-        record.exists, record.contradiction = True, why
-        self._disturb(record.position, self._config.neighbourhood)
-        self._emit("item", **record.row)
+        record.exists = True
+        if not contradiction:
+            record.touched, record.low_touches = record.label, 0
+        elif record.touched != record.label and not (beside_top and self._certainty.allow_low_touch(record)):
+            record.contradiction = contradiction
+            self._disturb(record.position, self._config.neighbourhood)
+            self._emit("item", **record.row)
+            return False
+        return True
 
     def missed(self, item: Item) -> None:
         """Record a grasp that did not hold: the cup may have pushed anything, so all is in doubt."""

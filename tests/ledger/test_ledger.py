@@ -104,7 +104,7 @@ def test_an_item_is_skipped_only_if_the_mission_was_completed_without_an_attempt
 def test_an_item_that_was_still_in_doubt_or_contradicted_is_not_skipped(bench: Bench) -> None:
     bench.look(CUBE, FAR)
     bench.look(("duck", 0.5, 0.0), FAR)  # a contradiction about the class of the first
-    bench.ledger.contradicted("cube-2", "it was touched 60 mm above the table, and a cube is 50 mm high")
+    bench.ledger.touched("cube-2", "it was touched 60 mm above the table, and a cube is 50 mm high")
     assert {state for state, _ in bench.end().values()} == {"rejected"}
 
 
@@ -116,10 +116,23 @@ def test_labels_that_the_cell_does_not_know_are_counted_by_the_look_with_most_of
 
 def test_a_rejection_after_a_contradiction_contains_it(bench: Bench) -> None:
     bench.look(CUBE)
-    bench.ledger.contradicted("cube-1", "it was touched 60 mm above the table, and a cube is 50 mm high")
+    bench.ledger.touched("cube-1", "it was touched 60 mm above the table, and a cube is 50 mm high")
     bench.ledger.rejected("cube-1", "could not be picked")
     ((_, why),) = bench.end().values()
     assert why == "could not be picked: it was touched 60 mm above the table, and a cube is 50 mm high"
+
+
+def test_a_touch_may_miss_the_top_of_an_object_once(bench: Bench) -> None:
+    bench.look(CUBE)
+    doubt = "it was touched 40 mm above the table, and a cube is 50 mm high"
+    assert [bench.ledger.touched("cube-1", doubt, beside_top=True) for _ in range(2)] == [True, False]
+
+
+def test_after_a_touch_at_its_height_an_object_may_lie_on_its_side(bench: Bench) -> None:
+    bench.look(CUBE)
+    doubt = "it was touched 40 mm above the table, and a cube is 50 mm high"
+    answers = [bench.ledger.touched("cube-1", text, beside_top=True) for text in (doubt, "", doubt, doubt)]
+    assert answers == [True] * 4
 
 
 def test_three_looks_that_contradict_the_class_of_an_item_reject_it(bench: Bench) -> None:
