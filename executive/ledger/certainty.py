@@ -24,7 +24,7 @@ MAX_REPEATS = 2
 """Number of repeated answers from one pose after which further looks from there add hardly any evidence."""
 MAX_MISJUDGED_BEFORE_TOUCH = 0.2
 """Probability of a wrong class up to which an item is touched, if a touch decides its class."""
-MAX_UNSURE_LOOKS = 20
+MAX_UNSURE_LOOKS = 10
 """Number of unsure looks since the last sure one after which an uncertain item is rejected."""
 
 

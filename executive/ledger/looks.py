@@ -81,7 +81,7 @@ class Looks:
                 # The less likely an object was overlooked there, the likelier it is invented.
                 odds = EXPECTED * self._coverage.find_miss_probability(place) / by.invented
                 record = self._enter(records, detection.label, place, odds)
-            if record.why.startswith(UNSURE):
+            if record.why.startswith(UNSURE) and not record.attempts:
                 record.state, record.why = State.SEEN, ""
             if not self.settled(record):
                 record.forget_answers()

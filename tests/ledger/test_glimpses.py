@@ -86,6 +86,15 @@ def test_a_look_that_is_unsure_of_a_known_item_does_not_miss_it(bench: Bench) ->
     assert bench.end() == {"cube-1": ("skipped", "the mission was completed without it")}
 
 
+def test_given_up_after_a_failed_grasp_it_stays_so(bench: Bench) -> None:
+    bench.look(THERE)
+    bench.ledger.missed("cube-1")
+    for _ in range(MAX_UNSURE_LOOKS):
+        bench.look(unsure=[THERE])
+    bench.look(THERE)
+    assert bench.states() == {"cube-1": UNSURE}
+
+
 def test_a_known_item_that_waits_its_turn_is_not_given_up_for_glimpses(bench: Bench) -> None:
     for _ in range(3):
         bench.look(THERE, ("cube", 0.55, 0.0))
