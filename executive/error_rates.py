@@ -1,4 +1,4 @@
-"""Error rates of a detector, from which the ledger weights looks."""
+"""Error rates of a detector, with which the ledger weights looks."""
 
 from __future__ import annotations
 

@@ -14,28 +14,28 @@ from executive.messages import Box, Detection, Frame, ObjectClass
 
 MAX_HEIGHT_ERROR = 0.003
 """Largest accepted difference between the measured and the expected height of a touch [m]; 52 touches of
-`sort_overhead` were at most 0.4 mm off."""
+`sort_overhead` had errors of at most 0.4 mm."""
 OTHER_CLASS_TOLERANCE = 0.0025
 """Tolerance within which a touch that is too low for its class matches another class [m]."""
 TOP_TOLERANCE = 0.012
 """Largest accepted difference between the measured and an expected height of a top in the depth image [m].
 
-In 480 scenes of the cell `depth`, 60 of them crowded and 60 with unknown objects, the tops of 1894 rightly
-detected objects were measured within 2.1 mm in the mean and 10.1 mm at worst: none contradicted its class.
-20 of the 26 boxes around unknown objects contradicted theirs.
+In 480 scenes of the cell `depth` (60 crowded, 60 with unknown objects), the tops of 1894 correctly detected
+objects had a mean error of 2.1 mm and a largest error of 10.1 mm: none contradicted its class. 20 of 26 boxes
+of unknown objects contradicted their label.
 """
-TOP_DISTANCE = 1.2
-"""Distance from the camera at which the above was measured [m].
+REFERENCE_DISTANCE = 1.2
+"""Largest distance from the camera at which `TOP_TOLERANCE` applies unchanged [m].
 
-Beyond, the tolerance grows with the square of the distance, as the noise of a stereo camera does: seen from
-1.8 m, 160 tops were measured within 18.3 mm, and 27 mm are accepted.
+At larger distances, the tolerance grows with the squared distance, like stereo noise: from 1.8 m, 160 tops
+had errors of at most 18.3 mm, and 27 mm are accepted.
 """
 SIZE_TOLERANCE = 0.15
 """Largest relative difference between a box and the sizes that its class allows."""
 SIZE_MARGIN = 2.0
 """Margin added to the relative tolerance [pixel]."""
-BORDER_DISTANCE = 2.0
-"""Distance to the border of the searched area under which a box may be cut off [pixel]."""
+MIN_BORDER_DISTANCE = 2.0
+"""Smallest distance to the border of the searched area at which a box is not cut off [pixel]."""
 
 
 def describe_unknown(counts: Mapping[str, int]) -> str:
@@ -50,7 +50,7 @@ def describe_wrong_height(label: str, height: float, classes: Mapping[str, Objec
     The object stands on the table or on an object of any class.
 
     Args:
-        label: Class that the object is believed to be of.
+        label: Believed class of the object.
         height: Height of the touch above the table [m].
         classes: Classes of the cell by label.
     """
@@ -63,14 +63,14 @@ def describe_wrong_height(label: str, height: float, classes: Mapping[str, Objec
 def may_miss_top(label: str, height: float, classes: Mapping[str, ObjectClass]) -> bool:
     """Return True if a touch is too low for a class and at the height of no other one.
 
-    It may have missed the top of the object. The arguments are those of `describe_wrong_height`.
+    Such a touch may have missed the top of the object. The arguments are those of `describe_wrong_height`.
     """
     errors = {other: _height_error(other, height, classes) for other in classes}
     return errors[label] < 0 and all(abs(error) > OTHER_CLASS_TOLERANCE for error in errors.values())
 
 
 def _height_error(label: str, height: float, classes: Mapping[str, ObjectClass]) -> float:
-    """Return the difference [m] between a height and the nearest height of a top of a class."""
+    """Return the difference [m] between a height and the nearest possible top of a class."""
     return min((height - top for top in _list_tops(label, classes)), key=abs)
 
 
@@ -79,8 +79,8 @@ def describe_wrong_top(
 ) -> str:
     """Return how the height of a top in the depth image contradicts a class, or "" if it does not.
 
-    The object lies on the table or on one object of any class. The box of the lower of two objects shows the
-    top of the upper one: the sum of both heights contradicts neither class.
+    The object lies on the table or on one object of any class. In a stack, the box of the lower object shows
+    the top of the upper one; the sum of both heights fits both classes.
 
     Args:
         detection: The box and its class.
@@ -96,7 +96,7 @@ def describe_wrong_top(
     except NoDepth:
         return ""
     expected = _list_tops(detection.label, classes)
-    tolerance = TOP_TOLERANCE * max(1.0, (_depth_of(position, frame) / TOP_DISTANCE) ** 2)
+    tolerance = TOP_TOLERANCE * max(1.0, (_depth_of(position, frame) / REFERENCE_DISTANCE) ** 2)
     if min(abs(top - height) for height in expected) <= tolerance:
         return ""
     *lower, highest = [f"{height * 1000:.0f}" for height in expected]
@@ -114,26 +114,26 @@ def _list_tops(label: str, classes: Mapping[str, ObjectClass]) -> list[float]:
 
 
 def describe_wrong_size(
-    detection: Detection, position: Array, frame: Frame, area: Box, kind: ObjectClass
+    detection: Detection, position: Array, frame: Frame, area: Box, object_class: ObjectClass
 ) -> str:
     """Return how the size of a box contradicts a class, or "" if it does not.
 
-    The class is enclosed by a cylinder of its radius and height. The longer side of the box is at
-    most that of the box around the cylinder's image, and at least a side of the square inscribed in its base.
+    A cylinder of its radius and height encloses the class. The longer side of the box is at most that of the
+    cylinder's image, and at least a side of the square inscribed in the cylinder's base.
 
     Args:
         detection: The box and its class.
         position: Centre of the object `(3,)` [m].
         frame: The image.
         area: Searched part of the image [pixel]. Only boxes that show the whole object are compared.
-        kind: The class.
+        object_class: The class.
     """
     if not _is_whole(detection, frame, area):
         return ""
     left, top, right, bottom = detection.box
-    sides = _project_cylinder(position, frame, kind)
+    sides = _project_cylinder(position, frame, object_class)
     scale = float(frame.matrix[0, 0]) / _depth_of(position, frame)
-    shortest = math.sqrt(2) * kind.radius * scale * (1 - SIZE_TOLERANCE) - SIZE_MARGIN
+    shortest = math.sqrt(2) * object_class.radius * scale * (1 - SIZE_TOLERANCE) - SIZE_MARGIN
     longest = max(sides) * (1 + SIZE_TOLERANCE) + SIZE_MARGIN
     measured = max(right - left, bottom - top)
     if shortest <= measured <= longest:
@@ -145,10 +145,10 @@ def describe_wrong_size(
 
 
 def _is_whole(detection: Detection, frame: Frame, area: Box) -> bool:
-    """Return False if the border of the searched area may cut a box off, or the arm hides part of it."""
+    """Return True if neither the border of the searched area nor the arm cuts off part of a box."""
     left, top, right, bottom = detection.box
     border_distance = min(left - area[0], top - area[1], area[2] - right, area[3] - bottom)
-    return border_distance >= BORDER_DISTANCE and frame.shown(detection.box) >= 1.0
+    return border_distance >= MIN_BORDER_DISTANCE and frame.visible_share(detection.box) >= 1.0
 
 
 def _depth_of(position: Array, frame: Frame) -> float:
@@ -156,11 +156,11 @@ def _depth_of(position: Array, frame: Frame) -> float:
     return float(frame.X_WC.inverse().apply(position)[2])
 
 
-def _project_cylinder(position: Array, frame: Frame, kind: ObjectClass) -> tuple[float, float]:
+def _project_cylinder(position: Array, frame: Frame, object_class: ObjectClass) -> tuple[float, float]:
     """Return width and height [pixel] of the box around the image of the cylinder that encloses a class."""
     angles = np.linspace(0, 2 * math.pi, 16, endpoint=False)
-    x, y = kind.radius * np.cos(angles), kind.radius * np.sin(angles)
-    rims = [np.stack((x, y, np.full(16, z)), axis=1) for z in (-kind.height / 2, kind.height / 2)]
+    x, y = object_class.radius * np.cos(angles), object_class.radius * np.sin(angles)
+    rims = [np.stack((x, y, np.full(16, level * object_class.height)), axis=1) for level in (-0.5, 0.5)]
     points = frame.X_WC.inverse().apply(position + np.concatenate(rims)) @ frame.matrix.T
     width, height = np.ptp(points[:, :2] / points[:, 2:], axis=0)
     return float(width), float(height)

@@ -47,7 +47,7 @@ class Frame:
     visible: NDArray[np.bool_]
     epoch: int
 
-    def shown(self, box: Box) -> float:
+    def visible_share(self, box: Box) -> float:
         """Return the share of a box (0 to 1) in which the arm does not hide the scene."""
         height, width = self.visible.shape
         left, right = (min(max(round(x), 0), width) for x in box[::2])
@@ -102,7 +102,7 @@ class Detection:
         label: Class name.
         confidence: 0 to 1.
         box: Bounding box of the whole object [pixel] in the frame's image.
-        rival: Confidence of the second class for this box, 0 to 1; 0 if the detector does not say.
+        rival: Confidence of the second class for this box, 0 to 1; 0 if unknown.
     """
 
     label: str
@@ -143,7 +143,7 @@ class Detections:
         error_rates: Error rates of that detector.
         view: Name of the part of the frame that was searched: `table` or `full`.
         area: That part [pixel].
-        doubtful: Detections that are below the threshold or hardly more likely than another class.
+        doubtful: Detections below the threshold or less than twice as likely as another class.
         unknown: Detections at or above the threshold with labels that the cell does not know.
     """
 

@@ -11,26 +11,26 @@ from executive.errors import Unavailable
 from executive.messages import Detection, Detections
 from executive.skill import Out, Skill, param, port
 
-IN_VIEW = 0.7
-"""Share of a box that the arm must leave in view for the box to be believed."""
+MIN_VISIBLE_SHARE = 0.7
+"""Smallest visible share of a box that counts; the arm may hide the rest."""
 MAX_BOXES = 60
 """Maximum number of boxes in one look, doubtful ones and unknown labels included. Shipped cells hold at most
 20 objects, and the time to match boxes with items grows faster than their number."""
-MAX_RIVAL = 0.5
-"""Largest ratio between the confidences of the second and the first class of a box."""
+MAX_SECOND_RATIO = 0.5
+"""Largest ratio of the second to the first class confidence at which a box is not in doubt."""
 
 
 class Detect(Skill):
     """Detect the objects in a new image without blocking the tick loop.
 
-    Succeeds with all detections at or above the detector's threshold. A detection is in doubt if it is below
-    the threshold or if its second class is nearly as likely. An empty list is a result, not a failure.
+    Succeeds with all detections that are not in doubt. A detection is in doubt if it is below the detector's
+    threshold or if its second class is more than half as likely. An empty list is a result, not a failure.
     The area hidden by the arm counts neither as empty nor as occupied.
     A look with more than 60 boxes fails with `crowded`, whatever their confidence.
     Fails with `camera_moved` if the image shows the bins away from their expected positions.
     """
 
-    detections: Out[Detections] = port(doc="what was found, with the frame it was found in")
+    detections: Out[Detections] = port(doc="the detections and their frame")
     detector: str = param("", refers="detector", doc="which detector of the cell; empty: the first")
     view: str = param(
         "table", choices=("table", "full"), doc="`table`: the workspace; `full`: everything the camera sees"
@@ -43,7 +43,7 @@ class Detect(Skill):
     hidden: str = param(
         "fail",
         choices=("fail", "pass"),
-        doc="where the arm hides part of the workspace: `fail` as hidden, or `pass` with a look at the rest",
+        doc="if the arm hides part of the workspace: `fail` with `hidden`, or `pass` and search the rest",
     )
     reasons: ClassVar = ("unsure", "hidden", "unavailable", "crowded", "camera_moved")
     uses: ClassVar = ("camera",)
@@ -77,29 +77,27 @@ class Detect(Skill):
                 f"cannot all be objects; at most {MAX_BOXES} are allowed: raise `floor` of the detector in "
                 "the cell file, or use another detector",
             )
-        if wrong := next((one for one in answer.found if not _is_valid(one)), None):
+        if invalid := next((one for one in answer.found if not _is_valid(one)), None):
             raise self.failed(
                 "unavailable",
-                f"detector {answer.detector} gave an invalid box: {wrong.label} {wrong.confidence:g} "
-                f"at {wrong.box}",
+                f"detector {answer.detector} gave an invalid box: {invalid.label} {invalid.confidence:g} "
+                f"at {invalid.box}",
             )
-        shown = [detection for detection in answer.found if frame.shown(detection.box) >= IN_VIEW]
-        known = [detection for detection in shown if detection.label in cell.classes]
+        visible = [one for one in answer.found if frame.visible_share(one.box) >= MIN_VISIBLE_SHARE]
+        known = [one for one in visible if one.label in cell.classes]
         threshold = answer.error_rates.threshold
         unknown = tuple(
-            detection
-            for detection in shown
-            if detection.label not in cell.classes and detection.confidence >= threshold
+            one for one in visible if one.label not in cell.classes and one.confidence >= threshold
         )
-        found = tuple(detection for detection in known if _is_clear(detection, threshold))
-        doubtful = tuple(detection for detection in known if not _is_clear(detection, threshold))
+        found = tuple(one for one in known if _is_clear(one, threshold))
+        doubtful = tuple(one for one in known if not _is_clear(one, threshold))
         if not found and doubtful and self.doubtful == "fail":
             best = doubtful[0]
             weak = best.confidence < threshold
             limit = f"< {threshold:.2f}" if weak else f"with another class at {best.rival:.2f}"
             raise self.failed(
                 "unsure",
-                f"detector {answer.detector} saw nothing it is sure of: at best a {best.label} "
+                f"detector {answer.detector} found nothing certain: at best a {best.label} "
                 f"at {best.confidence:.2f} {limit}",
             )
         self.detections = Detections(
@@ -115,13 +113,13 @@ class Detect(Skill):
 
 
 def _is_clear(detection: Detection, threshold: float) -> bool:
-    """Return True if a detection is confident enough, and its second class is not nearly as likely."""
+    """Return True if a detection is confident enough, and its second class at most half as likely."""
     confidence = detection.confidence
-    return confidence >= threshold and detection.rival <= MAX_RIVAL * confidence
+    return confidence >= threshold and detection.rival <= MAX_SECOND_RATIO * confidence
 
 
 def _is_valid(detection: Detection) -> bool:
-    """Return True if a detection has a possible box and a possible confidence."""
+    """Return True if a detection has a valid box and a valid confidence."""
     left, top, right, bottom = detection.box
     finite = all(math.isfinite(edge) for edge in detection.box)
     return finite and left <= right and top <= bottom and 0.0 <= detection.confidence <= 1.0

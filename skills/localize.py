@@ -23,7 +23,7 @@ class Localize(Skill):
     object of its class on the table nor one on another object.
     """
 
-    detections: In[Detections] = port(doc="what was found, with its frame")
+    detections: In[Detections] = port(doc="the detections and their frame")
     targets: Out[list[Target]] = port(
         doc="one target per open item whose place is known, from this look or an earlier one"
     )

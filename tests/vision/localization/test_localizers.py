@@ -107,7 +107,7 @@ def with_one_pixel(detection, frame):
         (
             DEPTH,
             lambda one, frame: (one, replace(frame, depth=None)),
-            "frame 7 has no depth image; localize by plane, or give camera eye one",
+            "frame 7 has no depth image; set `localization: plane`, or `depth` of the camera eye",
         ),
         (
             RayLocalizer(CLASSES, lambda origin, direction: None),
