@@ -10,8 +10,8 @@ from executive.cell_config import LedgerConfig
 from executive.ledger.item import LIKELY, UNSURE, Record, State
 
 MIN_P_VALUE, REJECTION_P_VALUE = 0.01, 0.001
-"""p-values of a binomial test of the number of looks with another class: the smallest at which an item may be
-sorted, and the limit below which it is rejected."""
+"""Limits of the p-value of a binomial test of the number of looks with another class: the smallest to sort an
+item, and the limit below which to reject it."""
 RETRY_STANDARD_ERROR_FACTOR = 2 / 3
 """Factor on the allowed standard error of an item's position after a failed grasp."""
 MIN_MISS_PROBABILITY = 0.1
@@ -22,7 +22,7 @@ MIN_CONTRADICTIONS_TO_REJECT = 3
 """Number of contradicting looks from which an item may be rejected."""
 MAX_REPEATS = 2
 """Number of repeated answers from one pose after which further looks from there add hardly any evidence."""
-MAX_MISJUDGED_BEFORE_TOUCH = 0.2
+MAX_CLASS_ERROR_FOR_TOUCH = 0.2
 """Probability of a wrong class up to which an item is touched, if a touch decides its class."""
 MAX_UNSURE_LOOKS = 10
 """Number of unsure looks since the last sure one after which an uncertain item is rejected."""
@@ -48,14 +48,14 @@ class Certainty:
         """
         limit = self.config.misjudged
         if record.repeats >= MAX_REPEATS and record.label in self.distinct_by_touch:
-            limit = MAX_MISJUDGED_BEFORE_TOUCH
+            limit = MAX_CLASS_ERROR_FOR_TOUCH
         standard_error = math.hypot(record.spread, record.bias)
         return (
             record.probability >= LIKELY
             and record.contradictions <= record.looks
             and record.overlooked >= MIN_MISS_PROBABILITY
             and record.misjudged <= limit
-            and record.consistency >= MIN_P_VALUE
+            and record.p_value >= MIN_P_VALUE
             and standard_error <= self.config.aim * (RETRY_STANDARD_ERROR_FACTOR if record.attempts else 1.0)
         )
 
@@ -71,7 +71,7 @@ class Certainty:
             record.glimpses = 0
         if record.state is not State.SEEN:
             return
-        if record.looks >= MIN_LOOKS_TO_REJECT and record.consistency < REJECTION_P_VALUE:
+        if record.looks >= MIN_LOOKS_TO_REJECT and record.p_value < REJECTION_P_VALUE:
             votes = ", ".join(f"{count} {label}" for label, count in record.tally.most_common())
             record.state, record.why = State.REJECTED, f"its class is in doubt: {votes}"
         elif self._lacks_second_evidence(record):

@@ -14,25 +14,25 @@ from executive.messages import Detections
 
 PITCH = 0.02
 """Pitch of the grid of points on the table [m]; smaller than the smallest object."""
-MARGIN = 0.4
+WATCHED_MARGIN = 0.4
 """Width of the watched area around the workspace [m]; dropped or pushed objects stay within it."""
 PRIOR_OUTSIDE = 0.01
-"""Prior probability of an object at a place outside the workspace before anything was dropped or pushed."""
+"""Prior probability of an object at a place outside the workspace before any drop or push."""
 PRIOR_OUTSIDE_AFTER_CHANGE = 0.1
-"""Probability of an object at a place outside the workspace after one was dropped or pushed."""
+"""Probability of an object at a place outside the workspace after a drop or a push."""
 MIN_PROBABILITY = 1e-4
-"""Smallest probability after any number of looks, because looks are not wholly independent."""
+"""Lower limit of the probability after many looks, because looks are not wholly independent."""
 RECENT_FULL_LOOKS = 4
-"""Number of the latest full images; a place that none of them shows cannot be seen."""
-BORDER = 12.0
+"""Number of latest full images that decide which places outside the workspace are in sight."""
+BORDER_WIDTH = 12.0
 """Width of the image's border in which a point does not count as shown [pixel]."""
 EDGE_MARGIN = 0.03
 """Distance outside the workspace up to which the centre of an object still counts as inside [m]."""
 PRIOR_INSIDE = 0.1
 """Prior probability that an object lies at a given place of the workspace: three objects of 6 cm x 6 cm on
 the 22 cm x 44 cm of the shipped cells."""
-HEIGHT = 0.025
-"""Height of the points over the table [m]: the centre of a usual object."""
+POINT_HEIGHT = 0.025
+"""Height of the points above the table [m]: the centre of a typical object."""
 
 
 class Coverage:
@@ -41,7 +41,7 @@ class Coverage:
     In the workspace, the probability is conditional on an object being there, and starts at 1. Outside, it
     includes the probability of an object, and starts low. A look multiplies the value of each searched point
     by the probability of another miss. A change that may have put an object there resets the value. Points
-    that a look does not show keep it: points hidden by the arm, outside the image, or disturbed since.
+    that a look does not show keep it: points hidden by the arm, outside the image, or changed since.
 
     Args:
         table: Declares the workspace.
@@ -49,48 +49,48 @@ class Coverage:
 
     def __init__(self, table: TableConfig) -> None:
         (left, right), (low, high) = table.x, table.y
-        xs = np.arange(left - MARGIN, right + MARGIN + PITCH / 2, PITCH)
-        ys = np.arange(low - MARGIN, high + MARGIN + PITCH / 2, PITCH)
-        self._points = np.array([(x, y, HEIGHT) for x in xs for y in ys])
+        xs = np.arange(left - WATCHED_MARGIN, right + WATCHED_MARGIN + PITCH / 2, PITCH)
+        ys = np.arange(low - WATCHED_MARGIN, high + WATCHED_MARGIN + PITCH / 2, PITCH)
+        self._points = np.array([(x, y, POINT_HEIGHT) for x in xs for y in ys])
         self._low, self._high = np.array([left, low]), np.array([right, high])
         self._workspace = self._within(self._points, 0.0)
         self._prior = np.where(self._within(self._points, EDGE_MARGIN), PRIOR_INSIDE, 1.0)
         self._overlooked = np.where(self._within(self._points, EDGE_MARGIN), 1.0, PRIOR_OUTSIDE)
-        self._after_a_change = np.where(
+        self._after_change = np.where(
             self._within(self._points, EDGE_MARGIN), 1.0, PRIOR_OUTSIDE_AFTER_CHANGE
         )
-        self._changed = np.zeros(len(self._points), dtype=int)
+        self._change_epochs = np.zeros(len(self._points), dtype=int)
         self._searched_from: dict[str, NDArray[np.bool_]] = {}
         self._full_looks = 0
-        self._shown = np.full(len(self._points), -RECENT_FULL_LOOKS)
+        self._last_shown = np.full(len(self._points), -RECENT_FULL_LOOKS)
 
-    def update(self, detections: Detections, unsure: Sequence[Array] = ()) -> None:
+    def update(self, detections: Detections, doubtful: Sequence[Array] = ()) -> None:
         """Update the probabilities after a look; places of found objects count as searched.
 
-        Points near doubtful detections, `unsure` `(3,)` [m], do not count as searched.
+        Points near the positions `doubtful` `(3,)` [m] of doubtful detections do not count as searched.
         """
         searched = detections.searched(self._points)
-        for place in unsure:
+        for place in doubtful:
             searched &= np.hypot(*(self._points - place)[:, :2].T) > PITCH
-        current = self._changed <= detections.frame.epoch
+        current = self._change_epochs <= detections.frame.epoch
         now = searched & current
         # Another view is another image for the detector: of 31 objects that the detector of the cell
         # fasteners missed in the view `table`, it missed 4 in the view `full` of the same pose.
         viewpoint = f"{viewpoint_of(detections)} {detections.view}"
         misses, repeated = detections.error_rates.misses, detections.error_rates.repeated
-        again = self._searched_from.setdefault(viewpoint, np.zeros(len(self._points), bool))
-        self._overlooked[now] *= np.where(again[now], repeat_probability(misses, repeated), misses)
+        searched_before = self._searched_from.setdefault(viewpoint, np.zeros(len(self._points), bool))
+        self._overlooked[now] *= np.where(searched_before[now], repeat_probability(misses, repeated), misses)
         self._overlooked = self._overlooked.clip(MIN_PROBABILITY)
-        again |= now
+        searched_before |= now
         if detections.view == "full":
             self._full_looks += 1
-            # Points at the border of the image may never be seen again; they are not required.
-            self._shown[searched & detections.shows(self._points, BORDER)] = self._full_looks
+            # Points at the border of the image may never be seen again; they do not count as shown.
+            self._last_shown[searched & detections.shows(self._points, BORDER_WIDTH)] = self._full_looks
 
-    def disturb(self, centre: Array, radius: float, epoch: int) -> None:
-        """Reset the points within `radius` [m] of `centre`: change `epoch` may have put an object there."""
+    def reset_near(self, centre: Array, radius: float, epoch: int) -> None:
+        """Reset points within `radius` [m] of `centre`; change no. `epoch` may have put an object there."""
         near = np.hypot(*(self._points - centre)[:, :2].T) <= radius
-        self._overlooked[near], self._changed[near] = self._after_a_change[near], epoch
+        self._overlooked[near], self._change_epochs[near] = self._after_change[near], epoch
         for searched in self._searched_from.values():
             searched[near] = False
 
@@ -105,7 +105,7 @@ class Coverage:
         return bool(self._within(position[None], EDGE_MARGIN)[0])
 
     @property
-    def max_probability(self) -> float:
+    def max_object_probability(self) -> float:
         """Maximum over the points of the probability that an overlooked object lies there.
 
         The points are those of the workspace and those shown in one of the last full images; others cannot
@@ -125,7 +125,7 @@ class Coverage:
 
     @property
     def _in_sight(self) -> NDArray[np.bool_]:
-        return self._workspace | (self._shown > self._full_looks - RECENT_FULL_LOOKS)
+        return self._workspace | (self._last_shown > self._full_looks - RECENT_FULL_LOOKS)
 
     def _within(self, points: Array, margin: float) -> NDArray[np.bool_]:
         """Return a mask `(N,)` of the points in the workspace or at most `margin` [m] outside it."""

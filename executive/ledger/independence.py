@@ -14,11 +14,11 @@ def viewpoint_of(look: Detections) -> str:
     return f"{look.detector} {x} {y} {z}"
 
 
-def repeat_probability(independent: float, repeated: float) -> float:
+def repeat_probability(independent_probability: float, copy_probability: float) -> float:
     """Return the probability that a look repeats the answer of an earlier look from the same viewpoint.
 
     Args:
-        independent: Probability of this answer in a look that is independent of the earlier one.
-        repeated: Probability that the look is a copy of the earlier one.
+        independent_probability: Probability of this answer in a look that is independent of the earlier one.
+        copy_probability: Probability that the look is a copy of the earlier one.
     """
-    return repeated + (1.0 - repeated) * independent
+    return copy_probability + (1.0 - copy_probability) * independent_probability

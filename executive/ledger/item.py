@@ -155,7 +155,7 @@ class Record:
         return odds / (1.0 + odds)
 
     @property
-    def consistency(self) -> float:
+    def p_value(self) -> float:
         """Chance, 0 to 1, that looks disagree as much about its class as they do, by the errors stated.
 
         The upper tail of the binomial distribution: small where the detector errs more than it says.

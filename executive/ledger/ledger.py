@@ -126,7 +126,7 @@ class ItemLedger:
             and self._coverage.in_sight(record.position)
             for record in self._records.values()
         )
-        return not waiting and self._coverage.max_probability <= self._config.overlooked
+        return not waiting and self._coverage.max_object_probability <= self._config.overlooked
 
     def touched(self, item: Item, contradiction: str = "", *, beside_top: bool = False) -> bool:
         """Record a touch, which proves that an item exists; return True if it may be of its class.
@@ -296,4 +296,4 @@ class ItemLedger:
 
     def _disturb(self, centre: Array, radius: float) -> None:
         self._freshness.disturb(np.asarray(centre, dtype=float), radius)
-        self._coverage.disturb(centre, radius, self.epoch)
+        self._coverage.reset_near(centre, radius, self.epoch)

@@ -38,13 +38,13 @@ def test_every_look_leaves_as_much_doubt_as_its_detector_misses(coverage: Covera
     for looks in range(1, 5):
         coverage.update(look())
         assert coverage.find_miss_probability(MIDDLE) == pytest.approx(0.2**looks)
-        assert coverage.max_probability == pytest.approx(PRIOR_INSIDE * 0.2**looks)
+        assert coverage.max_object_probability == pytest.approx(PRIOR_INSIDE * 0.2**looks)
 
 
 def test_before_anything_was_dropped_hardly_anything_lies_beside_the_workspace(coverage: Coverage) -> None:
     beside = np.array([0.53, 0.40, 0.025])
     assert coverage.find_miss_probability(beside) == PRIOR_OUTSIDE
-    coverage.disturb(MIDDLE, math.inf, epoch=1)
+    coverage.reset_near(MIDDLE, math.inf, epoch=1)
     assert coverage.find_miss_probability(beside) == PRIOR_OUTSIDE_AFTER_CHANGE
 
 
@@ -52,7 +52,7 @@ def test_looks_at_the_workspace_alone_never_show_that_nothing_lies_beside_it(cov
     for _ in range(20):
         coverage.update(look(view="table"))
     assert coverage.find_miss_probability(MIDDLE) == MIN_PROBABILITY, "looks are not wholly independent"
-    assert coverage.max_probability == 1.0
+    assert coverage.max_object_probability == 1.0
 
 
 def test_what_the_arm_hides_is_not_believed_empty(coverage: Coverage) -> None:
@@ -61,7 +61,7 @@ def test_what_the_arm_hides_is_not_believed_empty(coverage: Coverage) -> None:
         coverage.update(look(hidden=slice(320, 640)))
     sides = [coverage.find_miss_probability(np.array([0.53, y, 0.025])) for y in (-0.15, 0.15)]
     assert sorted(sides) == [pytest.approx(0.2**5), 1.0]
-    assert coverage.max_probability == PRIOR_INSIDE
+    assert coverage.max_object_probability == PRIOR_INSIDE
 
 
 def test_a_place_is_searched_only_if_all_of_an_object_there_would_show(coverage: Coverage) -> None:
@@ -71,7 +71,7 @@ def test_a_place_is_searched_only_if_all_of_an_object_there_would_show(coverage:
 
 def test_a_change_brings_the_doubt_back_whatever_a_frame_from_before_shows(coverage: Coverage) -> None:
     for _ in range(2):
-        coverage.disturb(CORNER, 0.07, epoch=1)
+        coverage.reset_near(CORNER, 0.07, epoch=1)
         coverage.update(look(epoch=0))
     assert coverage.find_miss_probability(CORNER) == 1.0
     assert coverage.find_miss_probability(MIDDLE) == pytest.approx(0.2**2)
@@ -91,12 +91,12 @@ def test_a_place_beside_the_workspace_that_no_pose_shows_any_more_is_not_waited_
     coverage: Coverage,
 ) -> None:
     coverage.update(look())
-    coverage.disturb(MIDDLE, math.inf, epoch=1)
+    coverage.reset_near(MIDDLE, math.inf, epoch=1)
     # The workspace is in the middle columns; on the left the arm stays in the way from now on.
     worst = []
     for _ in range(8):
         coverage.update(look(epoch=1, hidden=slice(0, 180)))
-        worst.append(coverage.max_probability)
+        worst.append(coverage.max_object_probability)
     assert worst[2] == PRIOR_OUTSIDE_AFTER_CHANGE, "hidden on the left"
     assert worst[4] <= 0.2**5 * 1.01
 

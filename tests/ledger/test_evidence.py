@@ -40,7 +40,7 @@ def test_votes_against_each_other_leave_nothing_certain() -> None:
         mixed.vote(label, BAD)
     assert mixed.label == "cube", "the first in the alphabet"
     assert mixed.misjudged == pytest.approx((1 + 1 / 9) / (2 + 1 / 9))
-    assert mixed.consistency == pytest.approx(0.19), "1 of 2 wrong at 10 %"
+    assert mixed.p_value == pytest.approx(0.19), "1 of 2 wrong at 10 %"
 
 
 def test_what_looks_say_of_existence_adds_up() -> None:

@@ -1,4 +1,4 @@
-"""Looks from one pose repeat_probability a share of their errors, so only the independent share adds up."""
+"""Looks from one pose repeat a share of their errors, so only the independent share adds up."""
 
 from __future__ import annotations
 
