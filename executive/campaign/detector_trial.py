@@ -17,12 +17,12 @@ from executive.mission.findings import alternatives
 from executive.sim.datasets import generate, run_frames
 from executive.sim.scene_file import load_scene
 from executive.sim.spawn import count_that_fits
-from executive.vision.detectors.registry import wrong_detectors
+from executive.vision.detectors.registry import find_problems
 from executive.vision.evaluation.asking import CellDetector
 from executive.vision.evaluation.evaluate import evaluate
 from executive.vision.evaluation.figures import Evaluation
 from executive.vision.evaluation.misses import WorstMisses
-from executive.vision.evaluation.model_file import FLOOR, NAME, model_detector
+from executive.vision.evaluation.model_file import FLOOR, MODEL_NAME, model_detector
 from executive.vision.localization.build import build_localizer
 from executive.vision.samples import LabelledImage, count_samples, read_samples
 
@@ -94,7 +94,7 @@ def list_detectors(
     """
     alone: dict[str, DetectorConfig] = {}
     if weights is not None:
-        alone = {NAME: model_detector(weights, labels or _labels_beside(weights))}
+        alone = {MODEL_NAME: model_detector(weights, labels or _labels_beside(weights))}
     elif not cells:
         alone = {"embedded": DetectorConfig(kind="embedded", floor=FLOOR)}
     if not cells:
@@ -122,7 +122,7 @@ def check_detector(detector: DetectorUnderTest, *, renders_scenes: bool, scene: 
         )
     if renders_scenes and cell:
         load_scene(scene, cell)
-    for (_, name, *_), sentence in wrong_detectors(detector.configs, detector.base):
+    for (_, name, *_), sentence in find_problems(detector.configs, detector.base):
         raise InputError(f"detector {name}: {sentence}")
 
 

@@ -13,8 +13,8 @@ from executive.vision.envelope.measurement import (
     SUFFIX,
     ErrorCounts,
     Measurement,
+    format_measurements,
     read_measurements,
-    text_with_measurement,
 )
 from executive.vision.evaluation.figures import NOTHING, Evaluation
 
@@ -41,7 +41,7 @@ def store_evaluation(
     measurement = _as_measurement(detector, evaluation, command, seconds)
     instead = "name another file with --out, and copy it into the folder of your cell file"
     with explained(InputError, f"the measurement {path} cannot be written", instead):
-        write_whole(path, text_with_measurement(read_measurements(path), measurement))
+        write_whole(path, format_measurements(read_measurements(path), measurement))
     return path
 
 

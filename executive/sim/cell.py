@@ -31,7 +31,7 @@ from executive.sim.scenery import SimScenery
 from executive.sim.spawn import PartSeeds, find_lack_of_room, first_world
 from executive.sim.tool import SuctionTool
 from executive.sim.view import ArmShadow
-from executive.vision.detectors.registry import known_labels, wrong_detectors
+from executive.vision.detectors.registry import find_problems, known_labels
 from executive.vision.detectors.setting import ClosableDetector
 from executive.vision.envelope.rated_detectors import build_rated_detectors
 from executive.vision.localization.build import build_localizer
@@ -129,7 +129,7 @@ class SimCell:
         return (
             *missing,
             *_lacking_depth(config),
-            *wrong_detectors(config.detectors, base),
+            *find_problems(config.detectors, base),
             *out_of_reach(config),
             *find_lack_of_room(config),
             # A world cannot be made without its models.

@@ -21,7 +21,7 @@ from executive.sim.scene_file import (
 )
 from executive.sim.table_top import WOOD
 from executive.sim.world import World
-from executive.vision.camera_model import calibrated, camera_matrix, field_of_view, on_plane
+from executive.vision.camera_model import calibrated, camera_matrix, field_of_view, intersect_plane
 
 
 def true_cell(config: CellConfig, scene: SceneConfig) -> CellConfig:
@@ -89,7 +89,7 @@ def _true_camera(camera: CameraConfig, error: SceneCameraConfig) -> CameraConfig
         return camera
     matrix, X_MC = calibrated(camera)
     if any(error.orbit_deg):
-        centre = on_plane(matrix, X_MC, matrix[:2, 2], 0.0)
+        centre = intersect_plane(matrix, X_MC, matrix[:2, 2], 0.0)
         X_MC = Pose.of(centre) @ _make_rotation(error.orbit_deg) @ Pose.of(-centre) @ X_MC
     X_MC = Pose.of(error.shift) @ X_MC @ _make_rotation(error.turn_deg)
     fov = field_of_view(matrix, camera.height) * error.fov_factor

@@ -27,7 +27,7 @@ from executive.sim.spawn import spawn
 from executive.sim.table_top import WOOD
 from executive.sim.variations import WOOD_COLOUR, random_camera, random_light, random_noise, random_table
 from executive.sim.world import World
-from executive.vision.camera_model import calibrated, on_plane, project
+from executive.vision.camera_model import calibrated, intersect_plane, project
 
 SIZE = 256
 """Side of a sample's image [pixel]: what a detector is given."""
@@ -157,7 +157,7 @@ class SceneRenderer:
         part = random_part(self._camera, rng)
         shown = colour if texture != WOOD else tuple(np.multiply(colour, WOOD_COLOUR).tolist())
         corners = [(x, y) for x in part[::2] for y in part[1::2]]
-        footprint = np.array([on_plane(matrix, X_WC, corner, 0.0)[:2] for corner in corners])
+        footprint = np.array([intersect_plane(matrix, X_WC, corner, 0.0)[:2] for corner in corners])
         items = arrange(self._config, footprint, part == self._camera.table_view, shown, rng)
         if holds:
             items.append(make_held_object(world.tool_pose(), self._config, rng))
@@ -229,7 +229,7 @@ class SceneRenderer:
             labels.append(item.label)
             boxes.append(box)
             shares.append(share)
-            positions.append(on_plane(view.matrix, view.X_WC, middle, float(centre[2])))
+            positions.append(intersect_plane(view.matrix, view.X_WC, middle, float(centre[2])))
             centres.append(centre)
         if half_hidden > max(1, len(items) * IGNORED_SHARE):
             return None

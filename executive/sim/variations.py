@@ -16,7 +16,7 @@ from executive.cell_config import CameraConfig, Colour, NoiseConfig
 from executive.geometry import Array, Pose, about_z
 from executive.sim.camera import CELL_LIGHT, Light
 from executive.sim.table_top import PLAIN, TEXTURES, WOOD
-from executive.vision.camera_model import on_plane
+from executive.vision.camera_model import intersect_plane
 
 MAX_FOV_CHANGE = 0.27
 """Largest relative change of the field of view."""
@@ -118,7 +118,7 @@ def random_camera(
     matrix[:2, 2] = centre
     if camera.mount == "wrist":
         return matrix, X_WC
-    target = on_plane(matrix, X_WC, (centre[0], centre[1]), 0.0)
+    target = intersect_plane(matrix, X_WC, (centre[0], centre[1]), 0.0)
     axis, tilt = rng.uniform(0, math.tau), MAX_TILT * float(rng.choice([0.0, 0.1, 0.3, 1.0])) * rng.random()
     rotation, _ = cv2.Rodrigues(tilt * np.array([math.cos(axis), math.sin(axis), 0.0]))
     rotation = np.asarray(rotation) @ about_z(rng.normal(0, math.radians(3)))

@@ -17,7 +17,7 @@ MAX_DISTANCE = 0.005
 
 Measured in 264 frames of undisplaced cameras (eight cells; lamps, shadows and tables varied; bins full and
 empty): wrist camera at most 0.6 mm, fixed camera at most 2.1 mm. With earlier settings of the fit, 990 frames
-had at most 3.6 mm, but one with a table in the colour of a bin, which now gives no estimate. In all 639
+had at most 3.6 mm, except one whose table had the colour of a bin; it now gives no estimate. In all 639
 frames of 81 complete runs, the arm in view and the bins filling: wrist camera at most 0.5 mm, fixed camera at
 most 2.2 mm.
 """
@@ -26,8 +26,8 @@ MIN_SUPPORT = 0.65
 MIN_CLEAR_SUPPORT = 0.85
 """Smallest support at which a pose near the declared one is accepted without a search for other poses.
 
-In 250 frames of undisplaced cameras in the light of the cells it was at least 0.89. Where cameras had moved
-by 12 to 60 mm, other edges beside the outlines gave up to 0.81 to a pose near the declared one.
+In 250 frames of undisplaced cameras in the light of the cells it was at least 0.89. In frames of cameras
+moved by 12 to 60 mm, poses near the declared one had a support of up to 0.81 from other edges.
 """
 MIN_GAIN = 0.15
 """Smallest difference between the support of a displaced pose and that of the declared pose."""
@@ -39,18 +39,18 @@ class CameraOffset:
 
     Attributes:
         shift, shift_std: Displacement in the world `(3,)` [m], and its standard deviation.
-        turn_deg: Angle of the rotation [degree].
+        rotation_deg: Angle of the rotation [degree].
         distance: Mean distance between the outlines of the bins and their expected positions [m].
-        pixels: Mean distance between the outlines and their expected positions in the image [pixel].
+        distance_px: Mean distance between the outlines and their expected positions in the image [pixel].
         support: Share of the outlines (0 to 1) with an edge beside them, at the estimated pose.
         bins: Names of the bins in view.
     """
 
     shift: Array
     shift_std: Array
-    turn_deg: float
+    rotation_deg: float
     distance: float
-    pixels: float
+    distance_px: float
     support: float
     bins: tuple[str, ...]
 
@@ -63,9 +63,9 @@ def describe_displacement(frame: Frame, bins: Sequence[Bin]) -> str:
     x, y, z = 1e3 * offset.shift
     return (
         f"camera {frame.camera} is not where the cell file says: the outlines of {', '.join(offset.bins)} "
-        f"appear {offset.pixels:.0f} pixels ({1e3 * offset.distance:.0f} mm) away from their expected "
+        f"appear {offset.distance_px:.0f} pixels ({1e3 * offset.distance:.0f} mm) away from their expected "
         f"positions, as if the camera had moved by ({x:+.0f}, {y:+.0f}, {z:+.0f}) mm (standard deviation "
-        f"{1e3 * offset.shift_std.max():.0f} mm) and turned by {offset.turn_deg:.1f} degrees; limit "
+        f"{1e3 * offset.shift_std.max():.0f} mm) and turned by {offset.rotation_deg:.1f} degrees; limit "
         f"{1e3 * MAX_DISTANCE:.0f} mm; mount camera and bins as declared, or measure the pose again"
     )
 
@@ -93,9 +93,9 @@ def _offset(fit: Fit, frame: Frame, bins: Sequence[Bin]) -> CameraOffset:
     return CameraOffset(
         shift=R_WC @ fit.offset[3:],
         shift_std=np.sqrt(np.diag(R_WC @ fit.covariance[3:, 3:] @ R_WC.T)),
-        turn_deg=math.degrees(float(np.linalg.norm(fit.offset[:3]))),
+        rotation_deg=math.degrees(float(np.linalg.norm(fit.offset[:3]))),
         distance=float((pixels * samples.in_camera[:, 2]).mean() / frame.matrix[0, 0]),
-        pixels=float(pixels.mean()),
+        distance_px=float(pixels.mean()),
         support=fit.support,
         bins=tuple(bins[index].name for index in np.unique(samples.bins)),
     )

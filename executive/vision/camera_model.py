@@ -105,7 +105,7 @@ def pixel_ray(matrix: Array, X_WC: Pose, pixel: ArrayLike) -> Array:
     return np.asarray(direction / np.linalg.norm(direction))
 
 
-def on_plane(matrix: Array, X_WC: Pose, pixel: ArrayLike, z: float) -> Array:
+def intersect_plane(matrix: Array, X_WC: Pose, pixel: ArrayLike, z: float) -> Array:
     """Return the point `(3,)` [m] at height `z` [m] in the world that appears at `pixel` `(2,)`.
 
     Raises:

@@ -31,8 +31,8 @@ SMOOTHING = 1.0
 MIN_CONTRAST = 4.0
 """Smallest difference between neighbouring pixels of the smoothed image that is an edge [grey level]."""
 NEAR_RANGES, FAR_RANGES, SUPPORT_RANGE = (8, 4, 3), (16, 8, 4, 3), 2
-"""Search distances beside an outline [pixel]: for each step of a fit from the declared pose, for each step of
-a fit from a pose of the grid, and for the support."""
+"""Search distances beside an outline [pixel]: per step of a fit from the declared pose, per step of one from
+a pose of the search grid, and for the support."""
 EDGE_STD = 2.0
 """Standard deviation of an edge position [pixel]; large, because errors of neighbours are correlated."""
 MIN_OUTLIER = 0.5
@@ -42,13 +42,13 @@ PRIOR_STD = np.full(6, 0.1)
 ROBUST_STEPS = 8
 """Number of iterations of the reweighted least squares."""
 TILTS_DEG, ROLLS_DEG = np.arange(-10.0, 11.0), np.arange(-8.0, 9.0, 4.0)
-"""Rotations of the grid about the axes x and y of the camera, and about the optical axis [degree]."""
+"""Rotations of the search grid about the axes x and y of the camera, and about the optical axis [degree]."""
 AXIAL_SHIFTS = np.linspace(-0.21, 0.21, 7)
-"""Shifts of the grid along the optical axis, as shares of the distance of the bins."""
-STARTS = 6
-"""Number of the poses of the grid that are refined."""
+"""Shifts of the search grid along the optical axis, as shares of the distance of the bins."""
+MAX_REFINED = 6
+"""Largest number of poses of the search grid that are refined."""
 SHRINK, THINNING = 4, 4
-"""Factors by which the image is reduced, and the samples are thinned, for the grid."""
+"""Factors by which the image is reduced, and the samples are thinned, for the search grid."""
 
 
 class Samples(NamedTuple):
@@ -57,7 +57,7 @@ class Samples(NamedTuple):
     Attributes:
         points: Places in the world `(N, 3)` [m].
         in_camera: Positions of the samples in the camera's frame `(N, 3)` [m].
-        pixels, normals: Places and directions across the outline in the image `(N, 2)` [pixel].
+        pixels, normals: Image positions [pixel] and unit normals of the outline, each `(N, 2)`.
         bins: Index of the bin of each sample `(N,)`.
     """
 
@@ -94,13 +94,13 @@ class OutlineFitter:
     def refine(self, offset: Array, ranges: Sequence[int] = NEAR_RANGES) -> Fit | None:
         """Return the fit near an offset `(6,)`; None if too little of the outlines is seen."""
         covariance = np.diag(PRIOR_STD**2)
-        for reach in ranges:
+        for max_distance in ranges:
             samples = self._samples(offset)
-            distances, found = self._edges(samples, reach)
+            distances, found = self._edges(samples, max_distance)
             if not _is_enough(samples) or found.sum() < MIN_SAMPLES / 2:
                 return None
             jacobian = _jacobian(samples, self._frame.matrix)[found]
-            offset, covariance = _solve(jacobian, distances[found], offset, reach / 2)
+            offset, covariance = _solve(jacobian, distances[found], offset, max_distance / 2)
         samples = self._samples(offset)
         return Fit(offset, covariance, samples, self.support(offset)) if _is_enough(samples) else None
 
@@ -137,7 +137,7 @@ class OutlineFitter:
             score = (np.sqrt(strength) * inside).sum(axis=1) / np.maximum(inside.sum(axis=1), len(points) / 2)
             best = int(score.argmax())
             scored.append((float(score[best]), np.concatenate([turns[best], shift])))
-        for _, offset in sorted(scored, key=lambda one: -one[0])[:STARTS]:
+        for _, offset in sorted(scored, key=lambda one: -one[0])[:MAX_REFINED]:
             fit = self.refine(offset, FAR_RANGES)
             if fit is not None:
                 yield fit
@@ -156,10 +156,10 @@ class OutlineFitter:
         shown &= visible[rows, columns]
         return Samples(points[shown], in_camera[shown], pixels[shown], normals[shown], bins[shown])
 
-    def _edges(self, samples: Samples, reach: int) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the distance `(N,)` [pixel] of the strongest edge along each normal, and a mask of them."""
+    def _edges(self, samples: Samples, max_distance: int) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the distance `(N,)` [pixel] of the strongest edge on each normal, and whether it exists."""
         n = samples.normals[:, None, None]
-        across = np.arange(-reach - 1.5, reach + 2)[:, None, None]
+        across = np.arange(-max_distance - 1.5, max_distance + 2)[:, None, None]
         along = np.array([-2.0, 0.0, 2.0])[:, None] * n[..., ::-1] * (-1, 1)
         # OpenCV's pixels have their centres at whole numbers.
         places = (samples.pixels[:, None, None] + across * n + along - 0.5).astype(np.float32)
@@ -178,7 +178,7 @@ class OutlineFitter:
         # The vertex of the parabola through three values.
         bend = np.minimum(before - 2 * middle + after, -1e-6)[each, best]
         vertex = 0.5 * (before - after)[each, best] / bend
-        return best - reach + vertex.clip(-0.5, 0.5), edge[each, best]
+        return best - max_distance + vertex.clip(-0.5, 0.5), edge[each, best]
 
 
 def _outlines(bins: Sequence[Bin], X_WC: Pose, matrix: Array) -> tuple[Array, Array, NDArray[np.intp]]:
@@ -226,7 +226,7 @@ def _is_enough(samples: Samples) -> bool:
 
 
 def _jacobian(samples: Samples, matrix: Array) -> Array:
-    """Return the derivative `(N, 6)` [pixel/rad, pixel/m] of each sample along its normal by the offset."""
+    """Return the Jacobian `(N, 6)` [pixel/rad, pixel/m] of positions along normals w.r.t. the offset."""
     x, y, z = samples.in_camera.T
     u, v = (samples.normals * matrix.diagonal()[:2]).T
     toward = np.column_stack([u / z, v / z, -(u * x + v * y) / z**2])
@@ -236,7 +236,7 @@ def _jacobian(samples: Samples, matrix: Array) -> Array:
 def _solve(jacobian: Array, distances: Array, offset: Array, scale: float) -> tuple[Array, Array]:
     """Return the offset `(6,)` that fits edges at `distances` `(N,)` [pixel], and its covariance.
 
-    Edges whose residual exceeds `scale` [pixel], or the typical residual, hardly count.
+    Residuals above `scale` [pixel], or 1.5 times their median magnitude, get little weight.
     """
     change, covariance = np.zeros(6), np.zeros((6, 6))
     for _ in range(ROBUST_STEPS):

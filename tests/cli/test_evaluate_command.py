@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from executive.cli.main import main
 from executive.vision.dataset import Entry, image_path, save_image, write_annotations
 from executive.vision.detectors.embedded import LABELS, MODEL
-from executive.vision.envelope.measurement import Rates, read_measurements
+from executive.vision.envelope.measurement import StoredErrorRates, read_measurements
 
 
 @pytest.fixture
@@ -44,7 +44,7 @@ def test_a_cells_detector_is_measured_as_in_a_run_with_a_sheet_of_its_worst_miss
     (measurement,) = read_measurements(stored)
     assert (measurement.detector, measurement.rates) == (
         "embedded",
-        Rates(**measured["reliability"]["rates"]),
+        StoredErrorRates(**measured["reliability"]["rates"]),
     )
     assert measurement.command == "executive evaluate --cell overhead --detector embedded --images 1 --seed 2"
     assert measurement.frames is not None

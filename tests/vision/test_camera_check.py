@@ -84,14 +84,14 @@ def test_a_shift_is_measured(shift: tuple[float, float, float]) -> None:
     assert offset is not None and offset.distance > MAX_DISTANCE
     assert offset.shift == pytest.approx(shift, abs=0.015)
     assert np.all(np.abs(offset.shift - shift) < 3 * offset.shift_std + 0.001)
-    assert offset.turn_deg < 1.0
+    assert offset.rotation_deg < 1.0
 
 
 @pytest.mark.parametrize("turn_deg", [(2, 0, 0), (0, -6, 0), (0, 0, 2), (0, 0, -10), (5, 5, 3)])
 def test_a_rotation_is_measured(turn_deg: tuple[float, float, float]) -> None:
     offset = estimate_offset(draw(moved(turn_deg=turn_deg)), BINS)
     assert offset is not None and offset.distance > MAX_DISTANCE
-    assert offset.turn_deg == pytest.approx(np.linalg.norm(turn_deg), abs=1.0)
+    assert offset.rotation_deg == pytest.approx(np.linalg.norm(turn_deg), abs=1.0)
 
 
 @pytest.mark.parametrize("fov", [0.85 * 55, 1.15 * 55])

@@ -18,8 +18,8 @@ from executive.vision.camera_model import (
     calibrated,
     camera_matrix,
     from_opencv,
+    intersect_plane,
     looking_at,
-    on_plane,
     pixel_ray,
     project,
     projection_matrix,
@@ -57,7 +57,7 @@ def test_looking_straight_down_agrees_with_looking_at_a_point_below():
 @given(cameras, points)
 def test_a_point_is_found_again_on_the_plane_it_lies_in(X_WC, point):
     pixel = project(K, X_WC, point)
-    assert on_plane(K, X_WC, pixel, point[2]) == pytest.approx(point, abs=1e-9)
+    assert intersect_plane(K, X_WC, pixel, point[2]) == pytest.approx(point, abs=1e-9)
     towards = point - X_WC.position
     # A point behind the camera has a pixel too, on the way to the other side.
     towards *= np.sign(X_WC.inverse().apply(point)[2])
@@ -78,7 +78,7 @@ def test_opengl_matrices_draw_a_point_where_it_is_projected(X_WC, point):
 
 def test_what_determines_no_ray_or_pose_is_refused():
     with pytest.raises(ValueError, match=r"1\.200 m high looks away from the plane z = 2\.000 m"):
-        on_plane(K, looking_down([0, 0, 1.2]), (320, 240), 2.0)
+        intersect_plane(K, looking_down([0, 0, 1.2]), (320, 240), 2.0)
     with pytest.raises(ValueError, match="up must not lie along the axis"):
         looking_at([0, 0, 1], [0, 0, 0], [0, 0, 1])
 

@@ -65,7 +65,7 @@ def build_detectors(
         raise
 
 
-def wrong_detectors(configs: Mapping[str, DetectorConfig], base: Path) -> Iterator[tuple[KeyPath, str]]:
+def find_problems(configs: Mapping[str, DetectorConfig], base: Path) -> Iterator[tuple[KeyPath, str]]:
     """Yield the key of the cell file and a sentence for everything that keeps a detector from being built.
 
     A kind that is not installed, and whatever the kind itself finds: one may have, beside `from_config`,

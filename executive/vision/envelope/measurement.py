@@ -17,11 +17,11 @@ from executive.vision.envelope.frame_statistics import FrameRange
 SUFFIX = ".measured.json"
 """Suffix of a measurement file; the name of the cell comes before it."""
 MAX_FILE_SIZE = 1_000_000
-"""Largest measurement file [byte]."""
+"""Largest accepted size of a measurement file [byte]."""
 
 
-class Rates(Section):
-    """Error rates of a detector; see `executive.error_rates.ErrorRates`."""
+class StoredErrorRates(Section):
+    """Stored fields of `executive.error_rates.ErrorRates`."""
 
     misses: float = Field(gt=0, lt=1)
     confused: float = Field(gt=0, lt=1)
@@ -31,12 +31,12 @@ class Rates(Section):
     bias: float = Field(ge=0)
 
     def build_error_rates(self, threshold: float) -> ErrorRates:
-        """Return these rates together with the confidence from which detections count."""
+        """Return these rates with `threshold`, the confidence from which detections count."""
         return ErrorRates(threshold, **self.model_dump())
 
 
 class ErrorCounts(Section):
-    """Errors on the objects of one class, or in scenes with the same number of objects."""
+    """Numbers of objects and errors, for one class or one number of objects per scene."""
 
     objects: int
     missed: int
@@ -50,15 +50,15 @@ class Measurement(Section):
     detector: str
     """Name of the detector in the cell."""
     fingerprint: dict[str, str]
-    """See `executive.vision.envelope.fingerprint`."""
+    """Declared properties on which its errors depend, by name."""
     command: str
     """Command line that repeats the measurement."""
     seconds: float
     """Duration of the measurement [s]."""
     images: int
-    rates: Rates
-    """Upper 95 % bounds `misses`, `confused` and `invented`; Laplace estimate `repeated`; standard deviations
-    `jitter` and `bias`."""
+    rates: StoredErrorRates
+    """`misses`, `confused`, `invented`: upper 95 % bounds; `repeated`: Laplace estimate; `jitter`, `bias`:
+    standard deviations."""
     classes: dict[str, ErrorCounts]
     """Errors by class; a false detection counts for the class that it was given."""
     counts: dict[str, ErrorCounts]
@@ -75,10 +75,10 @@ class MeasurementFile(Section):
 
 
 def read_measurements(path: Path) -> tuple[Measurement, ...]:
-    """Return the measurements in a file; none if there is no such file.
+    """Return the measurements in a file; empty if there is no such file.
 
     Raises:
-        InputError: The file cannot be read or has another form.
+        InputError: The file cannot be read or is invalid.
     """
     if not path.is_file():
         return ()
@@ -93,8 +93,8 @@ def read_measurements(path: Path) -> tuple[Measurement, ...]:
         ) from error
 
 
-def text_with_measurement(measurements: Iterable[Measurement], new: Measurement) -> str:
-    """Return the text of a file with a new measurement, in place of an older one of the same detector."""
+def format_measurements(measurements: Iterable[Measurement], new: Measurement) -> str:
+    """Return the text of a measurement file in which `new` replaces the measurement of its detector."""
     others = [one for one in measurements if one.detector != new.detector]
     ordered = sorted((*others, new), key=lambda one: one.detector)
     content = MeasurementFile(measurements=tuple(ordered)).model_dump(mode="json")

@@ -58,11 +58,11 @@ class RatedDetector:
         error_rates, frame_range = self.envelope.error_rates, self.envelope.frame_range
         statistics = measure_frame(frame, self.config.table) if frame_range else None
         if frame_range and statistics and (difference := frame_range.describe_difference(statistics)):
-            doubt = (
+            reason = (
                 f"the workspace looks different from all images that detector {self.name} was measured on: "
-                f"{difference}; {remedy(self.config)}"
+                f"{difference}; {advise_measuring(self.config)}"
             )
-            error_rates = assume_rates(error_rates.threshold, doubt)
+            error_rates = assume_rates(error_rates.threshold, reason)
         asked = self.detector.request(frame, view)
         return ChangedRequest(asked, lambda answer: replace(answer, error_rates=error_rates))
 
@@ -118,12 +118,12 @@ def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> d
         older = next((one for cell, one in stored if (cell, one.detector) == (config.cell, name)), None)
         change = describe_change(older.fingerprint, current) if older else ""
         was = f"was measured before a change of {change}" if change else "was never measured in this cell"
-        doubt = f"detector {name} {was}, so high error rates are assumed; {remedy(config)}"
-        envelopes[name] = DetectorEnvelope(assume_rates(threshold, "; ".join([doubt, *problems])))
+        reason = f"detector {name} {was}, so high error rates are assumed; {advise_measuring(config)}"
+        envelopes[name] = DetectorEnvelope(assume_rates(threshold, "; ".join([reason, *problems])))
     return envelopes
 
 
-def remedy(config: CellConfig) -> str:
+def advise_measuring(config: CellConfig) -> str:
     """Return the command that measures the detectors of a cell, as a part of a sentence."""
     return f"measure it with `executive evaluate --cell {config.cell}` (about {MEASURING_MINUTES} min)"
 

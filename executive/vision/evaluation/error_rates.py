@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from scipy.special import betaincinv, gammaincinv
 
-from executive.vision.envelope.measurement import Rates
+from executive.vision.envelope.measurement import StoredErrorRates
 
 CONFIDENCE = 0.95
 """Confidence level of the bounds."""
@@ -59,7 +59,7 @@ class MeasuredErrorRates:
     @staticmethod
     def of(
         *,
-        in_full_view: int,
+        full_view_count: int,
         missed: int,
         confused: int,
         invented: int,
@@ -68,17 +68,17 @@ class MeasuredErrorRates:
         repeated: float,
         bias: float,
     ) -> MeasuredErrorRates:
-        """Return the error rates; `in_full_view` counts objects, `looks` counts answers."""
+        """Return the error rates; `full_view_count` counts objects, `looks` counts answers."""
         return MeasuredErrorRates(
-            _count_share(missed, in_full_view), _count_share(confused, in_full_view - missed),
+            _bound_share(missed, full_view_count), _bound_share(confused, full_view_count - missed),
             CountedRate(invented, looks, float(gammaincinv(invented + 1, CONFIDENCE)) / looks), jitter,
             repeated, bias,
         )  # fmt: skip
 
     @property
-    def rates(self) -> Rates:
+    def rates(self) -> StoredErrorRates:
         """Rates for the ledger, rounded up: the bounds, the repeated share and the standard deviations."""
-        return Rates(
+        return StoredErrorRates(
             misses=min(round_up(self.misses.bound), MAX_SHARE),
             confused=min(round_up(self.confused.bound), MAX_SHARE),
             invented=round_up(self.invented.bound),
@@ -88,7 +88,7 @@ class MeasuredErrorRates:
         )
 
 
-def _count_share(events: int, trials: int) -> CountedRate:
+def _bound_share(events: int, trials: int) -> CountedRate:
     """Return a share with its upper bound, 1 if every trial is an event."""
     bound = float(betaincinv(events + 1, trials - events, CONFIDENCE)) if events < trials else 1.0
     return CountedRate(events, trials, bound)

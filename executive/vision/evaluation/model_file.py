@@ -13,7 +13,7 @@ from executive.vision.samples import read_samples
 
 FLOOR = 0.01
 """Confidence from which boxes of a model file count for the mean average precision."""
-NAME = "model"
+MODEL_NAME = "model"
 """What such a detector is called."""
 
 
@@ -40,6 +40,6 @@ def evaluate_folder(model: Path, labels: Path, folder: Path, threshold: float) -
     Raises:
         InputError: Model, labels or images cannot be read.
     """
-    detector = CellDetector({NAME: model_detector(model, labels)}, NAME, base=Path())
+    detector = CellDetector({MODEL_NAME: model_detector(model, labels)}, MODEL_NAME, base=Path())
     with contextlib.closing(detector):
         return evaluate(detector, read_samples(folder), threshold=threshold)

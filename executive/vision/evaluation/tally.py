@@ -11,7 +11,7 @@ import numpy as np
 from executive.cell import Localizer
 from executive.errors import NoDepth
 from executive.messages import Frame
-from executive.vision.camera_model import on_plane
+from executive.vision.camera_model import intersect_plane
 from executive.vision.evaluation.error_rates import MeasuredErrorRates
 from executive.vision.evaluation.figures import NOTHING, ClassFigures
 from executive.vision.evaluation.matching import Match, is_covered, offset_of
@@ -104,7 +104,7 @@ class Tally:
             return None
         total = float(np.sqrt(np.mean(self._squares))) if self._squares else 0.0
         return MeasuredErrorRates.of(
-            in_full_view=self._whole,
+            full_view_count=self._whole,
             missed=self._overlooked,
             confused=self._confused,
             invented=sum(count for (true, _), count in self.confusion.items() if true == NOTHING),
@@ -124,7 +124,7 @@ class Tally:
             return
         if "positions" in sample.truth:
             true = np.array(sample.truth["positions"][number])
-            seen = on_plane(frame.matrix, frame.X_WC, one.detection.centre, true[2])
+            seen = intersect_plane(frame.matrix, frame.X_WC, one.detection.centre, true[2])
             self.position.append(float(np.linalg.norm(seen - true) * 1000))
         if self._localizer is not None and "centres" in sample.truth:
             # Without a depth an object has no place in a run either.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from executive.errors import NoDepth
 from executive.geometry import Array
 from executive.messages import Detection, Frame
-from executive.vision.camera_model import on_plane
+from executive.vision.camera_model import intersect_plane
 
 
 def centre_at(detection: Detection, frame: Frame, height: float) -> Array:
@@ -15,7 +15,7 @@ def centre_at(detection: Detection, frame: Frame, height: float) -> Array:
         NoDepth: The ray does not meet that height in front of the camera.
     """
     try:
-        return on_plane(frame.matrix, frame.X_WC, detection.centre, height)
+        return intersect_plane(frame.matrix, frame.X_WC, detection.centre, height)
     except ValueError:
         column, row = detection.centre
         raise NoDepth(

@@ -17,7 +17,7 @@ MEASURED = Evaluation(
     confusion={"cube": {"cube": 882, "nothing": 18}, "nothing": {"cube": 8, "nothing": 0}},
     answered_by={"eye": 300},
     reliability=MeasuredErrorRates.of(
-        in_full_view=800, missed=2, confused=0, invented=8, looks=300, jitter=0.5, repeated=0.8, bias=0.001
+        full_view_count=800, missed=2, confused=0, invented=8, looks=300, jitter=0.5, repeated=0.8, bias=0.001
     ),
 )  # fmt: skip
 

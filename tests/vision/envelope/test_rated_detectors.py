@@ -12,9 +12,9 @@ from executive.vision.envelope.fingerprint import describe_change, take_fingerpr
 from executive.vision.envelope.frame_statistics import FrameRange
 from executive.vision.envelope.measurement import (
     Measurement,
-    Rates,
+    StoredErrorRates,
+    format_measurements,
     read_measurements,
-    text_with_measurement,
 )
 from executive.vision.envelope.rated_detectors import (
     DetectorEnvelope,
@@ -23,7 +23,7 @@ from executive.vision.envelope.rated_detectors import (
     find_unmeasured,
 )
 
-RATES = Rates(misses=0.01, confused=0.002, invented=0.015, jitter=0.1, repeated=0.5, bias=0.001)
+RATES = StoredErrorRates(misses=0.01, confused=0.002, invented=0.015, jitter=0.1, repeated=0.5, bias=0.001)
 WOOD = FrameRange(brightness=(180, 195), contrast=(0, 6), red=(210, 225), green=(190, 205), blue=(150, 165))
 
 
@@ -39,7 +39,7 @@ def stored(tmp_path, overhead):
         detector="embedded", fingerprint=dict(take_fingerprint(overhead, "embedded", tmp_path)),
         command="", seconds=1.0, images=1, rates=RATES, classes={}, counts={}, frames=WOOD,
     )  # fmt: skip
-    (tmp_path / "overhead.measured.json").write_text(text_with_measurement((), one))
+    (tmp_path / "overhead.measured.json").write_text(format_measurements((), one))
     return tmp_path
 
 
@@ -67,8 +67,9 @@ def test_a_damaged_file_is_named_and_the_rates_are_assumed(overhead, tmp_path):
     (tmp_path / "overhead.measured.json").write_text("{")
     error_rates = find_envelopes(overhead, tmp_path, [tmp_path])["embedded"].error_rates
     assert (error_rates.misses, error_rates.repeated) == (0.15, 0.8)
-    assert "was never measured in this cell" in error_rates.doubt
-    assert f"the measurements in {tmp_path}/overhead.measured.json cannot be read" in error_rates.doubt
+    reason = error_rates.doubt
+    assert "was never measured in this cell" in reason
+    assert f"the measurements in {tmp_path}/overhead.measured.json cannot be read" in reason
 
 
 def test_fake_cells_and_fake_detectors_are_not_measured(overhead, missions, tmp_path):
@@ -110,7 +111,7 @@ def test_rates_are_assumed_for_frames_outside_the_measured_ranges(overhead, colo
 
 def test_measurements_of_other_detectors_in_a_file_are_kept(stored):
     (one,) = read_measurements(stored / "overhead.measured.json")
-    text = text_with_measurement((one,), one.model_copy(update={"detector": "second"}))
+    text = format_measurements((one,), one.model_copy(update={"detector": "second"}))
     (stored / "both.measured.json").write_text(text)
     assert [each.detector for each in read_measurements(stored / "both.measured.json")] == [
         "embedded",

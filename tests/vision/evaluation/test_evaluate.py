@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from executive.errors import NoDepth
-from executive.vision.envelope.measurement import Rates
+from executive.vision.envelope.measurement import StoredErrorRates
 from executive.vision.evaluation.error_rates import MeasuredErrorRates, round_up
 from executive.vision.evaluation.evaluate import evaluate
 from executive.vision.evaluation.figures import ClassFigures, Spread
@@ -142,36 +142,36 @@ def test_a_spread_names_its_quantiles():
     assert Spread.of(list(range(101))) == Spread(median=50, p95=95, p99=99, worst=100)
 
 
-def rates(in_full_view, missed, confused, invented, looks, jitter):
+def rates(full_view_count, missed, confused, invented, looks, jitter):
     return MeasuredErrorRates.of(
-        in_full_view=in_full_view, missed=missed, confused=confused, invented=invented, looks=looks,
+        full_view_count=full_view_count, missed=missed, confused=confused, invented=invented, looks=looks,
         jitter=jitter, repeated=0.751, bias=0.00112,
     )  # fmt: skip
 
 
 def test_the_rates_for_the_ledger_are_upper_bounds_rounded_up():
-    assert rates(1344, 0, 2, 1, 300, 0.432).rates == Rates(
+    assert rates(1344, 0, 2, 1, 300, 0.432).rates == StoredErrorRates(
         misses=0.0023, confused=0.0047, invented=0.016, jitter=0.44, repeated=0.76, bias=0.0012
     )
 
 
-@pytest.mark.parametrize("in_full_view", [0, 5])
-def test_no_rate_is_zero_or_one_even_if_nothing_was_counted(in_full_view):
-    extreme = rates(in_full_view, in_full_view, 0, 0, 1, 0.0).rates
+@pytest.mark.parametrize("full_view_count", [0, 5])
+def test_no_rate_is_zero_or_one_even_if_nothing_was_counted(full_view_count):
+    extreme = rates(full_view_count, full_view_count, 0, 0, 1, 0.0).rates
     assert (extreme.misses, extreme.confused, extreme.invented, extreme.jitter) == (0.99, 0.99, 3.0, 0.01)
 
 
 @pytest.mark.parametrize(
-    ("in_full_view", "missed", "invented", "expected"),
+    ("full_view_count", "missed", "invented", "expected"),
     [
         (1344, 0, 0, (1 - 0.05 ** (1 / 1344), 0.029957)),
         (13, 2, 10, (0.410099, 0.169622)),
         (5, 5, 400, (1.0, 4.344968)),
     ],
 )
-def test_the_bounds_are_those_of_the_tables(in_full_view, missed, invented, expected):
+def test_the_bounds_are_those_of_the_tables(full_view_count, missed, invented, expected):
     """Clopper and Pearson's, and Garwood's: half the 95 % quantile of chi-squared with 2 k + 2 degrees."""
-    found = rates(in_full_view, missed, 0, invented, 100, 0.1)
+    found = rates(full_view_count, missed, 0, invented, 100, 0.1)
     assert (found.misses.bound, found.invented.bound) == pytest.approx(expected, rel=1e-4)
 
 
