@@ -12,7 +12,7 @@ from executive.cell_config.section import Length, Natural, Section, Vector
 Row = tuple[float, float, float]
 Share = Annotated[float, Field(ge=0, le=1)]
 
-SET_UP_BY_HAND = ("position", "look_at", "up", "fov_deg")
+POSE_AND_FOV_KEYS = ("position", "look_at", "up", "fov_deg")
 """Keys that say how a camera stands and sees where no calibration does."""
 
 
@@ -130,12 +130,12 @@ class CameraConfig(Section):
                 f"needs a table_view that is a square inside its image of {self.width} x {self.height} "
                 f"pixels, not {list(self.table_view)}"
             )
-        given = [key for key in SET_UP_BY_HAND if getattr(self, key) is not None]
+        given = [key for key in POSE_AND_FOV_KEYS if getattr(self, key) is not None]
         if self.calibration is not None and given:
             raise ValueError(f"needs no {', '.join(given)} where it has a calibration, which says it all")
-        if self.calibration is None and len(given) < len(SET_UP_BY_HAND):
-            lacking = ", ".join(key for key in SET_UP_BY_HAND if key not in given)
-            raise ValueError(f"needs {lacking}, or a calibration instead of {', '.join(SET_UP_BY_HAND)}")
+        if self.calibration is None and len(given) < len(POSE_AND_FOV_KEYS):
+            lacking = ", ".join(key for key in POSE_AND_FOV_KEYS if key not in given)
+            raise ValueError(f"needs {lacking}, or a calibration instead of {', '.join(POSE_AND_FOV_KEYS)}")
         if self.position is not None and self.look_at is not None and self.up is not None:
             axis = np.subtract(self.look_at, self.position)
             if np.linalg.norm(np.cross(axis, self.up)) < 1e-9:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field, model_validator
 
-from executive.cell_config.section import Colour, Count, Length, Natural, Range, Section, Vector, rising
+from executive.cell_config.section import Colour, Count, Length, Natural, Range, Section, Vector, check_rising
 
 
 class ObjectConfig(Section):
@@ -66,7 +66,7 @@ class TableConfig(Section):
     """Range of the workspace along x [m]."""
     y: Range = (-0.22, 0.22)
     """Range of the workspace along y [m]."""
-    objects: Annotated[tuple[Natural, Natural], AfterValidator(rising)] = (3, 6)
+    objects: Annotated[tuple[Natural, Natural], AfterValidator(check_rising)] = (3, 6)
     """Fewest and most objects that spawning puts there."""
     gap: float = Field(0.012, ge=0)
     """Smallest distance between the outlines of two objects when spawned [m]."""

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 Number = TypeVar("Number", int, float)
 
 
-def rising(pair: tuple[Number, Number]) -> tuple[Number, Number]:
+def check_rising(pair: tuple[Number, Number]) -> tuple[Number, Number]:
     """Return a range as it is.
 
     Raises:
@@ -23,7 +23,7 @@ def rising(pair: tuple[Number, Number]) -> tuple[Number, Number]:
 Length = Annotated[float, Field(gt=0)]
 Count = Annotated[int, Field(ge=1)]
 Natural = Annotated[int, Field(ge=0)]
-Range = Annotated[tuple[float, float], AfterValidator(rising)]
+Range = Annotated[tuple[float, float], AfterValidator(check_rising)]
 Vector = Annotated[tuple[float, float, float], Field(description="x, y, z [m]")]
 Joints = tuple[float, float, float, float, float, float, float]
 Limits = tuple[Length, Length, Length, Length, Length, Length, Length]

@@ -26,7 +26,7 @@ from executive.sim.models import missing_models, weighed
 from executive.sim.poses import out_of_reach, unfit_poses
 from executive.sim.rebuild import UnderWay, rebuild
 from executive.sim.scene_file import load_scene
-from executive.sim.scene_world import lamp
+from executive.sim.scene_world import build_light
 from executive.sim.scenery import SimScenery
 from executive.sim.spawn import PartSeeds, find_lack_of_room, first_world
 from executive.sim.tool import SuctionTool
@@ -92,7 +92,7 @@ class SimCell:
             seeds.camera,
             shadow=ArmShadow(self._arm, planner.kinematics, config, lambda: self._tool.holding),
             epoch=lambda: self._ledger.epoch,
-            light=lamp(scene.light),
+            light=build_light(scene.light),
             true=self._world.config.cameras[name],
             bins=tuple(self._bins.values()),
         )

@@ -1,4 +1,4 @@
-"""The typed scene file: changes of a simulated world that the cell file does not declare."""
+"""Schema of scene files: changes to the simulated world that the cell file does not declare."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 
 from executive.cell_config import CameraConfig, CellConfig, Colour, NoiseConfig, Section
-from executive.cell_config.section import Natural, rising
+from executive.cell_config.section import Natural, check_rising
 from executive.errors import InputError
 from executive.mission.findings import Finding, MissionError, alternatives, error, in_file_order
 from executive.mission.parse.validate import mark_of, validate
@@ -64,9 +64,9 @@ RgbColour = tuple[Share, Share, Share]
 Reflection = Annotated[float, Field(ge=0, le=3)]
 Shift = Annotated[float, Field(ge=-1, le=1)]
 AngleDeg = Annotated[float, Field(ge=-90, le=90)]
-Counts = Annotated[tuple[Natural, Natural], AfterValidator(rising)]
-ModelNumber = Annotated[int, Field(ge=0, lt=UNKNOWN_COUNT)]
-Models = Annotated[tuple[ModelNumber, ModelNumber], AfterValidator(rising), AfterValidator(check_models)]
+Counts = Annotated[tuple[Natural, Natural], AfterValidator(check_rising)]
+ModelId = Annotated[int, Field(ge=0, lt=UNKNOWN_COUNT)]
+Models = Annotated[tuple[ModelId, ModelId], AfterValidator(check_rising), AfterValidator(check_models)]
 Palette = Annotated[tuple[RgbColour, ...], AfterValidator(check_palette)]
 
 
@@ -97,7 +97,7 @@ class SceneTableConfig(Section):
     texture: Annotated[str, AfterValidator(check_texture)] = WOOD
     """`wood`, `plain` (white), or a generated texture, `pattern 0` to `pattern 23`."""
     objects: Counts | None = None
-    """Fewest and most objects of the cell's classes."""
+    """Range of the number of objects of the cell's classes."""
     gap: float | None = Field(None, ge=0, le=0.5)
     """Smallest distance between the outlines of two objects [m]; 0: outlines may touch."""
     stacked: Share | None = None
@@ -117,7 +117,7 @@ class UnknownConfig(Section):
     """Objects without a class, in addition to the other objects; they are never stacked."""
 
     count: Counts
-    """Fewest and most objects."""
+    """Range of their number."""
     models: Models = (800, 999)
     """First and last number of the random shapes in pybullet_data, 0 to 999; the shipped detector was
     trained with 0 to 799."""
@@ -169,7 +169,7 @@ def load_scene(path: Path | None, config: CellConfig) -> SceneConfig:
         config: The cell file.
 
     Raises:
-        MissionError: The file is wrong; the text contains every finding.
+        MissionError: The file is invalid; the error lists each finding.
         InputError: There is no such file, or the cell is not simulated.
     """
     if path is None:
@@ -185,19 +185,19 @@ def load_scene(path: Path | None, config: CellConfig) -> SceneConfig:
         raise MissionError(in_file_order(findings, source.path))
     validated = validate(root, SceneConfig)
     scene = validated.model
-    misfits = () if scene is None else _misfits(scene, root, config)
-    found = (*findings, *validated.findings, *misfits)
+    mismatches = () if scene is None else _find_mismatches(scene, root, config)
+    found = (*findings, *validated.findings, *mismatches)
     if scene is None or found:
         raise MissionError(in_file_order(found, source.path))
     return scene
 
 
-def _misfits(scene: SceneConfig, root: Node, config: CellConfig) -> Iterator[Finding]:
+def _find_mismatches(scene: SceneConfig, root: Node, config: CellConfig) -> Iterator[Finding]:
     """Yield a finding for every value that does not fit the cell."""
     for label in scene.objects:
         if label not in (ANY, *config.objects):
             mark = mark_of(root, ("objects", label), of_key=True)
-            hint = alternatives(label, (*config.objects, ANY), "objects takes")
+            hint = alternatives(label, (*config.objects, ANY), "Valid keys")
             yield error(mark, "unknown-class", f'the cell {config.cell} has no class "{label}"', hint)
     name, camera = next(iter(config.cameras.items()))
     if any(scene.camera.orbit_deg) and camera.mount != "fixed":

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from executive.cell_config import CalibrationConfig, CameraConfig, CellConfig, ObjectConfig, TransformConfig
-from executive.cell_config.cameras import SET_UP_BY_HAND
+from executive.cell_config.cameras import POSE_AND_FOV_KEYS
 from executive.geometry import Pose
 from executive.sim.arrangements import DAMAGED_MODEL, resized, unknown_model
 from executive.sim.camera import Light
@@ -41,8 +41,8 @@ def true_cell(config: CellConfig, scene: SceneConfig) -> CellConfig:
     )
 
 
-def lamp(light: LightConfig) -> Light:
-    """Return the lamp of a scene."""
+def build_light(light: LightConfig) -> Light:
+    """Return the lamp and the ambient light of a scene."""
     return Light(
         direction=light.direction,
         colour=light.colour,
@@ -76,7 +76,7 @@ def _true_object(model: ObjectConfig, appearance: SceneObjectConfig | None) -> O
         return model
     colours = appearance.colours or model.colours
     if len(colours) == 1:
-        # The choice of one colour draws no random number; later rotations and stacks would change.
+        # With one colour, no random number is drawn: later rotations and stacks would change.
         colours *= len(model.colours)
     return resized(model, appearance.scale).model_copy(update={"colours": colours})
 
@@ -98,7 +98,7 @@ def _true_camera(camera: CameraConfig, error: SceneCameraConfig) -> CameraConfig
     mounted = TransformConfig(rotation=tuple(X_MC.rotation_vector), translation=tuple(X_MC.position))
     rows = ((fx, 0.0, cx), (0.0, fy, cy), (0.0, 0.0, 1.0))
     calibration = CalibrationConfig(matrix=rows, camera_to_mount=mounted)
-    return camera.model_copy(update={**dict.fromkeys(SET_UP_BY_HAND), "calibration": calibration})
+    return camera.model_copy(update={**dict.fromkeys(POSE_AND_FOV_KEYS), "calibration": calibration})
 
 
 def _make_rotation(vector_deg: ArrayLike) -> Pose:

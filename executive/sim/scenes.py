@@ -21,7 +21,7 @@ from executive.sim.arrangements import UNKNOWN, SceneObject, arrange, make_held_
 from executive.sim.camera import CELL_LIGHT, Image, add_noise, camera_pose, render, sense
 from executive.sim.models import load_mesh
 from executive.sim.scene_file import DECLARED_SCENE, SceneConfig
-from executive.sim.scene_world import lamp, paint_table, true_cell
+from executive.sim.scene_world import build_light, paint_table, true_cell
 from executive.sim.silhouette import outline_box, visible_share
 from executive.sim.spawn import spawn
 from executive.sim.table_top import WOOD
@@ -184,7 +184,7 @@ class SceneRenderer:
                 SceneObject(world.bodies[body], world.models[body], world.object_pose(body), (0.0, 0.0, 0.0))
                 for body in bodies
             ]
-            whole, light = (0, 0, camera.width, camera.height), lamp(self._scene.light)
+            whole, light = (0, 0, camera.width, camera.height), build_light(self._scene.light)
             shot = render(world, self._matrix, X_WC, whole, light)
         finally:
             for body in bodies:

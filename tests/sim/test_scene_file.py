@@ -25,7 +25,7 @@ from executive.sim.camera import CELL_LIGHT
 from executive.sim.cell import SimCell
 from executive.sim.models import load_mesh
 from executive.sim.scene_file import DECLARED_SCENE, SceneConfig, load_scene
-from executive.sim.scene_world import lamp, true_cell
+from executive.sim.scene_world import build_light, true_cell
 from executive.sim.scenes import SceneRenderer
 from executive.sim.spawn import first_world
 from executive.sim.world import World
@@ -89,7 +89,7 @@ def placed(world: World) -> list[tuple[str, list[float]]]:
 
 def test_a_scene_without_changes_is_the_declared_world(world: Build, overhead: CellConfig) -> None:
     assert true_cell(overhead, scene()) == overhead
-    assert lamp(DECLARED_SCENE.light) == CELL_LIGHT
+    assert build_light(DECLARED_SCENE.light) == CELL_LIGHT
     declared = first_world(overhead, SEED)
     assert placed(world()) == placed(declared)
     declared.close()
@@ -296,7 +296,7 @@ WRONG = {
         scene.yaml:2:11: error[unknown-class]: the cell overhead has no class "cubes"
            2 | objects: {cubes: {scale: 0.8}}
              |           ^^^^^
-          Did you mean "cube"? objects takes: cube, sphere, duck, any.
+          Did you mean "cube"? Valid keys: cube, sphere, duck, any.
         """,
     ),
     "a texture that there is not": (
