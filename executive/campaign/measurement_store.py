@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from executive.campaign.detector_trial import DetectorUnderTest
+from executive.campaign.evaluation import DetectorUnderTest
 from executive.errors import InputError, explained
 from executive.record.whole_file import write_whole
 from executive.vision.envelope.fingerprint import take_fingerprint

@@ -87,7 +87,7 @@ def command(
     as_declared = not (weights or varied or scene or threshold) and view == "table"
     stored = bool(cells) and as_declared and (out is not None or not overrides)
     with stdout_kept_clean():
-        from executive.campaign.detector_trial import SceneSettings, check_detector, list_detectors, measure
+        from executive.campaign.evaluation import SceneSettings, check_detector, list_detectors, measure
         from executive.campaign.measurement_store import store_evaluation
         from executive.cli.cells import find_cell, load_cells
         from executive.cli.progress import bar
@@ -102,15 +102,15 @@ def command(
             check_detector(tested, renders_scenes=dataset is None, scene=scene)
         for tested in asked:
             where, began = tested.name_measurement(dataset), time.monotonic()
-            evaluation = measure(tested, dataset, scenes, threshold=threshold, worst=worst, progress=bar)
-            print_figures(where, tested.name, evaluation)
+            result = measure(tested, dataset, scenes, threshold=threshold, worst_misses=worst, progress=bar)
+            print_figures(where, tested.name, result)
             kind = tested.configs[tested.name].kind
-            measured[where] = {"detector": tested.name, "kind": kind, **evaluation.as_dict()}
+            measured[where] = {"detector": tested.name, "kind": kind, **result.as_dict()}
             if stored and tested.cell is not None:
                 source = f"--dataset {dataset}" if dataset else f"--images {images} --seed {seed}"
                 repeat = f"executive evaluate --cell {tested.cell.cell} --detector {tested.name} {source}"
                 seconds = time.monotonic() - began
-                path = store_evaluation(tested, evaluation, out, command=repeat, seconds=seconds)
+                path = store_evaluation(tested, result, out, command=repeat, seconds=seconds)
                 click.echo(f"stored in {path}", err=True)
         if sheet is not None:
             from executive.vision.evaluation.sheet import write_sheet

@@ -9,8 +9,8 @@ from pathlib import Path
 import click
 import yaml
 
-from executive.campaign.detector_trial import SceneSettings, check_detector, list_detectors
-from executive.campaign.detector_trial import measure as measure_detector
+from executive.campaign.evaluation import SceneSettings, check_detector, list_detectors
+from executive.campaign.evaluation import measure as measure_detector
 from executive.cell_config import CellConfig
 from executive.cli.cells import find_cell, load_cells
 from executive.cli.options import seed_option, workers_option
@@ -112,7 +112,9 @@ def evaluate_scene(
     (detector,) = list_detectors({file: cell}, None, None, None)
     check_detector(detector, renders_scenes=True, scene=scene)
     scenes = SceneSettings(images, seed, varied=False, view="table", workers=workers, scene=scene)
-    return measure_detector(detector, None, scenes, threshold=THRESHOLD, worst=WorstMisses(), progress=bar)
+    return measure_detector(
+        detector, None, scenes, threshold=THRESHOLD, worst_misses=WorstMisses(), progress=bar
+    )
 
 
 def describe_evaluation(name: str, evaluation: Evaluation) -> Figures:

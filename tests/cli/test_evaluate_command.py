@@ -112,7 +112,7 @@ def test_a_cell_with_other_values_is_measured_and_stored_in_a_named_file_only(mi
         (("--set", "attempts=3"), "--set attempts is no key of a cell; write cell.KEY.KEY=VALUE"),
         (
             ("--cell", "fruit"),
-            "fruit is of kind fake; measure its detector on images of your own",
+            "fruit is of kind fake; measure its detector on your own images",
         ),
         (("--dataset", "."), ". holds no labelled images"),
         (("--weights", "no.onnx", "--labels", LABELS, "--dataset", "grey"), "there is no model file"),

@@ -1,4 +1,4 @@
-"""Measurement of detectors on labelled images."""
+"""Evaluation of detectors on labelled images."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def list_detectors(
     Args:
         cells: Cells by the path of the cell file.
         detector: Name of the detector in each cell; None: the first.
-        weights: Model file to measure instead.
+        weights: Model file to measure in every cell; None: the detector of the cell file.
         labels: File with the class names of the model; None: the file in its folder.
 
     Raises:
@@ -117,8 +117,8 @@ def check_detector(detector: DetectorUnderTest, *, renders_scenes: bool, scene: 
     cell = detector.cell
     if renders_scenes and cell and cell.kind != "sim":
         raise InputError(
-            f"scenes can be rendered of cells of kind sim, and {cell.cell} is of kind {cell.kind}; "
-            "measure its detector on images of your own with --dataset"
+            f"only cells of kind sim can be rendered, and {cell.cell} is of kind {cell.kind}; "
+            "measure its detector on your own images with --dataset"
         )
     if renders_scenes and cell:
         load_scene(scene, cell)
@@ -132,7 +132,7 @@ def measure(
     scenes: SceneSettings,
     *,
     threshold: float | None,
-    worst: WorstMisses,
+    worst_misses: WorstMisses,
     progress: Progress,
 ) -> Evaluation:
     """Return an evaluation of a detector on `dataset`, or on scenes of its cell."""
@@ -152,7 +152,7 @@ def measure(
             with progress(f"asking {detector.name}") as update:
                 counted = _report_progress(samples, count, update)
                 return evaluate(
-                    asked, counted, threshold=threshold, localizer=localizer, worst=worst,
+                    asked, counted, threshold=threshold, localizer=localizer, worst=worst_misses,
                     table=config.table if config and in_run else None,
                 )  # fmt: skip
 
