@@ -15,6 +15,7 @@ from typing import Any
 
 import click
 
+from executive.cli.streams import tolerant_streams
 from executive.errors import ExecutiveError
 
 BAD_INPUT, BROKEN, INTERRUPTED = 2, 3, 130
@@ -63,54 +64,60 @@ class Executive(click.Group):
         """Run a command and exit with its code; tracebacks are shown only where asked for."""
         del standalone_mode  # This group always stands alone: it is a program, not a part of one.
         args = list(sys.argv[1:] if args is None else args)
-        debug = "--debug" in args
-        try:
-            with _sigterm_as_ctrl_c():
-                code = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
-            sys.exit(code if isinstance(code, int) else 0)
-        except click.ClickException as error:
-            error.show()
-            sys.exit(BAD_INPUT)
-        except (click.Abort, KeyboardInterrupt):
-            click.echo("halted", err=True)
-            sys.exit(INTERRUPTED)
-        except ExecutiveError as error:
-            if debug:
-                traceback.print_exc()
-            click.echo(str(error), err=True)
-            sys.exit(error.exit_code)
-        except Exception as error:
-            if debug:
-                traceback.print_exc()
-            else:
-                click.echo(_apology(error), err=True)
-            sys.exit(BROKEN)
+        with tolerant_streams():
+            try:
+                with _signals_as_ctrl_c():
+                    code = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
+            except (Exception, KeyboardInterrupt) as error:
+                code = _show_error(error, debug="--debug" in args)
+        sys.exit(code if isinstance(code, int) else 0)
+
+
+def _show_error(error: BaseException, *, debug: bool) -> int:
+    """Write an error that ended a command to standard error, and return the exit code."""
+    if isinstance(error, click.ClickException):
+        error.show()
+        return BAD_INPUT
+    if isinstance(error, (click.Abort, KeyboardInterrupt)):
+        click.echo("halted", err=True)
+        return INTERRUPTED
+    if debug:
+        traceback.print_exception(error)
+    if isinstance(error, ExecutiveError):
+        click.echo(str(error), err=True)
+        return error.exit_code
+    if not debug:
+        click.echo(_apology(error), err=True)
+    return BROKEN
 
 
 @contextlib.contextmanager
-def _sigterm_as_ctrl_c() -> Iterator[None]:
-    """Let SIGTERM interrupt what is done here as Ctrl-C does, where nothing else listens to it.
+def _signals_as_ctrl_c() -> Iterator[None]:
+    """Let SIGTERM and SIGHUP interrupt a command as Ctrl-C does, if nothing else handles them.
 
-    A signal that whoever started the process has it ignore stays ignored. Outside the main thread signals
-    are left alone: Python allows nothing else.
+    Signals that were ignored at the start of the process (`nohup`) stay ignored. Python handles signals in
+    the main thread alone.
     """
-    heard = signal.getsignal(signal.SIGTERM)
-    if heard is signal.SIG_IGN or threading.current_thread() is not threading.main_thread():
+    if threading.current_thread() is not threading.main_thread():
         yield
         return
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    previous = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
+    handled = {number: handler for number, handler in previous.items() if handler is not signal.SIG_IGN}
+    for number in handled:
+        signal.signal(number, signal.default_int_handler)
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, heard)
+        for number, handler in handled.items():
+            signal.signal(number, handler)
 
 
-def _apology(error: Exception) -> str:
+def _apology(error: BaseException) -> str:
     """Keep the traceback of `error` in a file and return one sentence that says where."""
     with tempfile.NamedTemporaryFile(
         "w", prefix="executive-", suffix=".txt", delete=False, encoding="utf-8", errors="backslashreplace"
     ) as file:
-        traceback.print_exc(file=file)
+        traceback.print_exception(error, file=file)
     return (
         f"internal error ({type(error).__name__}: {error}); the details are in {file.name}, "
         "or on the screen with `executive --debug ...`"

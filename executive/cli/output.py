@@ -20,11 +20,7 @@ def stdout_kept_clean() -> Iterator[None]:
     pybullet does so whenever a world is made; there is nothing in it that anybody needs.
     """
     sys.stdout.flush()
-    try:
-        kept = os.dup(1)
-    except OSError:  # There is no standard output, so nothing can be printed on it.
-        yield
-        return
+    kept = os.dup(1)
     nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(nowhere, 1)

@@ -67,6 +67,7 @@ def command(
         raise click.UsageError("--gui needs a display, and DISPLAY names none; leave it out")
     with stdout_kept_clean():
         from executive.discovery import discover
+        from executive.record.guarded_view import GuardedView
         from executive.record.result import disagreement, exit_code
         from executive.record.run_directory import RunDirectory
         from executive.view.report.page import leave_report
@@ -75,8 +76,9 @@ def command(
         skills = discover()
         shown = None if quiet else _view()
         with _page(live) as page:
+            views = [GuardedView(view) for view in (shown, page) if view is not None]
             options: dict[str, Any] = {
-                "views": [view for view in (shown, page) if view is not None],
+                "views": views,
                 "paused": paused,
                 "gui": gui,
                 "realtime": realtime,
@@ -97,6 +99,7 @@ def command(
             if page is not None:
                 page.finish(result, report and str(Path(report).resolve()))
                 problem = "; ".join(filter(None, (problem, page.problem)))
+        problem = "; ".join(filter(None, (problem, *(view.problem for view in views))))
         if problem and (options["views"] or result["story"] is not None):
             click.echo(f"note: {problem}", err=True)
         if shown is not None:

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM during a run."""
+"""Ctrl-C, SIGTERM and SIGHUP during a run."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ from types import FrameType
 
 from executive.runtime.run_control import RunControl
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @contextmanager
 def stopped_by_signals(control: RunControl) -> Iterator[None]:
-    """Turn the first Ctrl-C (or SIGTERM) into a wish to halt; the second does what it did before.
+    """Let the first of these signals halt the run; the second one does what it did before.
 
-    Outside the main thread signals are left alone: Python allows nothing else.
+    A SIGTERM or SIGHUP that was ignored at the start of the process (`nohup`) stays ignored. Python handles
+    signals in the main thread alone.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -32,8 +33,9 @@ def stopped_by_signals(control: RunControl) -> Iterator[None]:
         for number, handler in previous.items():
             signal.signal(number, handler)
 
-    previous = {number: signal.getsignal(number) for number in SIGNALS}
-    for number in SIGNALS:
+    ignored = {number for number in SIGNALS[1:] if signal.getsignal(number) is signal.SIG_IGN}
+    previous = {number: signal.getsignal(number) for number in SIGNALS if number not in ignored}
+    for number in previous:
         signal.signal(number, wish)
     try:
         yield

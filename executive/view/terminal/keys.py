@@ -56,7 +56,10 @@ class Keys:
     def _read(self) -> None:
         while not self._over.is_set():
             if select.select([self._file], [], [], SLICE)[0]:
-                key = os.read(self._file, 1).decode("ascii", "ignore")
+                try:
+                    key = os.read(self._file, 1).decode("ascii", "ignore")
+                except OSError:  # The terminal was closed.
+                    return
                 if not key:
                     return
                 self._do(key)

@@ -1,0 +1,98 @@
+"""Standard streams whose write errors do not change the work or the exit code of a command."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import sys
+from collections.abc import Iterator
+from typing import TextIO
+
+
+class TolerantStream(io.TextIOBase):
+    """A text stream that drops its output after the first write error.
+
+    Args:
+        stream: Where to write; None: the process was started with this stream closed.
+
+    Attributes:
+        error: First write error as text, or "".
+    """
+
+    def __init__(self, stream: TextIO | None) -> None:
+        self._stream = stream
+        self.error = ""
+
+    @property
+    def encoding(self) -> str:  # type: ignore[override]
+        """Name of the character encoding."""
+        return "utf-8" if self._stream is None else self._stream.encoding
+
+    def write(self, text: str) -> int:
+        """Write `text`, or drop it."""
+        if self._stream is None:
+            self.error = "it is closed"
+        elif not self.error:
+            try:
+                self._stream.write(text)
+            except OSError as error:
+                self._give_up(self._stream, error)
+        return len(text)
+
+    def flush(self) -> None:
+        """Write what waits in the buffer, or drop it."""
+        if self._stream is not None and not self.error:
+            try:
+                self._stream.flush()
+            except OSError as error:
+                self._give_up(self._stream, error)
+
+    def isatty(self) -> bool:
+        """Return True if the stream is a terminal."""
+        return self._stream is not None and self._stream.isatty()
+
+    def fileno(self) -> int:
+        """Return the number of the stream's file descriptor.
+
+        Raises:
+            OSError: There is none.
+        """
+        return super().fileno() if self._stream is None else self._stream.fileno()
+
+    def _give_up(self, stream: TextIO, error: OSError) -> None:
+        self.error = error.strerror or str(error)
+        # Python flushes the stream again at the end of the process; an error would change the exit code.
+        with contextlib.suppress(OSError):
+            null = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(null, stream.fileno())
+            os.close(null)
+
+
+@contextlib.contextmanager
+def tolerant_streams() -> Iterator[None]:
+    """Drop what standard output and standard error cannot take; afterwards, standard error says so once."""
+    _open_closed_descriptors()
+    with (
+        contextlib.redirect_stdout(TolerantStream(sys.stdout)) as output,
+        contextlib.redirect_stderr(TolerantStream(sys.stderr)) as errors,
+    ):
+        try:
+            yield
+        finally:
+            output.flush()
+            if output.error:
+                errors.write(f"note: standard output could not be written: {output.error}\n")
+            errors.flush()
+
+
+def _open_closed_descriptors() -> None:
+    """Connect closed standard streams to the null device.
+
+    A file that is opened later would get the number of the closed stream, and libraries would print into it.
+    """
+    for number in (0, 1, 2):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)

@@ -1,0 +1,54 @@
+"""A view whose errors do not affect the run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from executive.events import Event
+
+if TYPE_CHECKING:
+    from executive.record.recorded_run import View
+    from executive.runtime.run import Run
+
+
+class GuardedView:
+    """Forwards all calls to a view until the first error; from then on, only `close`. Implements `View`.
+
+    Args:
+        view: The view.
+
+    Attributes:
+        problem: First error of the view as a sentence, or "".
+    """
+
+    def __init__(self, view: View) -> None:
+        self._view = view
+        self.problem = ""
+
+    def open(self, run: Run) -> None:
+        """Begin to show a run."""
+        self._forward(lambda: self._view.open(run))
+
+    def __call__(self, event: Event) -> None:
+        """Show an event."""
+        self._forward(lambda: self._view(event))
+
+    def close(self) -> None:
+        """Stop showing."""
+        failed, self.problem = self.problem, ""
+        self._forward(self._view.close)
+        self.problem = failed or self.problem
+
+    def note(self, sentence: str) -> None:
+        """Show a sentence about the record."""
+        self._forward(lambda: self._view.note(sentence))
+
+    def _forward(self, call: Callable[[], None]) -> None:
+        if self.problem:
+            return
+        try:
+            call()
+        except Exception as error:
+            name = type(self._view).__name__
+            self.problem = f"the view {name} failed during the run: {type(error).__name__}: {error}"
