@@ -166,10 +166,14 @@ class Skill:
         super().__init_subclass__(**kwargs)
         _require_annotations(cls)
         params, ports = dict(cls.params), dict(cls.ports)
+        for name, hint in list(cls.__annotations__.items()):
+            if hint is ClassVar or str(hint).endswith("ClassVar"):
+                # Python 3.10 does not evaluate a ClassVar without a type.
+                del cls.__annotations__[name]
         hints = get_type_hints(cls, include_extras=True)
         for name in cls.__annotations__:
             hint = hints[name]
-            if get_origin(hint) is ClassVar or hint is ClassVar:
+            if get_origin(hint) is ClassVar:
                 continue
             base, *marks = get_args(hint) if get_origin(hint) is Annotated else (hint,)
             declared = cls.__dict__.get(name)

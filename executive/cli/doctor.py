@@ -105,7 +105,7 @@ def check_packages() -> Iterator[Finding]:
     """Yield findings on required packages, packages that provide `cv2`, extras, and the video encoder."""
     from importlib.metadata import packages_distributions
 
-    from executive.runtime.versions import ITSELF, installed, required
+    from executive.runtime.versions import ITSELF, installed, installer, required
 
     names = required()
     missing = [name for name in (ITSELF, *names) if not installed(name)]
@@ -120,7 +120,11 @@ def check_packages() -> Iterator[Finding]:
         yield Finding("ok", "opencv", f"{opencv[0]} is the only package that provides `cv2`")
     elif opencv:
         message = f"{len(opencv)} packages provide `cv2` and overwrite each other ({', '.join(opencv)})"
-        fix = "run `uv sync --reinstall`, which removes all but opencv-python-headless"
+        if installer(ITSELF) == "pip":
+            names = " ".join(sorted(set(packages_distributions()["cv2"])))
+            fix = f"run `pip uninstall -y {names}`, then `pip install opencv-python-headless`"
+        else:
+            fix = "run `uv sync --reinstall`, which removes all but opencv-python-headless"
         yield Finding("problem", "opencv", message, fix)
     for extra, purpose in EXTRAS.items():
         names = required(extra)

@@ -43,3 +43,11 @@ def installed(name: str) -> str:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
         return ""
+
+
+def installer(name: str) -> str:
+    """Return the program that installed a distribution, for instance `pip`; "" if that is not known."""
+    try:
+        return (metadata.distribution(name).read_text("INSTALLER") or "").strip()
+    except metadata.PackageNotFoundError:
+        return ""

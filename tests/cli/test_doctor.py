@@ -94,6 +94,17 @@ def test_packages(monkeypatch, missing, opencv, expected):
     assert shown(doctor.check_packages()) == expected
 
 
+def test_an_environment_made_with_pip_is_mended_with_pip(monkeypatch):
+    monkeypatch.setattr(versions, "installer", lambda name: "pip")
+    packages = {"cv2": ["opencv-python-headless", "opencv-python"]}
+    monkeypatch.setattr("importlib.metadata.packages_distributions", lambda: packages)
+    (problem,) = (finding for finding in doctor.check_packages() if finding.subject == "opencv")
+    assert problem.fix == (
+        "run `pip uninstall -y opencv-python opencv-python-headless`, "
+        "then `pip install opencv-python-headless`"
+    )
+
+
 def test_everything_registered_is_counted_and_loaded(tmp_path: Path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", list(sys.path))
