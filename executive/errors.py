@@ -5,11 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from executive.safe_text import shorten_quotations
+
 
 class ExecutiveError(Exception):
-    """Base of every error this project raises on purpose; `exit_code` is what the command ends with."""
+    """Base of every error this project raises on purpose; `exit_code` is what the command ends with.
+
+    Args:
+        message: What happened; of long quotations it keeps the beginning.
+    """
 
     exit_code = 3
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(shorten_quotations(message))
 
 
 class InputError(ExecutiveError):

@@ -10,7 +10,7 @@ from executive.cell_config.arm import ArmConfig, MotionConfig, ToolConfig
 from executive.cell_config.cameras import CameraConfig
 from executive.cell_config.detectors import DetectorConfig
 from executive.cell_config.objects import BinConfig, ObjectConfig, TableConfig
-from executive.cell_config.section import Section, Vector
+from executive.cell_config.section import Name, Section, Vector
 
 
 class LedgerConfig(Section):
@@ -34,7 +34,7 @@ class CellConfig(Section):
     base: str = Field("", exclude=True)
     """Another cell file. It gives every key of the first level that this file lacks, and every detector and
     key of a detector that `detectors` lacks; "" once it has."""
-    cell: str
+    cell: Name
     """Name of the cell."""
     description: str = ""
     """One sentence."""
@@ -44,15 +44,15 @@ class CellConfig(Section):
     tool: ToolConfig
     motion: MotionConfig = MotionConfig()
     table: TableConfig = TableConfig()
-    bins: dict[str, BinConfig] = Field(min_length=1)
-    cameras: dict[str, CameraConfig] = Field(min_length=1, max_length=1)
+    bins: dict[Name, BinConfig] = Field(min_length=1)
+    cameras: dict[Name, CameraConfig] = Field(min_length=1, max_length=1)
     detector: str = ""
     """The one of `detectors` that missions use unless they name another; "": the first."""
-    detectors: dict[str, DetectorConfig] = Field(min_length=1)
+    detectors: dict[Name, DetectorConfig] = Field(min_length=1)
     """By name. With a `base`, a detector of the same name and kind changes keys of the base's detector,
     another kind replaces it, another name adds a detector, and a name without a value removes one."""
     localization: Literal["plane", "depth", "ray"] = "plane"
-    objects: dict[str, ObjectConfig] = Field(min_length=1)
+    objects: dict[Name, ObjectConfig] = Field(min_length=1)
     ledger: LedgerConfig = LedgerConfig()
     safe_place: Vector
     """Where something held may be put down on the table."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
@@ -20,6 +21,21 @@ def check_rising(pair: tuple[Number, Number]) -> tuple[Number, Number]:
     return pair
 
 
+NAME = re.compile(r"\w[\w -]{0,63}")
+
+
+def check_name(name: str) -> str:
+    """Return the name of a class, bin, camera or detector as it is: it becomes part of file names.
+
+    Raises:
+        ValueError: It has other characters than letters, digits, blanks, "_" and "-", or more than 64.
+    """
+    if not NAME.fullmatch(name):
+        raise ValueError('must be named by at most 64 letters, digits, blanks, "_" and "-"')
+    return name
+
+
+Name = Annotated[str, AfterValidator(check_name)]
 Length = Annotated[float, Field(gt=0)]
 Count = Annotated[int, Field(ge=1)]
 Natural = Annotated[int, Field(ge=0)]

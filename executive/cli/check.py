@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,10 @@ from executive.cli.output import print_json, stdout_kept_clean
 if TYPE_CHECKING:
     from executive.mission.findings import Finding
     from executive.mission.flow.endings import Ending
+
+
+MAX_LISTED_FINDINGS = 1000
+"""Largest number of findings of a mission in the output of `--json`."""
 
 
 @click.command(name="check")
@@ -45,7 +49,10 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
                 missing = (Finding(mission, 0, 0, "error", "no-mission", str(error)),)
                 findings, endings, ok = getattr(error, "findings", missing), (), False
                 texts.append(str(error))
-            parts = {"findings": [*map(asdict, findings)], "endings": [*map(asdict, endings)]}
+            parts = {
+                "findings": [*map(asdict, findings[:MAX_LISTED_FINDINGS])],
+                "endings": [*map(asdict, endings)],
+            }
             reports.append({"mission": mission, "ok": ok, **parts})
     if as_json:
         print_json(reports)
@@ -54,9 +61,11 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
     ctx.exit(0 if all(report["ok"] for report in reports) else 2)
 
 
-def _verdict(mission: str, findings: Iterable[Finding], endings: Sequence[Ending]) -> str:
+def _verdict(mission: str, findings: Sequence[Finding], endings: Sequence[Ending]) -> str:
     """Return the warnings of a mission that can be run, and which failures can still end it."""
-    lines = [*map(str, findings), f"{mission}: ok"]
+    from executive.mission.findings import describe_findings
+
+    lines = [*describe_findings(findings), f"{mission}: ok"]
     if endings:
         lines.append("  nothing deals with these failures; each would end the mission:")
         # A subtree used twice is one place.

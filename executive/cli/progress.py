@@ -10,6 +10,8 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from executive.cli.streams import drawing_stream
+
 
 @contextmanager
 def bar(what: str, *, quiet: bool = False) -> Iterator[Callable[[int, int], None]]:
@@ -17,7 +19,7 @@ def bar(what: str, *, quiet: bool = False) -> Iterator[Callable[[int, int], None
 
     It is drawn ten times a second, and not at all where stderr is no terminal.
     """
-    console = Console(stderr=True)
+    console = Console(file=drawing_stream())
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     disable = quiet or not console.is_interactive
     # The speed is that of all parts: none may end within a shorter time.

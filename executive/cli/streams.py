@@ -1,4 +1,4 @@
-"""Standard streams whose write errors do not change the work or the exit code of a command."""
+"""Standard streams: tolerant of write errors, and safe from control characters."""
 
 from __future__ import annotations
 
@@ -9,19 +9,23 @@ import sys
 from collections.abc import Iterator
 from typing import TextIO
 
+from executive.safe_text import escape_control_characters
+
 
 class TolerantStream(io.TextIOBase):
-    """A text stream that drops its output after the first write error.
+    """A text stream that escapes control characters, and drops its output after the first write error.
 
     Args:
         stream: Where to write; None: the process was started with this stream closed.
 
     Attributes:
+        drawing: True to write control characters as they are: a library draws on the terminal.
         error: First write error as text, or "".
     """
 
-    def __init__(self, stream: TextIO | None) -> None:
+    def __init__(self, stream: TextIO | None, *, drawing: bool = False) -> None:
         self._stream = stream
+        self.drawing = drawing
         self.error = ""
 
     @property
@@ -35,7 +39,7 @@ class TolerantStream(io.TextIOBase):
             self.error = "it is closed"
         elif not self.error:
             try:
-                self._stream.write(text)
+                self._stream.write(text if self.drawing else escape_control_characters(text))
             except OSError as error:
                 self._give_up(self._stream, error)
         return len(text)
@@ -52,6 +56,10 @@ class TolerantStream(io.TextIOBase):
         """Return True if the stream is a terminal."""
         return self._stream is not None and self._stream.isatty()
 
+    def unescaped(self) -> TolerantStream:
+        """Return the same stream without the escaping of control characters."""
+        return TolerantStream(self._stream, drawing=True)
+
     def fileno(self) -> int:
         """Return the number of the stream's file descriptor.
 
@@ -67,6 +75,13 @@ class TolerantStream(io.TextIOBase):
             null = os.open(os.devnull, os.O_WRONLY)
             os.dup2(null, stream.fileno())
             os.close(null)
+
+
+def drawing_stream() -> TextIO:
+    """Return standard error for a library that draws on the terminal, and so writes control characters."""
+    if isinstance(sys.stderr, TolerantStream):
+        return sys.stderr.unescaped()
+    return sys.stderr
 
 
 @contextlib.contextmanager

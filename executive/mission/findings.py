@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from executive.errors import InputError
 from executive.mission.source import Mark
+from executive.safe_text import shorten_quotations
 
 _WINDOW = 140
 _MOST_LISTED = 24
+MAX_PRINTED_FINDINGS = 50
+"""Largest number of findings that a message lists; the others are counted."""
 _SECRET = re.compile(
     r"(?i)(\b\w*(?:api_?key|token|secret|password|authorization)\w*[\"']?\s*[:=]\s*|://(?=\S+@)).*"
 )
@@ -89,7 +93,18 @@ class MissionError(InputError):
 
     def __init__(self, findings: Iterable[Finding]) -> None:
         self.findings = tuple(findings)
-        super().__init__("\n".join(str(finding) for finding in self.findings))
+        super().__init__("\n".join(describe_findings(self.findings)))
+
+
+def describe_findings(findings: Sequence[Finding]) -> list[str]:
+    """Return the texts of the first findings, and a line with the number of the others."""
+    texts = [str(finding) for finding in findings[:MAX_PRINTED_FINDINGS]]
+    others = len(findings) - len(texts)
+    return (
+        [*texts, f"and {others} more findings; `executive check --json` lists up to 1000"]
+        if others
+        else texts
+    )
 
 
 def error(mark: Mark, code: str, message: str, hint: str = "") -> Finding:
@@ -105,9 +120,15 @@ def warning(mark: Mark, code: str, message: str, hint: str = "") -> Finding:
 def _finding(severity: str, mark: Mark, code: str, message: str, hint: str) -> Finding:
     assert code in CODES, code
     source = mark.source
-    # Whoever wrote a key into a file is told so, without the key.
-    excerpt = _SECRET.sub(r"\1***", source.line(mark.line))
+    excerpt = _without_secrets(source.line(mark.line))
+    message, hint = shorten_quotations(message), shorten_quotations(hint)
     return Finding(source.path, mark.line, mark.col, severity, code, message, mark.length, hint, excerpt)
+
+
+@lru_cache(maxsize=64)
+def _without_secrets(line: str) -> str:
+    """Return a line of a file with `***` for keys and passwords: a finding does not repeat them."""
+    return _SECRET.sub(r"\1***", line)
 
 
 def in_file_order(findings: Iterable[Finding], first: str) -> tuple[Finding, ...]:

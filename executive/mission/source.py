@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,8 +20,11 @@ class Source:
 
     def line(self, number: int) -> str:
         """Return line `number`, counted from 1, or "" beyond the end."""
-        lines = self.text.splitlines()
-        return lines[number - 1] if 1 <= number <= len(lines) else ""
+        return self._lines[number - 1] if 1 <= number <= len(self._lines) else ""
+
+    @cached_property
+    def _lines(self) -> list[str]:
+        return self.text.splitlines()
 
     def mark(self, line: int = 0, col: int = 0, length: int = 0) -> Mark:
         """Return the place at `line` and `col`, counted from 1; line 0 is the text as a whole."""

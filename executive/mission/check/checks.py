@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import islice
 
 from executive.mission.check import (
     constants,
@@ -48,6 +49,10 @@ CHECKS: tuple[Check, ...] = (
 """Each holds whatever else is wrong: what is unknown in one place makes no findings in others."""
 
 
+MAX_FINDINGS = 1000
+"""Largest number of findings of one check: hostile missions have hundreds of thousands."""
+
+
 def check(case: Case) -> list[Finding]:
     """Return the findings of every check."""
-    return [finding for one in CHECKS for finding in one(case)]
+    return [finding for one in CHECKS for finding in islice(one(case), MAX_FINDINGS)]

@@ -49,11 +49,14 @@ def shared_variables(case: Case) -> Iterator[Finding]:
 def racing_reads(case: Case) -> Iterator[Finding]:
     """Find every variable that one branch of a parallel reads while another may write it."""
     for node in _parallels(case):
-        for (index, reading), (other_index, writing) in permutations(enumerate(node.branches), 2):
-            written, own = _writes(case, writing), _writes(case, reading)
+        branches = [
+            (index, _first(branch), list(_reads(case, branch)), _writes(case, branch))
+            for index, branch in enumerate(node.branches)
+        ]
+        for (index, first, reads, own), (other_index, _, _, written) in permutations(branches, 2):
             # A skill with which an earlier branch begins has read before anything else can write.
-            begins = _first(reading) if index < other_index else None
-            for reader, what, variable, mark in _reads(case, reading):
+            begins = first if index < other_index else None
+            for reader, what, variable, mark in reads:
                 # What both write is told as such.
                 if reader is not begins and variable in written and variable not in own:
                     other, place, hint = written[variable]

@@ -16,6 +16,9 @@ from executive.mission.words import describe
 if TYPE_CHECKING:
     from executive.mission.parse.nodes import NodeParser
 
+MAX_BRANCHES = 200
+"""Largest number of branches of a parallel: every two of them are compared."""
+
 
 class Head:
     """One control node in the file: the mapping it stands in, its word, its label, its value."""
@@ -53,6 +56,10 @@ def _parallel(parser: NodeParser, head: Head) -> model.Node:
         body = fields.required("do")
     branches = () if body is None else parser.nodes(body, "parallel")
     if not branches:
+        return unread(head.mark)
+    if len(branches) > MAX_BRANCHES:
+        message = f"a parallel has at most {MAX_BRANCHES} branches, not {len(branches)}"
+        parser.refuse(head.mark, "too-large", message)
         return unread(head.mark)
     return model.ParallelNode(head.mark, head.label, branches, wait_for, halt)
 

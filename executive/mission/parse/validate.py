@@ -90,6 +90,8 @@ def _finding(root: Node, model: type[BaseModel], problem: Any) -> Finding:
     if kind == "missing":
         owner = dotted(inside) or "the file"
         return error(mark_of(root, inside), "missing-key", f'{owner} needs the key "{last}"')
+    if last == "[key]":
+        return error(mark_of(root, inside, of_key=True), "bad-name", f"{dotted(inside)} {violation(problem)}")
     code = "out-of-range" if "than" in kind else _CODES.get(kind, "wrong-type")
     name = dotted(path) or "the file"
     return error(mark_of(root, path), code, f"{name} {violation(problem)}")

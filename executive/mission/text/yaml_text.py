@@ -18,9 +18,9 @@ from executive.mission.findings import Finding, error
 from executive.mission.source import Mark, Source
 from executive.mission.text.scalars import ScalarValue, core_value
 
-_DEEPEST = 60
+_DEEPEST = 50
 _HALF = re.compile("[\ud800-\udfff]")
-_MOST_NODES = 100_000
+_MOST_NODES = 20_000
 _ADVICE = {
     "mapping values are not allowed here": (
         "Is a colon missing at the end of the line above, or are braces, as in Detect: {view: full}? "
@@ -147,7 +147,7 @@ class _Composer:
         if isinstance(event, yaml.AliasEvent):
             return self._alias(event, depth)
         before = self._count
-        self._count += 1
+        self._add(1, event)
         if event.tag is not None:
             self._refuse(self._mark(event), "tag", f'the tag "{event.tag}" is not allowed')
         node = self._value(event, depth)
@@ -161,11 +161,19 @@ class _Composer:
         node, size = self._anchors[event.anchor]
         if depth + _height(node) > _DEEPEST:
             raise self._unsound(self._mark(event), "too-deep", f"nested more than {_DEEPEST} levels deep")
-        self._count += size
-        if self._count > _MOST_NODES:
-            message = f"with its aliases written out, the file has more than {_MOST_NODES} values"
-            raise self._unsound(self._mark(event), "too-large", message)
+        self._add(size, event)
         return node
+
+    def _add(self, count: int, event: Any) -> None:
+        """Count keys and values.
+
+        Raises:
+            _Unsound: There are too many.
+        """
+        self._count += count
+        if self._count > _MOST_NODES:
+            message = f"the file has more than {_MOST_NODES} keys and values, those behind aliases included"
+            raise self._unsound(self._mark(event), "too-large", message)
 
     def _value(self, event: Any, depth: int) -> Node:
         if isinstance(event, yaml.ScalarEvent):

@@ -13,8 +13,8 @@ from executive.vision.evaluation.figures import NOTHING, Evaluation
 
 def print_figures(where: str, detector: str, evaluation: Evaluation) -> None:
     """Print how good a detector is on stderr."""
-    console = Console(stderr=True, highlight=False, markup=False)
-    console.print(f"{where}, detector {detector}", style="bold")
+    console = Console(stderr=True, highlight=False, markup=False, force_terminal=False)
+    console.print(f"{where}, detector {detector}")
     for part in _parts(detector, evaluation):
         console.print(part, soft_wrap=isinstance(part, str))
 

@@ -14,6 +14,7 @@ from executive.events import Event
 from executive.mission.outline import OutlineNode, outline
 from executive.runtime.run import Run
 from executive.runtime.run_control import RunControl
+from executive.safe_text import escape_control_characters
 from executive.view.items import ItemTable
 from executive.view.terminal.keys import HELP, HELP_PAUSED, Keys
 from executive.view.tree.outline import branches, opened
@@ -76,7 +77,8 @@ class Terminal:
             elif event.kind == "status":
                 node = str(data.get("node", ""))
                 self._status[node] = str(data.get("status", ""))
-                self._why[node] = str(data.get("reason") or data.get("item") or "")
+                why = str(data.get("reason") or data.get("item") or "")
+                self._why[node] = escape_control_characters(why)
             elif event.kind == "item":
                 self.items(event)
 
@@ -86,7 +88,8 @@ class Terminal:
 
     def note(self, sentence: str) -> None:
         """Write `sentence` on a line of its own."""
-        self._console.print(Text(f"note: {sentence}", style="yellow"))
+        text = escape_control_characters(sentence)
+        self._console.print(Text(f"note: {text}", style="yellow"))
 
     def render(self) -> RenderableType:
         """Return the view of this moment."""
