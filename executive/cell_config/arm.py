@@ -2,9 +2,26 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from pydantic import Field, model_validator
 
-from executive.cell_config.section import Joints, Limits, Section
+from executive.cell_config.section import SMALLEST, Distance, Force, Joints, Length, Name, Seconds, Section
+
+Opening = Annotated[float, Field(ge=1, le=360)]
+"""Largest joint angle to either side [degree]: under 1 degree a joint is fixed."""
+Speed = Annotated[float, Field(ge=1, le=1000)]
+"""[degree/s]; the fastest arms turn a joint by 1000 degrees per second."""
+Acceleration = Annotated[float, Field(ge=0.1, le=1000)]
+"""[rad/s²]; under 0.1 an arm takes minutes for a motion, and 1000 is ten times the fastest arms'."""
+Jerk = Annotated[float, Field(ge=1, le=1e5)]
+"""[rad/s³]; the bounds are those of the acceleration, reached within 0.1 s and 0.01 s."""
+Openings = tuple[Opening, Opening, Opening, Opening, Opening, Opening, Opening]
+Speeds = tuple[Speed, Speed, Speed, Speed, Speed, Speed, Speed]
+Accelerations = tuple[
+    Acceleration, Acceleration, Acceleration, Acceleration, Acceleration, Acceleration, Acceleration
+]
+Jerks = tuple[Jerk, Jerk, Jerk, Jerk, Jerk, Jerk, Jerk]
 
 
 class LimitsConfig(Section):
@@ -12,17 +29,17 @@ class LimitsConfig(Section):
 
     source: str
     """Where the figures were taken from."""
-    position_deg: Limits
+    position_deg: Openings
     """Largest joint angle to either side [degree]."""
-    velocity_deg: Limits
+    velocity_deg: Speeds
     """[degree/s]"""
-    acceleration: Limits
+    acceleration: Accelerations
     """[rad/s²]"""
-    jerk: Limits
+    jerk: Jerks
     """[rad/s³]"""
-    stop_acceleration: Limits
+    stop_acceleration: Accelerations
     """Largest acceleration while braking [rad/s²]."""
-    stop_jerk: Limits
+    stop_jerk: Jerks
     """Largest jerk while braking [rad/s³]."""
 
 
@@ -33,7 +50,7 @@ class ArmConfig(Section):
     """Model of the arm, in pybullet_data."""
     limits: LimitsConfig
     """What it may do."""
-    poses_deg: dict[str, Joints] = Field(min_length=1)
+    poses_deg: dict[Name, Joints] = Field(min_length=1)
     """Named joint poses; `home` is where a run begins."""
 
     @model_validator(mode="after")
@@ -46,19 +63,19 @@ class ArmConfig(Section):
 class ToolConfig(Section):
     """A suction tool with one bellows cup; the constants are justified by the suction map."""
 
-    length: float = Field(0.12, gt=0)
+    length: Length = 0.12
     """From the flange to the cup's lip [m]."""
-    cup_radius: float = Field(gt=0)
+    cup_radius: Length
     """Radius of the lip [m]."""
-    reach: float = Field(0.002, gt=0)
+    reach: Length = 0.002
     """Largest distance at which the lip still closes on a surface [m]."""
-    force: float = Field(gt=0)
+    force: Force
     """Breakaway force of a perfect seal [N]."""
-    gap: float = Field(gt=0)
+    gap: Length
     """Rim gap at which the breakaway force has fallen to zero [m]."""
-    tilt_deg: float = Field(gt=0, lt=90)
+    tilt_deg: float = Field(ge=1, lt=90)
     """Angle between surface normal and tool axis at which it has fallen to zero [degree]."""
-    least_force: float = Field(gt=0)
+    least_force: Force
     """Breakaway force under which the vacuum sensor reports no seal [N]."""
     source: str
     """Where the constants come from."""
@@ -67,15 +84,15 @@ class ToolConfig(Section):
 class MotionConfig(Section):
     """How the arm moves about the cell."""
 
-    margin: float = Field(0.005, ge=0)
+    margin: Distance = 0.005
     """Smallest distance of arm, tool and load to anything on the way [m]."""
-    clearance: float = Field(0.04, gt=0)
+    clearance: Length = 0.04
     """Height above walls and objects of a motion that stops at every corner, where no other is clear [m]."""
-    descent: float = Field(0.005, gt=0)
+    descent: float = Field(0.005, ge=SMALLEST, le=0.1)
     """Length of the guarded last part of an approach above the expected surface [m]."""
-    descent_speed: float = Field(0.035, gt=0)
-    """Tool speed of the guarded last part of an approach [m/s]."""
+    descent_speed: float = Field(0.035, ge=0.001, le=0.25)
+    """Tool speed of the guarded last part of an approach [m/s]; at most the reduced speed of ISO 10218."""
     straight: float = Field(0.0, ge=0, le=0.2)
     """Length of the last part of a way into a bin and the first part of a way up that are straight [m]."""
-    planning: float = Field(0.05, ge=0)
+    planning: Seconds = 0.05
     """Time that planning a motion takes on the run's clock, unless it was planned ahead [s]."""

@@ -7,10 +7,22 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from executive.cell_config.section import Length, Natural, Section, Vector
+from executive.cell_config.section import (
+    Distance,
+    GreyLevels,
+    Length,
+    Name,
+    Natural,
+    Section,
+    Share,
+    Vector,
+)
 
-Row = tuple[float, float, float]
-Share = Annotated[float, Field(ge=0, le=1)]
+Pixels = Annotated[float, Field(ge=-1e5, le=1e5)]
+"""An entry of a camera matrix [pixel]; with 100,000 pixels, a frame 640 pixels wide spans 0.4 degrees."""
+Row = tuple[Pixels, Pixels, Pixels]
+Turn = Annotated[float, Field(ge=-7, le=7)]
+"""A component of a rotation vector [rad], at most a whole turn."""
 
 POSE_AND_FOV_KEYS = ("position", "look_at", "up", "fov_deg")
 """Keys that say how a camera stands and sees where no calibration does."""
@@ -19,9 +31,9 @@ POSE_AND_FOV_KEYS = ("position", "look_at", "up", "fov_deg")
 class NoiseConfig(Section):
     """Sensor noise of a camera, drawn anew for every frame from the run's seed."""
 
-    gain: float = Field(0.02, ge=0)
+    gain: Share = 0.02
     """Standard deviation of a frame's brightness factor."""
-    read: float = Field(2.0, ge=0)
+    read: GreyLevels = 2.0
     """Standard deviation of a pixel's value [grey level of 255]."""
 
 
@@ -34,13 +46,13 @@ class DepthConfig(Section):
     and over how many pixels it errs alike, is assumed.
     """
 
-    floor: float = Field(0.0005, ge=0)
+    floor: Distance = 0.0005
     """Standard deviation right before the lens [m]."""
-    growth: float = Field(0.0038, ge=0)
+    growth: Share = 0.0038
     """What the square of the distance adds to it [1/m]: at distance z it is floor + growth · z²."""
-    grain: float = Field(1.0, ge=0)
+    grain: float = Field(1.0, ge=0, le=100)
     """Standard deviation of the window over which neighbours err alike [pixel]; 0: every one for itself."""
-    step: float = Field(0.001, ge=0)
+    step: Distance = 0.001
     """Distances are whole multiples of this [m]; 0: not rounded."""
     edge: Length = 0.02
     """Difference of neighbours that is an edge, where the sensor may see nothing [m]."""
@@ -55,7 +67,7 @@ class DepthConfig(Section):
 class TransformConfig(Section):
     """A change of frame as OpenCV writes it: p' = R p + t."""
 
-    rotation: Row
+    rotation: tuple[Turn, Turn, Turn]
     """Rotation vector, the axis times the angle [rad]: OpenCV's rvec; `cv2.Rodrigues` makes it of R."""
     translation: Vector
     """OpenCV's tvec t."""
@@ -100,9 +112,9 @@ class CameraConfig(Section):
     """A point on the optical axis."""
     up: Vector | None = None
     """Direction that the top of the image shows."""
-    width: int = Field(640, ge=64)
+    width: int = Field(640, ge=64, le=8192)
     """Image width [pixel]."""
-    height: int = Field(480, ge=64)
+    height: int = Field(480, ge=64, le=8192)
     """Image height [pixel]."""
     fov_deg: float | None = Field(None, gt=1, lt=179)
     """Vertical field of view [degree]."""
@@ -110,7 +122,7 @@ class CameraConfig(Section):
     """Camera matrix and pose, instead of `position`, `look_at`, `up` and `fov_deg`."""
     table_view: tuple[int, int, int, int]
     """Left, top, right, bottom [pixel] of the square part of the image that shows the workspace."""
-    scan_poses: tuple[str, ...] = Field(min_length=1)
+    scan_poses: tuple[Name, ...] = Field(min_length=1)
     """Arm poses from which it sees the table, best first."""
     noise: NoiseConfig = NoiseConfig()
     """Its sensor noise."""

@@ -10,21 +10,21 @@ from executive.cell_config.arm import ArmConfig, MotionConfig, ToolConfig
 from executive.cell_config.cameras import CameraConfig
 from executive.cell_config.detectors import DetectorConfig
 from executive.cell_config.objects import BinConfig, ObjectConfig, TableConfig
-from executive.cell_config.section import Name, Section, Vector
+from executive.cell_config.section import Distance, Length, Name, Section, Vector
 
 
 class LedgerConfig(Section):
     """When the ledger believes what."""
 
-    gate: float = Field(0.025, gt=0)
+    gate: Length = 0.025
     """Largest distance between a detection and the item it is bound to [m]."""
-    neighbourhood: float = Field(0.07, ge=0)
+    neighbourhood: Distance = 0.07
     """Radius around a picked item in which others may have been moved [m]."""
-    overlooked: float = Field(0.001, gt=0, lt=1)
+    overlooked: float = Field(0.001, ge=1e-9, lt=1)
     """Chance of an overlooked object up to which a place is believed empty."""
-    misjudged: float = Field(0.005, gt=0, lt=1)
+    misjudged: float = Field(0.005, ge=1e-9, lt=1)
     """Chance of a wrong class up to which an item is sorted."""
-    aim: float = Field(0.005, gt=0)
+    aim: Length = 0.005
     """Standard error of an item's place up to which it is approached [m]; two thirds after a failed grasp."""
 
 

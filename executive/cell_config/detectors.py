@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import ConfigDict, Field, model_validator
 
-from executive.cell_config.section import Section
+from executive.cell_config.section import Seconds, Section
 from executive.error_rates import ErrorRates
 
 
@@ -21,16 +21,16 @@ class DetectorConfig(Section):
     """Confidence from which a detection counts."""
     floor: float = Field(0.25, gt=0, lt=1)
     """Confidence under which a box is ignored altogether."""
-    latency: float = Field(0.05, ge=0)
+    latency: Seconds = 0.05
     """Time from a frame to its answer on the run's clock [s]."""
     misses: float = Field(0.03, gt=0, lt=1)
     """Share of the objects in full view that one look overlooks; this and the next three keys are only for
     fake detectors, those of others are measured by `executive evaluate`."""
     confused: float = Field(0.004, gt=0, lt=1)
     """Share of the objects it finds that it gives a wrong class."""
-    invented: float = Field(0.02, gt=0)
+    invented: float = Field(0.02, gt=0, le=100)
     """Objects that are not there, per look."""
-    jitter: float = Field(1.0, gt=0)
+    jitter: float = Field(1.0, ge=1e-3, le=1000)
     """Standard deviation of the centre of a found box, along each axis [pixel]."""
 
     @model_validator(mode="after")

@@ -6,7 +6,19 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field, model_validator
 
-from executive.cell_config.section import Colour, Count, Length, Natural, Range, Section, Vector, check_rising
+from executive.cell_config.section import (
+    Angles,
+    Colour,
+    Count,
+    Distance,
+    Length,
+    Natural,
+    Range,
+    Section,
+    Share,
+    Vector,
+    check_rising,
+)
 
 
 class ObjectConfig(Section):
@@ -17,17 +29,17 @@ class ObjectConfig(Section):
     mesh: str = ""
     """Path of a Wavefront mesh (`.obj`, z up or `upright_deg`), looked for in the same places. Each of its
     groups (`o`) collides as its convex hull: a part with a hole is made of convex groups around it."""
-    mass: float = Field(0.05, gt=0)
+    mass: float = Field(0.05, ge=1e-4, le=1000)
     """Mass of a mesh [kg]; a URDF says its own."""
-    scale: float = Field(1.0, gt=0)
+    scale: float = Field(1.0, ge=1e-4, le=1e4)
     """Factor on the model's size; a mesh at scale 1 is in metres."""
-    upright_deg: Vector = (0.0, 0.0, 0.0)
+    upright_deg: Angles = (0.0, 0.0, 0.0)
     """Roll, pitch, yaw [degree] that set the model upright, where its own z axis does not point up."""
-    height: float = Field(gt=0)
+    height: Length
     """Height of the object as it lies [m]."""
-    radius: float = Field(gt=0)
+    radius: Length
     """Radius of the circle around its outline seen from above [m]."""
-    ring: float = Field(0.0, ge=0)
+    ring: Distance = 0.0
     """Distance from its middle at which to touch it [m]; for parts with a hole."""
     colours: tuple[Colour, ...] = ((1.0, 1.0, 1.0),)
     """Colours (r, g, b in 0..1) that spawning picks from."""
@@ -68,7 +80,7 @@ class TableConfig(Section):
     """Range of the workspace along y [m]."""
     objects: Annotated[tuple[Natural, Natural], AfterValidator(check_rising)] = (3, 6)
     """Fewest and most objects that spawning puts there."""
-    gap: float = Field(0.012, ge=0)
+    gap: Distance = 0.012
     """Smallest distance between the outlines of two objects when spawned [m]."""
-    stacked: float = Field(0.0, ge=0, le=1)
+    stacked: Share = 0.0
     """Share of the objects that spawning puts on top of another one, as far as they stay up there."""

@@ -36,14 +36,29 @@ def check_name(name: str) -> str:
 
 
 Name = Annotated[str, AfterValidator(check_name)]
-Length = Annotated[float, Field(gt=0)]
-Count = Annotated[int, Field(ge=1)]
-Natural = Annotated[int, Field(ge=0)]
-Range = Annotated[tuple[float, float], AfterValidator(check_rising)]
-Vector = Annotated[tuple[float, float, float], Field(description="x, y, z [m]")]
-Joints = tuple[float, float, float, float, float, float, float]
-Limits = tuple[Length, Length, Length, Length, Length, Length, Length]
-Colour = tuple[float, float, float]
+SMALLEST, LARGEST = 1e-4, 10.0
+"""Smallest and largest length in a cell [m]: a tenth of a millimetre is below every sensor's error, and 10 m
+is beyond every arm's reach."""
+Length = Annotated[float, Field(ge=SMALLEST, le=LARGEST)]
+Distance = Annotated[float, Field(ge=0, le=LARGEST)]
+Coordinate = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Count = Annotated[int, Field(ge=1, le=1000)]
+"""A number of things [1]; a bin, a table or an image holds less than a thousand of them."""
+Natural = Annotated[int, Field(ge=0, le=1000)]
+Range = Annotated[tuple[Coordinate, Coordinate], AfterValidator(check_rising)]
+Vector = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(description="x, y, z [m]")]
+Angle = Annotated[float, Field(ge=-360, le=360)]
+"""An angle [degree]; a whole turn to either side covers all orientations."""
+Angles = Annotated[tuple[Angle, Angle, Angle], Field(description="roll, pitch, yaw [degree]")]
+Joints = tuple[Angle, Angle, Angle, Angle, Angle, Angle, Angle]
+Force = Annotated[float, Field(ge=1e-3, le=1e4)]
+"""A force [N]: from the weight of a tenth of a gram to that of a ton."""
+Channel = Annotated[float, Field(ge=0, le=1)]
+Colour = tuple[Channel, Channel, Channel]
+Share = Annotated[float, Field(ge=0, le=1)]
+Seconds = Annotated[float, Field(ge=0, le=600)]
+"""A time [s]; a step of ten minutes is an error of the cell."""
+GreyLevels = Annotated[float, Field(ge=0, le=255)]
 
 
 class Section(BaseModel):

@@ -31,7 +31,7 @@ class RfdetrOptions(Section):
     """Class names in the order of the model's outputs, or a text file with one a line."""
     class_map: dict[str, str] = Field(default_factory=dict)
     """From the model's class names to the cell's, where they differ."""
-    threads: int = Field(2, ge=1)
+    threads: int = Field(2, ge=1, le=64)
     """Threads one inference may use."""
 
     def names(self, base: Path) -> tuple[str, ...]:
