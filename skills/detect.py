@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -16,6 +15,10 @@ MIN_VISIBLE_SHARE = 0.7
 MAX_BOXES = 60
 """Maximum number of boxes in one look, doubtful ones and unknown labels included. Shipped cells hold at most
 20 objects, and the time to match boxes with items grows faster than their number."""
+MAX_PIXEL = 1e5
+"""Largest coordinate of a box [pixel]: no image is so large, and squares of much larger ones overflow."""
+MAX_LABEL = 100
+"""Largest number of characters of a label: it appears in messages and on the terminal."""
 MAX_SECOND_RATIO = 0.5
 """Largest ratio of the second to the first class confidence at which a box is not in doubt."""
 
@@ -80,8 +83,8 @@ class Detect(Skill):
         if invalid := next((one for one in answer.found if not _is_valid(one)), None):
             raise self.failed(
                 "unavailable",
-                f"detector {answer.detector} gave an invalid box: {invalid.label} {invalid.confidence:g} "
-                f"at {invalid.box}",
+                f"detector {answer.detector} gave an invalid box: {invalid.label[:MAX_LABEL]!r} "
+                f"{invalid.confidence:g} at {invalid.box}",
             )
         visible = [one for one in answer.found if frame.visible_share(one.box) >= MIN_VISIBLE_SHARE]
         known = [one for one in visible if one.label in cell.classes]
@@ -119,7 +122,9 @@ def _is_clear(detection: Detection, threshold: float) -> bool:
 
 
 def _is_valid(detection: Detection) -> bool:
-    """Return True if a detection has a valid box and a valid confidence."""
+    """Return True if a detection has a possible box, a possible confidence and a printable label."""
     left, top, right, bottom = detection.box
-    finite = all(math.isfinite(edge) for edge in detection.box)
-    return finite and left <= right and top <= bottom and 0.0 <= detection.confidence <= 1.0
+    # The comparisons are False for numbers that are not finite.
+    in_reach = all(abs(edge) <= MAX_PIXEL for edge in detection.box)
+    printable = detection.label.isprintable() and len(detection.label) <= MAX_LABEL
+    return in_reach and left <= right and top <= bottom and 0.0 <= detection.confidence <= 1.0 and printable

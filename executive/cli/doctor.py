@@ -121,8 +121,8 @@ def check_packages() -> Iterator[Finding]:
     elif opencv:
         message = f"{len(opencv)} packages provide `cv2` and overwrite each other ({', '.join(opencv)})"
         if installer(ITSELF) == "pip":
-            names = " ".join(sorted(set(packages_distributions()["cv2"])))
-            fix = f"run `pip uninstall -y {names}`, then `pip install opencv-python-headless`"
+            packages = " ".join(sorted(set(packages_distributions()["cv2"])))
+            fix = f"run `pip uninstall -y {packages}`, then `pip install opencv-python-headless`"
         else:
             fix = "run `uv sync --reinstall`, which removes all but opencv-python-headless"
         yield Finding("problem", "opencv", message, fix)

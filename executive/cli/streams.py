@@ -7,7 +7,7 @@ import io
 import os
 import sys
 from collections.abc import Iterator
-from typing import TextIO
+from typing import TextIO, cast
 
 from executive.safe_text import escape_control_characters
 
@@ -80,7 +80,7 @@ class TolerantStream(io.TextIOBase):
 def drawing_stream() -> TextIO:
     """Return standard error for a library that draws on the terminal, and so writes control characters."""
     if isinstance(sys.stderr, TolerantStream):
-        return sys.stderr.unescaped()
+        return cast(TextIO, sys.stderr.unescaped())
     return sys.stderr
 
 

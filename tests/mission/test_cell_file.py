@@ -34,7 +34,7 @@ def complaint(text: str, overrides: dict[str, str] | None = None) -> str:
         ("cup_radius", "cup_radios", '  Did you mean "cup_radius"? tool takes: length, cup_radius'),
         ("force: 12.0", "force: strong", 'c.yaml:12:34: error[wrong-type]: tool.force must be a number, not the text "strong"\n'),
         ("force: 12.0", "force: '12'", 'tool.force must be a number, not the text "12"\n'),
-        ("force: 12.0", "force: 0", "error[out-of-range]: tool.force must be more than 0, not 0\n"),
+        ("force: 12.0", "force: 0", "error[out-of-range]: tool.force must be at least 0.001, not 0\n"),
         ("force: 12.0", "force: .inf", 'error[not-finite]: ".inf" is not a number one can reach\n'),
         ("x: [0.4, 0.6]", "x: [0.4]", "c.yaml:13:9: error[wrong-length]: table.x has 1 of the 2 values it needs\n"),
         ("x: [0.4, 0.6]", "x: [0.4, b]", 'c.yaml:13:18: error[wrong-type]: table.x[1] must be a number, not the text "b"\n'),
@@ -85,6 +85,31 @@ def test_findings_about_overrides_show_the_override(
     key: str, value: str, expected: str, small_cell: str
 ) -> None:
     assert expected in complaint(small_cell + "kind: sim\n", {key: value})
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "expected"),
+    [
+        ("cell.motion.descent_speed", "1e-300", "motion.descent_speed must be at least 0.001, not 1e-300"),
+        ("cell.arm.limits.jerk", "[1e308, 9, 9, 9, 9, 9, 9]", "arm.limits.jerk[0] must be at most 100000"),
+        ("cell.detectors.first.jitter", "1e308", "detectors.first.jitter must be at most 1000"),
+        ("cell.detectors.first.latency", "1e308", "detectors.first.latency must be at most 600"),
+        ("cell.safe_place", "[0, 0, 1e9]", "safe_place[2] must be at most 10"),
+    ],
+)  # fmt: skip
+def test_numbers_that_no_cell_has_are_refused(key: str, value: str, expected: str, small_cell: str) -> None:
+    assert expected in complaint(small_cell, {key: value})
+
+
+def test_the_name_of_a_class_becomes_part_of_file_names(small_cell: str) -> None:
+    text = small_cell + "kind: sim\n"
+    assert (
+        complaint(text.replace("  cube:", "  a/b:", 1))
+        .splitlines()[0]
+        .endswith(
+            'error[bad-name]: objects.a/b must be named by at most 64 letters, digits, blanks, "_" and "-"'
+        )
+    )
 
 
 def test_a_cell_takes_from_its_base_every_key_that_it_has_not_itself(small_cell: str) -> None:
@@ -175,7 +200,7 @@ def test_a_finding_about_a_value_of_the_base_stands_in_the_base(small_cell: str)
         "c.yaml:2:9: error[wrong-length]: table.x has 1 of the 2 values it needs\n"
         "   2 | table: {x: [0.4]}\n"
         "     |         ^\n"
-        "parts/base.yaml:12:34: error[out-of-range]: tool.force must be more than 0, not 0\n"
+        "parts/base.yaml:12:34: error[out-of-range]: tool.force must be at least 0.001, not 0\n"
         "  12 | tool: {cup_radius: 0.006, force: 0, gap: 0.008, tilt_deg: 30, least_force: 3.0, source: a test}\n"
         "     |                                  ^"
     )
