@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import difflib
+import io
 import signal
 import sys
 import tempfile
@@ -17,6 +18,7 @@ import click
 
 from executive.cli.streams import tolerant_streams
 from executive.errors import ExecutiveError
+from executive.safe_text import shorten_quotations
 
 BAD_INPUT, BROKEN, INTERRUPTED = 2, 3, 130
 """Exit codes of what ends a command early."""
@@ -76,7 +78,9 @@ class Executive(click.Group):
 def _show_error(error: BaseException, *, debug: bool) -> int:
     """Write an error that ended a command to standard error, and return the exit code."""
     if isinstance(error, click.ClickException):
-        error.show()
+        text = io.StringIO()
+        error.show(text)
+        click.echo(shorten_quotations(text.getvalue()), err=True, nl=False)
         return BAD_INPUT
     if isinstance(error, (click.Abort, KeyboardInterrupt)):
         click.echo("halted", err=True)
@@ -118,8 +122,9 @@ def _apology(error: BaseException) -> str:
         "w", prefix="executive-", suffix=".txt", delete=False, encoding="utf-8", errors="backslashreplace"
     ) as file:
         traceback.print_exception(error, file=file)
+    text = shorten_quotations(f"{type(error).__name__}: {error}")
     return (
-        f"internal error ({type(error).__name__}: {error}); the details are in {file.name}, "
+        f"internal error ({text}); the details are in {file.name}, "
         "or on the screen with `executive --debug ...`"
     )
 

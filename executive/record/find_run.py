@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from executive.errors import InputError
@@ -16,7 +17,8 @@ def find_run(name: str, runs: Path) -> Path:
         InputError: There is no such directory, or no run in it.
     """
     for path in (Path(name), runs / name):
-        if (path / "journal.jsonl").is_file():
+        # Unlike Path's method this one says no to a name that no file can have.
+        if os.path.isfile(path / "journal.jsonl"):
             return path.resolve()
     known = sorted((path.parent for path in runs.glob("*/*/journal.jsonl")), reverse=True)
     hint = f"the last ones there: {', '.join(str(path.relative_to(runs)) for path in known[:3])}"

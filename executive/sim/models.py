@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -25,6 +26,8 @@ from executive.workcell import KeyPath
 
 TOLERANCE = 0.003
 """Difference between a cell file's figure and the model's own from which it counts as wrong [m]."""
+MAX_MODEL_SIZE = 20_000_000
+"""Largest size of a model file [byte]: larger ones take longer to check than a mission should."""
 FRICTION = 0.0005
 """Rolling and spinning friction: without it a ball at rest creeps, and a released one never stops."""
 
@@ -83,9 +86,12 @@ def find_model(name: str) -> Path:
     Raises:
         InputError: There is no such file.
     """
-    path = Path(pybullet_data.getDataPath()) / name
-    if path.is_file():
-        return path.resolve()
+    path = os.path.join(pybullet_data.getDataPath(), name)
+    # Unlike Path's method this one says no to a name that no file can have.
+    if os.path.isfile(path):
+        if os.path.getsize(path) > MAX_MODEL_SIZE:
+            raise InputError(f"the model {name} is larger than {MAX_MODEL_SIZE // 1_000_000} MB")
+        return Path(path).resolve()
     raise InputError(f"there is no model {name}, neither beside the cell file nor in pybullet_data")
 
 
@@ -103,7 +109,10 @@ def add_body(client: BulletClient, config: ObjectConfig, X_WO: Pose) -> int:
 
 def _add_urdf(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
     path = str(find_model(config.urdf))
-    return int(client.loadURDF(path, X_WL.position, X_WL.quaternion, globalScaling=config.scale))
+    try:
+        return int(client.loadURDF(path, X_WL.position, X_WL.quaternion, globalScaling=config.scale))
+    except pybullet.error as error:
+        raise InputError(f"PyBullet cannot load the model {config.urdf}: {error}") from error
 
 
 def _add_mesh(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
@@ -126,8 +135,8 @@ def mass_of(config: ObjectConfig) -> float:
     """Return what an object weighs in simulation [kg]: as the cell file or its URDF says."""
     if config.mesh:
         return config.mass
-    masses = ElementTree.parse(find_model(config.urdf)).getroot().iterfind(".//inertial/mass")
-    return sum(float(mass.get("value", "0")) for mass in masses)
+    masses = _read_urdf(find_model(config.urdf)).iterfind(".//inertial/mass")
+    return sum(sum(_numbers(mass.get("value"), (0.0,))) for mass in masses)
 
 
 def weighed(label: str, config: ObjectConfig) -> ObjectClass:
@@ -144,9 +153,10 @@ def missing_models(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     for label, kind in config.objects.items():
         key: KeyPath = ("objects", label)
         try:
-            find_model(kind.mesh or kind.urdf)
             if kind.mesh:
                 load_mesh(kind)
+            else:
+                mass_of(kind)
         except InputError as error:
             yield (*key, "mesh" if kind.mesh else "urdf"), str(error)
         else:
@@ -199,7 +209,7 @@ def load_mesh(config: ObjectConfig) -> Mesh:
     path = find_model(config.urdf)
     vertices: list[Array] = []
     triangles: list[NDArray[np.intp]] = []
-    for visual in ElementTree.parse(path).iter("visual"):
+    for visual in _read_urdf(path).iter("visual"):
         mesh = visual.find("geometry/mesh")
         if mesh is None or not mesh.get("filename", "").endswith(".obj"):
             raise InputError(f"{path}: only visuals made of .obj meshes can be labelled")
@@ -211,7 +221,24 @@ def load_mesh(config: ObjectConfig) -> Mesh:
         X_LV = Pose(_rotation(*rpy), np.array(xyz) * config.scale)
         triangles.append(faces + sum(map(len, vertices)))
         vertices.append((upright(config) @ X_LV).apply(corners * scale * config.scale))
+    if not vertices:
+        raise InputError(f"the model {path.name} has no visual, so no camera would see it")
     return Mesh(np.concatenate(vertices), np.concatenate(triangles))
+
+
+def _read_urdf(path: Path) -> ElementTree.Element:
+    """Return the root of a URDF.
+
+    Raises:
+        InputError: It is no XML, or another kind of XML.
+    """
+    try:
+        root = ElementTree.parse(path).getroot()
+    except (ElementTree.ParseError, OSError, ValueError, LookupError) as error:
+        raise InputError(f"the model {path.name} is no URDF: {error}") from None
+    if root.tag != "robot":
+        raise InputError(f"the model {path.name} is no URDF: its root is <{root.tag}>, not <robot>")
+    return root
 
 
 def read_obj(path: Path) -> tuple[Array, NDArray[np.intp]]:
@@ -233,7 +260,7 @@ def read_obj(path: Path) -> tuple[Array, NDArray[np.intp]]:
                 triangles += [(corners[0], a, b) for a, b in pairwise(corners[1:])]
         faces = np.array(triangles, dtype=np.intp).reshape(-1, 3)
         return _checked(np.array(vertices, dtype=float), faces)
-    except ValueError as error:
+    except (OSError, ValueError, IndexError) as error:
         raise InputError(f"the model {path.name} is no Wavefront mesh: {error}") from None
 
 
@@ -249,7 +276,20 @@ def _checked(vertices: Array, triangles: NDArray[np.intp]) -> tuple[Array, NDArr
 
 
 def _numbers(text: str | None, default: tuple[float, ...]) -> tuple[float, ...]:
-    return default if text is None else tuple(map(float, text.split()))
+    """Return the numbers in an attribute of a URDF.
+
+    Raises:
+        InputError: They are no numbers, not finite, or not as many as in `default`.
+    """
+    if text is None:
+        return default
+    try:
+        numbers = tuple(map(float, text.split()))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != len(default) or not np.isfinite(numbers).all():
+        raise InputError(f'a URDF has "{text}" in place of {len(default)} finite number(s)')
+    return numbers
 
 
 def _rotation(roll: float, pitch: float, yaw: float) -> Array:

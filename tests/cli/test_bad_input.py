@@ -188,6 +188,7 @@ SHIPPED = f"Shipped missions: {', '.join(shipped_missions())}.\n"
         ("sort_overhed", f'there is no mission file "sort_overhed", and no shipped mission of that name. Did you mean "sort_overhead"? {SHIPPED}'),
         ("nowhere.yaml", f'there is no mission file "nowhere.yaml", and no shipped mission of that name. {SHIPPED}'),
         ("cells", '"cells" is a folder; name one of its files\n'),
+        ("9" * 300, f'there is no mission file "{"9" * 197}…", and no shipped mission of that name. {SHIPPED}'),
         ("m.yaml --request cube --request banana", 'cannot pick "banana"; ask for one of: cube, sphere, duck\n'),
     ],
 )  # fmt: skip

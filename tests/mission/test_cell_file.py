@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -300,3 +301,28 @@ def test_a_bin_may_stand_diagonally_beside_the_workspace(missions: Path, x: floa
     config = read_cell(missions / "cells" / "overhead.yaml", overrides).config
     assert config is not None
     assert [key for key, _ in find_overlaps(config)].count(("bins", "red_bin", "position")) == findings
+
+
+@pytest.mark.parametrize("model", ["/etc/passwd", "../cup.urdf", "link.urdf"])
+def test_models_outside_of_the_folder_are_not_opened(model: str, small_cell: str) -> None:
+    Path("link.urdf").symlink_to("/etc/passwd")
+    text = small_cell.replace("urdf: sphere_small.urdf", f"urdf: {model}", 1)
+    Path("c.yaml").write_text(text)
+    file = read_cell(Path("c.yaml"), {})
+    assert file.config is None
+    assert [finding.code for finding in file.findings] == ["outside"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "sentence"),
+    [("folder", "is a folder"), ("pipe", "is a pipe or a device"), ("link", "is a link to nothing")],
+)
+def test_a_base_that_is_no_file_is_named_as_what_it_is(kind: str, sentence: str, small_cell: str) -> None:
+    path = Path("base.yaml")
+    if kind == "folder":
+        path.mkdir()
+    elif kind == "pipe":
+        os.mkfifo(path)
+    else:
+        path.symlink_to("nowhere")
+    assert f'"base.yaml" in . {sentence}, not a file' in complaint("base: base.yaml\n")

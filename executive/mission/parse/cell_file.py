@@ -81,7 +81,11 @@ def read_cell(path: Path, overrides: Mapped[str, str]) -> CellFile:
     if validated.model is None:
         return file
     overlaps = (file.finding(keys, "layout", text) for keys, text in find_overlaps(validated.model))
-    later = (*_links(file, validated.model), *_assets(file, validated.model), *overlaps)
+    outside = tuple(_models_outside(file, validated.model, parts.folders))
+    later = (*_links(file, validated.model), *outside, *overlaps)
+    if outside:
+        # Nobody may open these files, not even to check them.
+        return CellFile(None, source, root, (*file.findings, *later))
     found = _models_found(file, validated.model, parts.folders)
     return CellFile(found, source, root, (*file.findings, *later))
 
@@ -216,10 +220,15 @@ def _models_found(file: CellFile, config: CellConfig, folders: Mapped[Source, Pa
     return config.model_copy(update={"arm": arm, "objects": objects})
 
 
-def _assets(file: CellFile, config: CellConfig) -> Iterator[Finding]:
-    """Yield every model file that cannot lie below the cell's own folder or pybullet_data."""
+def _models_outside(file: CellFile, config: CellConfig, folders: Mapped[Source, Path]) -> Iterator[Finding]:
+    """Yield every model file that does not lie below the folder of the file that names it."""
+    assert file.root is not None
     for keys, model in _models(config):
         written = PurePosixPath(model)
+        folder = folders.get(mark_of(file.root, keys).source, folders[file.source])
         if written.is_absolute() or ".." in written.parts:
-            message = f'"{model}" must be a relative path without ".."'
-            yield file.finding(keys, "outside", message)
+            yield file.finding(keys, "outside", f'"{model}" must be a relative path without ".."')
+        elif os.path.isfile(folder / model) and not (folder / model).resolve().is_relative_to(
+            folder.resolve()
+        ):
+            yield file.finding(keys, "outside", f'"{model}" is a link out of {folder}')

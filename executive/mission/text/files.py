@@ -38,6 +38,8 @@ def find_mission(name: str | Path) -> Path:
         return path
     if os.path.isdir(path):
         raise InputError(f'"{name}" is a folder; name one of its files')
+    if os.path.lexists(path):
+        raise InputError(f'"{name}" is {_kind_of(path)}, not a file')
     bare = PurePosixPath(str(name).removeprefix("missions/").removesuffix(".yaml"))
     if len(bare.parts) == 1 and os.path.isfile(shipped := shipped_folder() / f"{bare}.yaml"):
         return shipped
@@ -64,6 +66,8 @@ def below(folder: Path, reference: str, shipped: Sequence[str] = ("",)) -> Path:
             if not path.resolve().is_relative_to(base.resolve()):
                 raise InputError(f'"{reference}" is a link out of {base}')
             return path
+        if os.path.lexists(path):
+            raise InputError(f'"{reference}" in {_shown(base)} is {_kind_of(path)}, not a file')
     folders = [(base, base / written.parent) for base in bases if os.path.isdir(base / written.parent)]
     known = {p.relative_to(base).as_posix() for base, folder in folders for p in folder.glob("*.yaml")}
     hint = alternatives(reference, sorted(known), "There are")
@@ -78,6 +82,8 @@ def read_source(path: Path) -> Source:
         InputError: It is missing, too large, or no UTF-8 text.
     """
     try:
+        if path.exists() and not path.is_file():
+            raise InputError(f"{path} is {_kind_of(path)}, not a file")
         if path.stat().st_size > _LARGEST:
             raise InputError(f"{path} is larger than {_LARGEST} bytes; it cannot be a mission or a cell")
         return Source(_shown(path), path.read_bytes().decode("utf-8-sig"))
@@ -89,7 +95,17 @@ def read_source(path: Path) -> Source:
         raise InputError(f"{path} cannot be read: {problem.strerror}") from None
 
 
+def _kind_of(path: str | Path) -> str:
+    """Return the kind of something that is there and no regular file, with an article."""
+    if os.path.isdir(path):
+        return "a folder"
+    return "a pipe or a device" if os.path.exists(path) else "a link to nothing"
+
+
 def _shown(path: Path) -> str:
     """Return the path as the user would write it here."""
-    here = Path.cwd()
+    try:
+        here = Path.cwd()
+    except FileNotFoundError:  # The working directory was deleted.
+        return str(path)
     return str(path.relative_to(here)) if path.is_absolute() and path.is_relative_to(here) else str(path)

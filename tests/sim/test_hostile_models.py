@@ -1,0 +1,55 @@
+"""Models that are no models: garbage, other XML, wrong numbers, names that no file can have."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from executive.cell_config import ObjectConfig
+from executive.errors import InputError
+from executive.sim.models import find_model, load_mesh, mass_of
+
+LEVELS = "".join(f"<!ENTITY a{number + 1} '{f'&a{number};' * 10}'>" for number in range(9))
+BOMB = f"<!DOCTYPE r [<!ENTITY a0 'ha'>{LEVELS}]><robot name='&a9;'/>"
+
+
+@pytest.mark.parametrize(
+    ("content", "error"),
+    [
+        ("garbage", "the model m.urdf is no URDF: syntax error"),
+        ("", "the model m.urdf is no URDF: no element found"),
+        (BOMB, "the model m.urdf is no URDF: "),
+        ("<svg/>", "the model m.urdf is no URDF: its root is <svg>, not <robot>"),
+        ("<?xml version='1.0' encoding='none'?><robot/>", "the model m.urdf is no URDF: "),
+        ("<robot><inertial><mass value='nan'/></inertial></robot>", 'a URDF has "nan" in place of 1 finite'),
+        ("<robot><inertial><mass value='1 2'/></inertial></robot>", 'a URDF has "1 2" in place of 1 finite'),
+    ],
+    ids=["garbage", "empty", "XML bomb", "other XML", "encoding", "not finite", "two numbers"],
+)
+def test_a_file_that_is_no_urdf_is_an_error(content: str, error: str, tmp_path: Path) -> None:
+    (tmp_path / "m.urdf").write_text(content)
+    config = ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03)
+    with pytest.raises(InputError) as raised:
+        mass_of(config)
+    assert str(raised.value).startswith(error)
+
+
+@pytest.mark.parametrize("content", ["", "f 1 2 3\n", "v a b c\n", "v 0 0 0\nf\n", "v 0 0 nan\nf 1 1 1\n"])
+def test_a_file_that_is_no_mesh_is_an_error(content: str, tmp_path: Path) -> None:
+    (tmp_path / "m.obj").write_text(content)
+    config = ObjectConfig(mesh=str(tmp_path / "m.obj"), height=0.05, radius=0.03)
+    with pytest.raises(InputError, match=r"^the model m\.obj is no Wavefront mesh: "):
+        load_mesh(config)
+
+
+def test_a_name_that_no_file_can_have_is_no_model() -> None:
+    with pytest.raises(InputError, match=r"^there is no model uuu"):
+        find_model("u" * 300)
+
+
+def test_a_model_of_more_than_20_megabytes_is_not_read(tmp_path: Path) -> None:
+    with (tmp_path / "m.obj").open("wb") as file:
+        file.truncate(20_000_001)
+    with pytest.raises(InputError, match=r"m\.obj is larger than 20 MB$"):
+        find_model(str(tmp_path / "m.obj"))
