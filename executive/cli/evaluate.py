@@ -90,7 +90,7 @@ def command(
         from executive.campaign.evaluation import SceneSettings, check_detector, list_detectors, measure
         from executive.campaign.measurement_store import store_evaluation
         from executive.cli.cells import find_cell, load_cells
-        from executive.cli.progress import bar
+        from executive.cli.progress import bar, report_polygons
         from executive.view.figures.detector import print_figures
         from executive.vision.evaluation.misses import WorstMisses
 
@@ -98,6 +98,8 @@ def command(
         named = cells or (() if dataset else ("overhead",))
         files = dict(zip(map(find_cell, named), load_cells(named, overrides).values(), strict=True))
         asked = list(list_detectors(files, detector, weights, labels))
+        if dataset is not None:
+            report_polygons(dataset)
         for tested in asked:
             check_detector(tested, renders_scenes=dataset is None, scene=scene)
         for tested in asked:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import click
 from rich.console import Console
@@ -26,6 +27,14 @@ def bar(what: str, *, quiet: bool = False) -> Iterator[Callable[[int, int], None
     with Progress(*columns, console=console, disable=disable, speed_estimate_period=math.inf) as progress:
         number = progress.add_task(what, total=None)
         yield lambda done, total: progress.update(number, completed=done, total=total)
+
+
+def report_polygons(folder: Path) -> None:
+    """Say how many boxes of labelled images are made from polygons, if any."""
+    from executive.vision.samples import count_polygons
+
+    if count := count_polygons(folder):
+        click.echo(f"note: {count} polygons in {folder} are used as boxes around them", err=True)
 
 
 def say_halting() -> None:

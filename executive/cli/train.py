@@ -29,10 +29,11 @@ from executive.cli.output import stdout_kept_clean
 def command(dataset: Path, out: Path, start: Path | None, rate: float | None, epochs: int, seed: int) -> None:
     """Train the small RF-DETR; needs the extra `train`."""
     with stdout_kept_clean():
-        from executive.cli.progress import bar
+        from executive.cli.progress import bar, report_polygons
         from executive.vision.train import train
         from executive.vision.training.settings import Settings
 
+        report_polygons(dataset / "train")
         with bar("training") as batches:
             train(dataset, out, Settings(start, rate, epochs, seed), _tell, batches)
 

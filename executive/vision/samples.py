@@ -15,12 +15,10 @@ from numpy.typing import NDArray
 from executive.errors import InputError
 from executive.geometry import Array
 from executive.messages import Box
+from executive.vision.annotations import COCO, read_annotations
 
-ANNOTATIONS = "_annotations.coco.json"
 SPLITS = ("test", "valid", "val", "train")
 """Folders of a data set in which labelled images are sought, those that no training has used first."""
-DATA = ("data.yaml", "data.yml")
-"""Files that name the classes of a YOLO data set."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,15 +55,15 @@ def read_samples(folder: Path) -> Iterator[LabelledImage]:
         InputError: There are none, or an image cannot be read.
     """
     split = _split(folder)
-    dataset = _dataset(split)
+    annotations = read_annotations(split)
     ignored, truth = (_read_json(split / name) for name in ("ignored.json", "truth.json"))
-    for path in map(Path, sorted(dataset.image_paths)):
-        objects = dataset.annotations[str(path)]
+    for path, annotation in annotations.items():
+        image = read_image(path)
         yield LabelledImage(
             path.name,
-            read_image(path),
-            tuple(dataset.classes[number] for number in objects.class_id),
-            tuple(map(tuple, objects.xyxy.tolist())),
+            image,
+            annotation.labels,
+            annotation.boxes_in_pixels(image.shape[1], image.shape[0]),
             tuple(map(tuple, ignored.get(path.name, ()))),
             truth.get(path.name, {}),
         )
@@ -77,7 +75,16 @@ def count_samples(folder: Path) -> int:
     Raises:
         InputError: There are none.
     """
-    return len(_dataset(_split(folder)))
+    return len(read_annotations(_split(folder)))
+
+
+def count_polygons(folder: Path) -> int:
+    """Return how many boxes `read_samples` makes from polygons.
+
+    Raises:
+        InputError: There are no labelled images.
+    """
+    return sum(one.polygon_count for one in read_annotations(_split(folder)).values())
 
 
 def read_image(path: Path) -> NDArray[np.uint8]:
@@ -99,32 +106,21 @@ def _split(folder: Path) -> Path:
         InputError: There is none.
     """
     for split in (folder, *(folder / name for name in SPLITS)):
-        if (split / ANNOTATIONS).is_file() or ((split / "images").is_dir() and (split / "labels").is_dir()):
+        if (split / COCO).is_file() or ((split / "images").is_dir() and (split / "labels").is_dir()):
             return split
     raise InputError(
-        f"{folder} holds no labelled images: {ANNOTATIONS} (COCO) or images/ and labels/ (YOLO) were looked "
+        f"{folder} holds no labelled images: {COCO} (COCO) or images/ and labels/ (YOLO) were looked "
         f"for there and in {', '.join(SPLITS)}; make some with `executive dataset`"
     )
 
 
-def _dataset(split: Path) -> Any:
-    """Return a split as a `supervision.DetectionDataset`; no image is read.
-
-    Raises:
-        InputError: An annotation or an image cannot be read.
-    """
-    import supervision as sv
-
-    try:
-        if (split / ANNOTATIONS).is_file():
-            return sv.DetectionDataset.from_coco(str(split), str(split / ANNOTATIONS))
-        data = next((split.parent / name for name in DATA if (split.parent / name).is_file()), None)
-        if data is None:
-            raise InputError(f"{split.parent} has no data.yaml, which names the classes of a YOLO data set")
-        return sv.DetectionDataset.from_yolo(str(split / "images"), str(split / "labels"), str(data))
-    except (OSError, ValueError, LookupError, TypeError) as error:
-        raise InputError(f"the labelled images in {split} cannot be read: {error}") from error
-
-
 def _read_json(path: Path) -> dict[str, Any]:
-    return dict(json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else {}
+    if not path.is_file():
+        return {}
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise InputError(f"{path} cannot be read: {error}") from error
+    if not isinstance(content, dict):
+        raise InputError(f"{path} must hold an object with a key for each image")
+    return content

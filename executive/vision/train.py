@@ -6,9 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from executive.errors import InputError
+from executive.vision.annotations import read_annotations
 from executive.vision.detectors.onnx_model import read_labels
 from executive.vision.evaluation.model_file import evaluate_folder
 from executive.vision.model_card import ModelCard, read_epochs
+from executive.vision.samples import SPLITS
 from executive.vision.training.settings import Settings
 
 Progress = Callable[[int, dict[str, float]], None]
@@ -87,6 +89,9 @@ def _check(dataset: Path, start: Path | None) -> None:
             f"{dataset} is not a data set: it needs train/_annotations.coco.json and "
             "valid/_annotations.coco.json (COCO), or data.yaml (YOLO); a Roboflow export has one of them"
         )
+    for name in SPLITS:
+        if (dataset / name).is_dir():
+            read_annotations(dataset / name)
 
 
 def _validation(dataset: Path) -> Path:

@@ -1,0 +1,222 @@
+"""Annotations of labelled images on disk, in COCO or YOLO format, checked before any image is read."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+from typing import Annotated, TypeVar
+
+import yaml
+from pydantic import BaseModel, Field, FiniteFloat, ValidationError
+
+from executive.errors import InputError
+from executive.messages import Box
+
+COCO = "_annotations.coco.json"
+DATA = ("data.yaml", "data.yml")
+"""Files that name the classes of a YOLO data set."""
+IMAGES = (".jpg", ".jpeg", ".png", ".bmp")
+"""Suffixes of images."""
+BOX_VALUES = 4
+"""Number of values of a YOLO box: centre x, centre y, width and height."""
+SLACK = 1e-6
+"""Accepted excess of a share over 1, for rounded values."""
+
+
+@dataclass(frozen=True)
+class ImageAnnotation:
+    """The labelled objects of an image.
+
+    Attributes:
+        labels: Class of each object.
+        boxes: Left, top, right and bottom of each object.
+        are_shares: True if the boxes are shares of width and height of the image; False for pixels.
+        polygon_count: Number of boxes that were made from polygons.
+    """
+
+    labels: tuple[str, ...] = ()
+    boxes: tuple[Box, ...] = ()
+    are_shares: bool = False
+    polygon_count: int = 0
+
+    def boxes_in_pixels(self, width: int, height: int) -> tuple[Box, ...]:
+        """Return the boxes in an image of this size [pixel]."""
+        if not self.are_shares:
+            return self.boxes
+        return tuple((x0 * width, y0 * height, x1 * width, y1 * height) for x0, y0, x1, y1 in self.boxes)
+
+
+Annotations = Mapping[Path, ImageAnnotation]
+"""The annotations of a folder by image, sorted by path."""
+Size = Annotated[FiniteFloat, Field(ge=0)]
+ContentT = TypeVar("ContentT", bound=BaseModel)
+
+
+class _CocoImage(BaseModel):
+    id: int
+    file_name: str
+
+
+class _CocoObject(BaseModel):
+    image_id: int
+    category_id: int
+    bbox: tuple[FiniteFloat, FiniteFloat, Size, Size]
+
+
+class _CocoCategory(BaseModel):
+    id: int
+    name: str
+
+
+class _CocoFile(BaseModel):
+    images: list[_CocoImage]
+    annotations: list[_CocoObject]
+    categories: list[_CocoCategory]
+
+
+class _YoloFile(BaseModel):
+    names: dict[int, str] | list[str]
+
+
+@dataclass
+class _Objects:
+    """Objects of an image, as they are read."""
+
+    labels: list[str] = field(default_factory=list)
+    boxes: list[Box] = field(default_factory=list)
+    polygon_count: int = 0
+
+
+def read_annotations(split: Path) -> Annotations:
+    """Return the annotations of a folder with one split of a data set.
+
+    Raises:
+        InputError: A file is damaged, or an image is missing or lies outside of the folder; the text names
+            the file and the line or the key.
+    """
+    images = _read_coco(split) if (split / COCO).is_file() else _read_yolo(split)
+    return dict(sorted(images, key=lambda image: str(image[0])))
+
+
+def _read_coco(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
+    file = split / COCO
+    content = _parse(file, lambda text: _CocoFile.model_validate_json(text))
+    names = {category.id: category.name for category in content.categories}
+    objects = {image.id: _Objects() for image in content.images}
+    if len(objects) < len(content.images):
+        raise InputError(f"{file}: two images have the same id")
+    for number, one in enumerate(content.annotations):
+        if one.image_id not in objects:
+            raise InputError(f"{file}: annotations[{number}].image_id: there is no image {one.image_id}")
+        if one.category_id not in names:
+            raise InputError(
+                f"{file}: annotations[{number}].category_id: there is no category {one.category_id}; "
+                f"there are {', '.join(map(str, names)) or 'none'}"
+            )
+        left, top, width, height = one.bbox
+        objects[one.image_id].labels.append(names[one.category_id])
+        objects[one.image_id].boxes.append((left, top, left + width, top + height))
+    for number, image in enumerate(content.images):
+        path = _find_image(split, image.file_name, f"{file}: images[{number}].file_name")
+        found = objects[image.id]
+        yield path, ImageAnnotation(tuple(found.labels), tuple(found.boxes))
+
+
+def _read_yolo(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
+    data = next((split.parent / name for name in DATA if (split.parent / name).is_file()), None)
+    if data is None:
+        raise InputError(f"{split.parent} has no data.yaml, which names the classes of a YOLO data set")
+    content = _parse(data, lambda text: _YoloFile.model_validate(yaml.safe_load(text)))
+    names = dict(enumerate(content.names)) if isinstance(content.names, list) else content.names
+    folder = split / "images"
+    for path in folder.iterdir():
+        if path.suffix.lower() in IMAGES:
+            image = _find_image(folder, path.name, str(path))
+            yield image, _read_labels(split / "labels" / f"{path.stem}.txt", names)
+
+
+def _read_labels(file: Path, names: Mapping[int, str]) -> ImageAnnotation:
+    """Return the objects in the label file of a YOLO image; an image without a file has none."""
+    if not os.path.lexists(file):
+        return ImageAnnotation(are_shares=True)
+    objects = _Objects()
+    for number, line in enumerate(_read_text(file).splitlines(), start=1):
+        if not line.strip():
+            continue
+        try:
+            label, *values = line.split()
+            numbers = [float(value) for value in values]
+            name = names[int(label)]
+        except KeyError:
+            raise InputError(f"{file}:{number}: there is no class {label}; there are {len(names)}") from None
+        except ValueError:
+            raise InputError(f"{file}:{number}: a line is a class number and shares, not {line!r}") from None
+        is_polygon = len(numbers) > BOX_VALUES and len(numbers) % 2 == 0
+        if len(numbers) != BOX_VALUES and not is_polygon:
+            raise InputError(
+                f"{file}:{number}: a box has {BOX_VALUES} values and a polygon at least 6, an even number, "
+                f"not {len(numbers)}"
+            )
+        # The comparison is False for numbers that are not finite.
+        if not all(-SLACK <= value <= 1 + SLACK for value in numbers):
+            raise InputError(f"{file}:{number}: values are shares of the image, 0 to 1, not {line!r}")
+        objects.labels.append(name)
+        objects.boxes.append(_bounds(numbers) if is_polygon else _corners(numbers))
+        objects.polygon_count += is_polygon
+    return ImageAnnotation(tuple(objects.labels), tuple(objects.boxes), True, objects.polygon_count)
+
+
+def _bounds(polygon: list[float]) -> Box:
+    xs, ys = polygon[0::2], polygon[1::2]
+    return min(xs), min(ys), max(xs), max(ys)
+
+
+def _corners(box: list[float]) -> Box:
+    x, y, width, height = box
+    return x - width / 2, y - height / 2, x + width / 2, y + height / 2
+
+
+def _find_image(folder: Path, name: str, place: str) -> Path:
+    """Return the path of an image; `place` names the file and the key that name it.
+
+    Raises:
+        InputError: It is missing, no regular file, or outside of the folder.
+    """
+    written, path = PurePosixPath(name), folder / name
+    if not name or written.is_absolute() or ".." in written.parts:
+        raise InputError(f'{place}: "{name}" is not below {folder}')
+    if not os.path.isfile(path):
+        raise InputError(f'{place}: "{name}" is no file in {folder}')
+    if not path.resolve().is_relative_to(folder.resolve()):
+        raise InputError(f'{place}: "{name}" is a link out of {folder}')
+    return path
+
+
+def _read_text(file: Path) -> str:
+    if not os.path.isfile(file):
+        raise InputError(f"{file} is no file")
+    try:
+        return file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{file} cannot be read: {error}") from error
+
+
+def _parse(file: Path, parse: Callable[[str], ContentT]) -> ContentT:
+    """Return the parsed content of a file.
+
+    Raises:
+        InputError: It cannot be read, or lacks something; the text names the line or the key.
+    """
+    try:
+        return parse(_read_text(file))
+    except yaml.MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else 1
+        raise InputError(f"{file}:{line}: no YAML: {error.problem}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        keys = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in first["loc"])
+        raise InputError(f"{file}: {keys.removeprefix('.') or 'content'}: {first['msg']}") from error
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{file} cannot be read: {error}") from error
