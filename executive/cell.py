@@ -164,8 +164,12 @@ class Ledger(Protocol):
     def in_doubt(self) -> Sequence[Item]:
         """Return the open items in the workspace that a further look may make sure, or show to be gone."""
 
-    def believes_empty(self) -> bool:
-        """Tell whether it is as good as certain that nothing with a route is left where one can look."""
+    def believes_empty(self, label: str | None = None) -> bool:
+        """Return True if it is as good as certain that nothing with a route is left where one can look.
+
+        Args:
+            label: Only objects of this class count; None: those of all classes.
+        """
 
     @property
     def unknown(self) -> Mapping[str, int]:

@@ -61,7 +61,7 @@ class SelectTarget(Skill):
             names = ", ".join(doubtful)
             return self.failed("doubtful", f"not enough looks agree on {names} yet; look again")
         sought = self.same or self.wanted or "object to sort"
-        if self.same is None and cell.ledger.believes_empty():
+        if self.same is None and cell.ledger.believes_empty(self.wanted):
             left = f"no {sought} is left on the table but what was rejected"
             message = "; ".join(filter(None, (left, describe_unknown(cell.ledger.unknown))))
             return self.failed("no_candidate", message)

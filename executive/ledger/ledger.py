@@ -117,11 +117,15 @@ class ItemLedger:
             and not self._is_known(record)
         ]
 
-    def believes_empty(self) -> bool:
-        """Tell whether it is as good as certain that nothing with a route is left where one can look."""
+    def believes_empty(self, label: str | None = None) -> bool:
+        """Return True if it is as good as certain that nothing with a route is left where one can look.
+
+        Args:
+            label: Only objects of this class count; None: those of all classes.
+        """
         waiting = any(
             # Before any look is sure, its class is a guess.
-            (record.label in self._routes or not record.votes)
+            ((record.label in self._routes and label in (None, record.label)) or not record.votes)
             and self._may_wait(record)
             and self._coverage.in_sight(record.position)
             for record in self._records.values()

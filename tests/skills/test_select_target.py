@@ -77,6 +77,13 @@ def test_two_empty_looks_at_the_full_frame_alone_are_believed(
         assert results[-1].message == "no object to sort is left on the table but what was rejected"
 
 
+def test_a_class_can_be_gone_while_others_are_left(fake: FakeCell, look) -> None:
+    put(fake, duck=(0.45, -0.2))
+    reasons = [select(fake, look("full"), wanted="sphere").reason for _ in range(2)]
+    assert reasons == ["unseen", "no_candidate"]
+    assert select(fake, look("full"), wanted="duck").outputs["item"] == "duck-1"
+
+
 def test_a_table_with_only_rejected_items_ends_the_work(fake: FakeCell, look) -> None:
     put(fake, cube=(0.6, 0.2))
     look()

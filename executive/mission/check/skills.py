@@ -125,7 +125,8 @@ def known_classes(case: Case) -> Iterator[Finding]:
         if label in case.cell.objects and not any(label in labels for labels in models.values()):
             said = "; ".join(f"{name}: {', '.join(labels)}" for name, labels in models.items())
             message = f'no detector of the cell can see the class "{label}"'
-            yield error(mark, "unseen-class", message, f"Their models know {said}.")
+            hint = f"Their models know {said}. Train one for it with `executive dataset` and `executive train`."
+            yield error(mark, "unseen-class", message, hint)
 
 
 def _named_classes(case: Case) -> Iterator[tuple[str, Mark]]:

@@ -90,12 +90,12 @@ class _Expander:
             if ("", name) not in self._looked_up and f"${name}" not in param.mark.source.text:
                 yield warning(param.mark, "unused-param", f'nothing uses the param "{name}"')
         for subtree in self.mission.trees.values():
-            if subtree.library or isinstance(subtree.do, UnknownNode) or not self._uses[subtree.name]:
+            if isinstance(subtree.do, UnknownNode) or not self._uses[subtree.name]:
                 continue
             for name, argument in subtree.args.items():
                 if (subtree.name, name) not in self._looked_up:
                     message = f'nothing in the subtree "{subtree.name}" uses its argument "{name}"'
-                    yield warning(argument.mark, "unused-argument", message)
+                    yield error(argument.mark, "unused-argument", message)
 
     def _node(self, node: Node, names: Names, inside: tuple[str, ...], depth: int) -> Node:
         self._count += 1
