@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import click
@@ -33,12 +35,26 @@ def command(dataset: Path, out: Path, start: Path | None, rate: float | None, ep
         from executive.vision.train import train
         from executive.vision.training.settings import Settings
 
-        report_polygons(dataset / "train")
+        if (dataset / "train").is_dir():
+            report_polygons(dataset / "train")
         with bar("training") as batches:
-            train(dataset, out, Settings(start, rate, epochs, seed), _tell, batches)
+            train(dataset, out, Settings(start, rate, epochs, seed), _epoch_printer(epochs), batches)
+        click.echo(
+            "write these lines into the cell file, with paths from its folder:\n\n"
+            "detectors:\n  trained:\n    kind: rfdetr\n"
+            f"    model_path: {out / 'model.onnx'}\n    labels: {out / 'labels.txt'}",
+            err=True,
+        )
 
 
-def _tell(epoch: int, metrics: dict[str, float]) -> None:
-    """Print the figures of an epoch."""
-    figures = ", ".join(f"{name} {value:.4g}" for name, value in metrics.items())
-    click.echo(f"epoch {epoch}: {figures}", err=True)
+def _epoch_printer(epochs: int) -> Callable[[int, dict[str, float]], None]:
+    """Return a function that prints the figures of an epoch and the time that the others will take."""
+    began = time.monotonic()
+
+    def print_epoch(epoch: int, metrics: dict[str, float]) -> None:
+        figures = ", ".join(f"{name} {value:.4g}" for name, value in metrics.items())
+        minutes = (time.monotonic() - began) / epoch * (epochs - epoch) / 60
+        left = f"; about {minutes:.0f} min left" if epoch < epochs else ""
+        click.echo(f"epoch {epoch} of {epochs}: {figures}{left}", err=True)
+
+    return print_epoch

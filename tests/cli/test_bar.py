@@ -46,6 +46,17 @@ def test_nothing_is_drawn_where_nothing_can_be_drawn_over(
     assert capsys.readouterr() == ("", "")
 
 
+def test_without_a_terminal_some_work_writes_lines(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    times = iter([0.0, 4.0, 12.0, 13.0])
+    monkeypatch.setattr("time.monotonic", lambda: next(times))
+    with bar("frames", lines=True) as move:
+        for done in (1, 3, 4):
+            move(done, 9)
+    assert capsys.readouterr() == ("", "frames: 3 of 9, about 24 s left\n")
+
+
 @pytest.fixture
 def at_terminal(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
     """Calls a command whose standard error passes for a terminal."""
@@ -96,7 +107,9 @@ def test_train_shows_batches_and_a_line_per_epoch(
     shown = at_terminal("train", "--dataset", "data", "--out", "out", "--epochs", "2")
     assert shown.exit_code == 0, shown.stderr
     assert "training" in shown.stderr and "4/4" in shown.stderr
-    assert "epoch 1: loss 0.5123" in shown.stderr and "epoch 2: loss 0.5123" in shown.stderr
+    assert "epoch 1 of 2: loss 0.5123; about 0 min left" in shown.stderr
+    assert "epoch 2 of 2: loss 0.5123" in shown.stderr
+    assert "    kind: rfdetr\n    model_path: out/model.onnx\n    labels: out/labels.txt\n" in shown.stderr
     assert shown.stdout == ""
 
 

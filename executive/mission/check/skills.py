@@ -125,7 +125,7 @@ def known_classes(case: Case) -> Iterator[Finding]:
         if label in case.cell.objects and not any(label in labels for labels in models.values()):
             said = "; ".join(f"{name}: {', '.join(labels)}" for name, labels in models.items())
             message = f'no detector of the cell can see the class "{label}"'
-            hint = f"Their models know {said}. Train one for it with `executive dataset` and `executive train`."
+            hint = f"Their models know {said}. `executive dataset` and `executive train` make another model."
             yield error(mark, "unseen-class", message, hint)
 
 
