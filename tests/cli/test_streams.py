@@ -12,7 +12,9 @@ import time
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from executive.cli.main import main
 from executive.record.journal import read_journal
 
 EXECUTIVE = f'"{sys.executable}" -m executive.cli.main'
@@ -83,3 +85,15 @@ def test_a_hangup_halts_a_run_unless_it_was_ignored_at_the_start(ignored: bool, 
         json.loads(Path(os.path.realpath(tmp_path / "latest"), "result.json").read_text())["status"]
         == "HALTED"
     )
+
+
+def test_control_characters_of_a_file_are_shown_escaped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("m.yaml").write_text('mission: "\\e[2Jred"\ntree: "\\e]0;title\\a"\n')
+    for words in (["check", "m.yaml"], ["check", "m.yaml", "--json"], ["run", "m.yaml"]):
+        done = CliRunner().invoke(main, words)
+        assert done.exit_code == 2
+        assert "\\u001b[2Jred" in done.output
+        assert not any(character in done.output for character in "\x1b\x07\x9b")
