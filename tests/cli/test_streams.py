@@ -95,5 +95,5 @@ def test_control_characters_of_a_file_are_shown_escaped(
     for words in (["check", "m.yaml"], ["check", "m.yaml", "--json"], ["run", "m.yaml"]):
         done = CliRunner().invoke(main, words)
         assert done.exit_code == 2
-        assert "\\u001b[2Jred" in done.output
+        assert "\\u001b]0;title\\u0007" in done.output
         assert not any(character in done.output for character in "\x1b\x07\x9b")
