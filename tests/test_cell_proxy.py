@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from executive.arm import Task
 from executive.cell_proxy import Access, intercept
 from executive.testing.conformance.watch import Watch
 from executive.testing.fake_cell import FakeCell
@@ -22,13 +23,13 @@ def test_every_access_goes_through_the_interceptor_and_so_do_those_to_what_a_cal
 
     cell = intercept(fake.cell, ask, ("arm", "detector"))
     assert cell.arm.at_rest
-    planning = cell.arm.plan("home", task=None)  # type: ignore[arg-type]
+    planning = cell.arm.plan("home", task=Task())
     assert not planning.ready
     frame = cell.camera.capture()
     assert not cell.detectors["embedded"].request(frame, view="full").ready
     assert seen == [
         ("arm.at_rest", "", (), False),
-        ("arm.plan", "", ("home", None), True),
+        ("arm.plan", "", ("home", Task()), True),
         ("plan.ready", "", (), False),
         ("detector.request", "embedded", (frame, "full"), True),
         ("request.ready", "embedded", (), False),

@@ -13,12 +13,13 @@ from executive.arm import Goal, Motion, Task, refuse_steps
 from executive.cell import Clock
 from executive.cell_config import CellConfig
 from executive.clock import STEP
-from executive.errors import Fault, Unreachable
+from executive.errors import Blocked, Fault, Unreachable
 from executive.events import Emit, ignore
 from executive.geometry import Array, Pose, tool_down
 from executive.layout import places_out_of_reach, travel_height
 from executive.motion.kinematics import Kinematics
 from executive.motion.plans import Plan, Plans
+from executive.testing.fake_obstacles import Collision, FakeObstacles
 from executive.testing.fake_world import FakeWorld
 from executive.workcell import KeyPath
 
@@ -47,11 +48,12 @@ class FakeMotion:
 class FakeArm:
     """An arm that is its tool: straight up, across and down at constant speed; it stops dead.
 
-    Nothing is in its way: it heeds the limits of its reach, and no task.
+    It heeds the limits of its reach, and of the task the load: neither the tool tip nor the lower end of the
+    load enters the table or the bins. Objects are not in its way.
 
     Args:
         world: Where it moves what it holds.
-        config: The cell file: named poses, travel height and the time that planning takes.
+        config: The cell file: named poses, travel height, bins and the time that planning takes.
         clock: The run's.
         emit: Tells the run what happens.
 
@@ -67,6 +69,7 @@ class FakeArm:
         self.commanded: list[str] = []
         self._world = world
         self._height = travel_height(config)
+        self._obstacles = FakeObstacles(config)
         self._plans = Plans(self._solve, clock, config.motion.planning, emit)
         self._tool = self.poses["home"]
         self._path: list[Pose] = []
@@ -106,7 +109,9 @@ class FakeArm:
     def plan(self, goal: Goal | str, task: Task = Task()) -> Plan[FakeMotion]:
         """Begin to plan a motion to a goal or a named pose; what was planned ahead is known at once.
 
-        The result raises Unreachable for what is farther than `REACH` from the base.
+        The result raises Unreachable for what is farther than `REACH` from the base, and Blocked where the
+        tool tip, or the load of the task, would enter the table or a bin, as the simulated arm's does: also
+        on the guarded part.
         """
         return self._plans.now(self.destination, goal, task)
 
@@ -147,8 +152,10 @@ class FakeArm:
             self.stop()
 
     def advance(self) -> None:
-        """Go one step along the path, with what the tool holds."""
-        if self._path:
+        """Go one step along the path, with what the tool holds, which stops the arm at table and bins."""
+        if self._path and (collision := self._find_collision_of_held(self._path[0])):
+            self.run_into(f"{collision.part} ran into {collision.obstacle}, {collision.place}")
+        elif self._path:
             self._tool = self._path.pop(0)
             if self.runs_into is not None and len(self._path) <= self._half:
                 self._met, self.runs_into = self.runs_into, None
@@ -158,21 +165,44 @@ class FakeArm:
             height = self._world.classes[thing.label].height
             thing.position = self._tool.position - np.array([0.0, 0.0, height / 2])
 
+    def _find_collision_of_held(self, pose: Pose) -> Collision | None:
+        """Return what stops the held object on the way to a pose: the plan may not have known of it."""
+        held = self._world.held
+        if held is None:
+            return None
+        tips = np.array([self._tool.position, pose.position])
+        return self._obstacles.find_collision(tips, self._world.classes[held.label])
+
     def _solve(self, start: Array, goal: Goal | str, task: Task) -> FakeMotion:
-        del task
+        load = task.load.kind if task.load else None
+        collisions = []
+        for path in self._paths(start, goal):
+            tips = np.array([start, *(pose.position for pose in path)])
+            collision = self._obstacles.find_collision(tips, load)
+            if collision is None:
+                return FakeMotion(path)
+            collisions.append(collision)
+        part, obstacle, depth, place = collisions[-1]
+        raise Blocked(f"the motion would bring {part} {depth:.3f} m into {obstacle}, {place}")
+
+    def _paths(self, start: Array, goal: Goal | str) -> Iterator[list[Pose]]:
+        """Yield the paths to a goal, best first: to a named pose straight, and then as to any other."""
+        raised = np.array([*start[:2], max(start[2], self._height)])
         if isinstance(goal, str):
             end = self.poses[goal]
-            return FakeMotion([*_line(start, end.position, end.rotation, SPEED)[:-1], end])
-        place = np.array(goal.position)
-        require_reachable(place)
-        above = np.array([*place[:2], place[2] + goal.guarded])
-        raised = np.array([*start[:2], max(start[2], self._height)])
+            place = above = end.position
+            rotation, speed = end.rotation, SPEED
+            yield [*_line(start, place, rotation, SPEED)[:-1], end]
+        else:
+            place = np.array(goal.position)
+            require_reachable(place)
+            above = np.array([*place[:2], place[2] + goal.guarded])
+            rotation, speed = tool_down(place, goal.yaw or 0.0).rotation, min(goal.speed, SPEED)
         over = np.array([*place[:2], max(above[2], self._height)])
-        rotation = tool_down(place, goal.yaw or 0.0).rotation
         fast = [
             pose for a, b in pairwise([start, raised, over, above]) for pose in _line(a, b, rotation, SPEED)
         ]
-        return FakeMotion([*fast, *_line(above, place, rotation, min(goal.speed, SPEED))])
+        yield [*fast, *_line(above, place, rotation, speed)]
 
 
 class FakeTool:

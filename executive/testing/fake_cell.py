@@ -50,7 +50,8 @@ class FakeCell:
     """A cell file brought to life without physics; implements `executive.workcell.Workcell`.
 
     Bins, classes, table, poses, camera, detectors and ledger are as the cell file says. The arm goes in
-    straight lines, the tool seals always, and every detector sees everything, whatever its kind.
+    straight lines, table and bins are solid, the tool seals always, and every detector sees everything,
+    whatever its kind.
 
     Args:
         config: The cell file; by default `bare_table`.

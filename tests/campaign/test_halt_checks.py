@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from executive.arm import Task
 from executive.campaign.halt_checks import check_journal, check_rest, check_tool
 from executive.runtime.outcome import Outcome
 from executive.testing.fake_cell import FakeCell
@@ -26,7 +27,7 @@ def entries(*statuses: tuple[str, str], **end: Any) -> list[dict[str, Any]]:
 
 def test_an_arm_that_moves_is_told(fake: FakeCell) -> None:
     assert list(check_rest(fake)) == []
-    fake.arm.start(fake.arm._solve(fake.arm.destination, "home", None) or pytest.fail())
+    fake.arm.start(fake.arm._solve(fake.arm.destination, "home", Task()) or pytest.fail())
     fake.arm._path *= 20
     found = list(check_rest(fake))
     assert found[0] == "the arm is not at rest"

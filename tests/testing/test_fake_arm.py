@@ -9,9 +9,9 @@ import pytest
 
 from executive.arm import Goal, Motion, Task
 from executive.clock import STEP
-from executive.errors import Fault, Unreachable
-from executive.geometry import Array
-from executive.messages import Obstacle
+from executive.errors import Blocked, Fault, Unreachable
+from executive.geometry import Array, tool_down
+from executive.messages import BIN_THICKNESS, Load, Obstacle
 from executive.testing.fake_arm import SPEED
 from executive.testing.fake_cell import FakeCell, bare_table
 
@@ -19,16 +19,16 @@ LATENCY = bare_table().motion.planning
 BESIDE = Goal((0.5, 0.2, 0.03), guarded=0.02, speed=0.05)
 
 
-def motion_to(fake: FakeCell, goal: Goal | str) -> Motion:
-    planning = fake.arm.plan(goal)
+def motion_to(fake: FakeCell, goal: Goal | str, task: Task = Task()) -> Motion:
+    planning = fake.arm.plan(goal, task)
     while not planning.ready:
         fake.advance()
     return planning.result()
 
 
-def go(fake: FakeCell, goal: Goal | str) -> Array:
+def go(fake: FakeCell, goal: Goal | str, task: Task = Task()) -> Array:
     """Go to a goal and return where the tool was at every step `(N, 3)` [m]."""
-    fake.arm.start(motion_to(fake, goal))
+    fake.arm.start(motion_to(fake, goal, task))
     places = []
     while not fake.arm.at_rest:
         fake.advance()
@@ -83,6 +83,85 @@ def test_what_is_out_of_reach_is_said_when_the_plan_is_known(fake: FakeCell) -> 
     planning = fake.arm.plan(Goal((0.8, 0.4, 0.1)))
     with pytest.raises(Unreachable, match=r"0\.90 m from the base is more than the arm's 0\.85 m"):
         planning.result()
+
+
+def hold_cube(fake: FakeCell) -> Task:
+    """Let the tool hold a cube that stands on the table, and return the task of carrying it."""
+    fake.world.held = fake.world.put("cube", 0.5, 0.0)
+    fake.arm.put(tool_down((0.5, 0.0, 0.05)))
+    return Task(Load(fake.cell.classes["cube"]))
+
+
+@pytest.mark.parametrize(
+    ("goal", "text"),
+    [
+        (Goal((0.5, 0.2, -0.01)), "tool 0.010 m into the table, with the tool at (0.500, 0.200, -0.010) m"),
+        (Goal((0.5, 0.2, -0.01), guarded=0.05, speed=0.05), "tool 0.010 m into the table, "),
+        (Goal((0.24, -0.48, 0.002)), "tool 0.003 m into red_bin, with the tool at (0.240, -0.480, 0.002) m"),
+        (Goal((0.1175, -0.48, 0.03)), "tool 0.009 m into red_bin, "),
+    ],
+    ids=["table", "table, guarded", "floor of a bin", "wall of a bin"],
+)
+def test_the_tool_enters_neither_table_nor_bins(fake: FakeCell, goal: Goal, text: str) -> None:
+    with pytest.raises(Blocked) as raised:
+        motion_to(fake, goal)
+    assert str(raised.value).startswith(f"the motion would bring the {text}")
+
+
+@pytest.mark.parametrize(
+    ("goal", "text"),
+    [
+        (Goal((0.5, 0.0, 0.02)), "0.030 m into the table, with the tool at (0.500, 0.000, 0.020) m"),
+        (Goal((0.24, -0.48, 0.05)), "0.005 m into red_bin, with the tool at (0.240, -0.480, 0.050) m"),
+        (Goal((0.15, -0.48, 0.06)), "0.005 m into red_bin, "),
+    ],
+    ids=["table", "floor of a bin", "wall of a bin"],
+)
+def test_a_load_enters_neither_table_nor_bins(fake: FakeCell, goal: Goal, text: str) -> None:
+    task = hold_cube(fake)
+    with pytest.raises(Blocked) as raised:
+        motion_to(fake, goal, task)
+    assert str(raised.value).startswith(f"the motion would bring the held cube {text}")
+
+
+def test_a_load_may_lie_on_the_table_and_on_the_floor_of_a_bin(fake: FakeCell) -> None:
+    task = hold_cube(fake)
+    for place in ((0.5, 0.0, 0.1), (0.5, 0.0, 0.05), (0.24, -0.48, 0.05 + BIN_THICKNESS)):
+        assert go(fake, Goal(place), task)[-1] == pytest.approx(place)
+
+
+def test_what_is_pressed_into_the_table_can_be_lifted_and_not_be_pressed_deeper(fake: FakeCell) -> None:
+    task = hold_cube(fake)
+    fake.arm.put(tool_down((0.5, 0.0, 0.045)))
+    with pytest.raises(Blocked, match=r"the held cube 0\.006 m into the table"):
+        motion_to(fake, Goal((0.5, 0.0, 0.044)), task)
+    assert go(fake, Goal((0.5, 0.0, 0.1)), task)[-1, 2] == pytest.approx(0.1)
+
+
+def test_a_load_that_the_plan_did_not_know_of_stops_the_arm_where_it_touches(fake: FakeCell) -> None:
+    hold_cube(fake)
+    places = go(fake, Goal((0.5, 0.0, 0.02)))
+    assert fake.arm.met is not None
+    assert fake.arm.met.startswith("the held cube ran into the table, with the tool at (0.500, 0.000, 0.04")
+    assert places[:, 2].min() == pytest.approx(0.05, abs=SPEED * STEP)
+    assert places[:, 2].min() >= 0.05
+    assert fake.arm.commanded == ["start", "stop"]
+    go(fake, Goal((0.5, 0.0, 0.1)))
+    assert fake.arm.met is None
+
+
+def test_it_goes_to_a_named_pose_straight_or_else_over_the_wall(fake: FakeCell) -> None:
+    aside = fake.arm.poses["aside"].position
+    straight = go(fake, "aside")
+    way = (aside - straight[0]) / np.linalg.norm(aside - straight[0])
+    assert np.linalg.norm(np.cross(straight - straight[0], way), axis=1).max() < 1e-9
+    task = hold_cube(fake)
+    go(fake, Goal((0.3, 0.4, 0.065)), task)
+    places = go(fake, "aside", task)
+    beside = np.hypot(*(places[:, :2] - [0.3, 0.4]).T) > 1e-9
+    assert places[beside, 2].min() == pytest.approx(0.16, abs=1e-3)
+    assert np.allclose(places[-1], aside)
+    assert np.allclose(fake.arm.tool_pose.rotation, fake.arm.poses["aside"].rotation)
 
 
 def test_a_motion_that_runs_into_something_ends_half_way_and_the_next_does_not(fake: FakeCell) -> None:

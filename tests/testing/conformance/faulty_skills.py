@@ -9,8 +9,8 @@ from typing import ClassVar
 from executive.arm import Goal
 from executive.cell import Cell, Steps
 from executive.messages import Item, Target
-from executive.moving import follow, heeding, planned
-from executive.skill import EMPTY, HOLDING, In, Metres, Out, Seconds, Skill, SkillFailed, param, port
+from executive.moving import carry, follow, heeding, planned
+from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Out, Seconds, Skill, SkillFailed, param, port
 
 
 class Push(Skill):
@@ -127,6 +127,29 @@ class AlwaysFails(Pause):
     def run(self, cell: Cell) -> Steps:
         yield
         raise self.failed("tired", "after 1 step")
+
+
+class Shake(Skill):
+    """Shake the held item up and down, around the height at which it is held."""
+
+    held: In[Item] = port(refers="item", doc="the item in the tool")
+    reasons: ClassVar = ("unreachable", "blocked", "dropped")
+    uses: ClassVar = ("arm", "tool")
+    moves: ClassVar = True
+    tool_state: ClassVar = (HOLDING, HOLDING)
+    tool_left: ClassVar = {"dropped": EMPTY, "halt": ANY}
+    strokes: ClassVar = (0.03, -0.03, 0.0)
+
+    def run(self, cell: Cell) -> Steps:
+        x, y, z = (float(value) for value in cell.arm.tool_pose.position)
+        for stroke in self.strokes:
+            yield from carry(self, cell, self.held, Goal((x, y, z + stroke)), "its place")
+
+
+class ShakeInTheAir(Shake):
+    """Shake the held item above the place where it is held."""
+
+    strokes: ClassVar = (0.06, 0.03, 0.0)
 
 
 class NeedsUnknown(Pause):

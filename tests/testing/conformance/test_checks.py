@@ -77,6 +77,11 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
         f'AlwaysFails never succeeded; {EMPTY} it failed with "tired" (after 1 step). Arrange a stage on '
         f"which it can: conformance(AlwaysFails, lambda stage: ...), {ARRANGE}",
     ]),
+    ("arranged", faulty.Shake, [
+        'Shake never succeeded; with an item in the tool it failed with "blocked" (the motion would bring '
+        "the held cube 0.030 m into the table, with the tool at (0.530, -0.110, 0.020) m). Arrange a stage "
+        f"on which it can: conformance(Shake, lambda stage: ...), {ARRANGE}",
+    ]),
     ("arranged", faulty.NeedsUnknown, [
         'NeedsUnknown cannot be tried: no value can be made up for "plan" (dict) and "words" (a text). Give '
         f'it in a test: conformance(NeedsUnknown, lambda stage: {{"plan": ..., "words": ...}}), {ARRANGE}',
@@ -179,7 +184,9 @@ def test_the_guide_lists_every_check_with_its_rule() -> None:
     assert str(conformance(faulty.Pause, name="Break")[0]) == "Break.documented"
 
 
-@pytest.mark.parametrize("skill", [faulty.Push, faulty.Careful], ids=lambda skill: skill.__name__)
+@pytest.mark.parametrize(
+    "skill", [faulty.Push, faulty.Careful, faulty.ShakeInTheAir], ids=lambda skill: skill.__name__
+)
 def test_nothing_is_found_in_a_skill_that_conforms(skill: type[Skill]) -> None:
     for check in conformance(skill):
         check()
