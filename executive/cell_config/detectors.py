@@ -30,7 +30,7 @@ class DetectorConfig(Section):
     """Share of the objects it finds that it gives a wrong class."""
     invented: float = Field(0.02, gt=0, le=100)
     """Objects that are not there, per look."""
-    jitter: float = Field(1.0, ge=1e-3, le=1000)
+    jitter: float = Field(1.0, gt=0, le=1000)
     """Standard deviation of the centre of a found box, along each axis [pixel]."""
 
     @model_validator(mode="after")
