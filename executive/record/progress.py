@@ -9,7 +9,7 @@ from typing import Any
 from executive.events import Event
 
 _OPEN_FATES = ("held", "dropped", "rejected", "skipped", "lost")
-"""States that are told of items in no bin; those on the table go without saying."""
+"""States of items outside of bins that are reported; items on the table are not."""
 
 
 class Progress:

@@ -1,4 +1,4 @@
-"""Settings of a training that whoever starts it chooses."""
+"""Settings of a training that the user chooses."""
 
 from __future__ import annotations
 
