@@ -24,7 +24,7 @@ from executive.vision.evaluation.figures import Evaluation
 from executive.vision.evaluation.misses import WorstMisses
 from executive.vision.evaluation.model_file import FLOOR, MODEL_NAME, model_detector
 from executive.vision.localization.build import build_localizer
-from executive.vision.samples import LabelledImage, count_samples, read_samples
+from executive.vision.samples import LabelledImage, Samples
 
 MAX_OBJECTS = 20
 """Largest number of objects in a scene, if the workspace has room for so many."""
@@ -165,7 +165,8 @@ def _images(
     config = detector.cell
     if dataset is not None or config is None:
         assert dataset is not None
-        yield read_samples(dataset), count_samples(dataset)
+        samples = Samples(dataset)
+        yield iter(samples), len(samples)
         return
     if not scenes.varied:
         with progress(f"rendering {config.cell}") as update:
@@ -183,7 +184,7 @@ def _images(
                 {config.cell: config}, Path(folder), images=scenes.images, seed=scenes.seed, layout="coco",
                 workers=scenes.workers, valid=1.0, progress=update,
             )  # fmt: skip
-        yield read_samples(Path(folder)), scenes.images
+        yield iter(Samples(Path(folder))), scenes.images
 
 
 def _report_progress(

@@ -58,9 +58,9 @@ def _lines(what: str) -> Callable[[int, int], None]:
 
 def report_polygons(folder: Path) -> None:
     """Say how many boxes of labelled images are made from polygons, if any."""
-    from executive.vision.samples import count_polygons
+    from executive.vision.samples import Samples
 
-    if count := count_polygons(folder):
+    if count := Samples(folder).polygon_count:
         click.echo(f"note: {count} polygons in {folder} are used as boxes around them", err=True)
 
 

@@ -32,11 +32,14 @@ def command(dataset: Path, out: Path, start: Path | None, rate: float | None, ep
     """Train the small RF-DETR; needs the extra `train`."""
     with stdout_kept_clean():
         from executive.cli.progress import bar, report_polygons
+        from executive.vision.annotations import is_split
+        from executive.vision.samples import SPLITS
         from executive.vision.train import train
         from executive.vision.training.settings import Settings
 
-        if (dataset / "train").is_dir():
-            report_polygons(dataset / "train")
+        for split in (dataset / name for name in SPLITS):
+            if is_split(split):
+                report_polygons(split)
         with bar("training") as batches:
             train(dataset, out, Settings(start, rate, epochs, seed), _epoch_printer(epochs), batches)
         click.echo(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Annotated, TypeVar
 
 import yaml
@@ -13,6 +13,8 @@ from pydantic import BaseModel, Field, FiniteFloat, ValidationError
 
 from executive.errors import InputError
 from executive.messages import Box
+from executive.safe_text import MAX_QUOTED
+from executive.written_paths import leaves_folder, links_out
 
 COCO = "_annotations.coco.json"
 DATA = ("data.yaml", "data.yml")
@@ -89,6 +91,11 @@ class _Objects:
     polygon_count: int = 0
 
 
+def is_split(folder: Path) -> bool:
+    """Return True if a folder holds labelled images."""
+    return (folder / COCO).is_file() or ((folder / "images").is_dir() and (folder / "labels").is_dir())
+
+
 def read_annotations(split: Path) -> Annotations:
     """Return the annotations of a folder with one split of a data set.
 
@@ -105,15 +112,20 @@ def _read_coco(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
     content = _parse(file, lambda text: _CocoFile.model_validate_json(text))
     names = {category.id: category.name for category in content.categories}
     objects = {image.id: _Objects() for image in content.images}
-    if len(objects) < len(content.images):
-        raise InputError(f"{file}: two images have the same id")
+    for what, values in (
+        ("images have the same id", [image.id for image in content.images]),
+        ("images have the same file_name", [split / image.file_name for image in content.images]),
+        ("categories have the same id", [category.id for category in content.categories]),
+    ):
+        if len(set(values)) < len(values):
+            raise InputError(f"{file}: two {what}")
     for number, one in enumerate(content.annotations):
         if one.image_id not in objects:
             raise InputError(f"{file}: annotations[{number}].image_id: there is no image {one.image_id}")
         if one.category_id not in names:
             raise InputError(
                 f"{file}: annotations[{number}].category_id: there is no category {one.category_id}; "
-                f"there are {', '.join(map(str, names)) or 'none'}"
+                f"there are {', '.join(map(str, names))[:MAX_QUOTED] or 'none'}"
             )
         left, top, width, height = one.bbox
         objects[one.image_id].labels.append(names[one.category_id])
@@ -128,7 +140,7 @@ def _read_yolo(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
     data = next((split.parent / name for name in DATA if (split.parent / name).is_file()), None)
     if data is None:
         raise InputError(f"{split.parent} has no data.yaml, which names the classes of a YOLO data set")
-    content = _parse(data, lambda text: _YoloFile.model_validate(yaml.safe_load(text)))
+    content = _parse(data, lambda text: _YoloFile.model_validate(yaml.load(text, Loader=yaml.BaseLoader)))
     names = dict(enumerate(content.names)) if isinstance(content.names, list) else content.names
     folder = split / "images"
     for path in folder.iterdir():
@@ -152,7 +164,7 @@ def _read_labels(file: Path, names: Mapping[int, str]) -> ImageAnnotation:
         except KeyError:
             raise InputError(f"{file}:{number}: there is no class {label}; there are {len(names)}") from None
         except ValueError:
-            raise InputError(f"{file}:{number}: a line is a class number and shares, not {line!r}") from None
+            raise InputError(f'{file}:{number}: a line is a class number and shares, not "{line}"') from None
         is_polygon = len(numbers) > BOX_VALUES and len(numbers) % 2 == 0
         if len(numbers) != BOX_VALUES and not is_polygon:
             raise InputError(
@@ -161,7 +173,7 @@ def _read_labels(file: Path, names: Mapping[int, str]) -> ImageAnnotation:
             )
         # The comparison is False for numbers that are not finite.
         if not all(-SLACK <= value <= 1 + SLACK for value in numbers):
-            raise InputError(f"{file}:{number}: values are shares of the image, 0 to 1, not {line!r}")
+            raise InputError(f'{file}:{number}: values are shares of the image, 0 to 1, not "{line}"')
         objects.labels.append(name)
         objects.boxes.append(_bounds(numbers) if is_polygon else _corners(numbers))
         objects.polygon_count += is_polygon
@@ -184,12 +196,12 @@ def _find_image(folder: Path, name: str, place: str) -> Path:
     Raises:
         InputError: It is missing, no regular file, or outside of the folder.
     """
-    written, path = PurePosixPath(name), folder / name
-    if not name or written.is_absolute() or ".." in written.parts:
+    path = folder / name
+    if not name or leaves_folder(name):
         raise InputError(f'{place}: "{name}" is not below {folder}')
     if not os.path.isfile(path):
         raise InputError(f'{place}: "{name}" is no file in {folder}')
-    if not path.resolve().is_relative_to(folder.resolve()):
+    if links_out(folder, name):
         raise InputError(f'{place}: "{name}" is a link out of {folder}')
     return path
 
@@ -218,5 +230,5 @@ def _parse(file: Path, parse: Callable[[str], ContentT]) -> ContentT:
         first = error.errors()[0]
         keys = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in first["loc"])
         raise InputError(f"{file}: {keys.removeprefix('.') or 'content'}: {first['msg']}") from error
-    except (ValueError, RecursionError) as error:
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise InputError(f"{file} cannot be read: {error}") from error

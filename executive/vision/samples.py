@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from executive.errors import InputError
 from executive.geometry import Array
 from executive.messages import Box
-from executive.vision.annotations import COCO, read_annotations
+from executive.vision.annotations import COCO, is_split, read_annotations
 
 SPLITS = ("test", "valid", "val", "train")
 """Folders of a data set in which labelled images are sought, those that no training has used first."""
@@ -48,43 +48,46 @@ class LabelledImage:
     second: NDArray[np.uint8] | None = None
 
 
-def read_samples(folder: Path) -> Iterator[LabelledImage]:
-    """Yield the labelled images of a split, or of the first of a data set's splits that exists.
+class Samples:
+    """The labelled images of a split, or of the first of a data set's splits that exists.
+
+    Iteration reads one image after the other.
+
+    Args:
+        folder: The split or the data set.
+
+    Attributes:
+        polygon_count: Number of boxes that are made from polygons.
 
     Raises:
-        InputError: There are none, or an image cannot be read.
+        InputError: There are no labelled images, or the annotations are damaged.
     """
-    split = _split(folder)
-    annotations = read_annotations(split)
-    ignored, truth = (_read_json(split / name) for name in ("ignored.json", "truth.json"))
-    for path, annotation in annotations.items():
-        image = read_image(path)
-        yield LabelledImage(
-            path.name,
-            image,
-            annotation.labels,
-            annotation.boxes_in_pixels(image.shape[1], image.shape[0]),
-            tuple(map(tuple, ignored.get(path.name, ()))),
-            truth.get(path.name, {}),
-        )
 
+    def __init__(self, folder: Path) -> None:
+        self._split = _split(folder)
+        self._annotations = read_annotations(self._split)
+        self.polygon_count = sum(one.polygon_count for one in self._annotations.values())
 
-def count_samples(folder: Path) -> int:
-    """Return how many labelled images `read_samples` yields.
+    def __len__(self) -> int:
+        return len(self._annotations)
 
-    Raises:
-        InputError: There are none.
-    """
-    return len(read_annotations(_split(folder)))
+    def __iter__(self) -> Iterator[LabelledImage]:
+        """Yield the images.
 
-
-def count_polygons(folder: Path) -> int:
-    """Return how many boxes `read_samples` makes from polygons.
-
-    Raises:
-        InputError: There are no labelled images.
-    """
-    return sum(one.polygon_count for one in read_annotations(_split(folder)).values())
+        Raises:
+            InputError: An image cannot be read.
+        """
+        ignored, truth = (_read_json(self._split / name) for name in ("ignored.json", "truth.json"))
+        for path, annotation in self._annotations.items():
+            image = read_image(path)
+            yield LabelledImage(
+                path.name,
+                image,
+                annotation.labels,
+                annotation.boxes_in_pixels(image.shape[1], image.shape[0]),
+                tuple(map(tuple, ignored.get(path.name, ()))),
+                truth.get(path.name, {}),
+            )
 
 
 def read_image(path: Path) -> NDArray[np.uint8]:
@@ -106,7 +109,7 @@ def _split(folder: Path) -> Path:
         InputError: There is none.
     """
     for split in (folder, *(folder / name for name in SPLITS)):
-        if (split / COCO).is_file() or ((split / "images").is_dir() and (split / "labels").is_dir()):
+        if is_split(split):
             return split
     raise InputError(
         f"{folder} holds no labelled images: {COCO} (COCO) or images/ and labels/ (YOLO) were looked "

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from executive.errors import InputError
-from executive.vision.annotations import read_annotations
+from executive.vision.annotations import is_split, read_annotations
 from executive.vision.detectors.onnx_model import read_labels
 from executive.vision.evaluation.model_file import evaluate_folder
 from executive.vision.model_card import ModelCard, read_epochs
@@ -89,9 +89,9 @@ def _check(dataset: Path, start: Path | None) -> None:
             f"{dataset} is not a data set: it needs train/_annotations.coco.json and "
             "valid/_annotations.coco.json (COCO), or data.yaml (YOLO); a Roboflow export has one of them"
         )
-    for name in SPLITS:
-        if (dataset / name).is_dir():
-            read_annotations(dataset / name)
+    for split in (dataset / name for name in SPLITS):
+        if is_split(split):
+            read_annotations(split)
 
 
 def _validation(dataset: Path) -> Path:

@@ -12,7 +12,7 @@ import pytest
 
 from executive.errors import InputError
 from executive.vision.annotations import read_annotations
-from executive.vision.samples import count_polygons
+from executive.vision.samples import Samples
 
 Content = dict[str, Any]
 
@@ -85,6 +85,10 @@ BOX = ("annotations", 0, "bbox")
         (changed(*BOX, value=[1, 2, -3, 4]), "bbox[2]: Input should be greater than or equal to 0"),
         (changed(*BOX, value="box"), "annotations[0].bbox: Input should be"),
         (changed("images", value=[{"id": 1, "file_name": "a.jpg"}] * 2), "two images have the same id"),
+        (changed("images", value=[{"id": 1, "file_name": "a.jpg"}, {"id": 2, "file_name": "./a.jpg"}]),
+         "two images have the same file_name"),
+        (changed("categories", value=[{"id": 3, "name": "duck"}, {"id": 3, "name": "cube"}]),
+         "two categories have the same id"),
         (changed(*NAME, value="b.jpg"), 'images[0].file_name: "b.jpg" is no file in '),
         (changed(*NAME, value="../../b.jpg"), 'images[0].file_name: "../../b.jpg" is not below '),
         (changed(*NAME, value="/etc/passwd"), 'images[0].file_name: "/etc/passwd" is not below '),
@@ -126,7 +130,7 @@ def test_boxes_and_polygons_of_yolo_are_read(yolo: Callable[..., Path]) -> None:
     box, polygon = annotation.boxes_in_pixels(100, 200)
     assert box == pytest.approx((40, 60, 60, 140))
     assert polygon == pytest.approx((10, 20, 30, 40))
-    assert count_polygons(split) == 1
+    assert Samples(split).polygon_count == 1
 
 
 @pytest.mark.parametrize(
@@ -146,7 +150,7 @@ def test_boxes_and_polygons_of_yolo_are_read(yolo: Callable[..., Path]) -> None:
         (
             "",
             "names: !!python/name:os.system ''\n",
-            "data.yaml:1: no YAML: could not determine",
+            "data.yaml: names.dict[int,str]: Input should be a valid dictionary",
         ),
     ],
 )
@@ -156,3 +160,11 @@ def test_a_damaged_yolo_folder_is_one_error(
     with pytest.raises(InputError) as raised:
         read_annotations(yolo(labels, data))
     assert error in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    "tag", ["!!bool foo", "!!timestamp foo", "!!int ''", "!!python/name:os.system ''", "yes"]
+)
+def test_names_of_classes_are_text_whatever_their_tag(yolo: Callable[..., Path], tag: str) -> None:
+    (annotation,) = read_annotations(yolo("0 0.5 0.5 0.2 0.4\n", f"names: [{tag}]\n")).values()
+    assert all(isinstance(label, str) for label in annotation.labels)

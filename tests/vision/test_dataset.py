@@ -10,7 +10,7 @@ import yaml
 
 from executive.errors import InputError
 from executive.vision.dataset import Entry, image_path, save_image, write_annotations
-from executive.vision.samples import count_samples, read_samples
+from executive.vision.samples import Samples
 
 CLASSES = ("cube", "duck")
 BOXES = ((10.0, 20.0, 30.0, 60.0), (50.5, 10.25, 60.0, 20.0))
@@ -56,31 +56,30 @@ def test_yolo_boxes_are_centre_and_size_relative_to_the_image(tmp_path):
 
 
 def test_the_images_that_no_training_used_are_read_as_they_were_written(root):
-    (sample,) = read_samples(root)
+    (sample,) = Samples(root)
     assert (sample.file, sample.labels, sample.image.shape) == ("a.jpg", ("duck", "cube"), (64, 128, 3))
     assert np.array(sample.boxes) == pytest.approx(np.array(BOXES), abs=1e-3)
     assert (sample.ignored, sample.truth) == (IGNORED, {"camera": "overhead"})
     assert sample.image[30, 60, 0] > 150 > 50 > sample.image[30, 60, 2]
-    assert count_samples(root) == 1
-    (sample,) = read_samples(root / "train")
+    assert len(Samples(root)) == 1
+    (sample,) = Samples(root / "train")
     assert (sample.file, sample.labels, sample.boxes, sample.ignored) == ("b.jpg", (), (), ())
 
 
 def test_what_cannot_be_written_or_read_is_explained(tmp_path):
     with pytest.raises(InputError, match='"voc" is unknown; there are coco and yolo'):
         write_annotations(tmp_path, "voc", ENTRIES, CLASSES)
-    for use in (lambda folder: list(read_samples(folder)), count_samples):
-        with pytest.raises(InputError, match=r"no labelled images: _annotations\.coco\.json"):
-            use(tmp_path)
+    with pytest.raises(InputError, match=r"no labelled images: _annotations\.coco\.json"):
+        Samples(tmp_path)
     write_annotations(tmp_path, "yolo", ENTRIES, CLASSES)
     (tmp_path / "valid/images").mkdir()
     (tmp_path / "data.yaml").unlink()
     with pytest.raises(InputError, match=r"has no data\.yaml, which names the classes"):
-        list(read_samples(tmp_path))
+        list(Samples(tmp_path))
 
 
 def test_a_damaged_image_is_named(root):
     (damaged,) = (root / "valid").rglob("a.jpg")
     damaged.write_bytes(b"no picture")
     with pytest.raises(InputError, match=r"a\.jpg"):
-        list(read_samples(root))
+        list(Samples(root))

@@ -6,7 +6,7 @@ import os.path
 from collections.abc import Iterator
 from collections.abc import Mapping as Mapped
 from dataclasses import dataclass, replace
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 from executive.cell_config import CellConfig
 from executive.errors import InputError
@@ -18,6 +18,7 @@ from executive.mission.source import Source
 from executive.mission.text.files import below, read_source
 from executive.mission.text.yaml_text import Entry, Mapping, Node, Scalar, parse_yaml, plain
 from executive.mission.words import describe
+from executive.written_paths import leaves_folder, links_out
 
 BASE = "base"
 """The key that names the file which gives every key of the first level that this one does not."""
@@ -224,11 +225,8 @@ def _models_outside(file: CellFile, config: CellConfig, folders: Mapped[Source, 
     """Yield every model file that does not lie below the folder of the file that names it."""
     assert file.root is not None
     for keys, model in _models(config):
-        written = PurePosixPath(model)
         folder = folders.get(mark_of(file.root, keys).source, folders[file.source])
-        if written.is_absolute() or ".." in written.parts:
+        if leaves_folder(model):
             yield file.finding(keys, "outside", f'"{model}" must be a relative path without ".."')
-        elif os.path.isfile(folder / model) and not (folder / model).resolve().is_relative_to(
-            folder.resolve()
-        ):
+        elif os.path.isfile(folder / model) and links_out(folder, model):
             yield file.finding(keys, "outside", f'"{model}" is a link out of {folder}')

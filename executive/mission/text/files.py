@@ -10,6 +10,7 @@ import executive
 from executive.errors import InputError
 from executive.mission.findings import alternatives
 from executive.mission.source import Source
+from executive.written_paths import leaves_folder, links_out
 
 _LARGEST = 1_000_000
 
@@ -53,8 +54,7 @@ def below(folder: Path, reference: str, shipped: Sequence[str] = ("",)) -> Path:
     Raises:
         InputError: The reference leaves the folder, or there is no such file.
     """
-    written = PurePosixPath(reference)
-    if written.is_absolute() or ".." in written.parts or "\\" in reference:
+    if leaves_folder(reference):
         raise InputError(
             f'"{reference}" is not below the folder of the file that names it; '
             'give a relative path without ".."'
@@ -63,12 +63,16 @@ def below(folder: Path, reference: str, shipped: Sequence[str] = ("",)) -> Path:
     for base in bases:
         path = base / reference
         if os.path.isfile(path):
-            if not path.resolve().is_relative_to(base.resolve()):
+            if links_out(base, reference):
                 raise InputError(f'"{reference}" is a link out of {base}')
             return path
         if os.path.lexists(path):
             raise InputError(f'"{reference}" in {_shown(base)} is {_kind_of(path)}, not a file')
-    folders = [(base, base / written.parent) for base in bases if os.path.isdir(base / written.parent)]
+    folders = [
+        (base, base / PurePosixPath(reference).parent)
+        for base in bases
+        if os.path.isdir(base / PurePosixPath(reference).parent)
+    ]
     known = {p.relative_to(base).as_posix() for base, folder in folders for p in folder.glob("*.yaml")}
     hint = alternatives(reference, sorted(known), "There are")
     searched = " or ".join(dict.fromkeys(map(_shown, bases)))

@@ -9,7 +9,7 @@ from executive.cell_config import DetectorConfig
 from executive.vision.evaluation.asking import CellDetector
 from executive.vision.evaluation.evaluate import evaluate
 from executive.vision.evaluation.figures import Evaluation
-from executive.vision.samples import read_samples
+from executive.vision.samples import Samples
 
 FLOOR = 0.01
 """Confidence from which boxes of a model file count for the mean average precision."""
@@ -42,4 +42,4 @@ def evaluate_folder(model: Path, labels: Path, folder: Path, threshold: float) -
     """
     detector = CellDetector({MODEL_NAME: model_detector(model, labels)}, MODEL_NAME, base=Path())
     with contextlib.closing(detector):
-        return evaluate(detector, read_samples(folder), threshold=threshold)
+        return evaluate(detector, Samples(folder), threshold=threshold)
