@@ -13,7 +13,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from types import FrameType
 from typing import TypeVar
 
-from executive.runtime.signals import SIGNALS
+from executive.runtime.signals import SIGNALS, handle_signals
 from executive.workers import Workers, kill_workers
 
 J = TypeVar("J")
@@ -109,9 +109,5 @@ def _wishes() -> Iterator[threading.Event]:
         del number, frame
         wished.set()
 
-    previous = {number: signal.signal(number, wish) for number in SIGNALS}
-    try:
+    with handle_signals(SIGNALS, wish):
         yield wished
-    finally:
-        for number, handler in previous.items():
-            signal.signal(number, handler)

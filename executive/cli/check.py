@@ -16,10 +16,6 @@ if TYPE_CHECKING:
     from executive.mission.flow.endings import Ending
 
 
-MAX_LISTED_FINDINGS = 1000
-"""Largest number of findings of a mission in the output of `--json`."""
-
-
 @click.command(name="check")
 @click.argument("missions", metavar="MISSION...", nargs=-1, required=True)
 @overrides_option
@@ -33,7 +29,7 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
     with stdout_kept_clean():
         from executive.discovery import discover
         from executive.errors import InputError
-        from executive.mission.findings import Finding
+        from executive.mission.findings import MAX_LISTED_FINDINGS, Finding
         from executive.mission.load import load_mission
         from executive.runtime.cells import cell_kind
 

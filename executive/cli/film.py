@@ -39,7 +39,7 @@ def command(
         from executive.cli.progress import bar
         from executive.record.find_run import find_run
         from executive.record.run_directory import RunDirectory
-        from executive.view.film.film import duration, film
+        from executive.view.film.film import HOLD, film
         from executive.view.film.formats import file_for, format_of
         from executive.view.film.source import Source
 
@@ -50,7 +50,8 @@ def command(
         speed = speed or format.speed
         with file_for(file, force=force) as part:
             if not quiet:
-                click.echo(f"making a film of {duration(source, format, speed):.0f} s", err=True)
+                seconds = source.entries[-1]["clock"] / speed + HOLD
+                click.echo(f"making a film of about {seconds:.0f} s", err=True)
             with bar("frames", quiet=quiet, lines=True) as progress:
                 frames = film(source, part, format, speed=speed, workers=workers, progress=progress)
         made = {

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 import difflib
 import io
 import signal
 import sys
 import tempfile
-import threading
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from importlib import import_module
 from typing import Any
 
@@ -18,6 +16,7 @@ import click
 
 from executive.cli.streams import tolerant_streams
 from executive.errors import ExecutiveError
+from executive.runtime.signals import TERMINATION, handle_signals
 from executive.safe_text import shorten_quotations
 
 BAD_INPUT, BROKEN, INTERRUPTED = 2, 3, 130
@@ -68,7 +67,7 @@ class Executive(click.Group):
         args = list(sys.argv[1:] if args is None else args)
         with tolerant_streams():
             try:
-                with _signals_as_ctrl_c():
+                with handle_signals(TERMINATION, signal.default_int_handler):
                     code = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
             except (Exception, KeyboardInterrupt) as error:
                 code = _show_error(error, debug="--debug" in args)
@@ -93,27 +92,6 @@ def _show_error(error: BaseException, *, debug: bool) -> int:
     if not debug:
         click.echo(_apology(error), err=True)
     return BROKEN
-
-
-@contextlib.contextmanager
-def _signals_as_ctrl_c() -> Iterator[None]:
-    """Let SIGTERM and SIGHUP interrupt a command as Ctrl-C does, if nothing else handles them.
-
-    Signals that were ignored at the start of the process (`nohup`) stay ignored. Python handles signals in
-    the main thread alone.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    previous = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
-    handled = {number: handler for number, handler in previous.items() if handler is not signal.SIG_IGN}
-    for number in handled:
-        signal.signal(number, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        for number, handler in handled.items():
-            signal.signal(number, handler)
 
 
 def _apology(error: BaseException) -> str:

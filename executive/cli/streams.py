@@ -17,15 +17,18 @@ class TolerantStream(io.TextIOBase):
 
     Args:
         stream: Where to write; None: the process was started with this stream closed.
+        drawing: True to write control characters as they are: a library draws on the terminal.
 
     Attributes:
-        drawing: True to write control characters as they are: a library draws on the terminal.
         error: First write error as text, or "".
     """
 
     def __init__(self, stream: TextIO | None, *, drawing: bool = False) -> None:
+        if isinstance(stream, io.TextIOWrapper):
+            # A character that the encoding lacks is escaped; it would be an error otherwise.
+            stream.reconfigure(errors="backslashreplace")
         self._stream = stream
-        self.drawing = drawing
+        self._drawing = drawing
         self.error = ""
 
     @property
@@ -39,7 +42,7 @@ class TolerantStream(io.TextIOBase):
             self.error = "it is closed"
         elif not self.error:
             try:
-                self._stream.write(text if self.drawing else escape_control_characters(text))
+                self._stream.write(text if self._drawing else escape_control_characters(text))
             except OSError as error:
                 self._give_up(self._stream, error)
         return len(text)

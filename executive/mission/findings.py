@@ -14,8 +14,8 @@ from executive.safe_text import shorten_quotations
 
 _WINDOW = 140
 _MOST_LISTED = 24
-MAX_PRINTED_FINDINGS = 50
-"""Largest number of findings that a message lists; the others are counted."""
+MAX_PRINTED_FINDINGS, MAX_LISTED_FINDINGS = 50, 1000
+"""Largest numbers of findings that a message and `--json` list; a message counts the others."""
 _SECRET = re.compile(
     r"(?i)(\b\w*(?:api_?key|token|secret|password|authorization)\w*[\"']?\s*[:=]\s*|://(?=\S+@)).*"
 )
@@ -93,7 +93,8 @@ class MissionError(InputError):
 
     def __init__(self, findings: Iterable[Finding]) -> None:
         self.findings = tuple(findings)
-        super().__init__("\n".join(describe_findings(self.findings)))
+        # Without the constructor of InputError: the texts of findings are shortened already.
+        Exception.__init__(self, "\n".join(describe_findings(self.findings)))
 
 
 def describe_findings(findings: Sequence[Finding]) -> list[str]:
@@ -101,7 +102,7 @@ def describe_findings(findings: Sequence[Finding]) -> list[str]:
     texts = [str(finding) for finding in findings[:MAX_PRINTED_FINDINGS]]
     others = len(findings) - len(texts)
     return (
-        [*texts, f"and {others} more findings; `executive check --json` lists up to 1000"]
+        [*texts, f"and {others} more findings; `executive check --json` lists up to {MAX_LISTED_FINDINGS}"]
         if others
         else texts
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class GuardedView:
-    """Forwards all calls to a view until the first error; from then on, only `close`. Implements `View`.
+    """Forwards all calls to a view until its first error, and then closes it. Implements `View`.
 
     Args:
         view: The view.
@@ -36,9 +37,7 @@ class GuardedView:
 
     def close(self) -> None:
         """Stop showing."""
-        failed, self.problem = self.problem, ""
         self._forward(self._view.close)
-        self.problem = failed or self.problem
 
     def note(self, sentence: str) -> None:
         """Show a sentence about the record."""
@@ -52,3 +51,6 @@ class GuardedView:
         except Exception as error:
             name = type(self._view).__name__
             self.problem = f"the view {name} failed during the run: {type(error).__name__}: {error}"
+            # An open view would keep the screen and the keyboard.
+            with contextlib.suppress(Exception):
+                self._view.close()

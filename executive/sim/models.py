@@ -23,6 +23,7 @@ from executive.geometry import Array, Pose
 from executive.layout import object_class
 from executive.messages import ObjectClass
 from executive.workcell import KeyPath
+from executive.written_paths import leaves_folder, links_out
 
 TOLERANCE = 0.003
 """Difference between a cell file's figure and the model's own from which it counts as wrong [m]."""
@@ -175,7 +176,7 @@ def _wrong_sizes(label: str, kind: ObjectConfig) -> Iterator[tuple[str, str]]:
         return
     for name, actual in (("height", mesh.top - mesh.bottom), ("radius", mesh.radius)):
         stated = getattr(kind, name)
-        if abs(stated - actual) > TOLERANCE:
+        if not abs(stated - actual) <= TOLERANCE:  # True if the size is not a number
             yield (
                 name,
                 f"the model of {label} has a {name} of {actual:.4f} m, not {stated:g} m; "
@@ -213,7 +214,12 @@ def load_mesh(config: ObjectConfig) -> Mesh:
         mesh = visual.find("geometry/mesh")
         if mesh is None or not mesh.get("filename", "").endswith(".obj"):
             raise InputError(f"{path}: only visuals made of .obj meshes can be labelled")
-        corners, faces = read_obj(path.parent / mesh.get("filename", ""))
+        written = mesh.get("filename", "")
+        if leaves_folder(written) or links_out(path.parent, written):
+            raise InputError(
+                f'the model {path.name} names the mesh "{written}", which is outside of its folder'
+            )
+        corners, faces = read_obj(find_model(str(path.parent / written)))
         scale = np.array(_numbers(mesh.get("scale"), (1.0, 1.0, 1.0)))
         origin = visual.find("origin")
         rpy = _numbers(None if origin is None else origin.get("rpy"), (0.0, 0.0, 0.0))
@@ -260,7 +266,7 @@ def read_obj(path: Path) -> tuple[Array, NDArray[np.intp]]:
                 triangles += [(corners[0], a, b) for a, b in pairwise(corners[1:])]
         faces = np.array(triangles, dtype=np.intp).reshape(-1, 3)
         return _checked(np.array(vertices, dtype=float), faces)
-    except (OSError, ValueError, IndexError) as error:
+    except (OSError, ValueError, IndexError, OverflowError) as error:
         raise InputError(f"the model {path.name} is no Wavefront mesh: {error}") from None
 
 

@@ -30,10 +30,10 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         return 30
 
     monkeypatch.setattr(
-        "executive.view.film.source.Source", lambda directory: SimpleNamespace(directory=directory)
+        "executive.view.film.source.Source",
+        lambda directory: SimpleNamespace(directory=directory, entries=[{"clock": 4.0}]),
     )
     monkeypatch.setattr("executive.view.film.film.film", film)
-    monkeypatch.setattr("executive.view.film.film.duration", lambda source, format, speed: 1.2)
     return path
 
 
@@ -44,7 +44,7 @@ def test_a_film_is_made_where_it_was_wanted(run: Path, tmp_path: Path) -> None:
     assert out.read_text() == "10-00-00_sort_s5 .mp4 1 3"
     told = json.loads(done.stdout)
     assert told == {"file": str(out), "frames": 30, "seconds": 1.2, "size": out.stat().st_size}
-    assert done.stderr.startswith("making a film of 1 s\n")
+    assert done.stderr.startswith("making a film of about 6 s\n")
     assert f"{out}: 1.2 s, 0.0 MB" in done.stderr.replace("\n", "")
 
 

@@ -57,8 +57,8 @@ def use(view: GuardedView) -> None:
     [
         ("open", ["open", "close"]),
         ("event", ["open", "event", "close"]),
-        ("close", ["open", "event", "event", "close"]),
-        ("note", ["open", "event", "event", "close", "note"]),
+        ("close", ["open", "event", "event", "close", "close"]),
+        ("note", ["open", "event", "event", "close", "note", "close"]),
     ],
 )
 def test_a_view_that_failed_is_only_closed(method: str, calls: list[str]) -> None:

@@ -35,12 +35,23 @@ def test_a_file_that_is_no_urdf_is_an_error(content: str, error: str, tmp_path: 
     assert str(raised.value).startswith(error)
 
 
-@pytest.mark.parametrize("content", ["", "f 1 2 3\n", "v a b c\n", "v 0 0 0\nf\n", "v 0 0 nan\nf 1 1 1\n"])
+@pytest.mark.parametrize(
+    "content", ["", "f 1 2 3\n", "v a b c\n", "v 0 0 0\nf\n", "v 0 0 nan\nf 1 1 1\n", f"f {10**20} 1 2\n"]
+)
 def test_a_file_that_is_no_mesh_is_an_error(content: str, tmp_path: Path) -> None:
     (tmp_path / "m.obj").write_text(content)
     config = ObjectConfig(mesh=str(tmp_path / "m.obj"), height=0.05, radius=0.03)
     with pytest.raises(InputError, match=r"^the model m\.obj is no Wavefront mesh: "):
         load_mesh(config)
+
+
+@pytest.mark.parametrize("mesh", ["/etc/x.obj", "../x.obj", "link.obj"])
+def test_a_mesh_outside_of_the_folder_of_its_urdf_is_not_opened(mesh: str, tmp_path: Path) -> None:
+    (tmp_path / "link.obj").symlink_to("/etc/passwd")
+    visual = f"<visual><geometry><mesh filename='{mesh}'/></geometry></visual>"
+    (tmp_path / "m.urdf").write_text(f"<robot>{visual}</robot>")
+    with pytest.raises(InputError, match=r"names the mesh .*, which is outside of its folder$"):
+        load_mesh(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
 
 
 def test_a_name_that_no_file_can_have_is_no_model() -> None:

@@ -38,7 +38,8 @@ def film(
         workers: Processes that take the pictures.
         progress: Takes the number of frames that are done, and of all frames.
     """
-    steps = _steps_of_frames(source, format, speed)
+    each = speed / format.rate / source.start["step"]
+    steps = shown_steps(steps_in(source.directory.world), each)
     held = round(HOLD * format.rate)
 
     def counted() -> Generator[Image.Image, None, None]:
@@ -49,16 +50,6 @@ def film(
     with closing(_pages(source, steps, held, speed, workers)) as pages:
         format.write(file, counted(), format.rate)
     return len(steps) + held
-
-
-def duration(source: Source, format: Format, speed: float) -> float:
-    """Return the duration of the film of a run [s]; the arguments are those of `film`."""
-    return len(_steps_of_frames(source, format, speed)) / format.rate + HOLD
-
-
-def _steps_of_frames(source: Source, format: Format, speed: float) -> list[int]:
-    each = speed / format.rate / source.start["step"]
-    return shown_steps(steps_in(source.directory.world), each)
 
 
 def shown_steps(steps: int, each: float) -> list[int]:

@@ -104,9 +104,11 @@ class Terminal:
 
     def _show(self, wanted: bool) -> None:
         """Take the terminal and its keyboard, or leave them to others who want to write and read there."""
-        (self._live.start if wanted else self._live.stop)()
-        if self._keys is not None:
-            (self._keys.listen if wanted else self._keys.leave)()
+        try:
+            (self._live.start if wanted else self._live.stop)()
+        finally:
+            if self._keys is not None:
+                (self._keys.listen if wanted else self._keys.leave)()
 
     def _tree(self) -> RenderableType:
         """Return the running path and its surroundings: a whole mission is taller than a terminal."""
