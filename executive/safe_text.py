@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 
 MAX_QUOTED = 200
-"""Largest number of characters of input that a message repeats in one piece."""
+"""Maximum length of a quotation or word in a message [characters]."""
 _CONTROL = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ud800-\udfff\ufeff]"
 )
-"""Characters that control a terminal, except tab and line feed, and halves of surrogate pairs."""
+"""Control characters except tab and line feed, invisible Unicode format characters and line separators, and
+lone surrogates."""
 _PIECE = re.compile(r'"[^"\n]*"|\S+')
 """A quotation or a word."""
 

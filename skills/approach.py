@@ -13,22 +13,24 @@ from executive.messages import Target
 from executive.moving import follow, planned
 from executive.skill import EMPTY, In, Metres, Skill, param, port
 
-EARLY = 0.001
-"""How far above the part in which contact is expected it means that something is in the way [m]."""
+EARLY_CONTACT_MARGIN = 0.001
+"""Height above the guarded part of the descent from which contact means that an obstacle is in the way
+[m]."""
 
 
 class Approach(Skill):
     """Touch the target with the cup from above.
 
-    One motion: over the target and down, fast, then feeling its way through the last part, since the surface
-    may be higher or lower than a camera can tell. Succeeds on contact near the expected height. Every attempt
-    after a failed one comes down a little beside the last: on a spiral, or further round the ring of a part
-    with a hole. A touch at a height that the target's class does not have is a contradiction;
-    a lower touch at the height of no class is one if it is the second, or if looks do not prove the class.
+    One motion: fast above and towards the target, then a slow guarded descent, because the camera does not
+    measure the height of the surface exactly. Succeeds on contact near the expected height. Each further
+    attempt is offset from the previous one: along a spiral, or along the ring of an object with a hole. A
+    touch at a wrong height contradicts the target's class. Exceptions: an earlier touch matched the class,
+    or it is the first touch too low for the class, at the height of no other class, and looks alone prove
+    the class.
     """
 
     target: In[Target] = port(doc="where to go")
-    overtravel: Metres = param(OVERTRAVEL, ge=0, le=0.03, doc="how far below the expected surface to feel")
+    overtravel: Metres = param(OVERTRAVEL, ge=0, le=0.03, doc="how far below the surface to search contact")
     offset: Metres = param(SPACING, ge=0, le=0.02, doc="spacing of the spiral of further attempts")
     reasons: ClassVar = ("stale", "unreachable", "blocked", "contradicted", "no_contact")
     uses: ClassVar = ("arm", "tool")
@@ -37,12 +39,12 @@ class Approach(Skill):
 
     @classmethod
     def shortest(cls, least: LeastTimes, given: Mapping[str, Any]) -> float:
-        """Return the time of the guarded part of the way down [s]; the arm may stand above the target."""
+        """Return the duration of the guarded descent [s]; the arm may already be above the target."""
         del given
         return least.descent
 
     def run(self, cell: Cell) -> Steps:
-        """Go there, down to the touch."""
+        """Move to the target and descend until the cup touches something."""
         item, tool = self.target.item, cell.tool
         if not cell.ledger.is_fresh(self.target):
             seen = f"{item} was seen at {self.target.stamp:.2f} s"
@@ -53,14 +55,14 @@ class Approach(Skill):
 
         motion = yield from planned(self, cell.arm, ask)
         goal, _ = ask()
-        yield from follow(self, cell, motion, until=_landing(tool))
+        yield from follow(self, cell, motion, until=_new_contact_check(tool))
         height, highest = float(cell.arm.tool_pose.position[2]), goal.position[2] + goal.guarded
         expected = f"expected at {(highest - cell.descent) * 1000:.0f} mm"
         if not tool.touching:
             cell.ledger.missed(item)
-            felt = f"nothing felt down to {height * 1000:.0f} mm"
+            felt = f"no contact down to {height * 1000:.0f} mm"
             raise self.failed("no_contact", f"{felt}, {item} was {expected}")
-        if height > highest + EARLY:
+        if height > highest + EARLY_CONTACT_MARGIN:
             cell.ledger.bumped()
             met = f"the tool met something at {height * 1000:.0f} mm"
             raise self.failed("blocked", f"{met}, on its way to {item}, which was {expected}")
@@ -70,8 +72,8 @@ class Approach(Skill):
             raise self.failed("contradicted", f"{item} may be no {self.target.label}: {doubt}")
 
 
-def _landing(tool: Tool) -> Callable[[], bool]:
-    """Return what tells whether the tool touches something, once it has left what it touches now."""
+def _new_contact_check(tool: Tool) -> Callable[[], bool]:
+    """Return a function that returns True on a new contact; a contact that exists now must first end."""
     away = not tool.touching
 
     def landed() -> bool:

@@ -16,7 +16,8 @@ MAX_BOXES = 60
 """Maximum number of boxes in one look, doubtful ones and unknown labels included. Shipped cells hold at most
 20 objects, and the time to match boxes with items grows faster than their number."""
 MAX_PIXEL = 1e5
-"""Largest coordinate of a box [pixel]: no image is so large, and squares of much larger ones overflow."""
+"""Largest valid coordinate of a box [pixel]: no image is larger, and the squares of much larger coordinates
+overflow."""
 MAX_LABEL = 100
 """Largest number of characters of a label: it appears in messages and on the terminal."""
 MAX_SECOND_RATIO = 0.5

@@ -1,4 +1,4 @@
-"""The arm, its tool, and how they move about."""
+"""Sections of a cell file: arm, tool and motion."""
 
 from __future__ import annotations
 
@@ -6,17 +6,19 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from executive.cell_config.section import SMALLEST, Distance, Force, Joints, Length, Name, Seconds, Section
+from executive.cell_config.section import MIN_LENGTH, Distance, Force, Joints, Length, Name, Seconds, Section
 
-Opening = Annotated[float, Field(ge=1, le=360)]
+MaxJointAngle = Annotated[float, Field(ge=1, le=360)]
 """Largest joint angle to either side [degree]: under 1 degree a joint is fixed."""
 Speed = Annotated[float, Field(ge=1, le=1000)]
 """[degree/s]; the fastest arms turn a joint by 1000 degrees per second."""
 Acceleration = Annotated[float, Field(ge=0.1, le=1000)]
-"""[rad/s²]; under 0.1 an arm takes minutes for a motion, and 1000 is ten times the fastest arms'."""
+"""[rad/s²]; below 0.1 a motion takes minutes, and 1000 is ten times the acceleration of the fastest arms."""
 Jerk = Annotated[float, Field(ge=1, le=1e5)]
-"""[rad/s³]; the bounds are those of the acceleration, reached within 0.1 s and 0.01 s."""
-Openings = tuple[Opening, Opening, Opening, Opening, Opening, Opening, Opening]
+"""[rad/s³]; the lower bound reaches 0.1 rad/s² in 0.1 s, the upper bound 1000 rad/s² in 0.01 s."""
+MaxJointAngles = tuple[
+    MaxJointAngle, MaxJointAngle, MaxJointAngle, MaxJointAngle, MaxJointAngle, MaxJointAngle, MaxJointAngle
+]
 Speeds = tuple[Speed, Speed, Speed, Speed, Speed, Speed, Speed]
 Accelerations = tuple[
     Acceleration, Acceleration, Acceleration, Acceleration, Acceleration, Acceleration, Acceleration
@@ -25,11 +27,11 @@ Jerks = tuple[Jerk, Jerk, Jerk, Jerk, Jerk, Jerk, Jerk]
 
 
 class LimitsConfig(Section):
-    """Joint limits of the arm, shape (7,) each, with where they come from."""
+    """Joint limits of the arm, shape (7,) each, and their source."""
 
     source: str
-    """Where the figures were taken from."""
-    position_deg: Openings
+    """Source of the limits."""
+    position_deg: MaxJointAngles
     """Largest joint angle to either side [degree]."""
     velocity_deg: Speeds
     """[degree/s]"""
@@ -49,7 +51,7 @@ class ArmConfig(Section):
     urdf: str = "kuka_iiwa/model.urdf"
     """Model of the arm, in pybullet_data."""
     limits: LimitsConfig
-    """What it may do."""
+    """Joint limits of the arm."""
     poses_deg: dict[Name, Joints] = Field(min_length=1)
     """Named joint poses; `home` is where a run begins."""
 
@@ -61,7 +63,7 @@ class ArmConfig(Section):
 
 
 class ToolConfig(Section):
-    """A suction tool with one bellows cup; the constants are justified by the suction map."""
+    """A suction tool with one bellows cup; `tests/benchmarks/suction_map.py` justifies the constants."""
 
     length: Length = 0.12
     """From the flange to the cup's lip [m]."""
@@ -74,25 +76,27 @@ class ToolConfig(Section):
     gap: Length
     """Rim gap at which the breakaway force has fallen to zero [m]."""
     tilt_deg: float = Field(ge=1, lt=90)
-    """Angle between surface normal and tool axis at which it has fallen to zero [degree]."""
+    """Angle between surface normal and tool axis at which the breakaway force has fallen to zero [degree]."""
     least_force: Force
     """Breakaway force under which the vacuum sensor reports no seal [N]."""
     source: str
-    """Where the constants come from."""
+    """Source of the constants."""
 
 
 class MotionConfig(Section):
-    """How the arm moves about the cell."""
+    """Parameters of motion planning."""
 
     margin: Distance = 0.005
     """Smallest distance of arm, tool and load to anything on the way [m]."""
     clearance: Length = 0.04
-    """Height above walls and objects of a motion that stops at every corner, where no other is clear [m]."""
-    descent: float = Field(0.005, ge=SMALLEST, le=0.1)
+    """Clearance above the highest wall and pile in the fallback motion, which stops at every corner and is
+    used if no direct motion or detour is collision-free [m]."""
+    descent: float = Field(0.005, ge=MIN_LENGTH, le=0.1)
     """Length of the guarded last part of an approach above the expected surface [m]."""
     descent_speed: float = Field(0.035, ge=0.001, le=0.25)
     """Tool speed of the guarded last part of an approach [m/s]; at most the reduced speed of ISO 10218."""
     straight: float = Field(0.0, ge=0, le=0.2)
-    """Length of the last part of a way into a bin and the first part of a way up that are straight [m]."""
+    """Length of the straight vertical segment at the end of a motion into a bin and at the start of a motion
+    upwards [m]."""
     planning: Seconds = 0.05
     """Time that planning a motion takes on the run's clock, unless it was planned ahead [s]."""

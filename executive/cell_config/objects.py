@@ -17,7 +17,7 @@ from executive.cell_config.section import (
     Section,
     Share,
     Vector,
-    check_rising,
+    check_ascending,
 )
 
 
@@ -78,7 +78,7 @@ class TableConfig(Section):
     """Range of the workspace along x [m]."""
     y: Range = (-0.22, 0.22)
     """Range of the workspace along y [m]."""
-    objects: Annotated[tuple[Natural, Natural], AfterValidator(check_rising)] = (3, 6)
+    objects: Annotated[tuple[Natural, Natural], AfterValidator(check_ascending)] = (3, 6)
     """Fewest and most objects that spawning puts there."""
     gap: Distance = 0.012
     """Smallest distance between the outlines of two objects when spawned [m]."""

@@ -1,4 +1,4 @@
-"""What every part of a cell file has in common, and the kinds of values in it."""
+"""Base class of all sections of a cell file, and the types of their values."""
 
 from __future__ import annotations
 
@@ -10,42 +10,42 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 Number = TypeVar("Number", int, float)
 
 
-def check_rising(pair: tuple[Number, Number]) -> tuple[Number, Number]:
-    """Return a range as it is.
+def check_ascending(pair: tuple[Number, Number]) -> tuple[Number, Number]:
+    """Return the range unchanged if its limits are in ascending order.
 
     Raises:
-        ValueError: It falls.
+        ValueError: The lower limit is greater than the upper limit.
     """
     if pair[0] > pair[1]:
-        raise ValueError(f"must not fall: {pair[0]:g} stands before {pair[1]:g}")
+        raise ValueError(f"must be in ascending order: {pair[0]:g} is greater than {pair[1]:g}")
     return pair
 
 
-NAME = re.compile(r"\w[\w -]{0,63}")
+NAME_PATTERN = re.compile(r"\w[\w -]{0,63}")
 
 
 def check_name(name: str) -> str:
-    """Return the name of a class, bin, camera or detector as it is: it becomes part of file names.
+    """Return the name of a class, bin, camera or detector unchanged if it can be part of a file name.
 
     Raises:
         ValueError: It has other characters than letters, digits, blanks, "_" and "-", or more than 64.
     """
-    if not NAME.fullmatch(name):
+    if not NAME_PATTERN.fullmatch(name):
         raise ValueError('must be named by at most 64 letters, digits, blanks, "_" and "-"')
     return name
 
 
 Name = Annotated[str, AfterValidator(check_name)]
-SMALLEST, LARGEST = 1e-4, 10.0
+MIN_LENGTH, MAX_LENGTH = 1e-4, 10.0
 """Smallest and largest length in a cell [m]: a tenth of a millimetre is below every sensor's error, and 10 m
 is beyond every arm's reach."""
-Length = Annotated[float, Field(ge=SMALLEST, le=LARGEST)]
-Distance = Annotated[float, Field(ge=0, le=LARGEST)]
-Coordinate = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Length = Annotated[float, Field(ge=MIN_LENGTH, le=MAX_LENGTH)]
+Distance = Annotated[float, Field(ge=0, le=MAX_LENGTH)]
+Coordinate = Annotated[float, Field(ge=-MAX_LENGTH, le=MAX_LENGTH)]
 Count = Annotated[int, Field(ge=1, le=1000)]
-"""A number of things [1]; a bin, a table or an image holds less than a thousand of them."""
+"""A positive count [1]; no bin, table or image holds more than 1000 objects."""
 Natural = Annotated[int, Field(ge=0, le=1000)]
-Range = Annotated[tuple[Coordinate, Coordinate], AfterValidator(check_rising)]
+Range = Annotated[tuple[Coordinate, Coordinate], AfterValidator(check_ascending)]
 Vector = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(description="x, y, z [m]")]
 Angle = Annotated[float, Field(ge=-360, le=360)]
 """An angle [degree]; a whole turn to either side covers all orientations."""
@@ -57,7 +57,7 @@ Channel = Annotated[float, Field(ge=0, le=1)]
 Colour = tuple[Channel, Channel, Channel]
 Share = Annotated[float, Field(ge=0, le=1)]
 Seconds = Annotated[float, Field(ge=0, le=600)]
-"""A time [s]; a step of ten minutes is an error of the cell."""
+"""A duration [s]; more than ten minutes is an error in the cell file."""
 GreyLevels = Annotated[float, Field(ge=0, le=255)]
 
 

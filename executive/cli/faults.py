@@ -63,13 +63,13 @@ def command(
     with stdout_kept_clean():
         from executive.campaign.faults.campaign import Campaign
         from executive.campaign.faults.trial import record
-        from executive.cli.progress import bar, say_halting
+        from executive.cli.progress import bar, print_halting
         from executive.view.figures.fault import fault_text, trial_text
         from executive.view.figures.fault_trials import as_plain, trial_as_plain
 
         subject = load_subject(mission, overrides, oracle, seed)
         with bar("tried", quiet=as_json or listed or numbers is not None) as progress:
-            campaign = Campaign(subject, workers=workers, progress=progress, halting=say_halting)
+            campaign = Campaign(subject, workers=workers, progress=progress, halting=print_halting)
             plain: Any
             if listed:
                 plain = [{"fault": number, "told": str(one)} for number, one in enumerate(campaign.faults, 1)]

@@ -52,7 +52,7 @@ def command(
             if not quiet:
                 seconds = source.entries[-1]["clock"] / speed + HOLD
                 click.echo(f"making a film of about {seconds:.0f} s", err=True)
-            with bar("frames", quiet=quiet, lines=True) as progress:
+            with bar("frames", quiet=quiet, print_lines=True) as progress:
                 frames = film(source, part, format, speed=speed, workers=workers, progress=progress)
         made = {
             "file": str(file), "frames": frames, "seconds": frames / format.rate, "size": file.stat().st_size

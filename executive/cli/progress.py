@@ -12,37 +12,39 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from executive.cli.streams import drawing_stream
+from executive.cli.streams import unescaped_stderr
 
 LINE_PERIOD = 10.0
 """Time between two lines about the progress of a command without a terminal [s]."""
 
 
 @contextmanager
-def bar(what: str, *, quiet: bool = False, lines: bool = False) -> Iterator[Callable[[int, int], None]]:
-    """Show a bar with the time left, and yield a function that takes the numbers of done and of all parts.
+def bar(
+    description: str, *, quiet: bool = False, print_lines: bool = False
+) -> Iterator[Callable[[int, int], None]]:
+    """Show a progress bar with the remaining time, and yield an update function `(done, total)`.
 
-    It is drawn ten times a second, and not at all where stderr is no terminal.
+    The bar is redrawn ten times per second. If stderr is not a terminal, there is no bar.
 
     Args:
-        what: Name of the work.
+        description: Name of the work.
         quiet: Show nothing.
-        lines: Without a terminal, write a line every ten seconds.
+        print_lines: Without a terminal, write a line every ten seconds.
     """
-    console = Console(file=drawing_stream())
+    console = Console(file=unescaped_stderr())
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     disable = quiet or not console.is_interactive
-    if lines and not quiet and disable:
-        yield _lines(what)
+    if print_lines and not quiet and disable:
+        yield _line_printer(description)
         return
-    # The speed is that of all parts: none may end within a shorter time.
+    # Estimate the speed from all finished parts: in a shorter period, no part may finish.
     with Progress(*columns, console=console, disable=disable, speed_estimate_period=math.inf) as progress:
-        number = progress.add_task(what, total=None)
+        number = progress.add_task(description, total=None)
         yield lambda done, total: progress.update(number, completed=done, total=total)
 
 
-def _lines(what: str) -> Callable[[int, int], None]:
-    """Return a function that takes the numbers of done and of all parts, and now and then writes a line."""
+def _line_printer(description: str) -> Callable[[int, int], None]:
+    """Return an update function `(done, total)` that prints a line at most every `LINE_PERIOD`."""
     began = shown = time.monotonic()
 
     def update(done: int, total: int) -> None:
@@ -51,7 +53,7 @@ def _lines(what: str) -> Callable[[int, int], None]:
         if done and now - shown >= LINE_PERIOD:
             shown = now
             left = (now - began) / done * (total - done)
-            click.echo(f"{what}: {done} of {total}, about {left:.0f} s left", err=True)
+            click.echo(f"{description}: {done} of {total}, about {left:.0f} s left", err=True)
 
     return update
 
@@ -64,8 +66,9 @@ def report_polygons(folder: Path) -> None:
         click.echo(f"note: {count} polygons in {folder} are used as boxes around them", err=True)
 
 
-def say_halting() -> None:
-    """Say that Ctrl-C or SIGTERM was heard, and what comes of it."""
+def print_halting() -> None:
+    """Print that Ctrl-C or SIGTERM was received, and what happens next."""
     click.echo(
-        "halting: no further run begins, and those under way are cut; once more ends at once", err=True
+        "halting: no new runs start, and current runs are stopped; press Ctrl-C again to quit immediately",
+        err=True,
     )

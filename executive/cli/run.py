@@ -13,7 +13,7 @@ import click
 
 from executive.cli.options import json_option, overrides_option, runs_option, scene_option, seed_option
 from executive.cli.output import print_json, stdout_kept_clean
-from executive.cli.streams import drawing_stream
+from executive.cli.streams import unescaped_stderr
 
 if TYPE_CHECKING:
     from executive.skill import Skill
@@ -184,7 +184,7 @@ def _view() -> Lines | Terminal:
     from executive.view.terminal.lines import Lines
     from executive.view.terminal.screen import Terminal
 
-    console = Console(file=drawing_stream())
+    console = Console(file=unescaped_stderr())
     if not console.is_terminal or console.is_dumb_terminal:
         return Lines(sys.stderr)
     return Terminal(console, sys.stdin.fileno() if sys.stdin is not None and sys.stdin.isatty() else None)

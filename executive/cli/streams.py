@@ -37,23 +37,23 @@ class TolerantStream(io.TextIOBase):
         return "utf-8" if self._stream is None else self._stream.encoding
 
     def write(self, text: str) -> int:
-        """Write `text`, or drop it."""
+        """Write `text`; drop it if the stream is closed or a write has failed."""
         if self._stream is None:
             self.error = "it is closed"
         elif not self.error:
             try:
                 self._stream.write(text if self._drawing else escape_control_characters(text))
             except OSError as error:
-                self._give_up(self._stream, error)
+                self._stop_writing(self._stream, error)
         return len(text)
 
     def flush(self) -> None:
-        """Write what waits in the buffer, or drop it."""
+        """Flush the buffer; do nothing if the stream is closed or a write has failed."""
         if self._stream is not None and not self.error:
             try:
                 self._stream.flush()
             except OSError as error:
-                self._give_up(self._stream, error)
+                self._stop_writing(self._stream, error)
 
     def isatty(self) -> bool:
         """Return True if the stream is a terminal."""
@@ -67,11 +67,11 @@ class TolerantStream(io.TextIOBase):
         """Return the number of the stream's file descriptor.
 
         Raises:
-            OSError: There is none.
+            OSError: The stream has no file descriptor.
         """
         return super().fileno() if self._stream is None else self._stream.fileno()
 
-    def _give_up(self, stream: TextIO, error: OSError) -> None:
+    def _stop_writing(self, stream: TextIO, error: OSError) -> None:
         self.error = error.strerror or str(error)
         # Python flushes the stream again at the end of the process; an error would change the exit code.
         with contextlib.suppress(OSError):
@@ -80,7 +80,7 @@ class TolerantStream(io.TextIOBase):
             os.close(null)
 
 
-def drawing_stream() -> TextIO:
+def unescaped_stderr() -> TextIO:
     """Return standard error for a library that draws on the terminal, and so writes control characters."""
     if isinstance(sys.stderr, TolerantStream):
         return cast(TextIO, sys.stderr.unescaped())
@@ -89,7 +89,7 @@ def drawing_stream() -> TextIO:
 
 @contextlib.contextmanager
 def tolerant_streams() -> Iterator[None]:
-    """Drop what standard output and standard error cannot take; afterwards, standard error says so once."""
+    """Drop output after the first write error of a stream; report an error of standard output at the end."""
     _open_closed_descriptors()
     with (
         contextlib.redirect_stdout(TolerantStream(sys.stdout)) as output,

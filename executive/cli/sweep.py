@@ -52,7 +52,7 @@ def command(
     """
     with stdout_kept_clean():
         from executive.campaign.sweep import summarize, sweep
-        from executive.cli.progress import bar, say_halting
+        from executive.cli.progress import bar, print_halting
         from executive.discovery import discover
         from executive.mission.load import load_mission
         from executive.record.run_directory import check_place
@@ -68,7 +68,7 @@ def command(
         with bar(mission) as progress:
             results = sweep(
                 mission, seeds, overrides=overrides, runs=runs, workers=workers, frames=frames, scene=scene,
-                progress=progress, halting=say_halting,
+                progress=progress, halting=print_halting,
             )  # fmt: skip
         figures = summarize(results, len(seeds))
         click.echo(_text(figures), err=True)

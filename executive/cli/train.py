@@ -17,7 +17,7 @@ from executive.cli.output import stdout_kept_clean
     "--dataset", type=FOLDER, required=True,
     help="COCO or YOLO folder, from `executive dataset` or a Roboflow export.",
 )  # fmt: skip
-@click.option("--out", type=FOLDER, required=True, help="Folder for checkpoints and figures.")
+@click.option("--out", type=FOLDER, required=True, help="Folder for checkpoints and metrics.")
 @click.option(
     "--from", "start", type=FILE, metavar="MODEL",
     help="Model of an earlier training to fine-tune, .onnx or .pth; without it, random weights.",
@@ -26,7 +26,7 @@ from executive.cli.output import stdout_kept_clean
     "--rate", type=click.FloatRange(min=0, min_open=True),
     help="Learning rate; by default 1e-4 for a model that knows the same classes, else 3e-4.",
 )  # fmt: skip
-@click.option("--epochs", type=COUNT, default=20, help="Passes over it.")
+@click.option("--epochs", type=COUNT, default=20, help="Number of passes over the data set.")
 @seed_option
 def command(dataset: Path, out: Path, start: Path | None, rate: float | None, epochs: int, seed: int) -> None:
     """Train the small RF-DETR; needs the extra `train`."""
@@ -43,7 +43,7 @@ def command(dataset: Path, out: Path, start: Path | None, rate: float | None, ep
         with bar("training") as batches:
             train(dataset, out, Settings(start, rate, epochs, seed), _epoch_printer(epochs), batches)
         click.echo(
-            "write these lines into the cell file, with paths from its folder:\n\n"
+            "add these lines to the cell file, with paths relative to its folder:\n\n"
             "detectors:\n  trained:\n    kind: rfdetr\n"
             f"    model_path: {out / 'model.onnx'}\n    labels: {out / 'labels.txt'}",
             err=True,
@@ -51,7 +51,7 @@ def command(dataset: Path, out: Path, start: Path | None, rate: float | None, ep
 
 
 def _epoch_printer(epochs: int) -> Callable[[int, dict[str, float]], None]:
-    """Return a function that prints the figures of an epoch and the time that the others will take."""
+    """Return a function that prints the metrics of an epoch and the estimated remaining time."""
     began = time.monotonic()
 
     def print_epoch(epoch: int, metrics: dict[str, float]) -> None:

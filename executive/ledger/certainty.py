@@ -74,16 +74,18 @@ class Certainty:
         if record.looks >= MIN_LOOKS_TO_REJECT and record.p_value < REJECTION_P_VALUE:
             votes = ", ".join(f"{count} {label}" for label, count in record.tally.most_common())
             record.state, record.why = State.REJECTED, f"its class is in doubt: {votes}"
-        elif self._lacks_second_evidence(record):
+        elif self._cannot_prove_class(record):
             chance = f"leave a chance of {record.misjudged:.1%} that it is no {record.label}"
-            why = f"{record.looks} looks from one pose {chance}, allowed {self.config.misjudged:.1%}"
+            why = (
+                f"{record.looks} looks from one pose {chance}; at most {self.config.misjudged:.1%} is allowed"
+            )
             record.state, record.why = State.REJECTED, why
         elif not known and (record.glimpses >= MAX_UNSURE_LOOKS or _is_contradicted(record)):
             record.state = State.REJECTED
             record.why = f"{UNSURE}: {record.contradiction}" if record.contradiction else UNSURE
             record.existence = max(record.existence, 0.0)
 
-    def allow_low_touch(self, record: Record) -> bool:
+    def count_low_touch(self, record: Record) -> bool:
         """Count a touch that is too low for the class; return True if it may have missed the top.
 
         That may happen once, and only to an item whose class the looks prove without a touch.
@@ -91,7 +93,7 @@ class Certainty:
         record.low_touches += 1
         return record.low_touches == 1 and record.misjudged <= self.config.misjudged
 
-    def _lacks_second_evidence(self, record: Record) -> bool:
+    def _cannot_prove_class(self, record: Record) -> bool:
         """Return True if all looks came from one viewpoint, and neither they nor a touch prove its class."""
         return (
             record.misjudged > self.config.misjudged

@@ -142,7 +142,7 @@ class ItemLedger:
         record.exists = True
         if not contradiction:
             record.touched, record.low_touches = record.label, 0
-        elif record.touched != record.label and not (beside_top and self._certainty.allow_low_touch(record)):
+        elif record.touched != record.label and not (beside_top and self._certainty.count_low_touch(record)):
             record.contradiction = contradiction
             self._disturb(record.position, self._config.neighbourhood)
             self._emit("item", **record.row)

@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 
 from executive.cell_config import CameraConfig, CellConfig, Colour, NoiseConfig, Section
-from executive.cell_config.section import Natural, check_rising
+from executive.cell_config.section import Natural, check_ascending
 from executive.errors import InputError
 from executive.mission.findings import Finding, MissionError, alternatives, error, in_file_order
 from executive.mission.parse.validate import mark_of, validate
@@ -64,9 +64,9 @@ RgbColour = tuple[Share, Share, Share]
 Reflection = Annotated[float, Field(ge=0, le=3)]
 Shift = Annotated[float, Field(ge=-1, le=1)]
 AngleDeg = Annotated[float, Field(ge=-90, le=90)]
-Counts = Annotated[tuple[Natural, Natural], AfterValidator(check_rising)]
+Counts = Annotated[tuple[Natural, Natural], AfterValidator(check_ascending)]
 ModelId = Annotated[int, Field(ge=0, lt=UNKNOWN_COUNT)]
-Models = Annotated[tuple[ModelId, ModelId], AfterValidator(check_rising), AfterValidator(check_models)]
+Models = Annotated[tuple[ModelId, ModelId], AfterValidator(check_ascending), AfterValidator(check_models)]
 Palette = Annotated[tuple[RgbColour, ...], AfterValidator(check_palette)]
 
 

@@ -17,7 +17,7 @@ class Collision(NamedTuple):
     """The place where a path leads farthest into an obstacle.
 
     Attributes:
-        part: What enters it: the tool or its load.
+        part: The colliding part: the tool or its load.
         obstacle: The table, or the name of a bin.
         depth: How far the part is inside [m].
         place: The place in words, for the text of an error.
@@ -30,7 +30,7 @@ class Collision(NamedTuple):
 
 
 class FakeObstacles:
-    """Table top, floors and walls of a cell file as boxes that reach down without end.
+    """Table top, and floors and walls of the bins, as boxes without a lower bound.
 
     Args:
         config: The cell file.
@@ -41,7 +41,7 @@ class FakeObstacles:
         parts = [(name, bin, *wall) for name, bin in config.bins.items() for wall in bin_walls(bin.size)]
         middles = np.array([np.add(bin.position, middle) for _, bin, _, middle in parts]).reshape(-1, 3)
         halves = np.array([half for _, _, half, _ in parts]).reshape(-1, 3)
-        # The table comes first: it is everywhere, up to height 0.
+        # Index 0 is the table: an infinite box with its top at height 0.
         self._names = ["the table", *(name for name, *_ in parts)]
         self._low = np.vstack([[-np.inf, -np.inf], (middles - halves)[:, :2]])
         self._high = np.vstack([[np.inf, np.inf], (middles + halves)[:, :2]])
@@ -50,11 +50,12 @@ class FakeObstacles:
     def find_collision(self, tips: Array, load: ObjectClass | None) -> Collision | None:
         """Return where a path of the tool tip leads into an obstacle, or None.
 
-        Inside an obstacle the path may begin, but it may not lead deeper into it.
+        The path may start inside an obstacle, but must not go deeper into it.
 
         Args:
-            tips: Places of the tool tip `(N, 3)` [m], the first where the tool is.
-            load: Class of the object in the tool, whose lower end counts then, or None.
+            tips: Positions of the tool tip along the path `(N, 3)` [m]; the first is the current position.
+            load: Class of the held object, or None. With a load, the lower end of the load is checked
+            instead of the tool tip.
         """
         height, radius = (load.height, load.radius + load.ring) if load else (0.0, self._cup_radius)
         x_y = tips[:, None, :2]

@@ -16,15 +16,15 @@ from executive.messages import Box
 from executive.safe_text import MAX_QUOTED
 from executive.written_paths import leaves_folder, links_out
 
-COCO = "_annotations.coco.json"
-DATA = ("data.yaml", "data.yml")
+COCO_FILE_NAME = "_annotations.coco.json"
+YOLO_CLASS_FILES = ("data.yaml", "data.yml")
 """Files that name the classes of a YOLO data set."""
-IMAGES = (".jpg", ".jpeg", ".png", ".bmp")
+IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp")
 """Suffixes of images."""
 BOX_VALUES = 4
 """Number of values of a YOLO box: centre x, centre y, width and height."""
-SLACK = 1e-6
-"""Accepted excess of a share over 1, for rounded values."""
+NORMALIZED_TOLERANCE = 1e-6
+"""Accepted amount by which a normalized coordinate may lie outside of 0 to 1, because of rounding."""
 
 
 @dataclass(frozen=True)
@@ -34,25 +34,25 @@ class ImageAnnotation:
     Attributes:
         labels: Class of each object.
         boxes: Left, top, right and bottom of each object.
-        are_shares: True if the boxes are shares of width and height of the image; False for pixels.
+        is_normalized: True if the boxes are in normalized coordinates (0 to 1); False if they are in pixels.
         polygon_count: Number of boxes that were made from polygons.
     """
 
     labels: tuple[str, ...] = ()
     boxes: tuple[Box, ...] = ()
-    are_shares: bool = False
+    is_normalized: bool = False
     polygon_count: int = 0
 
     def boxes_in_pixels(self, width: int, height: int) -> tuple[Box, ...]:
-        """Return the boxes in an image of this size [pixel]."""
-        if not self.are_shares:
+        """Return the boxes in pixels for an image of `width` by `height` pixels."""
+        if not self.is_normalized:
             return self.boxes
         return tuple((x0 * width, y0 * height, x1 * width, y1 * height) for x0, y0, x1, y1 in self.boxes)
 
 
 Annotations = Mapping[Path, ImageAnnotation]
 """The annotations of a folder by image, sorted by path."""
-Size = Annotated[FiniteFloat, Field(ge=0)]
+NonNegative = Annotated[FiniteFloat, Field(ge=0)]
 ContentT = TypeVar("ContentT", bound=BaseModel)
 
 
@@ -64,7 +64,7 @@ class _CocoImage(BaseModel):
 class _CocoObject(BaseModel):
     image_id: int
     category_id: int
-    bbox: tuple[FiniteFloat, FiniteFloat, Size, Size]
+    bbox: tuple[FiniteFloat, FiniteFloat, NonNegative, NonNegative]
 
 
 class _CocoCategory(BaseModel):
@@ -78,13 +78,13 @@ class _CocoFile(BaseModel):
     categories: list[_CocoCategory]
 
 
-class _YoloFile(BaseModel):
+class _YoloClassFile(BaseModel):
     names: dict[int, str] | list[str]
 
 
 @dataclass
 class _Objects:
-    """Objects of an image, as they are read."""
+    """Mutable lists in which the objects of one image are collected while its file is read."""
 
     labels: list[str] = field(default_factory=list)
     boxes: list[Box] = field(default_factory=list)
@@ -93,7 +93,9 @@ class _Objects:
 
 def is_split(folder: Path) -> bool:
     """Return True if a folder holds labelled images."""
-    return (folder / COCO).is_file() or ((folder / "images").is_dir() and (folder / "labels").is_dir())
+    return (folder / COCO_FILE_NAME).is_file() or (
+        (folder / "images").is_dir() and (folder / "labels").is_dir()
+    )
 
 
 def read_annotations(split: Path) -> Annotations:
@@ -103,12 +105,12 @@ def read_annotations(split: Path) -> Annotations:
         InputError: A file is damaged, or an image is missing or lies outside of the folder; the text names
             the file and the line or the key.
     """
-    images = _read_coco(split) if (split / COCO).is_file() else _read_yolo(split)
+    images = _read_coco(split) if (split / COCO_FILE_NAME).is_file() else _read_yolo(split)
     return dict(sorted(images, key=lambda image: str(image[0])))
 
 
 def _read_coco(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
-    file = split / COCO
+    file = split / COCO_FILE_NAME
     content = _parse(file, lambda text: _CocoFile.model_validate_json(text))
     names = {category.id: category.name for category in content.categories}
     objects = {image.id: _Objects() for image in content.images}
@@ -137,14 +139,16 @@ def _read_coco(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
 
 
 def _read_yolo(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
-    data = next((split.parent / name for name in DATA if (split.parent / name).is_file()), None)
+    data = next((split.parent / name for name in YOLO_CLASS_FILES if (split.parent / name).is_file()), None)
     if data is None:
         raise InputError(f"{split.parent} has no data.yaml, which names the classes of a YOLO data set")
-    content = _parse(data, lambda text: _YoloFile.model_validate(yaml.load(text, Loader=yaml.BaseLoader)))
+    content = _parse(
+        data, lambda text: _YoloClassFile.model_validate(yaml.load(text, Loader=yaml.BaseLoader))
+    )
     names = dict(enumerate(content.names)) if isinstance(content.names, list) else content.names
     folder = split / "images"
     for path in folder.iterdir():
-        if path.suffix.lower() in IMAGES:
+        if path.suffix.lower() in IMAGE_SUFFIXES:
             image = _find_image(folder, path.name, str(path))
             yield image, _read_labels(split / "labels" / f"{path.stem}.txt", names)
 
@@ -152,7 +156,7 @@ def _read_yolo(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
 def _read_labels(file: Path, names: Mapping[int, str]) -> ImageAnnotation:
     """Return the objects in the label file of a YOLO image; an image without a file has none."""
     if not os.path.lexists(file):
-        return ImageAnnotation(are_shares=True)
+        return ImageAnnotation(is_normalized=True)
     objects = _Objects()
     for number, line in enumerate(_read_text(file).splitlines(), start=1):
         if not line.strip():
@@ -172,37 +176,37 @@ def _read_labels(file: Path, names: Mapping[int, str]) -> ImageAnnotation:
                 f"not {len(numbers)}"
             )
         # The comparison is False for numbers that are not finite.
-        if not all(-SLACK <= value <= 1 + SLACK for value in numbers):
+        if not all(-NORMALIZED_TOLERANCE <= value <= 1 + NORMALIZED_TOLERANCE for value in numbers):
             raise InputError(f'{file}:{number}: values are shares of the image, 0 to 1, not "{line}"')
         objects.labels.append(name)
-        objects.boxes.append(_bounds(numbers) if is_polygon else _corners(numbers))
+        objects.boxes.append(_polygon_to_box(numbers) if is_polygon else _centre_to_corner_box(numbers))
         objects.polygon_count += is_polygon
     return ImageAnnotation(tuple(objects.labels), tuple(objects.boxes), True, objects.polygon_count)
 
 
-def _bounds(polygon: list[float]) -> Box:
+def _polygon_to_box(polygon: list[float]) -> Box:
     xs, ys = polygon[0::2], polygon[1::2]
     return min(xs), min(ys), max(xs), max(ys)
 
 
-def _corners(box: list[float]) -> Box:
+def _centre_to_corner_box(box: list[float]) -> Box:
     x, y, width, height = box
     return x - width / 2, y - height / 2, x + width / 2, y + height / 2
 
 
 def _find_image(folder: Path, name: str, place: str) -> Path:
-    """Return the path of an image; `place` names the file and the key that name it.
+    """Return the path of an image; `place` is the file and the key that list it, for error messages.
 
     Raises:
-        InputError: It is missing, no regular file, or outside of the folder.
+        InputError: The image is missing, is not a regular file, or lies outside of the folder.
     """
     path = folder / name
     if not name or leaves_folder(name):
         raise InputError(f'{place}: "{name}" is not below {folder}')
     if not os.path.isfile(path):
-        raise InputError(f'{place}: "{name}" is no file in {folder}')
+        raise InputError(f'{place}: "{name}" is not a file in {folder}')
     if links_out(folder, name):
-        raise InputError(f'{place}: "{name}" is a link out of {folder}')
+        raise InputError(f'{place}: "{name}" is a link to a file outside of {folder}')
     return path
 
 
@@ -219,13 +223,14 @@ def _parse(file: Path, parse: Callable[[str], ContentT]) -> ContentT:
     """Return the parsed content of a file.
 
     Raises:
-        InputError: It cannot be read, or lacks something; the text names the line or the key.
+        InputError: The file cannot be read, is not valid, or lacks a required key; the message names the
+        line or the key.
     """
     try:
         return parse(_read_text(file))
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
-        raise InputError(f"{file}:{line}: no YAML: {error.problem}") from error
+        raise InputError(f"{file}:{line}: invalid YAML: {error.problem}") from error
     except ValidationError as error:
         first = error.errors()[0]
         keys = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in first["loc"])

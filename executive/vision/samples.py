@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from executive.errors import InputError
 from executive.geometry import Array
 from executive.messages import Box
-from executive.vision.annotations import COCO, is_split, read_annotations
+from executive.vision.annotations import COCO_FILE_NAME, is_split, read_annotations
 
 SPLITS = ("test", "valid", "val", "train")
 """Folders of a data set in which labelled images are sought, those that no training has used first."""
@@ -112,8 +112,8 @@ def _split(folder: Path) -> Path:
         if is_split(split):
             return split
     raise InputError(
-        f"{folder} holds no labelled images: {COCO} (COCO) or images/ and labels/ (YOLO) were looked "
-        f"for there and in {', '.join(SPLITS)}; make some with `executive dataset`"
+        f"{folder} holds no labelled images: {COCO_FILE_NAME} (COCO) or images/ and labels/ (YOLO) were "
+        f"looked for there and in {', '.join(SPLITS)}; make some with `executive dataset`"
     )
 
 

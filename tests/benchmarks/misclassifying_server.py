@@ -14,7 +14,7 @@ from executive.campaign.pool import do_all
 from executive.cell import Clock, Request
 from executive.cell_config import CellConfig
 from executive.cli.options import runs_option, workers_option
-from executive.cli.progress import bar, say_halting
+from executive.cli.progress import bar, print_halting
 from executive.messages import Answer, Frame
 from executive.vision.detectors.setting import ClosableDetector
 from executive.vision.envelope.rated_detectors import build_rated_detectors
@@ -136,7 +136,7 @@ def measure(
     ]
     with bar("misclassifying server") as progress:
         results = do_all(
-            jobs, run_job, _describe_broken, workers=workers, progress=progress, halting=say_halting
+            jobs, run_job, _describe_broken, workers=workers, progress=progress, halting=print_halting
         )
     done = [run for run in results if run is not None and run.status != "HALTED"]
     figures = {

@@ -16,7 +16,7 @@ import yaml
 from executive.campaign.pool import do_all
 from executive.cell_config import CellConfig
 from executive.cli.options import runs_option, workers_option
-from executive.cli.progress import bar, say_halting
+from executive.cli.progress import bar, print_halting
 from executive.discovery import discover
 from executive.mission.load import load_mission
 from executive.sim.scene_file import load_scene
@@ -96,7 +96,7 @@ def measure(
             jobs += [Job(case, seed, scene, runs, wall_time_limit) for seed in range(first, first + count)]
         with bar("outside the envelope") as progress:
             results = do_all(
-                jobs, run_job, _describe_broken, workers=workers, progress=progress, halting=say_halting
+                jobs, run_job, _describe_broken, workers=workers, progress=progress, halting=print_halting
             )
     done = [result for result in results if result is not None and result.run.status != HALTED]
     figures = {"asked": len(jobs), "runs": len(done), "first_seed": first_seed, **summarize(done)}

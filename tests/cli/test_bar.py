@@ -51,7 +51,7 @@ def test_without_a_terminal_some_work_writes_lines(
 ) -> None:
     times = iter([0.0, 4.0, 12.0, 13.0])
     monkeypatch.setattr("time.monotonic", lambda: next(times))
-    with bar("frames", lines=True) as move:
+    with bar("frames", print_lines=True) as move:
         for done in (1, 3, 4):
             move(done, 9)
     assert capsys.readouterr() == ("", "frames: 3 of 9, about 24 s left\n")

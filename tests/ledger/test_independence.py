@@ -37,7 +37,7 @@ def test_the_same_answer_from_the_same_pose_proves_a_class_only_a_little_more(be
 def test_after_three_looks_an_item_without_other_evidence_is_rejected_with_both_values(bench):
     for _ in range(3):
         bench.look(CUBE, by=DOUBTFUL)
-    why = "3 looks from one pose leave a chance of 3.4% that it is no cube, allowed 0.5%"
+    why = "3 looks from one pose leave a chance of 3.4% that it is no cube; at most 0.5% is allowed"
     assert bench.states() == {"cube-1": ("rejected", why)}
 
 

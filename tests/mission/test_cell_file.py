@@ -43,7 +43,7 @@ def complaint(text: str, overrides: dict[str, str] | None = None) -> str:
         ("{home: [0, 0", "{hme: [0, 0", 'arm needs a pose named "home"; there are: hme, scan\n'),
         ("scan_poses: [home]", "scan_poses: [hom]", 'c.yaml:25:18: error[unknown-pose]: the arm has no pose "hom"; arm.poses_deg has: home, scan\n'),
         ("cube_small.urdf", "../cube.urdf", 'error[outside]: "../cube.urdf" must be a relative path without ".."\n'),
-        ("y: [-0.2, 0.2]", "y: [-0.2, 0.2], objects: [5, 3]", "error[wrong-value]: table.objects must not fall: 5 stands before 3\n"),
+        ("y: [-0.2, 0.2]", "y: [-0.2, 0.2], objects: [5, 3]", "error[wrong-value]: table.objects must be in ascending order: 5 is greater than 3\n"),
         ("0.06]}", "0.06], slots: [0, 3]}", "error[out-of-range]: bins.red_bin.slots[0] must be at least 1, not 0\n"),
         ("table_view: [192, 100, 448, 356]", "table_view: [192, 100, 748, 656]", "needs a table_view that is a square inside its image of 640 x 480 pixels, not [192, 100, 748, 656]\n"),
         ("table_view: [192, 100, 448, 356]", "table_view: [192, 100, 448, 350]", "needs a table_view that is a square inside its image"),

@@ -100,7 +100,7 @@ def test_a_link_out_of_the_folder_is_refused(load: Load, tmp_path: Path, small_c
     outside = tmp_path.parent / f"{tmp_path.name}_outside.yaml"
     outside.write_text(small_cell)
     Path("link.yaml").symlink_to(outside)
-    with pytest.raises(MissionError, match=r'"link\.yaml" is a link out of'):
+    with pytest.raises(MissionError, match=r'"link\.yaml" is a link to a file outside of'):
         load("mission: m\ncell: link.yaml\ntree: Look\n")
 
 

@@ -56,5 +56,5 @@ def test_nothing_is_felt_for_below_the_middle_of_a_thin_part(
     fake.world.objects.clear()
     result = run_skill(Approach(target=target), fake)
     assert (result.reason, result.message) == (
-        "no_contact", "nothing felt down to 4 mm, duck-1 was expected at 8 mm",
+        "no_contact", "no contact down to 4 mm, duck-1 was expected at 8 mm",
     )  # fmt: skip

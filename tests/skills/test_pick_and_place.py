@@ -52,7 +52,7 @@ def a_lamp(fake: FakeCell) -> None:
 @pytest.mark.parametrize(
     ("change", "reason", "message", "attempts", "is_fresh"),
     [
-        (nothing_there, "no_contact", "nothing felt down to 35 mm, cube-1 was expected at 50 mm", 1, False),
+        (nothing_there, "no_contact", "no contact down to 35 mm, cube-1 was expected at 50 mm", 1, False),
         (something_higher, "blocked",
          "the tool met something at 91 mm, on its way to cube-1, which was expected at 50 mm", 0, False),
         (a_lamp, "blocked", "link 4 ran into the lamp", 0, False),

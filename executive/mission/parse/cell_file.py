@@ -229,4 +229,4 @@ def _models_outside(file: CellFile, config: CellConfig, folders: Mapped[Source, 
         if leaves_folder(model):
             yield file.finding(keys, "outside", f'"{model}" must be a relative path without ".."')
         elif os.path.isfile(folder / model) and links_out(folder, model):
-            yield file.finding(keys, "outside", f'"{model}" is a link out of {folder}')
+            yield file.finding(keys, "outside", f'"{model}" is a link to a file outside of {folder}')

@@ -64,7 +64,7 @@ def below(folder: Path, reference: str, shipped: Sequence[str] = ("",)) -> Path:
         path = base / reference
         if os.path.isfile(path):
             if links_out(base, reference):
-                raise InputError(f'"{reference}" is a link out of {base}')
+                raise InputError(f'"{reference}" is a link to a file outside of {base}')
             return path
         if os.path.lexists(path):
             raise InputError(f'"{reference}" in {_shown(base)} is {_kind_of(path)}, not a file')
