@@ -32,8 +32,9 @@ def audit(
 
     A body in the tool is `left`, also over a bin. A body that fell into a wrong bin is out of reach: it
     counts as `elsewhere` and as `fell_in_wrong_bin`. A body that somebody took away is `elsewhere`, if it
-    was seen before. `unseen` counts the other bodies that no item of the ledger was first seen near. An
-    unknown object that no item was seen near counts only if it is in a bin: as `wrong_bin`.
+    was seen before; a body that somebody took out of a bin counts as if it still lay there. `unseen` counts
+    the other bodies that no item of the ledger was first seen near. An unknown object that no item was seen
+    near counts only if it is in a bin: as `wrong_bin`.
 
     Args:
         world: The simulated world as the run left it.
@@ -54,11 +55,14 @@ def audit(
             for place in places
         )
         if body not in world.bodies:
-            counts["elsewhere"] += seen
+            end = _find_place(*world.removed[body], bins, routes)
+            was_emptied = end in ("right", "wrong_bin") and body not in fallen
+            counts[end if was_emptied else "elsewhere"] += seen
             continue
-        end = "left" if body == held else _find_place(world, body, bins, routes)
+        label, position = world.bodies[body], world.object_pose(body).position
+        end = "left" if body == held else _find_place(label, position, bins, routes)
         fell = end == "wrong_bin" and body in fallen
-        unclaimed = world.bodies[body] == UNKNOWN and not seen
+        unclaimed = label == UNKNOWN and not seen
         if not unclaimed or end == "wrong_bin":
             counts["elsewhere" if fell else end] += 1
         counts["fell_in_wrong_bin"] += fell
@@ -66,12 +70,11 @@ def audit(
     return counts
 
 
-def _find_place(world: World, body: int, bins: Mapping[str, Bin], routes: Routes) -> str:
-    position = world.object_pose(body).position
+def _find_place(label: str, position: Array, bins: Mapping[str, Bin], routes: Routes) -> str:
     # What leans on a wall from inside may have its middle over it.
     inside = next((name for name, bin in bins.items() if bin.contains(position, BIN_THICKNESS)), None)
     if position[2] < FLOOR:
         return "elsewhere"
     if inside is None:
         return "left"
-    return "right" if inside in routes.get(world.bodies[body], ()) else "wrong_bin"
+    return "right" if inside in routes.get(label, ()) else "wrong_bin"

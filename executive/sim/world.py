@@ -61,6 +61,7 @@ class World:
         log: Where all that is done to it is noted, before it is done.
         idle: True while it is stepped for nobody's run.
         stood: Where loose objects `(3,)` [m] were put after they had been added, by body.
+        removed: Class and last position `(3,)` [m] of each object that somebody took away, by body.
     """
 
     flange = 6
@@ -90,6 +91,7 @@ class World:
         self.log = CommandLog()
         self.idle = False
         self.stood: dict[int, list[Array]] = {}
+        self.removed: dict[int, tuple[str, Array]] = {}
         self.set_arm(np.radians(config.arm.poses_deg["home"]))
 
     def add_object(
@@ -108,6 +110,7 @@ class World:
     def remove_object(self, body: int) -> None:
         """Take a loose object out of the world."""
         self.log.note(command_log.REMOVE, body)
+        self.removed[body] = self.bodies[body], self.object_pose(body).position
         del self.bodies[body], self.models[body]
         self.client.removeBody(body)
 

@@ -182,25 +182,32 @@ class FakeCell:
         """Return what became of the objects.
 
         `elsewhere` counts what was taken away, if it was seen before, and what fell into a wrong bin, which
-        `fell_in_wrong_bin` counts again; `unseen` counts what lies there and was never seen.
+        `fell_in_wrong_bin` counts again; `unseen` counts what lies there and was never seen. An object that
+        was taken out of a bin counts as if it still lay there.
         """
         counts = dict.fromkeys(PLACES, 0)
         for thing in self.world.objects:
-            bins = self._cell.bins.items()
-            # Nothing stands on a wall: what does here would have fallen in, if not into the next bin.
-            wall = BIN_THICKNESS + self._cell.classes[thing.label].radius / 2
-            within = (n for beside in (0.0, wall) for n, bin in bins if bin.contains(thing.position, beside))
-            inside = next(within, None)
-            if inside is None or thing is self.world.held:
-                counts["left"] += 1
-            elif inside in self.routes.get(thing.label, ()):
-                counts["right"] += 1
-            else:
-                counts["elsewhere" if thing.fell else "wrong_bin"] += 1
-                counts["fell_in_wrong_bin"] += thing.fell
+            place = self._find_place(thing)
+            fell = place == "wrong_bin" and thing.fell
+            counts["elsewhere" if fell else place] += 1
+            counts["fell_in_wrong_bin"] += fell
             counts["unseen"] += not self._was_seen(thing)
-        counts["elsewhere"] += sum(map(self._was_seen, self.world.removed))
+        for thing in self.world.removed:
+            place = "elsewhere" if thing.fell else self._find_place(thing)
+            counts["elsewhere" if place == "left" else place] += self._was_seen(thing)
         return counts
+
+    def _find_place(self, thing: FakeObject) -> str:
+        """Return `right`, `wrong_bin` or `left`, for an object on the table or in the tool."""
+        if thing is self.world.held:
+            return "left"
+        # Nothing stands on a wall: what does here would have fallen in, if not into the next bin.
+        wall = BIN_THICKNESS + self._cell.classes[thing.label].radius / 2
+        for beside in (0.0, wall):
+            for name, bin in self._cell.bins.items():
+                if bin.contains(thing.position, beside):
+                    return "right" if name in self.routes.get(thing.label, ()) else "wrong_bin"
+        return "left"
 
     def close(self) -> None:
         """Close the log."""

@@ -23,6 +23,7 @@ class OneBody:
 
     def __init__(self, label: str = "cube", place: Sequence[float] = IN_BIN) -> None:
         self.bodies = {7: label}
+        self.removed: dict[int, tuple[str, np.ndarray]] = {}
         self._place = place
 
     def object_pose(self, body: int) -> Pose:
@@ -53,6 +54,25 @@ def test_a_body_in_a_bin_counts_by_its_class_and_by_who_put_it_there(
     none = {"right": 0, "wrong_bin": 0, "left": 0, "elsewhere": 0, "fell_in_wrong_bin": 0, "unseen": 1}
     fell = bins == ("blue_bin",) and "fallen" in more
     assert counted(bins, **more) == {**none, end: 1, "fell_in_wrong_bin": int(fell)}
+
+
+@pytest.mark.parametrize(
+    ("bins", "place", "more", "end"),
+    [
+        (("red_bin",), IN_BIN, {}, "right"),
+        (("blue_bin",), IN_BIN, {}, "wrong_bin"),
+        (("red_bin",), IN_BIN, {"fallen": {7}}, "elsewhere"),
+        (("red_bin",), ON_TABLE, {}, "elsewhere"),
+    ],
+)
+def test_a_body_that_was_taken_out_of_a_bin_counts_as_if_it_still_lay_there(
+    bins: tuple[str, ...], place: Sequence[float], more: dict[str, Any], end: str
+) -> None:
+    world = OneBody()
+    world.removed[7] = (world.bodies.pop(7), np.array(place))
+    item = SimpleNamespace(state=None, first=np.array(ON_TABLE))
+    assert counted(bins, world, records=[item], **more) == {**dict.fromkeys(PLACES, 0), end: 1}
+    assert counted(bins, world, **more) == dict.fromkeys(PLACES, 0), "nobody had seen it"
 
 
 @pytest.mark.parametrize(

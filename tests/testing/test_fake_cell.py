@@ -196,3 +196,17 @@ def test_what_falls_on_the_wall_of_a_bin_falls_into_the_bin(load: Load, beside: 
     cell.tool.part()
     assert bin.contains(cube.position)
     assert beside is not None or np.allclose(cube.position[:2], (x, edge - radius))
+
+
+@pytest.mark.parametrize(("in_bin", "what"), [(True, "right"), (False, "elsewhere")])
+def test_what_is_taken_out_of_a_bin_counts_as_if_it_still_lay_there(
+    load: Load, in_bin: bool, what: str
+) -> None:
+    cell = FakeCell(load(table__objects="[0, 0]"), routes={"cube": ("red_bin",)})
+    cube = cell.world.put("cube", 0.5, 0.0)
+    look = run_skill(Detect(), cell)
+    run_skill(Localize(detections=look.outputs["detections"]), cell)
+    if in_bin:
+        cube.position = cell.cell.bins["red_bin"].position
+    cell.world.remove(cube)
+    assert cell.audit() == {**dict.fromkeys(PLACES, 0), what: 1}
