@@ -184,8 +184,13 @@ class Ledger(Protocol):
             beside_top: True if the touch may have missed the top of the object.
         """
 
-    def missed(self, item: Item) -> None:
-        """Record a grasp that did not hold; where things lie nearby is in doubt now."""
+    def missed(self, item: Item, *, found_table: bool = False) -> None:
+        """Record a failed attempt to pick an item; the positions of all objects are in doubt now.
+
+        Args:
+            item: The item.
+            found_table: True if the tool went down almost to the table at the item's place without a contact.
+        """
 
     def held(self, item: Item) -> None:
         """Record that the tool holds the item; its neighbours may have moved."""

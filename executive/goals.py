@@ -21,6 +21,10 @@ A mission may say otherwise.
 """
 OVERTRAVEL = 0.015
 """How far below the expected surface an approach feels, unless a mission says otherwise [m]."""
+PROBE_CLEARANCE = 0.005
+"""Height above the table down to which later attempts feel for an object [m]."""
+ATTEMPTS_BEFORE_PROBE = 3
+"""Number of failed attempts after which an approach goes down almost to the table."""
 SPACING = 0.0025
 """Spacing of the spiral on which further attempts come down, unless a mission says otherwise [m]."""
 SIDE_BY_SIDE = 0.02
@@ -35,13 +39,14 @@ def approach(
 ) -> tuple[Goal, Task]:
     """Return goal and task of an approach: through the surface of `target`, felt for on the last part.
 
-    Every attempt after a failed one comes down a little beside the last.
+    Every attempt after a failed one comes down a little beside the last. From the fourth on, attempts go down
+    almost to the table: if nothing is there, the item is a false detection.
 
     Args:
         cell: The work cell.
         target: What to touch.
-        overtravel: How far below the expected surface to feel [m], but not below the target's middle: what
-            is felt there is the table.
+        overtravel: How far below the expected surface the first attempts feel [m], but not below the
+            target's middle.
         spacing: Of the spiral of further attempts [m].
     """
     goal = onto(
@@ -81,6 +86,8 @@ def onto(
     dx, dy = _off_middle(attempt, kind.ring, spacing)
     surface = middle + kind.height / 2
     lowest = max(surface - overtravel, middle)
+    if attempt >= ATTEMPTS_BEFORE_PROBE:
+        lowest = min(lowest, middle - kind.height / 2 + PROBE_CLEARANCE)
     return Goal((x + dx, y + dy, lowest), guarded=surface + descent - lowest, speed=descent_speed)
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 from executive.ledger.item import NOTHING, ON_TABLE, UNSURE, Record, State
 from executive.messages import Detections
 
+MIN_EMPTY_PROBES = 3
+"""Number of times that the tool must find nothing but the table at an item's place to prove it a phantom."""
 FINAL_STATES = (State.PLACED, State.REJECTED, State.SKIPPED, State.LOST)
 """Final states of an object; each item that was no phantom has one of them."""
 
@@ -34,7 +36,7 @@ class Remarks:
 
 
 def find_final_state(
-    record: Record, *, gone: bool, sure: bool, routed: bool, completed: bool
+    record: Record, *, gone: bool, sure: bool, routed: bool, completed: bool, touched_any: bool
 ) -> tuple[State, str] | None:
     """Return the final state of an item and its reason, or None if the item has its final state already.
 
@@ -42,7 +44,9 @@ def find_final_state(
 
     1. An item in the tool is rejected.
     2. An item with uncertain detections only, whose place no look has found empty, is rejected.
-    3. An item that is likelier a false detection than an object is a phantom.
+    3. An item that is likelier a false detection than an object is a phantom. An item that looks show again
+       and again is one, too, if the tool went down to the table at its place without a contact, but met other
+       items where looks had shown them.
     4. An item that was dropped, or whose place was found empty, is lost.
     5. An item without a route is skipped.
     6. If the mission was completed, a certain item without a contradiction or an attempt is skipped: a quota
@@ -55,6 +59,7 @@ def find_final_state(
         sure: True if enough looks agree on its existence, class and position.
         routed: True if the mission has a bin for its class.
         completed: True if the behaviour tree succeeded.
+        touched_any: True if the tool has touched any item at the height of its class.
     """
     if record.state is State.HELD:
         return State.REJECTED, "still in the tool when the run ended"
@@ -64,6 +69,8 @@ def find_final_state(
         return State.REJECTED, UNSURE
     if record.probability < 0.5:
         return State.PHANTOM, NOTHING
+    if record.empty_probes >= MIN_EMPTY_PROBES and touched_any and not record.touched:
+        return State.PHANTOM, f"the tool found only the table at its place, {record.empty_probes} times"
     if record.state is State.DROPPED or gone:
         return State.LOST, "known to exist, not found again"
     if record.state is State.REJECTED:
@@ -73,6 +80,24 @@ def find_final_state(
     if completed and sure and not (record.attempts or record.contradiction):
         return State.SKIPPED, "the mission was completed without it"
     return State.REJECTED, "the run ended before its turn"
+
+
+def find_lost_elsewhere(records: Collection[Record]) -> list[Record]:
+    """Turn each lost item that somebody has moved into a phantom, and return those items.
+
+    An item of its class must have appeared where looks had found the table empty, after a look saw the lost
+    item last. Each such item explains one lost item.
+    """
+    lost = [record for record in records if record.state is State.LOST]
+    appeared = [record for record in records if record.appeared and record.state in FINAL_STATES]
+    found = []
+    for old in lost:
+        same = [new for new in appeared if new.label == old.label and new.since > old.stamp]
+        if same:
+            old.state, old.why = State.PHANTOM, f"it is {same[0].item}"
+            appeared.remove(same[0])
+            found.append(old)
+    return found
 
 
 def forget_rejected(records: Iterable[Record]) -> list[Record]:

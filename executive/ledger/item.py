@@ -20,6 +20,8 @@ NOTHING = "more looks missed it than saw it"
 """Why an item is a phantom."""
 UNSURE = "no look is sure of it"
 """Why an item is given up that a detector is unsure of time and again."""
+SAME_PLACE = 0.01
+"""Distance up to which two measured positions count as the same place [m]."""
 NEARBY = 0.02
 """Share of the searched area in which an invented box would be taken for a given item."""
 INSIDE = 0.04
@@ -83,11 +85,13 @@ class Record:
         bias: Standard deviation of the systematic error of its position, along each axis [m].
         answers: Last class by viewpoint (`executive.ledger.independence`), since it may last have been moved.
         repeats: Number of looks that repeated the answer of an earlier look from the same viewpoint.
+        appeared: True if looks had found its place empty before one saw it there.
         moved: True once it has been seen again after something may have moved it.
         exists: True once it is known to exist: enough looks agree, or the tool has touched it.
         touched: Class at whose height the tool has touched it last, or "".
         low_touches: Number of touches too low for its class since the last one at the height of its class.
-        attempts: Failed grasps so far.
+        attempts: Failed attempts to pick it so far.
+        empty_probes: Probes that found only the table at its place, since it last moved or was touched.
         bin: Where it was placed, or "".
         why: Why it was rejected, is lost, a phantom or believed to be in its bin, or "".
         contradictions: Number of looks that showed something which its class cannot be.
@@ -118,11 +122,13 @@ class Record:
     bias: float = 0.0
     answers: dict[str, str] = field(default_factory=dict)
     repeats: int = 0
+    appeared: bool = False
     moved: bool = False
     exists: bool = False
     touched: str = ""
     low_touches: int = 0
     attempts: int = 0
+    empty_probes: int = 0
     bin: str = ""
     why: str = ""
     contradictions: int = 0
@@ -167,7 +173,12 @@ class Record:
     @property
     def probability(self) -> float:
         """Chance that it is an object at all, 0 to 1."""
-        return 1.0 if self.exists else 1.0 / (1.0 + math.exp(-max(self.existence, -CERTAIN)))
+        return 1.0 if self.exists else _probability_of(self.existence)
+
+    @property
+    def last_probability(self) -> float:
+        """Probability that it is an object, 0 to 1, when a look saw it last."""
+        return 1.0 if self.exists else _probability_of(self.existence - math.log(self.overlooked))
 
     @property
     def target(self) -> Target:
@@ -229,6 +240,8 @@ class Record:
         It is averaged with those before where the item has `settled`, and replaces them where it may have
         been moved since.
         """
+        if float(np.linalg.norm(position - self.position)) > SAME_PLACE:
+            self.empty_probes = 0
         if settled and math.isfinite(self.spread):
             mine, new = self.spread**-2, spread**-2
             self.position = np.asarray((self.position * mine + position * new) / (mine + new))
@@ -269,11 +282,18 @@ class Record:
         for label, vote in found.votes.items():
             self.votes[label] += vote
         self.tally += found.tally
+        self.empty_probes = 0
         self.position, self.spread, self.epoch = found.position, found.spread, found.epoch
         self.frame, self.stamp, self.confidence = found.frame, found.stamp, found.confidence
         self.overlooked = 1.0
         self.looks += found.looks
         # Where it was first, it was before it fell or was pushed.
         self.moved = True
-        if self.state is State.DROPPED:
+        if self.state is State.PHANTOM:
+            self.existence, self.why = found.existence, ""
+        if self.state in (State.DROPPED, State.PHANTOM):
             self.state = State.REJECTED if self.why else State.SEEN
+
+
+def _probability_of(log_odds: float) -> float:
+    return 1.0 / (1.0 + math.exp(-max(log_odds, -CERTAIN)))

@@ -13,7 +13,13 @@ from executive.cell_config import LedgerConfig, TableConfig
 from executive.errors import Fault
 from executive.events import Emit
 from executive.geometry import Array
-from executive.ledger.accounts import Remarks, count_states, find_final_state, forget_rejected
+from executive.ledger.accounts import (
+    Remarks,
+    count_states,
+    find_final_state,
+    find_lost_elsewhere,
+    forget_rejected,
+)
 from executive.ledger.bins import Bins
 from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage
@@ -139,7 +145,7 @@ class ItemLedger:
         height of its class before may have fallen since: then no height contradicts its class.
         """
         record = self._record(item)
-        record.exists = True
+        record.exists, record.empty_probes = True, 0
         if not contradiction:
             record.touched, record.low_touches = record.label, 0
         elif record.touched != record.label and not (beside_top and self._certainty.count_low_touch(record)):
@@ -149,10 +155,11 @@ class ItemLedger:
             return False
         return True
 
-    def missed(self, item: Item) -> None:
-        """Record a grasp that did not hold: the cup may have pushed anything, so all is in doubt."""
+    def missed(self, item: Item, *, found_table: bool = False) -> None:
+        """Record a failed attempt: the cup may have pushed anything, so all is in doubt."""
         record = self._record(item)
         record.attempts += 1
+        record.empty_probes += found_table
         self._disturb(record.position, math.inf)
         self._emit("item", **record.row)
 
@@ -235,17 +242,20 @@ class ItemLedger:
 
     def close(self, *, completed: bool) -> None:
         """Decide the final state of each item; `completed` is True if the tree succeeded."""
+        touched_any = any(record.touched for record in self._records.values())
         for record in self._records.values():
             if bin := self._in_bins.believed(record):
                 record.why = "it fell there"
                 self.placed(record.item, bin)
             final = find_final_state(
                 record, gone=self._is_gone(record), sure=self._certainty.is_sure(record),
-                routed=record.label in self._routes, completed=completed,
+                routed=record.label in self._routes, completed=completed, touched_any=touched_any,
             )  # fmt: skip
             if final is not None:
                 record.why = final[1]
                 self._change(record.item, final[0])
+        for record in find_lost_elsewhere(self._records.values()):
+            self._emit("item", **record.row)
 
     def reopen(self) -> None:
         """Forget the items that were left on the table; the next look enters those that still lie there."""

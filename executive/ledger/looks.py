@@ -109,7 +109,8 @@ class Looks:
     def _enter(self, records: Items, label: str, place: Array, odds: float) -> Record:
         """Enter something new, with the odds that it is an object."""
         self._counts[label] += 1
-        record = Record(f"{label}-{self._counts[label]}", label, place, math.log(odds))
+        appeared = self._coverage.find_miss_probability(place) <= GONE
+        record = Record(f"{label}-{self._counts[label]}", label, place, math.log(odds), appeared=appeared)
         records[record.item] = record
         return record
 
@@ -210,7 +211,8 @@ class Looks:
     def _may_be(self, old: Record, new: Record) -> bool:
         """Tell whether a new item may be one that is not where it was.
 
-        The robot may have pushed it anywhere; somebody else, not far.
+        The robot may have pushed it anywhere; somebody else, not far. A phantom may be one, too, if the robot
+        tried to pick it: it has vanished since.
         """
         if old is new or old.label != new.label:
             return False
@@ -220,7 +222,8 @@ class Looks:
         apart = float(np.linalg.norm((old.position - new.position)[:2]))
         moved = new.entered >= pushed if pushed is not None else False
         nudged = apart <= NUDGED and new.since > old.stamp and old.overlooked <= self._config.overlooked
-        missing = old.state in LYING and old.overlooked <= GONE and old.probability >= 0.5
+        vanished = old.state is State.PHANTOM and old.why == NOTHING and old.attempts > 0
+        missing = (old.state in LYING or vanished) and old.overlooked <= GONE and old.last_probability >= 0.5
         return missing and (moved or nudged)
 
 

@@ -76,9 +76,10 @@ def problems_of(do: Callable[[], None]) -> list[str]:
 def judge_items(accounts: Accounts) -> Ending:
     """Return the end of a run whose tree succeeded: its items decide whether it is a success."""
     rows = accounts.rows()
-    lost = sum(row["state"] == "lost" for row in rows)
+    lost = [str(row["item"]) for row in rows if row["state"] == "lost"]
     if lost:
-        return Ending("FAILURE", "lost", f"{lost} object(s) were lost and not found again")
+        message = f"{len(lost)} object(s) were lost and not found again: {', '.join(lost)}"
+        return Ending("FAILURE", "lost", message)
     rejected = [f"{row['item']} ({row['why']})" for row in rows if row["state"] == "rejected"]
     if rejected:
         message = f"{len(rejected)} object(s) were not sorted: {', '.join(rejected)}"

@@ -363,3 +363,89 @@ def test_what_lies_where_something_was_invented_before_the_table_changed_is_new(
     for _ in range(3):
         bench.look(("cube", 0.5, 0.02))
     assert [record.item for record in bench.ledger.records if record.state.value == "seen"] == ["cube-1"]
+
+
+@pytest.mark.parametrize(
+    ("probes", "touches_other", "moved", "final"),
+    [
+        (3, True, 0.0, ("phantom", "the tool found only the table at its place, 3 times")),
+        (2, True, 0.0, ("rejected", "could not be picked")),
+        (3, False, 0.0, ("rejected", "could not be picked")),
+        (3, True, 0.02, ("rejected", "could not be picked")),
+    ],
+    ids=["three probes", "two probes", "no touch of another item", "it moved"],
+)
+def test_an_item_is_a_phantom_if_the_tool_found_only_the_table_there_three_times(
+    bench: Bench, probes: int, touches_other: bool, moved: float, final: tuple[str, str]
+) -> None:
+    for number in range(probes):
+        bench.look(("cube", 0.5 + (moved if number == probes - 1 else 0.0), 0.0), FAR)
+        bench.ledger.missed("cube-1", found_table=True)
+    bench.look(("cube", 0.5 + moved, 0.0), FAR)
+    if touches_other:
+        bench.ledger.touched("cube-2")
+    bench.ledger.rejected("cube-1", "could not be picked")
+    assert bench.end()["cube-1"] == final
+
+
+def test_an_item_that_was_touched_exists_although_the_tool_finds_only_the_table_later(bench: Bench) -> None:
+    bench.look(CUBE)
+    bench.ledger.touched("cube-1")
+    for _ in range(3):
+        bench.ledger.missed("cube-1", found_table=True)
+        bench.look(CUBE)
+    bench.ledger.rejected("cube-1", "could not be picked")
+    assert bench.end()["cube-1"] == ("rejected", "could not be picked")
+
+
+def test_a_phantom_that_the_tool_tried_to_pick_may_turn_up_elsewhere(bench: Bench) -> None:
+    bench.look(CUBE)
+    bench.ledger.missed("cube-1")
+    for _ in range(4):
+        bench.look()
+    assert bench.states() == {"cube-1": PHANTOM}
+    for _ in range(2):
+        bench.look(("cube", 0.55, 0.05))
+    assert (bench.states()["cube-1"], bench.ledger.attempts("cube-1")) == (("seen", ""), 1)
+
+
+def put_away(bench: Bench, *still_there: Thing) -> None:
+    """Look until the items that are not still there count as gone, and at what is still there."""
+    for _ in range(4):
+        bench.look(*still_there, view="full")
+
+
+@pytest.mark.parametrize("label", ["cube", "duck"])
+def test_a_lost_item_that_somebody_carried_across_the_table_is_the_one_that_appeared_there(
+    bench: Bench, label: str
+) -> None:
+    for _ in range(2):
+        bench.look(CUBE, view="full")
+    put_away(bench)
+    put_away(bench, (label, 0.5, 0.2))
+    final = bench.end()["cube-1"]
+    assert final == (("phantom", "it is cube-2") if label == "cube" else LOST)
+
+
+def test_an_item_that_appeared_explains_one_lost_item_only(bench: Bench) -> None:
+    for _ in range(2):
+        bench.look(CUBE, FAR, view="full")
+    put_away(bench)
+    put_away(bench, ("cube", 0.45, -0.2))
+    assert list(bench.end().values()) == [("phantom", "it is cube-3"), LOST, LEFT]
+
+
+def test_an_item_carried_away_twice_is_one_item(bench: Bench) -> None:
+    for place in (CUBE, FAR, ("cube", 0.45, -0.2)):
+        put_away(bench, place)
+    assert list(bench.end().values()) == [("phantom", "it is cube-2"), ("phantom", "it is cube-3"), LEFT]
+
+
+def test_an_item_first_seen_where_nobody_had_looked_explains_no_lost_item(bench: Bench) -> None:
+    behind_arm = slice(0, 280)
+    for things in ([CUBE], []):
+        for _ in range(2):
+            bench.look(*things, view="full", hidden=behind_arm)
+    for _ in range(2):
+        bench.look(("cube", 0.53, 0.18), view="full")
+    assert bench.end() == {"cube-1": LOST, "cube-2": LEFT}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -58,3 +59,18 @@ def test_nothing_is_felt_for_below_the_middle_of_a_thin_part(
     assert (result.reason, result.message) == (
         "no_contact", "no contact down to 4 mm, duck-1 was expected at 8 mm",
     )  # fmt: skip
+
+
+def test_the_fourth_attempt_feels_for_an_object_almost_down_to_the_table(
+    fake: FakeCell, look: Callable[..., list[Target]]
+) -> None:
+    fake.world.put("cube", 0.5, 0.0)
+    (target,) = look()
+    fake.world.objects.clear()
+    messages = []
+    for _ in range(4):
+        current = replace(target, epoch=fake.ledger.epoch)
+        messages.append(run_skill(Approach(target=current), fake).message)
+    heights = [message.removeprefix("no contact down to ").split(" mm")[0] for message in messages]
+    assert heights == ["35", "35", "35", "5"]
+    assert [record.empty_probes for record in fake.ledger.records] == [1]
