@@ -1,0 +1,118 @@
+"""Under disturbances, the ledger agrees with the audit, or the run names the items in question."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from executive.messages import Answer, Detection
+from executive.runtime.cells import cell_kind
+from executive.testing.disturbances import Disturbance, after, during, object_bumped, with_probability
+from executive.testing.disturbances.detector import DetectorDisturbed
+from executive.testing.disturbances.effect import Effect, Occasion
+from executive.testing.fake_cell import FakeCell
+from executive.testing.run_mission import MissionResult, run_mission
+
+X_RANGE, Y_RANGE = (0.42, 0.64), (-0.22, 0.22)
+"""Part of the table in which bumped objects stay [m]."""
+SWAPPED = {"cube": "sphere", "sphere": "cube", "duck": "duck"}
+SEEDS = range(171000, 171006)
+
+
+@dataclass(frozen=True)
+class ObjectsExchanged(Effect):
+    """Somebody exchanges the nearest object with another one of another class, once."""
+
+    name = "objects_exchanged"
+
+    def act(self, now: Occasion) -> bool:
+        hand = now.scene.hand
+        if (first := now.scene.find("node", now.item)) is None:
+            return False
+        others = [
+            thing
+            for thing in hand.things
+            if thing.label != first.label
+            and not any(b.contains(thing.position) for b in now.scene.cell.bins.values())
+        ]
+        if not others:
+            return False
+        x, y = (others[0].position - first.position)[:2]
+        hand.move(first, (float(x), float(y)))
+        hand.move(others[0], (-float(x), -float(y)))
+        now.tell(first)
+        return True
+
+
+@dataclass(frozen=True)
+class BinEmptied(Effect):
+    """Somebody takes all objects out of the first bin that holds some, once."""
+
+    name = "bin_emptied"
+
+    def act(self, now: Occasion) -> bool:
+        for bin in now.scene.cell.bins.values():
+            inside = [thing for thing in now.scene.hand.things if bin.contains(thing.position)]
+            for thing in inside:
+                now.tell(thing)
+                now.scene.hand.remove(thing)
+            if inside:
+                return True
+        return False
+
+
+def detector_invents(seed: int) -> Effect:
+    """Add the same box to each answer of the detector."""
+    u, v = np.random.default_rng(seed).uniform((250, 170), (390, 330))
+    box = (float(u), float(v), float(u) + 26.0, float(v) + 26.0)
+
+    def add(answer: Answer) -> Answer:
+        return replace(answer, found=(*answer.found, Detection("cube", 0.9, box)))
+
+    return DetectorDisturbed("detector_invents", add)
+
+
+def detector_swaps_classes() -> Effect:
+    """Exchange the classes cube and sphere in an answer."""
+
+    def swap(answer: Answer) -> Answer:
+        return replace(answer, found=tuple(replace(one, label=SWAPPED[one.label]) for one in answer.found))
+
+    return DetectorDisturbed("detector_swaps_classes", swap)
+
+
+def schedule(kind: str, seed: int) -> list[Disturbance]:
+    if kind == "moved before each approach":
+        return [during("*/Approach", object_bumped(X_RANGE, Y_RANGE))]
+    if kind == "false detection":
+        return [after(0.0, detector_invents(seed))]
+    if kind == "wrong classes in a third of the looks":
+        return [with_probability(0.3, "*/Detect", detector_swaps_classes(), seed=seed)]
+    if kind == "exchanged before an approach":
+        return [during("*/Approach", ObjectsExchanged(), nth=1 + seed % 3)]
+    return [after(4.0 + seed % 6, BinEmptied())]
+
+
+KINDS = (
+    "moved before each approach", "false detection", "wrong classes in a third of the looks",
+    "exchanged before an approach", "emptied bin",
+)  # fmt: skip
+
+
+def names_items_in_question(result: MissionResult) -> bool:
+    rows = [row for row in result.items["rows"] if row["state"] in ("rejected", "lost")]
+    return result.status == "INCOMPLETE" and all(row["item"] in result.message for row in rows)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("cell", ["fake", "sim"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_ledger_and_audit_agree_or_the_run_names_the_items(kind: str, cell: str, seed: int) -> None:
+    result = run_mission(
+        "sort_overhead", FakeCell if cell == "fake" else cell_kind("sim"),
+        seed=seed, disturbances=schedule(kind, seed), set={"cell.kind": cell},
+    )  # fmt: skip
+    assert result.agrees or names_items_in_question(result)
