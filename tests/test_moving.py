@@ -39,4 +39,4 @@ def test_what_a_look_shows_while_a_motion_is_planned_is_heeded(fake: FakeCell) -
             fake.advance()
             ticks += 1
     assert len(asked) == 4, "planned, and found changed; planned anew, and found the same"
-    assert ticks == pytest.approx(2 * 0.05 * 240, abs=2)
+    assert ticks == pytest.approx(2 * 0.1 * 240, abs=2)

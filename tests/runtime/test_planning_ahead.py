@@ -23,7 +23,7 @@ from skills.release import Release
 from skills.select_target import SelectTarget
 from skills.transit import Transit
 
-LATENCY = 0.05
+LATENCY = 0.1
 """Time that a plan takes in the shipped cell [s]."""
 
 

@@ -33,9 +33,9 @@ def test_a_plan_takes_its_time_on_the_clock_and_is_told(rig: Rig) -> None:
     while not planning.ready:
         rig.step()
         waited += 1
-    assert waited == round(rig.config.motion.planning * 240) == 12
+    assert waited == round(rig.config.motion.planning * 240) == 24
     duration = round(planning.result().duration, 4)
-    assert rig.events == [{"kind": "plan", "ahead": False, "waits": 0.05, "duration": duration}]
+    assert rig.events == [{"kind": "plan", "ahead": False, "waits": 0.1, "duration": duration}]
 
 
 def test_a_motion_planned_ahead_is_known_at_once_and_begins_where_the_running_one_ends(rig: Rig) -> None:
@@ -61,7 +61,7 @@ def test_a_motion_planned_ahead_too_late_is_waited_for_as_long_as_it_takes(rig: 
     rig.arm.plan_ahead("home")
     rig.step(4)
     assert not rig.arm.plan("home").ready
-    assert rig.events[-1]["waits"] == pytest.approx(8 / 240, abs=1e-4)
+    assert rig.events[-1]["waits"] == pytest.approx(20 / 240, abs=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -107,7 +107,7 @@ def test_its_destination_is_where_the_running_motion_ends_or_where_it_stands(rig
 def test_what_cannot_be_reached_is_said_by_the_result_in_its_time(rig: Rig) -> None:
     planning = rig.arm.plan(Goal((0.9, 0.0, 0.114)))
     assert not planning.ready
-    rig.step(12)
+    rig.step(24)
     assert planning.ready
     with pytest.raises(Unreachable, match=r"the tool cannot reach \(0\.900, 0\.000, 0\.114\) m"):
         planning.result()

@@ -133,7 +133,7 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
         f'tool_left says nothing of "halt". {TOOL}',
     ]),
     ("arm_left_at_rest", faulty.RunsOnWhenHalted, [
-        f"{EMPTY} it was halted at tick 13, and the arm still moves. {REST}",
+        f"{EMPTY} it was halted at tick 25, and the arm still moves. {REST}",
     ]),
     ("halts_at_once", faulty.WaitsInFinally, [
         f"{EMPTY} at tick 1 it yielded while it was halted; nothing may wait in \"finally\". {FINALLY}",

@@ -46,7 +46,7 @@ def test_the_verdict_comes_first_and_then_why_objects_timeline_and_tree(failed):
         "FAILURE Grasp.missed Grasp of sphere-1 failed (missed) on the last of 2 attempts: no seal on"
     )
     for section, words in (
-        ("header", "trial , seed 3, 1.2 s on the robot's clock"),
+        ("header", "trial , seed 3, 1.4 s on the robot's clock"),
         ("story", "Why nothing in the mission stopped it, from the root down: retry all 2 attempts failed"),
         ("story", "tree/5:retry/do/Grasp"),
         ("story", "left to do 2: sphere-1"),
@@ -70,7 +70,7 @@ def test_every_object_is_there_with_its_fate_its_time_its_picture_and_what_went_
     assert all(f"{row.item} rejected" in told for row in facts.objects)
     assert [row.item for row in facts.objects] == ["sphere-1", "sphere-2"]
     assert "2 seen, 0 placed, 2 rejected" in told
-    assert "0.76 s Grasp.missed no seal on sphere-1" in told
+    assert "0.81 s Grasp.missed no seal on sphere-1" in told
     alts = [attributes["alt"] for tag, attributes in found.elements if tag == "img"]
     assert alts.count("What the decision for sphere-1 was made from") == 1
     assert alts.count("sphere-1: missed") == 2
@@ -124,7 +124,7 @@ def test_the_time_and_the_pictures_of_what_was_no_object_are_shown_all_the_same(
     phantom = {"state": "phantom"}
     change(run / "journal.jsonl", lambda entry: entry | (phantom if entry.get("item") == "sphere-1" else {}))
     found = page(run)
-    assert "sphere-1 missed at step 300" in found.texts["objects"]
+    assert "sphere-1 missed at step 325" in found.texts["objects"]
     assert "What the decision for sphere-1 was made from" not in found.texts["objects"]
     table, _ = found.texts["objects"].split(" look: ")
     assert "sphere-1" in table

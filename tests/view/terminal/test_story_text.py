@@ -49,13 +49,13 @@ def test_an_object_that_slips_out_of_the_cup_every_time(abroad) -> None:
     assert (
         text(run)
         == """\
-FAILURE after 1.77 s: Transit of cube-1 failed (dropped) on the last of 3 attempts: the seal on cube-1 broke
+FAILURE after 1.92 s: Transit of cube-1 failed (dropped) on the last of 3 attempts: the seal on cube-1 broke
   on the way to red_bin, near (0.50, 0.10, 0.12) m
 why nothing in trial.yaml stopped it, from the root down:
   retry              all 3 attempts failed: 1 x Grasp.missed, 2 x Transit.dropped (line 11)
   Transit of cube-1  tree/5:retry/do/Transit (line 15)
-the cell    tool.holding = False (1.77 s), tool.touching = True (1.60 s), tool.bears = 7.9 (1.19 s)
-last look   cube-1 as cube 0.90 at (0.498, 0.102, 0.025) m: frame 3, camera overhead, by embedded, at 1.31 s;
+the cell    tool.holding = False (1.92 s), tool.touching = True (1.75 s), tool.bears = 7.9 (1.28 s)
+last look   cube-1 as cube 0.90 at (0.498, 0.102, 0.025) m: frame 3, camera overhead, by embedded, at 1.41 s;
             3 looks, 3 failed attempts in all
 now         the arm is at rest, the tool is empty
 left to do  1: cube-1
@@ -88,10 +88,10 @@ def test_an_exception_in_a_part(abroad) -> None:
     assert (
         text(run, tail=TAIL + GO_ON)
         == """\
-FAULT after 0.57 s: Grasp: ZeroDivisionError: vacuum gauge
+FAULT after 0.62 s: Grasp: ZeroDivisionError: vacuum gauge
 where       tree/5:retry/do/Grasp (trial.yaml:15)
 raised at   terminal/test_story_text.py:N, in broken; the whole traceback is in the journal, event "fault"
-the cell    command raised ZeroDivisionError (0.57 s)
+the cell    command raised ZeroDivisionError (0.62 s)
 last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera overhead, by embedded, at 0.05 s;
             1 look, 0 failed attempts in all
 now         the arm is at rest, the tool is empty
@@ -139,9 +139,9 @@ def test_an_object_that_is_lost(at_home) -> None:
     assert (
         text(run, numbered=False)
         == """\
-FAILURE after 1.43 s: 1 object was lost: cube-1
+FAILURE after 1.53 s: 1 object was lost: cube-1
 lost        cube-1 seen last at (0.500, 0.100, 0.025) m at 0.05 s, not in the 3 looks since; Transit.dropped
-            at 0.75 s: the seal on cube-1 broke on the way to red_bin, near (0.50, 0.10, 0.12) m
+            at 0.80 s: the seal on cube-1 broke on the way to red_bin, near (0.50, 0.10, 0.12) m
 now         the arm is at rest, the tool is empty
 next        look for cube-1 by hand, below where it was dropped
 """
@@ -158,7 +158,7 @@ def test_an_arm_whose_way_is_barred_whenever_it_carries(at_home) -> None:
     assert (
         text(run, numbered=False)
         == """\
-FAILURE after 1.91 s: PutDown of cube-1 failed (blocked): link 5 met a wrench
+FAILURE after 2.11 s: PutDown of cube-1 failed (blocked): link 5 met a wrench
 why nothing in missions/sort_overhead.yaml stopped it, from the root down:
   repeat                ends well only with choice.no_candidate (line N)
   carry_and_watch: try  caught Transit.blocked (link 5 met a wrench), but what it did instead failed
@@ -166,7 +166,7 @@ why nothing in missions/sort_overhead.yaml stopped it, from the root down:
   put_aside: try        catches only PutDown.dropped (missions/library/sorting.yaml:N)
   PutDown of cube-1     tree/2:repeat/do/carry_and_watch/try/catch/4/put_aside/try/do/PutDown
                         (missions/library/sorting.yaml:N)
-the cell    arm.met = link 5 met a wrench (1.15 s), tool.bears = 7.9 (0.68 s), tool.holding = True (0.68 s)
+the cell    arm.met = link 5 met a wrench (1.20 s), tool.bears = 7.9 (0.72 s), tool.holding = True (0.72 s)
 last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera overhead, by embedded, at 0.05 s;
             1 look, 0 failed attempts in all
 now         the arm is at rest, the tool holds cube-1
