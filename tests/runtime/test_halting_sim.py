@@ -57,8 +57,8 @@ class Halt:
 
 @pytest.fixture(scope="module", params=[209, 885, 1223])
 def halt(missions: Path, tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Halt:
-    """Press Ctrl-C after some control steps of a sort."""
-    tick, file = request.param, tmp_path_factory.mktemp("halt") / "journal.jsonl"
+    """Press Ctrl-C in the first motion after some control steps of a sort."""
+    earliest, file = request.param, tmp_path_factory.mktemp("halt") / "journal.jsonl"
     loaded = load_mission(missions / "sort_overhead.yaml", discover())
     journal = Journal(file)
     run = Run(loaded, discover(), seed=2, kind=oracle_cell(), observers=[journal])
@@ -66,7 +66,8 @@ def halt(missions: Path, tmp_path_factory: pytest.TempPathFactory, request: pyte
     assert isinstance(workcell, SimCell)
     client, arm, advance = workcell._world.client, workcell._arm, workcell.advance
     send = client.setJointMotorControlArray
-    last, commands, paths = arm.q, [], []
+    last, commands = arm.q, []
+    pressed: list[tuple[int, Trajectory]] = []
 
     def sent(*args: Any, targetPositions: list[float], **options: Any) -> None:
         nonlocal last
@@ -74,8 +75,8 @@ def halt(missions: Path, tmp_path_factory: pytest.TempPathFactory, request: pyte
         send(*args, targetPositions=targetPositions, **options)
 
     def advanced() -> None:
-        if len(commands) == tick:
-            paths.append(arm._motion)
+        if not pressed and len(commands) >= earliest and arm._motion is not None:
+            pressed.append((len(commands), arm._motion))
             os.kill(os.getpid(), signal.SIGINT)
         advance()
         commands.append(last)
@@ -93,8 +94,9 @@ def halt(missions: Path, tmp_path_factory: pytest.TempPathFactory, request: pyte
         run.close()
         journal.close()
     assert signal.getsignal(signal.SIGINT) is handler
+    (tick, path), *_ = pressed
     return Halt(
-        tick, outcome, paths[0], np.array(commands[tick - BEFORE :]), np.array(measured),
+        tick, outcome, path, np.array(commands[tick - BEFORE :]), np.array(measured),
         JointLimits.of(loaded.cell_config.arm.limits),
         [node.name for node in run.root.iterate() if node.status is Status.RUNNING],
         read_journal(file),
