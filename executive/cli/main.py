@@ -89,6 +89,9 @@ def _show_error(error: BaseException, *, debug: bool) -> int:
     if isinstance(error, ExecutiveError):
         click.echo(str(error), err=True)
         return error.exit_code
+    if isinstance(error, OSError) and error.filename:
+        click.echo(shorten_quotations(f"{error.filename}: {error.strerror}"), err=True)
+        return BAD_INPUT
     if not debug:
         click.echo(_apology(error), err=True)
     return BROKEN
@@ -113,7 +116,8 @@ def _apology(error: BaseException) -> str:
 def main(debug: bool) -> None:
     """Run pick-and-place missions written as behaviour trees in YAML.
 
-    Exit codes: 0 success, 1 mission failed, 2 bad input, 3 fault, 130 halted by the user.
+    Exit codes: 0 success, 1 mission failed or the audit disagrees, 2 invalid input, 3 fault, 4 incomplete
+    (objects were rejected), 130 halted by the user.
     """
     del debug  # Read by `Executive.main`, which also sees errors from outside of any command.
 

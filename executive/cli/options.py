@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +24,14 @@ def _by_key(ctx: click.Context, param: click.Parameter, values: tuple[str, ...])
 
 
 class PathType(click.Path):
-    """A path that is not empty: an empty one would mean the working directory."""
+    """A path that is neither empty, which would mean the working directory, nor a link to a missing file."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the path, or end the command with an error."""
         if str(value) == "":
             self.fail("the path is empty", param, ctx)
+        if os.path.islink(value) and not os.path.exists(value):
+            self.fail(f"{value} is a link to a file that does not exist", param, ctx)
         return super().convert(value, param, ctx)
 
 

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from itertools import pairwise
-from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import pybullet
-import pybullet_data
 from numpy.typing import NDArray
 from pybullet_utils.bullet_client import BulletClient
 
@@ -22,13 +17,11 @@ from executive.errors import InputError
 from executive.geometry import Array, Pose
 from executive.layout import object_class
 from executive.messages import ObjectClass
+from executive.sim.model_files import find_mesh, find_model, read_numbers, read_obj, read_urdf
 from executive.workcell import KeyPath
-from executive.written_paths import leaves_folder, links_out
 
 TOLERANCE = 0.003
 """Difference between a cell file's figure and the model's own from which it counts as wrong [m]."""
-MAX_MODEL_SIZE = 20_000_000
-"""Largest size of a model file [byte]: larger ones take longer to check than a mission should."""
 FRICTION = 0.0005
 """Rolling and spinning friction: without it a ball at rest creeps, and a released one never stops."""
 
@@ -81,21 +74,6 @@ class Mesh:
         return bool(outside.max() < 1e-4)
 
 
-def find_model(name: str) -> Path:
-    """Return the path of a model: a full path as it is, any other name as one of pybullet_data's.
-
-    Raises:
-        InputError: There is no such file.
-    """
-    path = os.path.join(pybullet_data.getDataPath(), name)
-    # Unlike Path's method this one says no to a name that no file can have.
-    if os.path.isfile(path):
-        if os.path.getsize(path) > MAX_MODEL_SIZE:
-            raise InputError(f"the model {name} is larger than {MAX_MODEL_SIZE // 1_000_000} MB")
-        return Path(path).resolve()
-    raise InputError(f"there is no model {name}, neither beside the cell file nor in pybullet_data")
-
-
 def add_body(client: BulletClient, config: ObjectConfig, X_WO: Pose) -> int:
     """Put an object at `X_WO` (z up as it stands) and return its body.
 
@@ -136,8 +114,8 @@ def mass_of(config: ObjectConfig) -> float:
     """Return what an object weighs in simulation [kg]: as the cell file or its URDF says."""
     if config.mesh:
         return config.mass
-    masses = _read_urdf(find_model(config.urdf)).iterfind(".//inertial/mass")
-    return sum(sum(_numbers(mass.get("value"), (0.0,))) for mass in masses)
+    masses = read_urdf(find_model(config.urdf)).iterfind(".//inertial/mass")
+    return sum(sum(read_numbers(mass.get("value"), (0.0,))) for mass in masses)
 
 
 def weighed(label: str, config: ObjectConfig) -> ObjectClass:
@@ -210,92 +188,21 @@ def load_mesh(config: ObjectConfig) -> Mesh:
     path = find_model(config.urdf)
     vertices: list[Array] = []
     triangles: list[NDArray[np.intp]] = []
-    for visual in _read_urdf(path).iter("visual"):
+    for visual in read_urdf(path).iter("visual"):
         mesh = visual.find("geometry/mesh")
         if mesh is None or not mesh.get("filename", "").endswith(".obj"):
             raise InputError(f"{path}: only visuals made of .obj meshes can be labelled")
-        written = mesh.get("filename", "")
-        if leaves_folder(written) or links_out(path.parent, written):
-            raise InputError(
-                f'the model {path.name} names the mesh "{written}", which is outside of its folder'
-            )
-        corners, faces = read_obj(find_model(str(path.parent / written)))
-        scale = np.array(_numbers(mesh.get("scale"), (1.0, 1.0, 1.0)))
+        corners, faces = read_obj(find_mesh(path, mesh))
+        scale = np.array(read_numbers(mesh.get("scale"), (1.0, 1.0, 1.0)))
         origin = visual.find("origin")
-        rpy = _numbers(None if origin is None else origin.get("rpy"), (0.0, 0.0, 0.0))
-        xyz = _numbers(None if origin is None else origin.get("xyz"), (0.0, 0.0, 0.0))
+        rpy = read_numbers(None if origin is None else origin.get("rpy"), (0.0, 0.0, 0.0))
+        xyz = read_numbers(None if origin is None else origin.get("xyz"), (0.0, 0.0, 0.0))
         X_LV = Pose(_rotation(*rpy), np.array(xyz) * config.scale)
         triangles.append(faces + sum(map(len, vertices)))
         vertices.append((upright(config) @ X_LV).apply(corners * scale * config.scale))
     if not vertices:
         raise InputError(f"the model {path.name} has no visual, so no camera would see it")
     return Mesh(np.concatenate(vertices), np.concatenate(triangles))
-
-
-def _read_urdf(path: Path) -> ElementTree.Element:
-    """Return the root of a URDF.
-
-    Raises:
-        InputError: It is no XML, or another kind of XML.
-    """
-    try:
-        root = ElementTree.parse(path).getroot()
-    except (ElementTree.ParseError, OSError, ValueError, LookupError) as error:
-        raise InputError(f"the model {path.name} is no URDF: {error}") from None
-    if root.tag != "robot":
-        raise InputError(f"the model {path.name} is no URDF: its root is <{root.tag}>, not <robot>")
-    return root
-
-
-def read_obj(path: Path) -> tuple[Array, NDArray[np.intp]]:
-    """Return vertices `(N, 3)` and triangles `(M, 3)` of a Wavefront file; polygons are cut into fans.
-
-    Raises:
-        InputError: It holds no mesh.
-    """
-    vertices: list[list[float]] = []
-    triangles: list[tuple[int, int, int]] = []
-    try:
-        for line in path.read_text(encoding="utf-8").splitlines():
-            key, *values = line.split() or [""]
-            if key == "v":
-                vertices.append([float(value) for value in values[:3]])
-            elif key == "f":
-                corners = [int(value.split("/")[0]) for value in values]
-                corners = [i - 1 if i > 0 else len(vertices) + i for i in corners]
-                triangles += [(corners[0], a, b) for a, b in pairwise(corners[1:])]
-        faces = np.array(triangles, dtype=np.intp).reshape(-1, 3)
-        return _checked(np.array(vertices, dtype=float), faces)
-    except (OSError, ValueError, IndexError, OverflowError) as error:
-        raise InputError(f"the model {path.name} is no Wavefront mesh: {error}") from None
-
-
-def _checked(vertices: Array, triangles: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
-    """Return what it is given if that is a mesh; raises ValueError."""
-    if not triangles.size:
-        raise ValueError("it has no faces (lines beginning with f)")
-    if vertices.shape != (len(vertices), 3) or not np.isfinite(vertices).all():
-        raise ValueError("a vertex (lines beginning with v) needs three finite numbers")
-    if triangles.min() < 0 or triangles.max() >= len(vertices):
-        raise ValueError(f"a face names a vertex that is not there; there are {len(vertices)}")
-    return vertices, triangles
-
-
-def _numbers(text: str | None, default: tuple[float, ...]) -> tuple[float, ...]:
-    """Return the numbers in an attribute of a URDF.
-
-    Raises:
-        InputError: They are no numbers, not finite, or not as many as in `default`.
-    """
-    if text is None:
-        return default
-    try:
-        numbers = tuple(map(float, text.split()))
-    except ValueError:
-        numbers = ()
-    if len(numbers) != len(default) or not np.isfinite(numbers).all():
-        raise InputError(f'a URDF has "{text}" in place of {len(default)} finite number(s)')
-    return numbers
 
 
 def _rotation(roll: float, pitch: float, yaw: float) -> Array:

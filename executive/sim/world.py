@@ -22,7 +22,8 @@ from executive.motion.kinematics import FLANGE_OFFSET
 from executive.motion.state import JOINTS
 from executive.sim import command_log
 from executive.sim.command_log import CommandLog
-from executive.sim.models import add_body, find_model, upright
+from executive.sim.model_files import find_model
+from executive.sim.models import add_body, upright
 from executive.sim.table_top import TableTop
 
 TABLE_HEIGHT = 0.625

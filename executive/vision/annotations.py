@@ -23,6 +23,10 @@ IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp")
 """Suffixes of images."""
 BOX_VALUES = 4
 """Number of values of a YOLO box: centre x, centre y, width and height."""
+MAX_OBJECTS = 1_000
+"""Largest number of labelled objects in an image; RF-DETR finds at most 300 (its number of queries)."""
+MAX_COCO_SIZE, MAX_LABEL_SIZE, MAX_CLASS_FILE_SIZE = 500_000_000, 10_000_000, 100_000
+"""Largest COCO file, YOLO label file and YOLO class file [byte]: the annotations of COCO 2017 have 470 MB."""
 NORMALIZED_TOLERANCE = 1e-6
 """Accepted amount by which a normalized coordinate may lie outside of 0 to 1, because of rounding."""
 
@@ -111,7 +115,7 @@ def read_annotations(split: Path) -> Annotations:
 
 def _read_coco(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
     file = split / COCO_FILE_NAME
-    content = _parse(file, lambda text: _CocoFile.model_validate_json(text))
+    content = _parse(file, MAX_COCO_SIZE, lambda text: _CocoFile.model_validate_json(text))
     names = {category.id: category.name for category in content.categories}
     objects = {image.id: _Objects() for image in content.images}
     for what, values in (
@@ -130,6 +134,11 @@ def _read_coco(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
                 f"there are {', '.join(map(str, names))[:MAX_QUOTED] or 'none'}"
             )
         left, top, width, height = one.bbox
+        if len(objects[one.image_id].labels) == MAX_OBJECTS:
+            raise InputError(
+                f"{file}: annotations[{number}].image_id: image {one.image_id} has more than {MAX_OBJECTS} "
+                "objects; divide the image"
+            )
         objects[one.image_id].labels.append(names[one.category_id])
         objects[one.image_id].boxes.append((left, top, left + width, top + height))
     for number, image in enumerate(content.images):
@@ -143,7 +152,9 @@ def _read_yolo(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
     if data is None:
         raise InputError(f"{split.parent} has no data.yaml, which names the classes of a YOLO data set")
     content = _parse(
-        data, lambda text: _YoloClassFile.model_validate(yaml.load(text, Loader=yaml.BaseLoader))
+        data,
+        MAX_CLASS_FILE_SIZE,
+        lambda text: _YoloClassFile.model_validate(yaml.load(text, Loader=yaml.BaseLoader)),
     )
     names = dict(enumerate(content.names)) if isinstance(content.names, list) else content.names
     folder = split / "images"
@@ -158,7 +169,7 @@ def _read_labels(file: Path, names: Mapping[int, str]) -> ImageAnnotation:
     if not os.path.lexists(file):
         return ImageAnnotation(is_normalized=True)
     objects = _Objects()
-    for number, line in enumerate(_read_text(file).splitlines(), start=1):
+    for number, line in enumerate(_read_text(file, MAX_LABEL_SIZE).splitlines(), start=1):
         if not line.strip():
             continue
         try:
@@ -178,6 +189,8 @@ def _read_labels(file: Path, names: Mapping[int, str]) -> ImageAnnotation:
         # The comparison is False for numbers that are not finite.
         if not all(-NORMALIZED_TOLERANCE <= value <= 1 + NORMALIZED_TOLERANCE for value in numbers):
             raise InputError(f'{file}:{number}: values are shares of the image, 0 to 1, not "{line}"')
+        if len(objects.labels) == MAX_OBJECTS:
+            raise InputError(f"{file}:{number}: an image has at most {MAX_OBJECTS} objects; divide the image")
         objects.labels.append(name)
         objects.boxes.append(_polygon_to_box(numbers) if is_polygon else _centre_to_corner_box(numbers))
         objects.polygon_count += is_polygon
@@ -210,24 +223,26 @@ def _find_image(folder: Path, name: str, place: str) -> Path:
     return path
 
 
-def _read_text(file: Path) -> str:
+def _read_text(file: Path, max_size: int) -> str:
     if not os.path.isfile(file):
         raise InputError(f"{file} is no file")
+    if file.stat().st_size > max_size:
+        raise InputError(f"{file} has more than {max_size / 1e6:g} MB")
     try:
         return file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{file} cannot be read: {error}") from error
 
 
-def _parse(file: Path, parse: Callable[[str], ContentT]) -> ContentT:
-    """Return the parsed content of a file.
+def _parse(file: Path, max_size: int, parse: Callable[[str], ContentT]) -> ContentT:
+    """Return the parsed content of a file of at most `max_size` [byte].
 
     Raises:
-        InputError: The file cannot be read, is not valid, or lacks a required key; the message names the
-        line or the key.
+        InputError: The file is too large, cannot be read, is not valid, or lacks a required key; the message
+        names the line or the key.
     """
     try:
-        return parse(_read_text(file))
+        return parse(_read_text(file, max_size))
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
         raise InputError(f"{file}:{line}: invalid YAML: {error.problem}") from error

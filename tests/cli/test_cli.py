@@ -171,7 +171,11 @@ def test_help_names_every_command_and_every_exit_code():
     shown = invoke("--help")
     assert shown.exit_code == 0
     assert all(f"  {command} " in shown.stdout for command in COMMANDS)
-    assert "0 success, 1 mission failed, 2 bad input, 3 fault, 130 halted" in shown.stdout
+    codes = (
+        "0 success, 1 mission failed or the audit disagrees, 2 invalid input, 3 fault, 4 incomplete "
+        "(objects were rejected), 130 halted by the user."
+    )
+    assert codes in " ".join(shown.stdout.split())
     assert [invoke(command, "--help").exit_code for command in COMMANDS] == [0] * len(COMMANDS)
 
 
@@ -196,12 +200,20 @@ def test_what_cannot_be_meant_is_refused(project, monkeypatch, words, sentence):
     assert sentence in shown.stderr
 
 
+def test_an_output_folder_that_is_a_link_to_a_missing_file_is_refused(project, tmp_path):
+    (tmp_path / "link").symlink_to("nowhere")
+    shown = invoke("dataset", "overhead", "--out", str(tmp_path / "link"))
+    assert (shown.exit_code, shown.stdout) == (2, "")
+    assert "link is a link to a file that does not exist" in shown.stderr
+
+
 @pytest.mark.parametrize(
     ("error", "code", "said"),
     [
         (InputError('there is no mission "sort"'), 2, 'there is no mission "sort"\n'),
         (Fault("the simulator is gone"), 3, "the simulator is gone\n"),
         (KeyboardInterrupt(), 130, "halted\n"),
+        (OSError(36, "File name too long", "x"), 2, "x: File name too long\n"),
     ],
 )
 def test_what_ends_a_run_is_its_text_and_nothing_else(project, error, code, said):

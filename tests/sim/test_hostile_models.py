@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 
 from executive.cell_config import ObjectConfig
 from executive.errors import InputError
-from executive.sim.models import find_model, load_mesh, mass_of
+from executive.sim.model_files import find_model
+from executive.sim.models import load_mesh, mass_of
 
 LEVELS = "".join(f"<!ENTITY a{number + 1} '{f'&a{number};' * 10}'>" for number in range(9))
 BOMB = f"<!DOCTYPE r [<!ENTITY a0 'ha'>{LEVELS}]><robot name='&a9;'/>"
@@ -52,6 +54,15 @@ def test_a_mesh_outside_of_the_folder_of_its_urdf_is_not_opened(mesh: str, tmp_p
     (tmp_path / "m.urdf").write_text(f"<robot>{visual}</robot>")
     with pytest.raises(InputError, match=r"names the mesh .*, which is outside of its folder$"):
         load_mesh(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
+
+
+@pytest.mark.parametrize("part", ["visual", "collision"])
+def test_a_mesh_that_is_no_file_is_not_opened(part: str, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.obj")
+    shape = f"<{part}><geometry><mesh filename='pipe.obj'/></geometry></{part}>"
+    (tmp_path / "m.urdf").write_text(f"<robot>{shape}</robot>")
+    with pytest.raises(InputError, match=r"^there is no model .*pipe\.obj, neither beside the cell file nor"):
+        mass_of(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
 
 
 def test_a_name_that_no_file_can_have_is_no_model() -> None:

@@ -11,7 +11,8 @@ import pytest
 from executive.cell_config import CellConfig, ObjectConfig
 from executive.errors import InputError
 from executive.geometry import Pose, about_z
-from executive.sim.models import load_mesh, missing_models, read_obj
+from executive.sim.model_files import read_obj
+from executive.sim.models import load_mesh, missing_models
 from executive.sim.world import World
 from tests.sim.conftest import shipped_cell
 
