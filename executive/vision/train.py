@@ -56,7 +56,8 @@ def train(
         from executive.vision.training.run import fit
     except ImportError as error:
         raise InputError(
-            f'training needs the package "{error.name}"; install the extra: uv sync --extra train'
+            f'training needs the package "{error.name}"; install the extra, about 3 GB to download on Linux: '
+            "uv sync --extra train"
         ) from error
     out.mkdir(parents=True, exist_ok=True)
     fit(dataset, out, settings, progress, batches)
