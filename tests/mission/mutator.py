@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import yaml
-from mutations import Draft, mutate_text, roles
 
 from executive.mission.source import Source
 from executive.mission.text.yaml_text import parse_yaml, plain
+from tests.mission.mutations import Draft, mutate_text, roles
 
 _TEXTUAL = 0.15
 """Share of the mutants that come from the text."""

@@ -16,10 +16,6 @@ from unittest import mock
 
 import pytest
 import yaml
-from mutations import places
-from mutator import Base, Mutator
-from unkind_cell import UnkindCell
-from witness import Witness
 
 from executive.control.scope import Scope
 from executive.discovery import discover
@@ -32,6 +28,10 @@ from executive.runtime.cells import cell_kind
 from executive.runtime.run import Run
 from executive.skill import Skill
 from executive.testing.fake_cell import FakeCell
+from tests.mission.mutations import places
+from tests.mission.mutator import Base, Mutator
+from tests.mission.unkind_cell import UnkindCell
+from tests.mission.witness import Witness
 
 pytestmark = pytest.mark.usefixtures("shared_cells")
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from py_trees.common import Status
-from unkind_cell import UnkindCell
 
 from executive.control.scope import Scope
 from executive.events import Event
@@ -14,6 +13,7 @@ from executive.mission.load import LoadedMission
 from executive.mission.model.nodes import SkillNode
 from executive.runtime.run import Outcome, Run
 from executive.skill import EMPTY, HOLDING, Skill
+from tests.mission.unkind_cell import UnkindCell
 
 
 class Witness:
