@@ -178,8 +178,9 @@ def _damage(rng: random.Random, file: Path) -> None:
     change = rng.random()
     if change < 0.75 and file.is_file() and file.suffix != ".jpg":
         text = file.read_text(errors="replace")
-        edits = (lambda: mutate_text(rng, text).encode(errors="replace"), lambda: vandalize(rng, text or "a"))
-        file.write_bytes(rng.choice(edits)())
+        content = text if re.search(r"\w", text) else "a"
+        mutated = mutate_text(rng, content).encode(errors="replace")
+        file.write_bytes(rng.choice((mutated, vandalize(rng, content))))
         return
     if file.is_dir() and not file.is_symlink():
         file.rmdir()

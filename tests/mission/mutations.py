@@ -77,7 +77,7 @@ class Draft:
     def insert(self) -> None:
         if found := self._step():
             container, index, role = found
-            new = self.rng.choice((*self.pool[role], container[index]))
+            new = self.rng.choice((*self.pool.get(role, ()), container[index]))
             # Sometimes the very same object, which is written as an anchor and an alias.
             again = new if self.rng.random() < 0.1 else deepcopy(new)
             container[index : index + 1] = self.rng.sample([container[index], again], 2)
