@@ -20,9 +20,9 @@ DROP = 0.01
 A mission may say otherwise.
 """
 OVERTRAVEL = 0.015
-"""How far below the expected surface an approach feels, unless a mission says otherwise [m]."""
+"""How far below the expected surface an approach searches for contact, unless the mission sets it [m]."""
 PROBE_CLEARANCE = 0.005
-"""Height above the table down to which later attempts feel for an object [m]."""
+"""Height above the table down to which later attempts search for contact [m]."""
 ATTEMPTS_BEFORE_PROBE = 3
 """Number of failed attempts after which an approach goes down almost to the table."""
 SPACING = 0.0025
@@ -37,17 +37,18 @@ GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 def approach(
     cell: Cell, target: Target, overtravel: float = OVERTRAVEL, spacing: float = SPACING
 ) -> tuple[Goal, Task]:
-    """Return goal and task of an approach: through the surface of `target`, felt for on the last part.
+    """Return goal and task of an approach to a point below the surface of `target`.
 
-    Every attempt after a failed one comes down a little beside the last. From the fourth on, attempts go down
-    almost to the table: if nothing is there, the item is a false detection.
+    The last part of the motion is guarded: it stops on contact. Each further attempt comes down a little
+    beside the previous one. From the fourth attempt on, the motion ends almost at the table: if the tool
+    meets nothing, the item is a false detection.
 
     Args:
         cell: The work cell.
         target: What to touch.
-        overtravel: How far below the expected surface the first attempts feel [m], but not below the
-            target's middle.
-        spacing: Of the spiral of further attempts [m].
+        overtravel: How far below the expected surface the first attempts search for contact [m], but not
+            below the target's middle.
+        spacing: Spacing of the spiral of further attempts [m].
     """
     goal = onto(
         cell.classes[target.label],
@@ -85,10 +86,21 @@ def onto(
     x, y, middle = (float(value) for value in position)
     dx, dy = _off_middle(attempt, kind.ring, spacing)
     surface = middle + kind.height / 2
-    lowest = max(surface - overtravel, middle)
+    lowest = lowest_contact(kind, middle, overtravel)
     if attempt >= ATTEMPTS_BEFORE_PROBE:
         lowest = min(lowest, middle - kind.height / 2 + PROBE_CLEARANCE)
     return Goal((x + dx, y + dy, lowest), guarded=surface + descent - lowest, speed=descent_speed)
+
+
+def lowest_contact(kind: ObjectClass, middle: float, overtravel: float = OVERTRAVEL) -> float:
+    """Return the lowest height of a contact that may be the top of an object [m].
+
+    Args:
+        kind: Class of the object.
+        middle: Height of its centre [m].
+        overtravel: See `approach`.
+    """
+    return max(middle + kind.height / 2 - overtravel, middle)
 
 
 def nearest_first(cell: Cell, targets: Sequence[Target]) -> list[Target]:

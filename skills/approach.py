@@ -8,14 +8,13 @@ from typing import Any, ClassVar
 from executive.arm import Goal, Task
 from executive.cell import Cell, LeastTimes, Steps, Tool
 from executive.evidence import describe_wrong_height, may_miss_top
-from executive.goals import OVERTRAVEL, PROBE_CLEARANCE, SPACING, approach
+from executive.goals import OVERTRAVEL, PROBE_CLEARANCE, SPACING, approach, lowest_contact
 from executive.messages import Target
 from executive.moving import follow, planned
 from executive.skill import EMPTY, In, Metres, Skill, param, port
 
 EARLY_CONTACT_MARGIN = 0.001
-"""Height above the guarded part of the descent from which contact means that an obstacle is in the way
-[m]."""
+"""A contact more than this height [m] above the guarded part of the descent is a collision."""
 
 
 class Approach(Skill):
@@ -25,14 +24,17 @@ class Approach(Skill):
     measure the height of the surface exactly. Succeeds on contact near the expected height. Each further
     attempt is offset from the previous one: along a spiral, or along the ring of an object with a hole. From
     the fourth attempt on, the descent ends only 5 mm above the table, to tell a false detection from an
-    object. A
-    touch at a wrong height contradicts the target's class. Exceptions: an earlier touch matched the class,
-    or it is the first touch too low for the class, at the height of no other class, and looks alone prove
-    the class.
+    object.
+
+    A touch at a wrong height contradicts the target's class. There are two exceptions: an earlier touch
+    matched the class; or this touch is the first one that is too low, it matches no other class, and looks
+    alone prove the class. Neither applies to a touch more than `overtravel` too low.
     """
 
     target: In[Target] = port(doc="where to go")
-    overtravel: Metres = param(OVERTRAVEL, ge=0, le=0.03, doc="how far below the surface to search contact")
+    overtravel: Metres = param(
+        OVERTRAVEL, ge=0, le=0.03, doc="how far below the surface to search for contact"
+    )
     offset: Metres = param(SPACING, ge=0, le=0.02, doc="spacing of the spiral of further attempts")
     reasons: ClassVar = ("stale", "unreachable", "blocked", "contradicted", "no_contact")
     uses: ClassVar = ("arm", "tool")
@@ -70,9 +72,14 @@ class Approach(Skill):
             met = f"the tool met something at {height * 1000:.0f} mm"
             raise self.failed("blocked", f"{met}, on its way to {item}, which was {expected}")
         doubt = describe_wrong_height(self.target.label, height, cell.classes)
-        beside_top = may_miss_top(self.target.label, height, cell.classes)
+        kind, middle = cell.classes[self.target.label], float(self.target.position[2])
+        near_top = height >= lowest_contact(kind, middle, self.overtravel)
+        beside_top = near_top and may_miss_top(self.target.label, height, cell.classes)
         if not cell.ledger.touched(item, doubt, beside_top=beside_top):
             raise self.failed("contradicted", f"{item} may be no {self.target.label}: {doubt}")
+        if doubt and not near_top:
+            cell.ledger.missed(item)
+            raise self.failed("no_contact", f"the top of {item} was {expected}; {doubt}")
 
 
 def _new_contact_check(tool: Tool) -> Callable[[], bool]:

@@ -1,4 +1,4 @@
-"""Parts with a hole are touched on their ring, thin ones not felt for below their middle."""
+"""Where approaches end: on the ring of a part, above its middle, and near the table in later attempts."""
 
 from __future__ import annotations
 
@@ -74,3 +74,26 @@ def test_the_fourth_attempt_feels_for_an_object_almost_down_to_the_table(
     heights = [message.removeprefix("no contact down to ").split(" mm")[0] for message in messages]
     assert heights == ["35", "35", "35", "5"]
     assert [record.empty_probes for record in fake.ledger.records] == [1]
+
+
+@pytest.mark.parametrize(
+    ("is_touched", "reason", "message"),
+    [
+        (False, "contradicted", "cube-1 may be no cube: it was touched 22 mm above the table, and a cube is"),
+        (True, "no_contact", "the top of cube-1 was expected at 50 mm; it was touched 22 mm above the table"),
+    ],
+)
+def test_a_touch_that_only_the_fourth_attempt_can_make_is_no_touch_of_the_target(
+    fake: FakeCell, look: Callable[..., list[Target]], is_touched: bool, reason: str, message: str
+) -> None:
+    thing = fake.world.put("cube", 0.5, 0.0)
+    for _ in range(3):
+        (target,) = look()
+    if is_touched:
+        run_skill(Approach(target=target), fake)
+    for _ in range(3):
+        fake.ledger.missed(target.item)
+    thing.position[2] = -0.005
+    result = run_skill(Approach(target=replace(target, epoch=fake.ledger.epoch)), fake)
+    assert (result.reason, result.message[: len(message)]) == (reason, message)
+    assert fake.ledger.attempts(target.item) == (4 if is_touched else 3)
