@@ -15,10 +15,10 @@ FINAL_STATES = (State.PLACED, State.REJECTED, State.SKIPPED, State.LOST)
 
 
 class Remarks:
-    """Circumstances of looks that a run reports at its end.
+    """Warnings about the detections of a run, for its final report.
 
     Attributes:
-        unknown: Largest number of boxes in one look for each label that the cell does not know.
+        unknown: For each label that is not in the cell file, the largest number of its boxes in a look.
         doubts: Reasons why error rates of detectors were assumed and not measured, in the order of the looks.
     """
 
@@ -27,10 +27,10 @@ class Remarks:
         self.doubts: list[str] = []
 
     def add(self, look: Detections) -> None:
-        """Take a look into account."""
+        """Update both attributes with the detections of one look."""
         self.unknown |= Counter(detection.label for detection in look.unknown)
         doubt = look.error_rates.doubt
-        # The figures of each frame differ a little; the first frame stands for all of them.
+        # The numbers after the colon differ from frame to frame; the first text is kept.
         if doubt and not any(known.startswith(doubt.partition(":")[0]) for known in self.doubts):
             self.doubts.append(doubt)
 
@@ -44,13 +44,13 @@ def find_final_state(
 
     1. An item in the tool is rejected.
     2. An item with uncertain detections only, whose place no look has found empty, is rejected.
-    3. An item that is likelier a false detection than an object is a phantom. An item that looks show again
-       and again is one, too, if the tool went down to the table at its place without a contact, but met other
-       items where looks had shown them.
+    3. An item that is likelier a false detection than an object is a phantom. So is an item that was detected
+       repeatedly, if the tool reached the table at its place without a contact at least `MIN_EMPTY_PROBES`
+       times, never touched it, and touched another item.
     4. An item that was dropped, or whose place was found empty, is lost.
     5. An item without a route is skipped.
-    6. If the mission was completed, a certain item without a contradiction or an attempt is skipped: a quota
-       was reached, or the operator quit.
+    6. If the mission was completed, an item that is sure, not contradicted and not attempted is skipped: a
+       quota was reached, or the operator quit.
     7. Any other item is rejected.
 
     Args:
@@ -83,10 +83,10 @@ def find_final_state(
 
 
 def find_lost_elsewhere(records: Collection[Record]) -> list[Record]:
-    """Turn each lost item that somebody has moved into a phantom, and return those items.
+    """Set each lost item to PHANTOM if it is known as another item, and return those items.
 
-    An item of its class must have appeared where looks had found the table empty, after a look saw the lost
-    item last. Each such item explains one lost item.
+    The other item is of the same class, and it appeared at an empty place after the last detection of the
+    lost item: somebody moved the object. Each such item explains one lost item.
     """
     lost = [record for record in records if record.state is State.LOST]
     appeared = [record for record in records if record.appeared and record.state in FINAL_STATES]
@@ -101,9 +101,9 @@ def find_lost_elsewhere(records: Collection[Record]) -> list[Record]:
 
 
 def forget_rejected(records: Iterable[Record]) -> list[Record]:
-    """Turn each rejected or skipped item into a phantom, and return those items.
+    """Set each rejected or skipped item to PHANTOM, and return those items.
 
-    Somebody may have moved it: the next look enters what it finds, without evidence from before.
+    Somebody may have moved the object. The next look creates a new item without earlier evidence.
     """
     left = [record for record in records if record.state in (State.REJECTED, State.SKIPPED)]
     for record in left:

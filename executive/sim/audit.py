@@ -31,18 +31,17 @@ def audit(
     """Return how many bodies ended `right`, `wrong_bin`, `left` on the table, or `elsewhere`.
 
     A body in the tool is `left`, also over a bin. A body that fell into a wrong bin is out of reach: it
-    counts as `elsewhere` and as `fell_in_wrong_bin`. A body that somebody took away is `elsewhere`, if it
-    was seen before; a body that somebody took out of a bin counts as if it still lay there. `unseen` counts
-    the other bodies that no item of the ledger was first seen near. An unknown object that no item was seen
-    near counts only if it is in a bin: as `wrong_bin`.
+    counts as `elsewhere` and as `fell_in_wrong_bin`. A removed body counts only if it was seen before: in the
+    bin that it was taken out of, or as `elsewhere`. `unseen` counts the bodies in the world that no item was
+    first seen near. An unknown object that no item was seen near counts only in a bin, as `wrong_bin`.
 
     Args:
         world: The simulated world as the run left it.
-        stood: Where each body `(3,)` [m] lay when the run began, and wherever it was put since then, by body.
+        stood: By body, the positions `(3,)` [m] at the start and after each time that somebody moved it.
         records: The ledger's items.
         bins: The cell's bins.
         routes: Class label to the bins that are right for it.
-        reach: How far from one of these places an item may have been seen first [m].
+        reach: Largest distance between the first position of an item and a position in `stood` [m].
         held: Body in the tool, or None.
         fallen: Bodies that fell from the tool and were not in it again.
     """
@@ -71,7 +70,7 @@ def audit(
 
 
 def _find_place(label: str, position: Array, bins: Mapping[str, Bin], routes: Routes) -> str:
-    # What leans on a wall from inside may have its middle over it.
+    # The centre of an object that leans on a bin wall may be above the wall.
     inside = next((name for name, bin in bins.items() if bin.contains(position, BIN_THICKNESS)), None)
     if position[2] < FLOOR:
         return "elsewhere"

@@ -179,7 +179,9 @@ def _read_labels(file: Path, names: Mapping[int, str]) -> ImageAnnotation:
         except KeyError:
             raise InputError(f"{file}:{number}: there is no class {label}; there are {len(names)}") from None
         except ValueError:
-            raise InputError(f'{file}:{number}: a line is a class number and shares, not "{line}"') from None
+            raise InputError(
+                f'{file}:{number}: a line has a class number and normalized coordinates, not "{line}"'
+            ) from None
         is_polygon = len(numbers) > BOX_VALUES and len(numbers) % 2 == 0
         if len(numbers) != BOX_VALUES and not is_polygon:
             raise InputError(
@@ -188,7 +190,7 @@ def _read_labels(file: Path, names: Mapping[int, str]) -> ImageAnnotation:
             )
         # The comparison is False for numbers that are not finite.
         if not all(-NORMALIZED_TOLERANCE <= value <= 1 + NORMALIZED_TOLERANCE for value in numbers):
-            raise InputError(f'{file}:{number}: values are shares of the image, 0 to 1, not "{line}"')
+            raise InputError(f'{file}:{number}: coordinates must be normalized (0 to 1), not "{line}"')
         if len(objects.labels) == MAX_OBJECTS:
             raise InputError(f"{file}:{number}: an image has at most {MAX_OBJECTS} objects; divide the image")
         objects.labels.append(name)

@@ -44,7 +44,7 @@ COCO = {
 
 
 class TextMaker:
-    """Writes mission, cell and library files that are mutated or vandalized."""
+    """Writes mission, cell and library files that are mutated or corrupted."""
 
     def __init__(self) -> None:
         missions = {file.stem: file.read_text() for file in sorted(MISSIONS.glob("*.yaml"))}
@@ -65,15 +65,15 @@ class TextMaker:
         content = text.encode()
         if rng.random() < 0.5:
             base = rng.choice(self._bases)
-            content = vandalize(rng, base.text)
+            content = corrupt_text(rng, base.text)
         (folder / base.file).parent.mkdir(parents=True, exist_ok=True)
         (folder / "mission.yaml").write_text(base.mission)
         (folder / base.file).write_bytes(content)
         return ["check", "mission.yaml", *rng.choice(([], ["--json"]))]
 
 
-def vandalize(rng: random.Random, text: str) -> bytes:
-    """Return a text with an odd word, a part repeated many times, deep nesting or bytes of no encoding."""
+def corrupt_text(rng: random.Random, text: str) -> bytes:
+    """Return a text with an odd word, repetitions, deep nesting, aliases, another encoding or wrong bytes."""
     lines, count, word = text.splitlines(keepends=True), rng.choice(REPETITIONS), rng.choice(ODD_WORDS)
     line, spot = rng.randrange(len(lines)), rng.choice(list(re.finditer(r"[\w.$]+", text)))
     repetitions = min(count, 1 + MAX_REPEATED_TEXT // len(lines[line]))
@@ -133,11 +133,19 @@ def write_model(seed: int, folder: Path) -> Arguments:
     cube = f"{{{'mesh: m.obj' if mesh else 'urdf: m.urdf'}, height: 0.05, radius: 0.0354}}"
     cell = f"cell: hostile\nbase: overhead.yaml\nobjects:\n  cube: {cube}\n"
     if rng.random() < 0.2:
-        cell += "detectors: {embedded: {kind: rfdetr, weights: m.onnx, labels: [cube, sphere, duck]}}\n"
-    texts = {"cell.yaml": cell, "mission.yaml": MISSION, "m.urdf": URDF, "m.obj": MESH, "m.onnx": "model"}
+        cell += "detectors: {embedded: {kind: rfdetr, model_path: m.onnx, labels: labels.txt}}\n"
+    model = "m.obj" if mesh or rng.random() < 0.3 else "m.urdf"
+    texts = {
+        "cell.yaml": cell,
+        "mission.yaml": MISSION,
+        "m.urdf": URDF,
+        "m.obj": MESH,
+        "m.onnx": "model",
+        "labels.txt": "cube\nsphere\nduck\n",
+    }
     for name, text in texts.items():
         (folder / name).write_text(text)
-    _damage(rng, folder / ("m.obj" if mesh or rng.random() < 0.3 else "m.urdf"))
+    _damage(rng, folder / rng.choice((model, model, "m.onnx", "labels.txt")))
     return rng.choice(
         (
             ["check", "mission.yaml"],
@@ -146,7 +154,7 @@ def write_model(seed: int, folder: Path) -> Arguments:
     )
 
 
-def name_path(seed: int, folder: Path) -> Arguments:
+def write_odd_paths(seed: int, folder: Path) -> Arguments:
     """Return a command with an odd path or number."""
     rng = random.Random(seed)
     (folder / "folder.yaml").mkdir()
@@ -180,7 +188,7 @@ def _damage(rng: random.Random, file: Path) -> None:
         text = file.read_text(errors="replace")
         content = text if re.search(r"\w", text) else "a"
         mutated = mutate_text(rng, content).encode(errors="replace")
-        file.write_bytes(rng.choice((mutated, vandalize(rng, content))))
+        file.write_bytes(rng.choice((mutated, corrupt_text(rng, content))))
         return
     if file.is_dir() and not file.is_symlink():
         file.rmdir()

@@ -1,6 +1,6 @@
 """Commands with hostile input: internal errors, exit codes, time, memory and control characters.
 
-Each command runs in a child that continues from this process, with all modules imported. A command has a
+Each command runs in a forked child process, so that all modules are imported already. A command has a
 problem if it has an internal error, exceeds a limit, ends with another exit code than 0, 1, 2 or 4, or prints
 a control character or one character more than 200 times in a row.
 """
@@ -26,7 +26,7 @@ import click
 from executive.cli.main import COMMANDS, main
 from executive.cli.options import seed_option
 from executive.discovery import discover
-from tests.benchmarks.hostile_files import Arguments, TextMaker, name_path, write_data_set, write_model
+from tests.benchmarks.hostile_files import Arguments, TextMaker, write_data_set, write_model, write_odd_paths
 from tests.benchmarks.report import Figures, run_command, show_progress
 
 MAX_CPU_TIME = 5.0
@@ -45,7 +45,7 @@ Writer = Callable[[int, Path], Arguments]
 
 
 @dataclass(frozen=True)
-class Answer:
+class CommandResult:
     """Result of a command: exit code, standard output and error, CPU time [s] and peak memory [MB]."""
 
     exit_code: int
@@ -64,28 +64,28 @@ def measure(texts: int, data_sets: int, models: int, seed: int) -> Figures:
         ("texts", texts, TextMaker().write),
         ("data sets", data_sets, write_data_set),
         ("models", models // 2, write_model),
-        ("paths", models - models // 2, name_path),
+        ("paths", models - models // 2, write_odd_paths),
     ]
     rows, problems = [], []
     for group, number, write in groups:
-        answers = []
+        results = []
         for case in show_progress(range(seed, seed + number), group):
-            answer, arguments, found = run_case(write, case)
-            answers.append(answer)
+            result, arguments, found = run_case(write, case)
+            results.append(result)
             problems += [f"{group} {case}, {' '.join(arguments)[:80]}: {problem}" for problem in found]
-        rows.append({"group": group, **_summarize(answers)})
+        rows.append({"group": group, **_summarize(results)})
     return {"seed": seed, "groups": rows, "problems": problems}
 
 
-def run_case(write: Writer, case: int) -> tuple[Answer, Arguments, list[str]]:
-    """Run the command of a case in a new folder, and return its answer, its arguments and its problems."""
+def run_case(write: Writer, case: int) -> tuple[CommandResult, Arguments, list[str]]:
+    """Run the command of a case in a new folder, and return its result, its arguments and its problems."""
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as logs:
         arguments = write(case, Path(folder))
-        answer = run_in_child(arguments, Path(folder), Path(logs))
-    return answer, arguments, find_problems(arguments, answer)
+        result = run_in_child(arguments, Path(folder), Path(logs))
+    return result, arguments, find_problems(arguments, result)
 
 
-def run_in_child(arguments: Arguments, folder: Path, logs: Path) -> Answer:
+def run_in_child(arguments: Arguments, folder: Path, logs: Path) -> CommandResult:
     """Run the command `executive` in a forked child whose working directory is `folder`."""
     outputs = [logs / "output.txt", logs / "errors.txt"]
     child = os.fork()
@@ -106,28 +106,30 @@ def run_in_child(arguments: Arguments, folder: Path, logs: Path) -> Answer:
     status, usage = _wait(child)
     texts = [file.read_bytes().decode(errors="backslashreplace") for file in outputs]
     cpu_time = usage.ru_utime + usage.ru_stime
-    return Answer(os.waitstatus_to_exitcode(status), texts[0], texts[1], cpu_time, usage.ru_maxrss / 1e3)
+    return CommandResult(
+        os.waitstatus_to_exitcode(status), texts[0], texts[1], cpu_time, usage.ru_maxrss / 1e3
+    )
 
 
-def find_problems(arguments: Arguments, answer: Answer) -> list[str]:
-    """Return everything that is wrong with the answer of a command."""
-    text = answer.output + answer.errors
+def find_problems(arguments: Arguments, result: CommandResult) -> list[str]:
+    """Return everything that is wrong with the result of a command."""
+    text = result.output + result.errors
     problems = []
     if "internal error" in text or "Traceback" in text:
         problems.append(f"an internal error: {text[-300:]}")
-    if answer.exit_code not in EXIT_CODES:
-        problems.append(f"exit code {answer.exit_code}: {text[-300:]}")
-    if answer.cpu_time > MAX_CPU_TIME:
-        problems.append(f"{answer.cpu_time:.1f} s of CPU time; {MAX_CPU_TIME:g} s are allowed")
-    if answer.memory > MAX_MEMORY and arguments[0] == "check":
-        problems.append(f"{answer.memory:.0f} MB of memory; {MAX_MEMORY:g} MB are allowed")
+    if result.exit_code not in EXIT_CODES:
+        problems.append(f"exit code {result.exit_code}: {text[-300:]}")
+    if result.cpu_time > MAX_CPU_TIME:
+        problems.append(f"{result.cpu_time:.1f} s of CPU time; {MAX_CPU_TIME:g} s are allowed")
+    if result.memory > MAX_MEMORY and arguments[0] == "check":
+        problems.append(f"{result.memory:.0f} MB of memory; {MAX_MEMORY:g} MB are allowed")
     if found := FORBIDDEN.search(text):
         problems.append(f"prints {found[0][:20]!r}: {text[max(found.start() - 60, 0) : found.end()][:300]!r}")
-    if answer.exit_code and not text.strip():
-        problems.append(f"exit code {answer.exit_code} without a message")
-    if "--json" in arguments and answer.output:
+    if result.exit_code and not text.strip():
+        problems.append(f"exit code {result.exit_code} without a message")
+    if "--json" in arguments and result.output:
         try:
-            json.loads(answer.output)
+            json.loads(result.output)
         except ValueError as error:
             problems.append(f"standard output is no JSON: {error}")
     return problems
@@ -145,13 +147,13 @@ def _wait(child: int) -> tuple[int, resource.struct_rusage]:
         time.sleep(0.002)
 
 
-def _summarize(answers: list[Answer]) -> Figures:
-    codes = Counter(answer.exit_code for answer in answers)
+def _summarize(results: list[CommandResult]) -> Figures:
+    codes = Counter(result.exit_code for result in results)
     return {
-        "cases": len(answers),
+        "cases": len(results),
         "exit codes": ", ".join(f"{number} × {code}" for code, number in sorted(codes.items())),  # noqa: RUF001
-        "cpu_time_s": max((answer.cpu_time for answer in answers), default=0.0),
-        "memory_mb": max((answer.memory for answer in answers), default=0.0),
+        "cpu_time_s": max((result.cpu_time for result in results), default=0.0),
+        "memory_mb": max((result.memory for result in results), default=0.0),
     }
 
 

@@ -9,32 +9,32 @@ from pathlib import Path
 import pytest
 
 from tests.benchmarks.hostile_files import Arguments
-from tests.benchmarks.hostile_input import Answer, find_problems
+from tests.benchmarks.hostile_input import CommandResult, find_problems
 
 CHECK, CHECK_JSON = ["check", "mission.yaml"], ["check", "mission.yaml", "--json"]
 
 
 @pytest.mark.parametrize(
-    ("answer", "problem"),
+    ("result", "problem"),
     [
-        (Answer(2, "mission.yaml:1: wrong\n", "", 1.0, 100.0), None),
-        (Answer(3, "", "internal error (KeyError: 1)", 1.0, 100.0), "an internal error: "),
-        (Answer(3, "", "fault", 1.0, 100.0), "exit code 3: fault"),
-        (Answer(2, "", "", 1.0, 100.0), "exit code 2 without a message"),
-        (Answer(2, "wrong", "", 5.1, 100.0), "5.1 s of CPU time; 5 s are allowed"),
-        (Answer(2, "wrong", "", 1.0, 301.0), "301 MB of memory; 300 MB are allowed"),
-        (Answer(2, "a\x1b[31m", "", 1.0, 100.0), r"prints '\x1b'"),
-        (Answer(2, "x" * 201, "", 1.0, 100.0), "prints 'xxxxx"),
+        (CommandResult(2, "mission.yaml:1: wrong\n", "", 1.0, 100.0), None),
+        (CommandResult(3, "", "internal error (KeyError: 1)", 1.0, 100.0), "an internal error: "),
+        (CommandResult(3, "", "fault", 1.0, 100.0), "exit code 3: fault"),
+        (CommandResult(2, "", "", 1.0, 100.0), "exit code 2 without a message"),
+        (CommandResult(2, "wrong", "", 5.1, 100.0), "5.1 s of CPU time; 5 s are allowed"),
+        (CommandResult(2, "wrong", "", 1.0, 301.0), "301 MB of memory; 300 MB are allowed"),
+        (CommandResult(2, "a\x1b[31m", "", 1.0, 100.0), r"prints '\x1b'"),
+        (CommandResult(2, "x" * 201, "", 1.0, 100.0), "prints 'xxxxx"),
     ],
 )
-def test_problems_of_an_answer_are_found(answer: Answer, problem: str | None) -> None:
-    problems = find_problems(CHECK, answer)
+def test_problems_of_an_result_are_found(result: CommandResult, problem: str | None) -> None:
+    problems = find_problems(CHECK, result)
     assert any(found.startswith(problem) for found in problems) if problem else problems == []
 
 
 @pytest.mark.parametrize(("arguments", "found"), [(CHECK, False), (CHECK_JSON, True)])
 def test_text_in_place_of_json_is_a_problem(arguments: Arguments, found: bool) -> None:
-    problems = find_problems(arguments, Answer(2, "wrong", "", 1.0, 100.0))
+    problems = find_problems(arguments, CommandResult(2, "wrong", "", 1.0, 100.0))
     assert any(problem.startswith("standard output is no JSON") for problem in problems) is found
 
 

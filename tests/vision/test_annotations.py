@@ -140,16 +140,20 @@ def test_boxes_and_polygons_of_yolo_are_read(yolo: Callable[..., Path]) -> None:
     [
         ("2 0.5 0.5 0.2 0.4\n", "names: [duck, cube]\n", "labels/a.txt:1: there is no class 2; there are 2"),
         ("\n-1 0.5 0.5 0.2 0.4\n", "names: [duck]\n", "labels/a.txt:2: there is no class -1; there are 1"),
-        ("duck 0.5 0.5 0.2 0.4\n", "names: [duck]\n", "labels/a.txt:1: a line is a class number and shares"),
+        (
+            "duck 0.5 0.5 0.2 0.4\n",
+            "names: [duck]\n",
+            "labels/a.txt:1: a line has a class number and normalized",
+        ),
         ("0 0.5 0.5 0.2\n", "names: [duck]\n", "labels/a.txt:1: a box has 4 values and a polygon at least 6"),
         ("0 0.5 0.5 0.2 0.1 0.1\n", "names: [duck]\n", "labels/a.txt:1: a box has 4 values and a polygon"),
-        ("0 0.5 0.5 nan 0.4\n", "names: [duck]\n", "labels/a.txt:1: values are shares of the image, 0 to 1"),
+        ("0 0.5 0.5 nan 0.4\n", "names: [duck]\n", "labels/a.txt:1: coordinates must be normalized (0 to 1)"),
         (
             "0 0.5 0.5 0.2 0.4\n" * 1001,
             "names: [duck]\n",
             "labels/a.txt:1001: an image has at most 1000 objects",
         ),
-        ("0 12 20 30 40\n", "names: [duck]\n", "labels/a.txt:1: values are shares of the image, 0 to 1"),
+        ("0 12 20 30 40\n", "names: [duck]\n", "labels/a.txt:1: coordinates must be normalized (0 to 1)"),
         (" " * 10_000_001, "names: [duck]\n", "labels/a.txt has more than 10 MB"),
         ("", " " * 100_001, "data.yaml has more than 0.1 MB"),
         ("", "names: [duck\n", "data.yaml:2: invalid YAML: "),
