@@ -46,7 +46,10 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
                 findings, endings, ok = getattr(error, "findings", missing), (), False
                 texts.append(str(error))
             parts = {
-                "findings": [*map(asdict, findings[:MAX_LISTED_FINDINGS])],
+                "findings": [
+                    {**asdict(finding), "excerpt": finding.shown_excerpt}
+                    for finding in findings[:MAX_LISTED_FINDINGS]
+                ],
                 "endings": [*map(asdict, endings)],
             }
             reports.append({"mission": mission, "ok": ok, **parts})

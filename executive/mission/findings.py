@@ -13,6 +13,7 @@ from executive.mission.source import Mark
 from executive.safe_text import shorten_quotations
 
 _WINDOW = 140
+"""Largest number of characters of a source line that a finding shows."""
 _MOST_LISTED = 24
 MAX_PRINTED_FINDINGS, MAX_LISTED_FINDINGS = 50, 1000
 """Largest numbers of findings that a message and `--json` list; a message counts the others."""
@@ -53,7 +54,7 @@ class Finding:
         message: What is wrong, one sentence.
         length: How many characters the caret line underlines.
         hint: What was allowed and what to do next, or "".
-        excerpt: The source line.
+        excerpt: The whole source line, without keys and passwords.
     """
 
     path: str
@@ -66,14 +67,21 @@ class Finding:
     hint: str = ""
     excerpt: str = ""
 
+    @property
+    def shown_excerpt(self) -> str:
+        """The part of the source line around the place, of at most `_WINDOW` characters."""
+        return self.excerpt[self._excerpt_start : self._excerpt_start + _WINDOW]
+
+    @property
+    def _excerpt_start(self) -> int:
+        return max(0, self.col - _WINDOW // 2) if len(self.excerpt) > _WINDOW else 0
+
     def __str__(self) -> str:
         place = f"{self.path}:{self.line}:{self.col}" if self.line else self.path
         lines = [f"{place}: {self.severity}[{self.code}]: {self.message}"]
         if self.line and self.excerpt:
             number = f"{self.line:4d}"
-            # Of a very long line only what is around the place is shown.
-            begin = max(0, self.col - _WINDOW // 2) if len(self.excerpt) > _WINDOW else 0
-            excerpt, before = self.excerpt[begin : begin + _WINDOW], self.col - 1 - begin
+            excerpt, before = self.shown_excerpt, self.col - 1 - self._excerpt_start
             # Tabs stay tabs under the text, so that the caret lines up at any tab width.
             blank = "".join(c if c == "\t" else " " for c in excerpt[:before])
             room = max(1, min(self.length, len(excerpt) - before))

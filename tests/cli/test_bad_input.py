@@ -6,6 +6,7 @@ Every case changes the shipped mission or its cell in one place and runs the rea
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from collections.abc import Callable
@@ -166,6 +167,12 @@ def test_a_wrong_override_is_shown_as_it_was_given(
     ran = invoke("run", "m.yaml", "--set", override)
     assert (ran.exit_code, ran.stdout) == (2, "")
     assert ran.stderr == dedent(expected).lstrip("\n")
+
+
+def test_a_finding_in_json_shows_a_part_of_a_long_line(write: Callable[..., int]) -> None:
+    write(("- Localize", f"- {'x' * 1000}"))
+    (report,) = json.loads(invoke("check", "m.yaml", "--json").stdout)
+    assert [finding["excerpt"] for finding in report["findings"]] == [f"  - {'x' * 136}"]
 
 
 @pytest.mark.slow
