@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from executive.cell import Cell, LeastTimes, Steps
-from executive.errors import Unavailable
-from executive.messages import Detection, Detections
+from executive.errors import NoDepth, Unavailable
+from executive.messages import BIN_THICKNESS, Detection, Detections, Frame
 from executive.skill import Out, Skill, param, port
 
 MIN_VISIBLE_SHARE = 0.7
@@ -42,7 +42,7 @@ class Detect(Skill):
     doubtful: str = param(
         "fail",
         choices=("fail", "pass"),
-        doc="if all detections are in doubt: `fail` with `unsure`, or `pass` with no detections",
+        doc="if all detections on the table are in doubt: `fail` with `unsure`, or `pass` with no detections",
     )
     hidden: str = param(
         "fail",
@@ -95,8 +95,8 @@ class Detect(Skill):
         )
         found = tuple(one for one in known if _is_clear(one, threshold))
         doubtful = tuple(one for one in known if not _is_clear(one, threshold))
-        if not found and doubtful and self.doubtful == "fail":
-            best = doubtful[0]
+        on_table = (one for one in doubtful if not _is_in_bin(cell, one, frame))
+        if not found and self.doubtful == "fail" and (best := next(on_table, None)):
             weak = best.confidence < threshold
             limit = f"< {threshold:.2f}" if weak else f"with another class at {best.rival:.2f}"
             raise self.failed(
@@ -120,6 +120,15 @@ def _is_clear(detection: Detection, threshold: float) -> bool:
     """Return True if a detection is confident enough, and its second class at most half as likely."""
     confidence = detection.confidence
     return confidence >= threshold and detection.rival <= MAX_SECOND_RATIO * confidence
+
+
+def _is_in_bin(cell: Cell, detection: Detection, frame: Frame) -> bool:
+    """Return True if a detection lies in a bin: the ledger knows the objects there."""
+    try:
+        position = cell.localizer.locate(detection, frame)
+    except NoDepth:
+        return False
+    return any(bin.contains(position, BIN_THICKNESS) for bin in cell.bins.values())
 
 
 def _is_valid(detection: Detection) -> bool:

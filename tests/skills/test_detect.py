@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -65,6 +66,16 @@ def test_an_answer_that_is_of_no_use_is_a_failure(
     fake.detector.answers = lambda look, true: answer
     result = run_skill(Detect(), fake)
     assert (result.reason, result.message[: len(message)]) == (reason, message)
+
+
+@pytest.mark.parametrize(("x", "y", "status"), [(0.5, 0.0, "FAILURE"), (0.24, 0.48, "SUCCESS")])
+def test_an_uncertain_detection_in_a_bin_is_no_failure(
+    fake: FakeCell, x: float, y: float, status: str
+) -> None:
+    fake.world.put("cube", x, y)
+    fake.detector.answers = lambda look, true: [replace(one, confidence=0.4) for one in true]
+    result = run_skill(Detect(view="full"), fake)
+    assert (result.status, result.reason) == (status, "unsure" if status == "FAILURE" else "")
 
 
 def test_an_arm_in_the_way_may_be_looked_past(fake: FakeCell) -> None:
