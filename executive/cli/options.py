@@ -38,6 +38,8 @@ class PathType(click.Path):
 FILE = PathType(path_type=Path, dir_okay=False)
 FOLDER = PathType(path_type=Path, file_okay=False)
 COUNT = click.IntRange(min=1)
+MAX_SEED = 2**32 - 1
+"""Largest seed: the names of run directories contain the seed."""
 MISSION = click.argument("mission", metavar="MISSION")
 
 overrides_option = click.option(
@@ -46,7 +48,9 @@ overrides_option = click.option(
 )  # fmt: skip
 runs_option = click.option("--runs", type=FOLDER, default=Path("runs"), help="Folder of the run directories.")
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on stdout.")
-seed_option = click.option("--seed", type=click.IntRange(min=0), default=0, help="What chance draws from.")
+seed_option = click.option(
+    "--seed", type=click.IntRange(0, MAX_SEED), default=0, help="Seed of all random numbers."
+)
 scene_option = click.option(
     "--scene", type=FILE, metavar="FILE",
     help="Change the simulated world without the executive's knowledge: light, table, objects, camera.",

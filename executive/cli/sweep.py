@@ -14,12 +14,14 @@ from executive.cli.output import print_json, stdout_kept_clean
 
 def seed_range(text: str) -> range:
     """Return the seeds that `A-B`, both included, or a single seed names."""
-    match = re.fullmatch(r"(\d+)(?:-(\d+))?", text)
+    match = re.fullmatch(r"(\d{1,10})(?:-(\d{1,10}))?", text)
     if match is None:
         raise click.BadParameter(f'"{text}" is no range of seeds; write it as 0-99')
     first, last = int(match[1]), int(match[2] or match[1])
     if last < first:
         raise click.BadParameter(f'"{text}" holds no seed: {last} is less than {first}')
+    if last > options.MAX_SEED:
+        raise click.BadParameter(f'"{text}" holds the seed {last}; the largest seed is {options.MAX_SEED}')
     return range(first, last + 1)
 
 

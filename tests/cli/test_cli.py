@@ -190,6 +190,11 @@ def test_help_names_every_command_and_every_exit_code():
         ("run sort --paused", "nobody could let it go on: --paused needs --view or a terminal to type in"),
         ("sweep sort --seeds 3-1", '"3-1" holds no seed: 1 is less than 3'),
         ("sweep sort --seeds a-b", '"a-b" is no range of seeds; write it as 0-99'),
+        (
+            f"sweep sort --seeds {2**32}",
+            '"4294967296" holds the seed 4294967296; the largest seed is 4294967295',
+        ),
+        (f"run sort --seed {2**32}", "4294967296 is not in the range 0<=x<=4294967295"),
         ("dataset overhed --out x", 'Did you mean "overhead"?'),
     ],
 )
