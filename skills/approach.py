@@ -60,11 +60,13 @@ class Approach(Skill):
         motion = yield from planned(self, cell.arm, ask)
         goal, _ = ask()
         yield from follow(self, cell, motion, until=_new_contact_check(tool))
+        kind, middle = cell.classes[self.target.label], float(self.target.position[2])
         height, highest = float(cell.arm.tool_pose.position[2]), goal.position[2] + goal.guarded
         expected = f"expected at {(highest - cell.descent) * 1000:.0f} mm"
         if not tool.touching:
-            bottom = self.target.position[2] - cell.classes[self.target.label].height / 2
-            cell.ledger.missed(item, found_table=goal.position[2] <= bottom + PROBE_CLEARANCE)
+            # A probe cannot tell a thin part from the table.
+            probe_end = middle - kind.height / 2 + PROBE_CLEARANCE
+            cell.ledger.missed(item, found_table=goal.position[2] <= probe_end < middle)
             felt = f"no contact down to {height * 1000:.0f} mm"
             raise self.failed("no_contact", f"{felt}, {item} was {expected}")
         if height > highest + EARLY_CONTACT_MARGIN:
@@ -72,7 +74,6 @@ class Approach(Skill):
             met = f"the tool met something at {height * 1000:.0f} mm"
             raise self.failed("blocked", f"{met}, on its way to {item}, which was {expected}")
         doubt = describe_wrong_height(self.target.label, height, cell.classes)
-        kind, middle = cell.classes[self.target.label], float(self.target.position[2])
         near_top = height >= lowest_contact(kind, middle, self.overtravel)
         beside_top = near_top and may_miss_top(self.target.label, height, cell.classes)
         if not cell.ledger.touched(item, doubt, beside_top=beside_top):
