@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
@@ -9,7 +10,7 @@ from executive.arm import Goal, Task
 from executive.cell import Cell, LeastTimes, Steps, Tool
 from executive.evidence import describe_wrong_height, may_miss_top
 from executive.goals import OVERTRAVEL, PROBE_CLEARANCE, SPACING, approach, lowest_contact
-from executive.messages import Target
+from executive.messages import ObjectClass, Target
 from executive.moving import follow, planned
 from executive.skill import EMPTY, In, Metres, Skill, param, port
 
@@ -28,7 +29,9 @@ class Approach(Skill):
 
     A touch at a wrong height contradicts the target's class. There are two exceptions: an earlier touch
     matched the class; or this touch is the first one that is too low, it matches no other class, and looks
-    alone prove the class. Neither applies to a touch more than `overtravel` too low.
+    alone prove the class. A touch more than `overtravel` too low, or below the middle of the object, is never
+    a touch of the target: it fails with `no_contact` if an earlier touch matched the class, and contradicts
+    the class otherwise.
     """
 
     target: In[Target] = port(doc="where to go")
@@ -64,9 +67,7 @@ class Approach(Skill):
         height, highest = float(cell.arm.tool_pose.position[2]), goal.position[2] + goal.guarded
         expected = f"expected at {(highest - cell.descent) * 1000:.0f} mm"
         if not tool.touching:
-            # A probe cannot tell a thin part from the table.
-            probe_end = middle - kind.height / 2 + PROBE_CLEARANCE
-            cell.ledger.missed(item, found_table=goal.position[2] <= probe_end < middle)
+            cell.ledger.missed(item, found_table=_proves_absence(goal, self.target, kind))
             felt = f"no contact down to {height * 1000:.0f} mm"
             raise self.failed("no_contact", f"{felt}, {item} was {expected}")
         if height > highest + EARLY_CONTACT_MARGIN:
@@ -81,6 +82,16 @@ class Approach(Skill):
         if doubt and not near_top:
             cell.ledger.missed(item)
             raise self.failed("no_contact", f"the top of {item} was {expected}; {doubt}")
+
+
+def _proves_absence(goal: Goal, target: Target, kind: ObjectClass) -> bool:
+    """Return True if a descent to `goal` without a contact proves that no object is at the target's place.
+
+    The descent must end near the table, below the middle of the object, and within half of its radius.
+    """
+    x, y, z = goal.position
+    is_central = math.dist((x, y), target.position[:2]) <= kind.radius / 2
+    return is_central and z < target.position[2] and z <= 2 * PROBE_CLEARANCE
 
 
 def _new_contact_check(tool: Tool) -> Callable[[], bool]:

@@ -69,7 +69,7 @@ def find_final_state(
         return State.REJECTED, UNSURE
     if record.probability < 0.5:
         return State.PHANTOM, NOTHING
-    if record.empty_probes >= MIN_EMPTY_PROBES and touched_any and not record.touched:
+    if record.empty_probes >= MIN_EMPTY_PROBES and touched_any and not record.had_contact:
         return State.PHANTOM, f"the tool found only the table at its place, {record.empty_probes} times"
     if record.state is State.DROPPED or gone:
         return State.LOST, "known to exist, not found again"
@@ -82,14 +82,17 @@ def find_final_state(
     return State.REJECTED, "the run ended before its turn"
 
 
-def find_lost_elsewhere(records: Collection[Record]) -> list[Record]:
+def find_lost_elsewhere(records: Collection[Record], dropped: Collection[Record]) -> list[Record]:
     """Set each lost item to PHANTOM if it is known as another item, and return those items.
 
-    The other item is of the same class, and it appeared at an empty place after the last detection of the
-    lost item: somebody moved the object. Each such item explains one lost item.
+    The other item certainly exists, is of the same class, and appeared at an empty place after the last
+    detection of the lost item: somebody moved the object. Each such item explains one lost item. The tool
+    held the items `dropped` after their last detection, so another item may have appeared before the drop.
     """
-    lost = [record for record in records if record.state is State.LOST]
-    appeared = [record for record in records if record.appeared and record.state in FINAL_STATES]
+    lost = [record for record in records if record.state is State.LOST and record not in dropped]
+    appeared = [
+        record for record in records if record.appeared and record.exists and record.state in FINAL_STATES
+    ]
     found = []
     for old in lost:
         same = [new for new in appeared if new.label == old.label and new.since > old.stamp]

@@ -88,6 +88,7 @@ class Record:
         appeared: True if looks had found its place empty before one saw it there.
         moved: True once it has been seen again after something may have moved it.
         exists: True once it is known to exist: enough looks agree, or the tool has touched it.
+        had_contact: True if the tool has touched it, at any height.
         touched: Class at whose height the tool has touched it last, or "".
         low_touches: Number of touches too low for its class since the last one at the height of its class.
         attempts: Failed attempts to pick it so far.
@@ -125,6 +126,7 @@ class Record:
     appeared: bool = False
     moved: bool = False
     exists: bool = False
+    had_contact: bool = False
     touched: str = ""
     low_touches: int = 0
     attempts: int = 0

@@ -145,7 +145,7 @@ class ItemLedger:
         height of its class before may have fallen since: then no height contradicts its class.
         """
         record = self._record(item)
-        record.exists, record.empty_probes = True, 0
+        record.exists, record.had_contact, record.empty_probes = True, True, 0
         if not contradiction:
             record.touched, record.low_touches = record.label, 0
         elif record.touched != record.label and not (beside_top and self._certainty.count_low_touch(record)):
@@ -243,6 +243,7 @@ class ItemLedger:
     def close(self, *, completed: bool) -> None:
         """Decide the final state of each item; `completed` is True if the tree succeeded."""
         touched_any = any(record.touched for record in self._records.values())
+        dropped = [record for record in self._records.values() if record.state is State.DROPPED]
         for record in self._records.values():
             if bin := self._in_bins.believed(record):
                 record.why = "it fell there"
@@ -254,7 +255,7 @@ class ItemLedger:
             if final is not None:
                 record.why = final[1]
                 self._change(record.item, final[0])
-        for record in find_lost_elsewhere(self._records.values()):
+        for record in find_lost_elsewhere(self._records.values(), dropped):
             self._emit("item", **record.row)
 
     def reopen(self) -> None:

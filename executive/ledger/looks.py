@@ -109,7 +109,7 @@ class Looks:
     def _enter(self, records: Items, label: str, place: Array, odds: float) -> Record:
         """Enter something new, with the odds that it is an object."""
         self._counts[label] += 1
-        appeared = self._coverage.find_miss_probability(place) <= GONE
+        appeared = self._coverage.find_miss_probability(place) <= self._config.overlooked
         record = Record(f"{label}-{self._counts[label]}", label, place, math.log(odds), appeared=appeared)
         records[record.item] = record
         return record

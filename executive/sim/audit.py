@@ -32,8 +32,8 @@ def audit(
 
     A body in the tool is `left`, also over a bin. A body that fell into a wrong bin is out of reach: it
     counts as `elsewhere` and as `fell_in_wrong_bin`. A removed body counts only if it was seen before: in the
-    bin that it was taken out of, or as `elsewhere`. `unseen` counts the bodies in the world that no item was
-    first seen near. An unknown object that no item was seen near counts only in a bin, as `wrong_bin`.
+    bin that it was placed in, otherwise as `elsewhere`. `unseen` counts the bodies in the world that no item
+    was first seen near. An unknown object that no item was seen near counts only in a bin, as `wrong_bin`.
 
     Args:
         world: The simulated world as the run left it.

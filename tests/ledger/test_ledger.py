@@ -388,9 +388,15 @@ def test_an_item_is_a_phantom_if_the_tool_found_only_the_table_there_three_times
     assert bench.end()["cube-1"] == final
 
 
-def test_an_item_that_was_touched_exists_although_the_tool_finds_only_the_table_later(bench: Bench) -> None:
-    bench.look(CUBE)
-    bench.ledger.touched("cube-1")
+@pytest.mark.parametrize("contradiction", ["", "it was touched 15 mm above the table"])
+def test_an_item_that_was_touched_exists_although_the_tool_finds_only_the_table_later(
+    bench: Bench, contradiction: str
+) -> None:
+    for _ in range(3):
+        bench.look(CUBE, FAR)
+    bench.ledger.touched("cube-2")
+    bench.look(CUBE, FAR)
+    assert bench.ledger.touched("cube-1", contradiction, beside_top=True)
     for _ in range(3):
         bench.ledger.missed("cube-1", found_table=True)
         bench.look(CUBE)
@@ -425,6 +431,18 @@ def test_a_lost_item_that_somebody_carried_across_the_table_is_the_one_that_appe
     put_away(bench, (label, 0.5, 0.2))
     final = bench.end()["cube-1"]
     assert final == (("phantom", "it is cube-2") if label == "cube" else LOST)
+
+
+def test_an_item_that_appeared_while_the_tool_held_another_does_not_explain_its_loss(bench: Bench) -> None:
+    for _ in range(2):
+        bench.look(CUBE, view="full")
+    put_away(bench, CUBE)
+    bench.ledger.held("cube-1")
+    put_away(bench, FAR)
+    bench.drop("cube-1")
+    bench.place("cube-2")
+    put_away(bench)
+    assert bench.end()["cube-1"] == LOST
 
 
 def test_an_item_that_appeared_explains_one_lost_item_only(bench: Bench) -> None:

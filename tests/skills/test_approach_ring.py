@@ -77,6 +77,20 @@ def test_the_fourth_attempt_feels_for_an_object_almost_down_to_the_table(
     assert [record.empty_probes for record in fake.ledger.records] == [1]
 
 
+def test_a_probe_far_beside_the_middle_proves_nothing(
+    fake: FakeCell, look: Callable[..., list[Target]]
+) -> None:
+    fake.world.put("duck", 0.5, 0.0)
+    fake.world.put("sphere", 0.6, 0.1)
+    _, target = look()
+    fake.world.objects.clear()
+    for offset, empty_probes in ((0.02, 0), (0.0025, 1)):
+        for _ in range(3):
+            fake.ledger.missed(target.item)
+        run_skill(Approach(target=replace(target, epoch=fake.ledger.epoch), offset=offset), fake)
+        assert fake.ledger.records[1].empty_probes == empty_probes
+
+
 @pytest.mark.parametrize(
     ("is_touched", "reason", "message"),
     [
