@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import errno
 import io
 import signal
 import sys
@@ -19,6 +20,11 @@ from executive.errors import ExecutiveError
 from executive.runtime.signals import TERMINATION, handle_signals
 from executive.safe_text import shorten_quotations
 
+PATH_ERRORS = (
+    errno.EACCES, errno.EEXIST, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR,
+    errno.EPERM, errno.EROFS,
+)  # fmt: skip
+"""Errors of the operating system that mean a wrong path of the user."""
 BAD_INPUT, BROKEN, INTERRUPTED = 2, 3, 130
 """Exit codes of what ends a command early."""
 
@@ -89,7 +95,7 @@ def _show_error(error: BaseException, *, debug: bool) -> int:
     if isinstance(error, ExecutiveError):
         click.echo(str(error), err=True)
         return error.exit_code
-    if isinstance(error, OSError) and error.filename:
+    if isinstance(error, OSError) and error.filename and error.errno in PATH_ERRORS:
         click.echo(shorten_quotations(f"{error.filename}: {error.strerror}"), err=True)
         return BAD_INPUT
     if not debug:

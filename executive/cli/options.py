@@ -24,14 +24,14 @@ def _by_key(ctx: click.Context, param: click.Parameter, values: tuple[str, ...])
 
 
 class PathType(click.Path):
-    """A path that is neither empty, which would mean the working directory, nor a link to a missing file."""
+    """A path that is not empty, which would mean the working directory, and no link without a target."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the path, or end the command with an error."""
         if str(value) == "":
             self.fail("the path is empty", param, ctx)
         if os.path.islink(value) and not os.path.exists(value):
-            self.fail(f"{value} is a link to a file that does not exist", param, ctx)
+            self.fail(f"{value} is a link that leads to no file", param, ctx)
         return super().convert(value, param, ctx)
 
 
@@ -39,7 +39,7 @@ FILE = PathType(path_type=Path, dir_okay=False)
 FOLDER = PathType(path_type=Path, file_okay=False)
 COUNT = click.IntRange(min=1)
 MAX_SEED = 2**32 - 1
-"""Largest seed: the names of run directories contain the seed."""
+"""Largest seed: a number of 32 bits, which every random number generator accepts."""
 MISSION = click.argument("mission", metavar="MISSION")
 
 overrides_option = click.option(

@@ -17,9 +17,8 @@ from executive.written_paths import leaves_folder, links_out
 
 MAX_MODEL_SIZE = 20_000_000
 """Largest size of a model file [byte]: larger ones take longer to check than a mission should."""
-MAX_FACES = 20_000
-"""Largest number of faces of a mesh in Wavefront format: PyBullet takes 3 s to collide with 20,000, and 60 s
-with 300,000."""
+MAX_TRIANGLES = 20_000
+"""Largest number of triangles of a mesh: PyBullet takes 3 s to collide with 20,000, and 60 s with 300,000."""
 
 
 def find_model(name: str) -> Path:
@@ -49,8 +48,13 @@ def read_urdf(path: Path) -> ElementTree.Element:
         raise InputError(f"the model {path.name} is no URDF: {error}") from None
     if root.tag != "robot":
         raise InputError(f"the model {path.name} is no URDF: its root is <{root.tag}>, not <robot>")
-    for mesh in root.iter("mesh"):
-        find_mesh(path, mesh)
+    for element in root.iter():
+        if element.tag.startswith("{"):
+            raise InputError(f"the model {path.name} has an XML namespace, {element.tag}; remove it")
+        if "filename" in element.attrib:
+            _check_name(path, element.attrib["filename"])
+        if element.tag == "mesh":
+            find_mesh(path, element)
     return root
 
 
@@ -58,15 +62,38 @@ def find_mesh(urdf: Path, mesh: ElementTree.Element) -> Path:
     """Return the path of a mesh that a URDF names.
 
     Raises:
-        InputError: The mesh is no file in the folder of the URDF, is too large, or has too many faces.
+        InputError: The mesh is no file in the folder of the URDF, is too large, or has too many triangles.
     """
-    name = mesh.get("filename", "").removeprefix("package://")
-    if leaves_folder(name) or links_out(urdf.parent, name):
-        raise InputError(f'the model {urdf.name} names the mesh "{name}", which is outside of its folder')
-    path = find_model(str(urdf.parent / name))
-    if path.suffix == ".obj" and path.read_bytes().count(b"\nf ") > MAX_FACES:
-        raise InputError(f"the model {path.name} has more than {MAX_FACES} faces; simplify the mesh")
+    path = find_model(str(urdf.parent / _check_name(urdf, mesh.get("filename", ""))))
+    if _count_triangles(path) > MAX_TRIANGLES:
+        raise InputError(f"the model {path.name} has more than {MAX_TRIANGLES} triangles; simplify the mesh")
     return path
+
+
+def _check_name(urdf: Path, name: str) -> str:
+    """Return the name of a file in a URDF without a leading `package://`.
+
+    Raises:
+        InputError: The file is outside of the folder of the URDF.
+    """
+    name = name.removeprefix("package://")
+    if leaves_folder(name) or links_out(urdf.parent, name):
+        raise InputError(f'the model {urdf.name} names the file "{name}", which is outside of its folder')
+    return name
+
+
+def _count_triangles(path: Path) -> int:
+    """Return the number of triangles of a mesh in Wavefront or STL format, and 0 for other formats."""
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"the model {path.name} cannot be read: {error.strerror}") from error
+    if path.suffix.lower() == ".stl":
+        # A binary file states the number after 80 bytes, and has 50 bytes for each triangle.
+        number = int.from_bytes(content[80:84], "little")
+        return number if len(content) == 84 + 50 * number else content.count(b"endfacet")
+    words = (line.split() for line in content.splitlines())
+    return sum(len(face) - 3 for face in words if face[:1] == [b"f"])
 
 
 def read_obj(path: Path) -> tuple[Array, NDArray[np.intp]]:
@@ -86,8 +113,10 @@ def read_obj(path: Path) -> tuple[Array, NDArray[np.intp]]:
                 corners = [int(value.split("/")[0]) for value in values]
                 corners = [i - 1 if i > 0 else len(vertices) + i for i in corners]
                 triangles += [(corners[0], a, b) for a, b in pairwise(corners[1:])]
-        if len(triangles) > MAX_FACES:
-            raise InputError(f"the model {path.name} has more than {MAX_FACES} triangles; simplify the mesh")
+        if len(triangles) > MAX_TRIANGLES:
+            raise InputError(
+                f"the model {path.name} has more than {MAX_TRIANGLES} triangles; simplify the mesh"
+            )
         faces = np.array(triangles, dtype=np.intp).reshape(-1, 3)
         return _check_mesh(np.array(vertices, dtype=float), faces)
     except (OSError, ValueError, IndexError, OverflowError) as error:

@@ -52,7 +52,7 @@ def test_a_mesh_outside_of_the_folder_of_its_urdf_is_not_opened(mesh: str, tmp_p
     (tmp_path / "link.obj").symlink_to("/etc/passwd")
     visual = f"<visual><geometry><mesh filename='{mesh}'/></geometry></visual>"
     (tmp_path / "m.urdf").write_text(f"<robot>{visual}</robot>")
-    with pytest.raises(InputError, match=r"names the mesh .*, which is outside of its folder$"):
+    with pytest.raises(InputError, match=r"names the file .*, which is outside of its folder$"):
         load_mesh(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
 
 
@@ -65,13 +65,47 @@ def test_a_mesh_that_is_no_file_is_not_opened(part: str, tmp_path: Path) -> None
         mass_of(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
 
 
+@pytest.mark.parametrize(
+    ("part", "error"),
+    [
+        (
+            "<mesh xmlns='q' filename='../m.obj'/>",
+            "the model m.urdf has an XML namespace, {q}mesh; remove it",
+        ),
+        ("<texture filename='../m.png'/>", 'the model m.urdf names the file "../m.png", which is outside of'),
+    ],
+)
+def test_no_element_of_a_urdf_names_a_file_outside_of_its_folder(
+    part: str, error: str, tmp_path: Path
+) -> None:
+    (tmp_path / "m.urdf").write_text(f"<robot><visual><geometry>{part}</geometry></visual></robot>")
+    with pytest.raises(InputError) as raised:
+        mass_of(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
+    assert str(raised.value).startswith(error)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"\0" * 80 + (20_001).to_bytes(4, "little") + b"\0" * 50 * 20_001, b"solid\n" + b"endfacet\n" * 20_001],
+    ids=["binary", "text"],
+)
+def test_an_stl_mesh_of_more_than_20000_triangles_is_refused(content: bytes, tmp_path: Path) -> None:
+    (tmp_path / "m.stl").write_bytes(content)
+    shape = "<collision><geometry><mesh filename='m.stl'/></geometry></collision>"
+    (tmp_path / "m.urdf").write_text(f"<robot>{shape}</robot>")
+    with pytest.raises(InputError, match=r"^the model m\.stl has more than 20000 triangles; simplify"):
+        mass_of(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
+
+
 @pytest.mark.parametrize("model", ["m.urdf", "m.obj"])
-def test_a_mesh_of_more_than_20000_faces_is_refused(model: str, tmp_path: Path) -> None:
+def test_a_mesh_of_more_than_20000_triangles_is_refused(model: str, tmp_path: Path) -> None:
     (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "f 1 2 3\n" * 20_001)
     shape = "<collision><geometry><mesh filename='m.obj'/></geometry></collision>"
     (tmp_path / "m.urdf").write_text(f"<robot>{shape}</robot>")
     key = {"mesh" if model.endswith("obj") else "urdf": str(tmp_path / model)}
-    with pytest.raises(InputError, match=r"^the model m\.obj has more than 20000 \w+; simplify the mesh$"):
+    with pytest.raises(
+        InputError, match=r"^the model m\.obj has more than 20000 triangles; simplify the mesh$"
+    ):
         load_mesh(ObjectConfig(**key, height=0.05, radius=0.03))
 
 
