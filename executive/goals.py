@@ -92,7 +92,7 @@ def onto(
     return Goal((x + dx, y + dy, lowest), guarded=surface + descent - lowest, speed=descent_speed)
 
 
-def lowest_contact(kind: ObjectClass, middle: float, overtravel: float = OVERTRAVEL) -> float:
+def lowest_contact(kind: ObjectClass, middle: float, overtravel: float) -> float:
     """Return the lowest height of a contact that may be the top of an object [m].
 
     Args:

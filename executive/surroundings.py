@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from executive.cell import Cell
+from executive.geometry import Array
 from executive.messages import BIN_THICKNESS, Bin, Item, Obstacle, Target
 
 ROLLED = 0.002
@@ -20,6 +21,11 @@ def around(cell: Cell, but: Item | None = None) -> tuple[Obstacle, ...]:
         *(obstacle_of(cell, target) for target in cell.ledger.standing() if target.item != but),
         *_filled(cell, but),
     )
+
+
+def is_in_bin(cell: Cell, position: Array) -> bool:
+    """Return True if a position `(3,)` [m] is inside a bin or its walls."""
+    return any(bin.contains(position, BIN_THICKNESS) for bin in cell.bins.values())
 
 
 def slots_taken(cell: Cell, bin: str, but: Item | None = None) -> int:

@@ -7,8 +7,9 @@ from typing import Any, ClassVar
 
 from executive.cell import Cell, LeastTimes, Steps
 from executive.errors import NoDepth, Unavailable
-from executive.messages import BIN_THICKNESS, Detection, Detections, Frame
+from executive.messages import Detection, Detections, Frame
 from executive.skill import Out, Skill, param, port
+from executive.surroundings import is_in_bin
 
 MIN_VISIBLE_SHARE = 0.7
 """Smallest visible share of a box that counts; the arm may hide the rest."""
@@ -95,7 +96,7 @@ class Detect(Skill):
         )
         found = tuple(one for one in known if _is_clear(one, threshold))
         doubtful = tuple(one for one in known if not _is_clear(one, threshold))
-        on_table = (one for one in doubtful if not _is_in_bin(cell, one, frame))
+        on_table = (one for one in doubtful if not _shows_bin_content(cell, one, frame))
         if not found and self.doubtful == "fail" and (best := next(on_table, None)):
             weak = best.confidence < threshold
             limit = f"< {threshold:.2f}" if weak else f"with another class at {best.rival:.2f}"
@@ -122,13 +123,13 @@ def _is_clear(detection: Detection, threshold: float) -> bool:
     return confidence >= threshold and detection.rival <= MAX_SECOND_RATIO * confidence
 
 
-def _is_in_bin(cell: Cell, detection: Detection, frame: Frame) -> bool:
-    """Return True if a detection lies in a bin: the ledger knows the objects there."""
+def _shows_bin_content(cell: Cell, detection: Detection, frame: Frame) -> bool:
+    """Return True if a detection is at a position in a bin; the ledger knows the objects there."""
     try:
         position = cell.localizer.locate(detection, frame)
     except NoDepth:
         return False
-    return any(bin.contains(position, BIN_THICKNESS) for bin in cell.bins.values())
+    return is_in_bin(cell, position)
 
 
 def _is_valid(detection: Detection) -> bool:

@@ -10,8 +10,9 @@ from executive.cell import Cell
 from executive.errors import NoDepth
 from executive.evidence import describe_wrong_size, describe_wrong_top
 from executive.geometry import Array
-from executive.messages import BIN_THICKNESS, Detection, Detections, Glimpse, Target
+from executive.messages import Detection, Detections, Glimpse, Target
 from executive.skill import In, Out, Skill, port
+from executive.surroundings import is_in_bin
 
 
 class Localize(Skill):
@@ -54,7 +55,7 @@ class Localize(Skill):
 
     def _contradiction(self, cell: Cell, detection: Detection, place: Array) -> str:
         """Return how its box or its top contradicts a class, or ""; in a bin, objects lean and lie deep."""
-        if any(bin.contains(place, BIN_THICKNESS) for bin in cell.bins.values()):
+        if is_in_bin(cell, place):
             return ""
         frame, area, kind = self.detections.frame, self.detections.area, cell.classes[detection.label]
         wrong_size = describe_wrong_size(detection, place, frame, area, kind)

@@ -229,7 +229,7 @@ def _read_text(file: Path, max_size: int) -> str:
     if not os.path.isfile(file):
         raise InputError(f"{file} is no file")
     if file.stat().st_size > max_size:
-        raise InputError(f"{file} has more than {max_size / 1e6:g} MB; divide the data set")
+        raise InputError(f"{file} has more than {max_size / 1e6:g} MB, the limit of such a file")
     try:
         return file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
