@@ -1,11 +1,20 @@
-"""What can go wrong outside a mission's own failures, each with its exit code."""
+"""Errors with their exit codes, and text of users and third parties made safe for messages."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from executive.safe_text import shorten_quotations
+MAX_QUOTED = 200
+"""Maximum length of a quotation or word in a message [characters]."""
+_CONTROL = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ud800-\udfff\ufeff]"
+)
+"""Control characters except tab and line feed, invisible Unicode format characters and line separators, and
+lone surrogates."""
+_PIECE = re.compile(r'"[^"\n]*"|\S+')
+"""A quotation or a word."""
 
 
 class ExecutiveError(Exception):
@@ -88,3 +97,20 @@ def explained(kind: type[ExecutiveError], what: str, then: str = "") -> Iterator
         yield
     except OSError as error:
         raise kind(f"{what}: {reason_of(error)}" + (f"; {then}" if then else "")) from error
+
+
+def escape_control_characters(text: str) -> str:
+    r"""Return `text` with control characters written as in JSON, for instance `\u001b`."""
+    return _CONTROL.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
+
+
+def shorten_quotations(text: str) -> str:
+    """Return `text` with every quotation and word cut to `MAX_QUOTED` characters."""
+    return _PIECE.sub(lambda match: _shorten(match[0]), text)
+
+
+def _shorten(piece: str) -> str:
+    if len(piece) <= MAX_QUOTED:
+        return piece
+    end = '…"' if piece[0] == piece[-1] == '"' else "…"
+    return piece[: MAX_QUOTED - len(end)] + end

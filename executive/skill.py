@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, get_args, g
 from executive.errors import Fault, InputError
 
 if TYPE_CHECKING:
-    from executive.cell import Cell, LeastTimes
+    from executive.cell.protocols import Cell, LeastTimes
 
 T = TypeVar("T")
 

@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
-from executive.arm import Goal, Task
-from executive.cell import Cell, LeastTimes, Steps, Tool
-from executive.evidence import describe_wrong_height, may_miss_top
-from executive.goals import OVERTRAVEL, PROBE_CLEARANCE, SPACING, approach, lowest_contact
-from executive.messages import ObjectClass, Target
-from executive.moving import follow, planned
+from executive.cell.arm import Goal, Task
+from executive.cell.protocols import Cell, LeastTimes, Steps, Tool
+from executive.cell.values import ObjectClass, Target
+from executive.manipulation.motions import follow, planned
+from executive.manipulation.tool_goals import OVERTRAVEL, PROBE_CLEARANCE, SPACING, approach, lowest_contact
+from executive.perception.evidence import describe_wrong_height, may_miss_top
 from executive.skill import EMPTY, In, Metres, Skill, param, port
 
 EARLY_CONTACT_MARGIN = 0.001

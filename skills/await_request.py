@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from executive.cell import Cell
+from executive.cell.protocols import Cell
 from executive.skill import Out, Skill, port
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from executive.cell import Cell, LeastTimes, Steps
+from executive.cell.protocols import Cell, LeastTimes, Steps
+from executive.cell.values import Detection, Detections, Frame
 from executive.errors import NoDepth, Unavailable
-from executive.messages import Detection, Detections, Frame
+from executive.manipulation.obstacles import is_in_bin
 from executive.skill import Out, Skill, param, port
-from executive.surroundings import is_in_bin
 
 MIN_VISIBLE_SHARE = 0.7
 """Smallest visible share of a box that counts; the arm may hide the rest."""

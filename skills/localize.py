@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import ClassVar
 
-from executive.cell import Cell
+from executive.cell.protocols import Cell
+from executive.cell.values import Detection, Detections, Glimpse, Target
 from executive.errors import NoDepth
-from executive.evidence import describe_wrong_size, describe_wrong_top
 from executive.geometry import Array
-from executive.messages import Detection, Detections, Glimpse, Target
+from executive.manipulation.obstacles import is_in_bin
+from executive.perception.evidence import describe_wrong_size, describe_wrong_top
 from executive.skill import In, Out, Skill, port
-from executive.surroundings import is_in_bin
 
 
 class Localize(Skill):

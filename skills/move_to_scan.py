@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from executive.cell import Cell, Steps
-from executive.moving import follow, heeding, planned, settle
+from executive.cell.protocols import Cell, Steps
+from executive.manipulation.motions import follow, heeding, planned, settle
 from executive.skill import Skill, param
 
 

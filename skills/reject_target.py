@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from executive.cell import Cell
-from executive.messages import Item
+from executive.cell.protocols import Cell
+from executive.cell.values import Item
 from executive.skill import In, Skill, param, port
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from executive.cell import Cell
-from executive.evidence import describe_unknown
-from executive.goals import nearest_first
-from executive.messages import Item, Target
+from executive.cell.protocols import Cell
+from executive.cell.values import Item, Target
+from executive.manipulation.obstacles import slots_taken
+from executive.manipulation.tool_goals import nearest_first
+from executive.perception.evidence import describe_unknown
 from executive.skill import In, Out, Skill, SkillFailed, param, port
-from executive.surroundings import slots_taken
 
 
 class SelectTarget(Skill):

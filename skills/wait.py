@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from executive.cell import Cell, Steps
+from executive.cell.protocols import Cell, Steps
 from executive.skill import Seconds, Skill, param
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from executive.messages import Target
-from executive.testing.fake_cell import FakeCell
+from executive.cell.values import Target
+from executive.cells.fake.cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
 from skills.detect import Detect

@@ -8,8 +8,8 @@ import pytest
 from at_hand import look
 from hypothesis import settings
 
-from executive.messages import Target
-from executive.testing.fake_cell import FakeCell
+from executive.cell.values import Target
+from executive.cells.fake.cell import FakeCell
 
 # Every run of the tests draws the same examples, so that a red test is red again when it is repeated.
 settings.register_profile("repeatable", derandomize=True, database=None, deadline=None)

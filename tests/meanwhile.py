@@ -6,11 +6,11 @@ from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
+from executive.cell.workcell import CellOptions, CellPast, Workcell
+from executive.cells.fake.cell import SilentOperator
 from executive.events import ignore
 from executive.mission.load import LoadedMission
-from executive.testing.disturbances.hand import Hand, hand_of
-from executive.testing.fake_cell import SilentOperator
-from executive.workcell import CellOptions, CellPast, Workcell
+from executive.testing.faults.hand import Hand, hand_of
 
 
 def meanwhile(

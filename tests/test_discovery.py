@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from executive.discovery import discover
 from executive.errors import InputError
+from executive.plugins import discover
 
 Install = Callable[..., None]
 
@@ -27,7 +27,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Install:
         points = [
             EntryPoint(name, f"{module}:{value}", "executive.skills") for name, value in entries.items()
         ]
-        monkeypatch.setattr("executive.entry_points.entry_points", lambda group: points)
+        monkeypatch.setattr("executive.plugins.entry_points", lambda group: points)
 
     return install
 

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from executive.evidence import (
+from executive.cell.values import Box, Detection, Frame, ObjectClass
+from executive.geometry import Array
+from executive.perception.evidence import (
     describe_unknown,
     describe_wrong_height,
     describe_wrong_size,
     describe_wrong_top,
     may_miss_top,
 )
-from executive.geometry import Array
-from executive.messages import Box, Detection, Frame, ObjectClass
 from tests.camera_poses import looking_down
 
 CUBE, SPHERE = ObjectClass("cube", 0.05, 0.0354), ObjectClass("sphere", 0.06, 0.03)

@@ -14,22 +14,9 @@ import pytest
 from click.testing import CliRunner
 from guide_blocks import AUTHORS, GUIDES, ROOT, blocks, files, in_code, read, rows, shown, transcripts
 
-from executive.cli.main import main
-from executive.discovery import discover
-from executive.events import Event
-from executive.messages import Target
-from executive.mission.findings import CODES, MissionError
-from executive.mission.load import LoadedMission, load_mission
-from executive.mission.model import grammar
-from executive.mission.parse.cell_file import load_cell
-from executive.mission.schema.files import mission_schema
-from executive.mission.source import Source
-from executive.mission.text.files import shipped_missions
-from executive.mission.text.yaml_text import parse_yaml, plain
-from executive.record.result import EXIT_CODES
-from executive.runtime.cells import cell_kind
-from executive.runtime.run import Run
-from executive.sim.scene_file import (
+from executive.cell.values import Target
+from executive.cells.fake.cell import FakeCell
+from executive.cells.sim.scene_file import (
     LightConfig,
     SceneCameraConfig,
     SceneConfig,
@@ -38,7 +25,19 @@ from executive.sim.scene_file import (
     UnknownConfig,
     load_scene,
 )
-from executive.testing.fake_cell import FakeCell
+from executive.cli.main import main
+from executive.events import Event
+from executive.mission.findings import CODES, MissionError
+from executive.mission.load import LoadedMission, load_mission
+from executive.mission.model import grammar
+from executive.mission.parse.cell_file import load_cell
+from executive.mission.schema.files import mission_schema
+from executive.mission.source import Source
+from executive.mission.text.files import shipped_missions
+from executive.mission.text.yaml_text import parse_yaml, plain
+from executive.plugins import cell_kind, discover
+from executive.record.result import EXIT_CODES
+from executive.run.run import Run
 from executive.testing.run_skill import run_skill
 
 LONGEST = 300.0

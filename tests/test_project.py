@@ -10,7 +10,7 @@ from unittest.mock import Mock
 import pytest
 
 from executive.errors import InputError
-from executive.project import project_here
+from executive.plugins import project_here
 
 Write = Callable[[str], Path]
 

@@ -9,22 +9,22 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
-from executive.cell import Localizer
-from executive.cell_config import CellConfig, DetectorConfig
+from executive.cell.config import CellConfig, DetectorConfig
+from executive.cell.layout import object_class
+from executive.cell.protocols import Localizer
+from executive.cells.sim.scene_file import load_scene
+from executive.cells.sim.spawn import count_that_fits
 from executive.errors import InputError
-from executive.layout import object_class
 from executive.mission.findings import alternatives
-from executive.sim.datasets import generate, run_frames
-from executive.sim.scene_file import load_scene
-from executive.sim.spawn import count_that_fits
-from executive.vision.detectors.registry import find_problems
-from executive.vision.evaluation.asking import CellDetector
-from executive.vision.evaluation.evaluate import evaluate
-from executive.vision.evaluation.figures import Evaluation
-from executive.vision.evaluation.misses import WorstMisses
-from executive.vision.evaluation.model_file import FLOOR, MODEL_NAME, model_detector
-from executive.vision.localization.build import build_localizer
-from executive.vision.samples import LabelledImage, Samples
+from executive.perception.detectors.registry import find_problems
+from executive.perception.localization.build import build_localizer
+from executive.training.evaluation.asking import CellDetector
+from executive.training.evaluation.evaluate import evaluate
+from executive.training.evaluation.figures import Evaluation
+from executive.training.evaluation.misses import WorstMisses
+from executive.training.evaluation.model_file import FLOOR, MODEL_NAME, model_detector
+from executive.training.rendering import generate, run_frames
+from executive.training.samples import LabelledImage, Samples
 
 MAX_OBJECTS = 20
 """Largest number of objects in a scene, if the workspace has room for so many."""

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from executive.runtime.outcome import Outcome
-from executive.workcell import Workcell
+from executive.cell.workcell import Workcell
+from executive.run.outcome import Outcome
 
 AFTER = 6
 """Control steps after the end of a run in which the arm must not move any more."""

@@ -7,16 +7,16 @@ from pathlib import Path
 
 from executive.campaign.evaluation import DetectorUnderTest
 from executive.errors import InputError, explained
-from executive.record.whole_file import write_whole
-from executive.vision.envelope.fingerprint import take_fingerprint
-from executive.vision.envelope.measurement import (
+from executive.perception.envelope.fingerprint import take_fingerprint
+from executive.perception.envelope.measurement import (
     SUFFIX,
     ErrorCounts,
     Measurement,
     format_measurements,
     read_measurements,
 )
-from executive.vision.evaluation.figures import NOTHING, Evaluation
+from executive.record.whole_file import write_whole
+from executive.training.evaluation.figures import NOTHING, Evaluation
 
 
 def store_evaluation(

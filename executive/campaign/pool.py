@@ -13,8 +13,8 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from types import FrameType
 from typing import TypeVar
 
-from executive.runtime.signals import SIGNALS, handle_signals
-from executive.workers import Workers, kill_workers
+from executive.processes import Workers, kill_workers
+from executive.run.signals import SIGNALS, handle_signals
 
 J = TypeVar("J")
 R = TypeVar("R")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from executive.cell.workcell import Workcell
 from executive.mission.load import LoadedMission
 from executive.skill import Skill
-from executive.workcell import Workcell
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from typing import Any
 
 from executive.campaign.pool import do_all
 from executive.campaign.statistics import spread, wilson
+from executive.cell.workcell import PLACES
 from executive.errors import ExecutiveError
 from executive.record.result import ITEM_COUNTS
-from executive.workcell import PLACES
 
 Result = Mapping[str, Any]
 
@@ -66,8 +66,8 @@ def sweep(
 
 def run_job(job: Job) -> Result:
     """Do one run, leave its record and its report, and return its result object."""
-    from executive.discovery import discover
     from executive.mission.load import load_mission
+    from executive.plugins import discover
     from executive.record.recorded_run import recorded_run
     from executive.view.report.page import leave_report
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from executive.cell_config import CellConfig
+    from executive.cell.config import CellConfig
 
 
 def load_cells(names: tuple[str, ...], overrides: Mapping[str, str] | None = None) -> dict[str, CellConfig]:

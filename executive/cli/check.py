@@ -27,11 +27,10 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
     Exit code 2 if any cannot be run.
     """
     with stdout_kept_clean():
-        from executive.discovery import discover
         from executive.errors import InputError
         from executive.mission.findings import MAX_LISTED_FINDINGS, Finding
         from executive.mission.load import load_mission
-        from executive.runtime.cells import cell_kind
+        from executive.plugins import cell_kind, discover
 
         skills = discover()
         reports: list[dict[str, Any]] = []

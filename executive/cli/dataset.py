@@ -28,7 +28,7 @@ def command(
     with stdout_kept_clean():
         from executive.cli.cells import load_cells
         from executive.cli.progress import bar
-        from executive.sim.datasets import generate
+        from executive.training.rendering import generate
 
         configs = load_cells(cells)
         with bar("rendering") as progress:

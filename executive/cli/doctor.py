@@ -21,7 +21,7 @@ import click
 from executive.cli.options import json_option
 from executive.cli.output import print_json, stdout_kept_clean
 from executive.errors import InputError
-from executive.programs import program
+from executive.processes import program
 
 MIN_PYTHON, MAX_PYTHON = (3, 10), (3, 11)
 """Oldest and newest Python for which every required package has wheels."""
@@ -105,7 +105,7 @@ def check_packages() -> Iterator[Finding]:
     """Yield findings on required packages, packages that provide `cv2`, extras, and the video encoder."""
     from importlib.metadata import packages_distributions
 
-    from executive.runtime.versions import ITSELF, installed, installer, required
+    from executive.run.versions import ITSELF, installed, installer, required
 
     names = required()
     missing = [name for name in (ITSELF, *names) if not installed(name)]
@@ -139,14 +139,11 @@ def check_packages() -> Iterator[Finding]:
 
 def check_plugins() -> Iterator[Finding]:
     """Load every installed skill, kind of cell and kind of detector, and yield how many there are."""
-    from executive.discovery import discover
-    from executive.entry_points import registered
-    from executive.project import project_here
-    from executive.runtime import cells
-    from executive.vision.detectors import registry
+    from executive.perception.detectors import registry
+    from executive.plugins import CELL_KINDS, discover, project_here, registered
 
     skills, project = discover(), project_here()
-    kinds, detectors = registered(cells.GROUP, "kind of cell"), registry.installed()
+    kinds, detectors = registered(CELL_KINDS, "kind of cell"), registry.installed()
     for entry in (*kinds.values(), *detectors.values()):
         entry.load()
     message = f"{len(skills)} skills, {len(kinds)} kinds of cells, {len(detectors)} kinds of detectors"
@@ -170,8 +167,8 @@ def check_renderer() -> Iterator[Finding]:
 
 def check_roboflow() -> Iterator[Finding]:
     """Yield whether there is a key, without showing it, and whether Roboflow's own server answers."""
-    from executive.vision.detectors.roboflow.key import VARIABLE, ApiKey
-    from executive.vision.detectors.roboflow.options import HOSTED
+    from executive.perception.detectors.roboflow.key import VARIABLE, ApiKey
+    from executive.perception.detectors.roboflow.options import HOSTED
 
     if ApiKey(os.environ).is_set:
         yield Finding("ok", "key", f"{VARIABLE} is set")
@@ -221,10 +218,10 @@ def prepare_drawing(renderer: str) -> Callable[[], object]:
     """
     import pybullet
 
+    from executive.cells.sim.camera import CELL_LIGHT, camera_pose, render
+    from executive.cells.sim.world import World
     from executive.cli.cells import load_cells
-    from executive.sim.camera import CELL_LIGHT, camera_pose, render
-    from executive.sim.world import World
-    from executive.vision.camera_model import calibrated
+    from executive.perception.camera_model import calibrated
 
     if renderer == "egl":
         pybullet.connect(pybullet.DIRECT)

@@ -91,8 +91,8 @@ def command(
         from executive.campaign.measurement_store import store_evaluation
         from executive.cli.cells import find_cell, load_cells
         from executive.cli.progress import bar, report_polygons
+        from executive.training.evaluation.misses import WorstMisses
         from executive.view.figures.detector import print_figures
-        from executive.vision.evaluation.misses import WorstMisses
 
         worst, scenes = WorstMisses(), SceneSettings(images, seed, varied, view, workers, scene)
         named = cells or (() if dataset else ("overhead",))
@@ -115,7 +115,7 @@ def command(
                 path = store_evaluation(tested, result, out, command=repeat, seconds=seconds)
                 click.echo(f"stored in {path}", err=True)
         if sheet is not None:
-            from executive.vision.evaluation.sheet import write_sheet
+            from executive.training.evaluation.sheet import write_sheet
 
             write_sheet(sheet, worst.kept, ", ".join(measured))
             click.echo(f"the {len(worst.kept)} worst in {sheet}", err=True)

@@ -16,9 +16,8 @@ from typing import Any
 import click
 
 from executive.cli.streams import tolerant_streams
-from executive.errors import ExecutiveError
-from executive.runtime.signals import TERMINATION, handle_signals
-from executive.safe_text import shorten_quotations
+from executive.errors import ExecutiveError, shorten_quotations
+from executive.run.signals import TERMINATION, handle_signals
 
 PATH_ERRORS = (
     errno.EACCES, errno.EEXIST, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR,

@@ -60,7 +60,7 @@ def _line_printer(description: str) -> Callable[[int, int], None]:
 
 def report_polygons(folder: Path) -> None:
     """Say how many boxes of labelled images are made from polygons, if any."""
-    from executive.vision.samples import Samples
+    from executive.training.samples import Samples
 
     if count := Samples(folder).polygon_count:
         click.echo(f"note: {count} polygons in {folder} are used as boxes around them", err=True)

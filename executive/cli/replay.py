@@ -27,7 +27,7 @@ def command(ctx: click.Context, run: str, edited: Path | None, runs: Path, as_js
     camera, detectors and operator. Says which decision differs first; exit code 1 if one does.
     """
     with stdout_kept_clean():
-        from executive.discovery import discover
+        from executive.plugins import discover
         from executive.record.find_run import find_run
         from executive.record.journal import read_journal
         from executive.record.replay import replay

@@ -67,7 +67,7 @@ def command(
         # The simulator would end the process with a line of its own.
         raise click.UsageError("--gui needs a display, and DISPLAY names none; leave it out")
     with stdout_kept_clean():
-        from executive.discovery import discover
+        from executive.plugins import discover
         from executive.record.guarded_view import GuardedView
         from executive.record.result import disagreement, exit_code
         from executive.record.run_directory import RunDirectory
@@ -132,15 +132,15 @@ def _fresh(
 ) -> dict[str, Any]:
     """Run a mission from its start and return the result."""
     from executive.mission.load import load_mission
+    from executive.plugins import cell_kind
     from executive.record.recorded_run import recorded_run
-    from executive.runtime.cells import cell_kind
 
     loaded = load_mission(mission, skills, overrides, cell_kind)
     if options["views"]:
         for warning in loaded.warnings:
             click.echo(str(warning), err=True)
     if options["scene"] is not None:
-        from executive.sim.scene_file import load_scene
+        from executive.cells.sim.scene_file import load_scene
 
         # A cell that is not simulated would not read it.
         load_scene(options["scene"], loaded.cell_config)

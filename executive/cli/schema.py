@@ -19,9 +19,9 @@ def command(cell: bool, library: bool) -> None:
     if cell and library:
         raise click.UsageError("--cell and --library are two schemas; ask for one at a time")
     with stdout_kept_clean():
-        from executive.discovery import discover
         from executive.mission.schema.files import library_schema, mission_schema
         from executive.mission.schema.types import cell_schema
+        from executive.plugins import discover
 
         of_missions = library_schema if library else mission_schema
         schema = cell_schema() if cell else of_missions(discover())

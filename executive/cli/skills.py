@@ -35,9 +35,9 @@ def command(ctx: click.Context, name: str | None, conform: bool, as_json: bool) 
     With --conform the exit code is 1 if a check fails, or cannot be run.
     """
     with stdout_kept_clean():
-        from executive.discovery import discover
         from executive.errors import InputError
         from executive.mission.findings import alternatives
+        from executive.plugins import discover
 
         skills = discover()
         if name is not None and name not in skills:
@@ -123,7 +123,7 @@ def _default(of: Param | Port) -> Any:
 def _type(declared: Any) -> str:
     plain = isinstance(declared, type) and not get_args(declared)
     name = declared.__name__ if plain else str(declared)
-    return name.replace("typing.", "").replace("executive.messages.", "")
+    return name.replace("typing.", "").replace("executive.cell.values.", "")
 
 
 def _briefly(facts: Facts) -> str:

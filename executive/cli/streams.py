@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator
 from typing import TextIO, cast
 
-from executive.safe_text import escape_control_characters
+from executive.errors import escape_control_characters
 
 
 class TolerantStream(io.TextIOBase):

@@ -22,10 +22,9 @@ def load_subject(mission: str, overrides: dict[str, str], oracle: bool, seed: in
         InputError: There is no such mission, or its cell is not simulated and an oracle was asked for.
     """
     from executive.campaign.subject import Subject
-    from executive.discovery import discover
     from executive.errors import InputError
     from executive.mission.load import load_mission
-    from executive.runtime.cells import cell_kind
+    from executive.plugins import cell_kind, discover
 
     skills = discover()
     loaded = load_mission(mission, skills, overrides, cell_kind)

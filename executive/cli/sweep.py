@@ -55,15 +55,14 @@ def command(
     with stdout_kept_clean():
         from executive.campaign.sweep import summarize, sweep
         from executive.cli.progress import bar, print_halting
-        from executive.discovery import discover
         from executive.mission.load import load_mission
+        from executive.plugins import cell_kind, discover
         from executive.record.run_directory import check_place
-        from executive.runtime.cells import cell_kind
 
         # What is wrong with the mission, or with the place, is told once and not for every seed.
         loaded = load_mission(mission, discover(), overrides, cell_kind)
         if scene is not None:
-            from executive.sim.scene_file import load_scene
+            from executive.cells.sim.scene_file import load_scene
 
             load_scene(scene, loaded.cell_config)
         check_place(runs)

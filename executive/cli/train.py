@@ -32,10 +32,10 @@ def command(dataset: Path, out: Path, start: Path | None, rate: float | None, ep
     """Train the small RF-DETR; needs the extra `train`, about 3 GB to download on Linux."""
     with stdout_kept_clean():
         from executive.cli.progress import bar, report_polygons
-        from executive.vision.annotations import is_split
-        from executive.vision.samples import SPLITS
-        from executive.vision.train import train
-        from executive.vision.training.settings import Settings
+        from executive.training.annotations import is_split
+        from executive.training.samples import SPLITS
+        from executive.training.settings import Settings
+        from executive.training.train import train
 
         for split in (dataset / name for name in SPLITS):
             if is_split(split):

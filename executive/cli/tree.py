@@ -13,7 +13,7 @@ from executive.cli.options import MISSION, json_option, overrides_option
 from executive.cli.output import print_json, stdout_kept_clean
 
 if TYPE_CHECKING:
-    from executive.cell import Cell
+    from executive.cell.protocols import Cell
     from executive.mission.outline import OutlineNode
 
 
@@ -67,12 +67,12 @@ def command(
 
 def _outline_of(mission: str, overrides: dict[str, str]) -> tuple[str, Sequence[OutlineNode]]:
     """Return a mission's name and its tree's outline."""
-    from executive.control.scope import Scope
-    from executive.discovery import discover
     from executive.events import ignore
     from executive.mission.build import build
     from executive.mission.load import load_mission
     from executive.mission.outline import outline
+    from executive.plugins import discover
+    from executive.tree.blackboard import Scope
 
     skills = discover()
     loaded = load_mission(mission, skills, overrides)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 
+from executive.cell.values import Detections
 from executive.ledger.item import NOTHING, ON_TABLE, UNSURE, Record, State
-from executive.messages import Detections
 
 MIN_EMPTY_PROBES = 3
 """Number of times that the tool must find nothing but the table at an item's place to prove it a phantom."""

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from executive.cell import Routes
-from executive.cell_config import LedgerConfig
+from executive.cell.config import LedgerConfig
+from executive.cell.protocols import Routes
+from executive.cell.values import BIN_THICKNESS, Bin, Detections, Item
 from executive.geometry import Array
 from executive.ledger.item import Record, State
-from executive.ledger.looks import SURE, spread_of
-from executive.messages import BIN_THICKNESS, Bin, Detections, Item
+from executive.ledger.update import SURE, spread_of
 
 WALL = 0.035
 """How far from a bin's wall the middle of something has to come down to be in it for sure [m]: its radius."""

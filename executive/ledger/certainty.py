@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from executive.cell_config import LedgerConfig
+from executive.cell.config import LedgerConfig
 from executive.ledger.item import LIKELY, UNSURE, Record, State
 
 MIN_P_VALUE, REJECTION_P_VALUE = 0.01, 0.001

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell_config import TableConfig
+from executive.cell.config import TableConfig
+from executive.cell.values import Detections
 from executive.geometry import Array
 from executive.ledger.independence import repeat_probability, viewpoint_of
-from executive.messages import Detections
 
 PITCH = 0.02
 """Pitch of the grid of points on the table [m]; smaller than the smallest object."""

@@ -9,10 +9,10 @@ from enum import Enum
 
 import numpy as np
 
-from executive.error_rates import ErrorRates
+from executive.cell.error_rates import ErrorRates
+from executive.cell.values import Detection, Frame, Target
 from executive.geometry import Array
 from executive.ledger.independence import repeat_probability
-from executive.messages import Detection, Frame, Target
 
 LIKELY = 0.9
 """Probability of its existence from which an item is worth a grasp, and may be one missed elsewhere."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from executive.cell.values import Detection, Detections, Glimpse
 from executive.geometry import Array
-from executive.messages import Detection, Detections, Glimpse
 
 
 def describe_look(

@@ -8,23 +8,7 @@ from fnmatch import fnmatchcase
 from math import inf
 from typing import Any
 
-from executive.cell import Cell
-from executive.control.attempt import Try
-from executive.control.backoff import Backoff
-from executive.control.beside import Beside
-from executive.control.fallback import Fallback
-from executive.control.for_each import ForEach
-from executive.control.invert import Invert
-from executive.control.node import ControlNode, Site
-from executive.control.parallel import Parallel
-from executive.control.repeat import Repeat
-from executive.control.retry import Retry
-from executive.control.scope import Scope
-from executive.control.sequence import Sequence as SequenceOf
-from executive.control.skill_node import SkillNode, Wiring
-from executive.control.succeed import Succeed
-from executive.control.timeout import Timeout
-from executive.control.while_loop import While
+from executive.cell.protocols import Cell
 from executive.errors import InputError
 from executive.events import Emit
 from executive.mission.load import LoadedMission
@@ -33,6 +17,22 @@ from executive.mission.model.typed import convert
 from executive.mission.model.values import Literal, Match, Value
 from executive.mission.model.wiring import literals, wires
 from executive.skill import Direction, Param, Port, Skill
+from executive.tree.backoff import Backoff
+from executive.tree.blackboard import Scope
+from executive.tree.fallback import Fallback
+from executive.tree.for_each import ForEach
+from executive.tree.invert import Invert
+from executive.tree.node import ControlNode, Site
+from executive.tree.parallel import Parallel
+from executive.tree.parallel_lead import Beside
+from executive.tree.repeat import Repeat
+from executive.tree.retry import Retry
+from executive.tree.sequence import Sequence as SequenceOf
+from executive.tree.skill_leaf import SkillNode, Wiring
+from executive.tree.succeed import Succeed
+from executive.tree.timeout import Timeout
+from executive.tree.try_catch import Try
+from executive.tree.while_loop import While
 
 TreeNode = ControlNode | SkillNode
 """What a mission's tree is made of: py_trees behaviours that know their `path` and their `failure`."""

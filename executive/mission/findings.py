@@ -8,9 +8,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-from executive.errors import InputError
+from executive.errors import InputError, shorten_quotations
 from executive.mission.source import Mark
-from executive.safe_text import shorten_quotations
 
 _WINDOW = 140
 """Largest number of characters of a source line that a finding shows."""

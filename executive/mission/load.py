@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from executive.cell_config import CellConfig
+from executive.cell.config import CellConfig
+from executive.cell.workcell import CellKind
 from executive.errors import InputError
 from executive.mission.check.case import Case
 from executive.mission.check.checks import check
@@ -21,9 +22,8 @@ from executive.mission.parse.cell_file import CellFile
 from executive.mission.parse.read_mission import GivenCell, MissionFiles, read_mission
 from executive.mission.parse.validate import mark_of
 from executive.mission.text.files import find_mission, shipped_folder
+from executive.perception.envelope.rated_detectors import find_unmeasured
 from executive.skill import Skill
-from executive.vision.envelope.rated_detectors import find_unmeasured
-from executive.workcell import CellKind
 
 Kinds = Callable[[str], CellKind]
 """Finds the installed kind of cells of a name; raises InputError where there is none."""

@@ -10,8 +10,8 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 
-from executive.control.attempt import Try
-from executive.control.skill_node import SkillNode
+from executive.tree.skill_leaf import SkillNode
+from executive.tree.try_catch import Try
 
 _NUMBER = re.compile(r"[0-9]+:")
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from executive.cell_config import LimitsConfig
+from executive.cell.config import LimitsConfig
 from executive.geometry import Array
 
 

@@ -16,19 +16,19 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from executive.arm import Goal, Task
-from executive.cell_config import CellConfig
-from executive.clock import STEP
+from executive.cell.arm import Goal, Task
+from executive.cell.clock import STEP
+from executive.cell.config import CellConfig
+from executive.cell.layout import travel_height
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
-from executive.layout import travel_height
-from executive.motion.free import NoProfile
+from executive.motion.clearance_model import BETWEEN
 from executive.motion.kinematics import Kinematics, fold
 from executive.motion.limits import JointLimits
+from executive.motion.payload import Hold
+from executive.motion.point_to_point import NoProfile
 from executive.motion.postures import find_postures
-from executive.motion.seal import Hold
 from executive.motion.search import Search
-from executive.motion.surroundings import BETWEEN
 from executive.motion.trajectory import Trajectory, thinned
 
 Check = Callable[[Array, Task], None]

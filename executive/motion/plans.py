@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from executive.arm import Goal, Motion, Task
-from executive.cell import Clock
+from executive.cell.arm import Goal, Motion, Task
+from executive.cell.protocols import Clock
 from executive.errors import Blocked, Unreachable
 from executive.events import Emit
 from executive.geometry import Array
@@ -18,7 +18,7 @@ M = TypeVar("M", bound=Motion)
 
 @dataclass(frozen=True, eq=False)
 class Plan(Generic[M]):
-    """A motion being planned; implements `executive.arm.Planning`.
+    """A motion being planned; implements `executive.cell.arm.Planning`.
 
     Attributes:
         due: When it is known [s].

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from executive.arm import Goal
+from executive.cell.arm import Goal
 from executive.errors import Unreachable
 from executive.geometry import Array, Pose, tool_down
 from executive.motion.kinematics import Kinematics, wrapped

@@ -9,23 +9,23 @@ from itertools import islice
 
 import numpy as np
 
-from executive.arm import Goal, Task
-from executive.cell_config import CellConfig
+from executive.cell.arm import Goal, Task
+from executive.cell.config import CellConfig
+from executive.cell.layout import travel_height
 from executive.errors import Unreachable
 from executive.geometry import Array, tool_down
-from executive.layout import travel_height
-from executive.motion.detour import Detour, Gap
-from executive.motion.free import Connector, NoProfile
+from executive.motion.candidates import Way, ways_down
+from executive.motion.cartesian_line import SAMPLES, Line
+from executive.motion.clearance_model import Surroundings, hanging
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
-from executive.motion.line import SAMPLES, Line
+from executive.motion.optimizer import Detour, Gap
+from executive.motion.payload import Hold
+from executive.motion.point_to_point import Connector, NoProfile
 from executive.motion.postures import line_chain, upright_line
-from executive.motion.seal import Hold
 from executive.motion.state import Piece, State
-from executive.motion.surroundings import Surroundings, hanging
 from executive.motion.trajectory import Trajectory, over
 from executive.motion.transcription import PLACES
-from executive.motion.ways import Way, ways_down
 
 WAYS = 3
 """Ends of a motion that are tried."""

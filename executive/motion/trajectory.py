@@ -11,11 +11,11 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 
-from executive.clock import STEP
+from executive.cell.clock import STEP
 from executive.errors import Fault, Unreachable
 from executive.geometry import Array
-from executive.motion.free import NoProfile
 from executive.motion.limits import JointLimits
+from executive.motion.point_to_point import NoProfile
 from executive.motion.state import JOINTS, Piece, State
 
 _ROUNDING = 1e-6
@@ -23,7 +23,7 @@ _ROUNDING = 1e-6
 
 
 class Trajectory:
-    """A motion of all joints, at rest where it begins and where it ends; implements `executive.arm.Motion`.
+    """A motion of all joints, at rest where it begins and where it ends; implements `cell.arm.Motion`.
 
     Attributes:
         duration: Time from start to rest [s].

@@ -9,8 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from executive.cell.values import Detection, Frame
 from executive.events import Event
-from executive.messages import Detection, Frame
 from executive.record.pictures.drawer import Drawer
 from executive.record.pictures.scene import Scene
 from executive.record.progress import Progress, is_skill, skill_name

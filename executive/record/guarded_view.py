@@ -10,7 +10,7 @@ from executive.events import Event
 
 if TYPE_CHECKING:
     from executive.record.recorded_run import View
-    from executive.runtime.run import Run
+    from executive.run.run import Run
 
 
 class GuardedView:

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from executive.cell.values import Frame
 from executive.events import Exact
 from executive.geometry import Pose
-from executive.messages import Frame
 
 DIGITS = 6
 """Decimal places kept: a micrometre, a microradian, a microsecond."""

@@ -10,12 +10,12 @@ import yaml
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import to_json
 
-from executive.cell_config import CellConfig
+from executive.cell.config import CellConfig
 from executive.errors import InputError, explained
 from executive.mission.outline import OutlineNode
 from executive.mission.parse.read_mission import GivenCell
+from executive.replay.input_log import Entry
 from executive.skill import Skill
-from executive.tape.past import Entry
 
 if TYPE_CHECKING:
     from executive.mission.load import LoadedMission

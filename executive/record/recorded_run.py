@@ -15,18 +15,18 @@ from executive.errors import ExecutiveError
 from executive.events import Event, Observer
 from executive.mission.outline import outline
 from executive.mission.text.files import read_source
+from executive.record.diagnosis.diagnosis import Story
 from executive.record.recorded_mission import tree_text
 from executive.record.recorder import Recorder
 from executive.record.result import ENDED, result_of, write_result
 from executive.record.run_directory import RunDirectory
-from executive.record.story.story import Story
 
 if TYPE_CHECKING:
+    from executive.cell.workcell import Workcell
     from executive.mission.load import LoadedMission
-    from executive.runtime.outcome import Outcome
-    from executive.runtime.run import Run
+    from executive.run.outcome import Outcome
+    from executive.run.run import Run
     from executive.skill import Skill
-    from executive.workcell import Workcell
 
 
 class View(Protocol):
@@ -82,7 +82,7 @@ def recorded_run(
         InputError: The run directory cannot be made, or the cell cannot be built.
         ExecutiveError: The result cannot be written.
     """
-    from executive.runtime.run import Run
+    from executive.run.run import Run
 
     began = time.perf_counter()
     run = Run(

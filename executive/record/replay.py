@@ -13,11 +13,11 @@ from executive.mission.load import LoadedMission
 from executive.record.entry import entry_of
 from executive.record.progress import is_skill, skill_name
 from executive.record.recorded_mission import recorded_mission
-from executive.runtime.run import Run
+from executive.replay.input_log import Entry, Past
+from executive.replay.input_recorder import Unrecorded
+from executive.replay.replayed_cell import PlayedCell
+from executive.run.run import Run
 from executive.skill import Skill
-from executive.tape.past import Entry, Past
-from executive.tape.played_cell import PlayedCell
-from executive.tape.tape import Unrecorded
 
 Decision = Mapping[str, Any]
 """What was decided in a control step, as plain values: its `tick`, `clock` and `kind`, and what it says."""

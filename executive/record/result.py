@@ -7,15 +7,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from executive.cell.workcell import PLACES
 from executive.errors import ExecutiveError, explained
 from executive.record.journal import ending_of
 from executive.record.plain import plain
 from executive.record.run_directory import RunDirectory
 from executive.record.whole_file import write_whole
-from executive.workcell import PLACES
 
 if TYPE_CHECKING:
-    from executive.runtime.outcome import Outcome
+    from executive.run.outcome import Outcome
 
 QUIT = "quit"
 """Word of the operator who wants nothing more."""

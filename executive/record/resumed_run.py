@@ -17,11 +17,11 @@ from executive.record.recorder import Recorder
 from executive.record.replay import compare
 from executive.record.result import ENDED
 from executive.record.run_directory import RunDirectory
-from executive.tape.past import Entry, Past
+from executive.replay.input_log import Entry, Past
 
 if TYPE_CHECKING:
+    from executive.cell.workcell import Workcell
     from executive.skill import Skill
-    from executive.workcell import Workcell
 
 UNPLAYED = ("run", "plan", "request")
 """Events that do not come about again when a past is played."""
@@ -65,7 +65,7 @@ def resumed_run(
             a record, or would be decided otherwise by what is installed now.
         ExecutiveError: The result cannot be written.
     """
-    from executive.runtime.run import Run
+    from executive.run.run import Run
 
     began = time.perf_counter()
     directory = RunDirectory(path)

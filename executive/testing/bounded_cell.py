@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from executive.cell.workcell import Workcell
 from executive.errors import Fault
 from executive.testing.cell_wrapper import CellWrapper
-from executive.workcell import Workcell
 
 
 class BoundedCell(CellWrapper):

@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from executive.cell import Cell
-from executive.scenery import Scenery
-from executive.workcell import Accounts, Workcell
+from executive.cell.protocols import Cell
+from executive.cell.visuals import Scenery
+from executive.cell.workcell import Accounts, Workcell
 
 
 def _do_nothing() -> None:

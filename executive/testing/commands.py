@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from executive.arm import Goal
-from executive.cell import Cell
-from executive.cell_proxy import Access, intercept
-from executive.messages import Detections, Frame, Target
-from executive.tape.recorded_cell import COMMANDS
+from executive.cell.arm import Goal
+from executive.cell.protocols import Cell
+from executive.cell.proxy import Access, intercept
+from executive.cell.values import Detections, Frame, Target
+from executive.replay.recorded_cell import COMMANDS
 
 _ROLES = ("arm", "tool", "camera", "detector", "ledger", "operator")
 _NOTED = COMMANDS | {

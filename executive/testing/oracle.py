@@ -16,18 +16,18 @@ from typing import Any
 import cv2
 import numpy as np
 
-from executive.cell import Clock
-from executive.cell_config import CameraConfig, CellConfig, DetectorConfig
+from executive.cell.config import CameraConfig, CellConfig, DetectorConfig
+from executive.cell.protocols import Clock
+from executive.cell.values import Detection, Frame
+from executive.cells.sim.arrangements import UNKNOWN
+from executive.cells.sim.camera import Image, SimCamera
+from executive.cells.sim.cell import SimCell
+from executive.cells.sim.models import load_mesh
+from executive.cells.sim.silhouette import outline_box
+from executive.cells.sim.world import World
 from executive.geometry import Array
-from executive.messages import Detection, Frame
-from executive.sim.arrangements import UNKNOWN
-from executive.sim.camera import Image, SimCamera
-from executive.sim.cell import SimCell
-from executive.sim.models import load_mesh
-from executive.sim.silhouette import outline_box
-from executive.sim.world import World
-from executive.vision.camera_model import NEAR, project
-from executive.vision.detectors.requests import Pending
+from executive.perception.camera_model import NEAR, project
+from executive.perception.detectors.requests import Pending
 
 CONFIDENCE = 0.9
 """What an oracle says of everything it sees."""
@@ -96,7 +96,7 @@ class TruthCamera(SimCamera):
 
 @dataclass(frozen=True, eq=False)
 class Oracle:
-    """A detector that answers with the truth of a `TrueFrame`; implements `executive.cell.Detector`.
+    """A detector that answers with the truth of a `TrueFrame`; implements `cell.protocols.Detector`.
 
     It reports what has the centre of its box in the searched part of the image and not behind the arm.
 

@@ -8,21 +8,21 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from executive.control.skill_node import SkillNode
-from executive.discovery import discover
+from executive.cell.workcell import Workcell
+from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.events import Event, Observer
 from executive.mission.load import load_mission
+from executive.plugins import discover
 from executive.record.result import agrees
-from executive.runtime.outcome import Outcome
-from executive.runtime.run import Run
+from executive.run.outcome import Outcome
+from executive.run.run import Run
 from executive.skill import Skill
 from executive.testing.bounded_cell import BoundedCell
 from executive.testing.cell_wrapper import innermost
-from executive.testing.disturbances.disturbed_cell import DisturbedCell, disturbed
-from executive.testing.disturbances.script import Disturbance
-from executive.testing.fake_cell import FakeCell
-from executive.workcell import Workcell
+from executive.testing.faults.disturbed_cell import DisturbedCell, disturbed
+from executive.testing.faults.script import Disturbance
+from executive.tree.skill_leaf import SkillNode
 
 LONGEST = 600.0
 """Time on its clock after which a mission that is not done counts as one that never ends [s]."""

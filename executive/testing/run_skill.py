@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from executive.cell.workcell import Workcell
 from executive.errors import InputError
-from executive.runtime.plant import LONGEST_BRAKING
+from executive.run.run_context import LONGEST_BRAKING
 from executive.skill import Skill, SkillFailed
-from executive.skill_run import SkillRun
 from executive.testing.commands import written_down
-from executive.workcell import Workcell
+from executive.tree.skill_run import SkillRun
 
 
 @dataclass(frozen=True)

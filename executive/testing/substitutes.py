@@ -12,7 +12,7 @@ from contextlib import closing
 from itertools import count, islice
 from typing import Any, cast
 
-from executive.cell import Cell, Steps
+from executive.cell.protocols import Cell, Steps
 from executive.errors import InputError
 from executive.skill import Direction, Skill
 

@@ -11,12 +11,12 @@ import yaml
 
 from executive.campaign.evaluation import SceneSettings, check_detector, list_detectors
 from executive.campaign.evaluation import measure as measure_detector
-from executive.cell_config import CellConfig
+from executive.cell.config import CellConfig
 from executive.cli.cells import find_cell, load_cells
 from executive.cli.options import seed_option, workers_option
 from executive.cli.progress import bar
-from executive.vision.evaluation.figures import NOTHING, Evaluation
-from executive.vision.evaluation.misses import WorstMisses
+from executive.training.evaluation.figures import NOTHING, Evaluation
+from executive.training.evaluation.misses import WorstMisses
 from tests.benchmarks.report import Figures, run_command, write_json
 from tests.benchmarks.scenes_outside import Scene
 

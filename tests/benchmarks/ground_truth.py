@@ -9,23 +9,22 @@ from pathlib import Path
 
 import numpy as np
 
-from executive.cell import Routes
-from executive.cell_config import CellConfig
-from executive.discovery import discover
+from executive.cell.config import CellConfig
+from executive.cell.protocols import Routes
+from executive.cell.values import BIN_THICKNESS
+from executive.cell.workcell import CellOptions
+from executive.cells.sim.arrangements import UNKNOWN
+from executive.cells.sim.audit import audit
+from executive.cells.sim.cell import SimCell
 from executive.events import Emit
 from executive.ledger.item import State
-from executive.messages import BIN_THICKNESS
 from executive.mission.load import load_mission
+from executive.perception.detectors.setting import ClosableDetector
+from executive.perception.envelope.rated_detectors import build_rated_detectors
+from executive.plugins import cell_kind, discover
 from executive.record.journal import read_journal
 from executive.record.recorded_run import recorded_run
 from executive.record.result import exit_code
-from executive.runtime.cells import cell_kind
-from executive.sim.arrangements import UNKNOWN
-from executive.sim.audit import audit
-from executive.sim.cell import SimCell
-from executive.vision.detectors.setting import ClosableDetector
-from executive.vision.envelope.rated_detectors import build_rated_detectors
-from executive.workcell import CellOptions
 from tests.benchmarks.forks import ForkRunner
 from tests.benchmarks.report import WALL_TIME_LIMIT
 

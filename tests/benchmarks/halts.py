@@ -22,19 +22,19 @@ from py_trees.common import Status
 
 from executive.campaign.halt_checks import check_journal, check_rest, check_tool
 from executive.campaign.subject import Subject
-from executive.clock import STEP
+from executive.cell.clock import STEP
+from executive.cell.workcell import Workcell
+from executive.cells.sim.arm import SimArm
 from executive.errors import ExecutiveError
 from executive.geometry import Array
 from executive.motion.limits import JointLimits
 from executive.motion.trajectory import Trajectory
+from executive.plugins import cell_kind
 from executive.record.journal import Journal, read_journal
 from executive.record.trace import Trace
-from executive.runtime.cells import cell_kind
-from executive.runtime.outcome import Outcome
-from executive.runtime.run import Run
-from executive.sim.arm import SimArm
+from executive.run.outcome import Outcome
+from executive.run.run import Run
 from executive.testing.cell_wrapper import CellWrapper
-from executive.workcell import Workcell
 from tests.benchmarks.forks import ForkRunner
 from tests.benchmarks.report import Figures, describe, record_run, run_mission_command
 

@@ -25,7 +25,7 @@ import click
 
 from executive.cli.main import COMMANDS, main
 from executive.cli.options import seed_option
-from executive.discovery import discover
+from executive.plugins import discover
 from tests.benchmarks.hostile_files import Arguments, TextMaker, write_data_set, write_model, write_odd_paths
 from tests.benchmarks.report import Figures, run_command, show_progress
 

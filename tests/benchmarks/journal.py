@@ -12,7 +12,7 @@ from executive.cli.options import runs_option
 from executive.events import Event
 from executive.record.recorder import Recorder
 from executive.record.run_directory import RunDirectory
-from executive.runtime.run import Run
+from executive.run.run import Run
 from tests.benchmarks.report import Figures, describe, run_mission_command
 
 MAX_PERCENT = 3.0

@@ -19,19 +19,19 @@ import click
 import numpy as np
 
 from executive.campaign.subject import Subject
-from executive.cell_config import TableConfig
+from executive.cell.config import TableConfig
 from executive.cli.options import runs_option
 from executive.errors import ExecutiveError
 from executive.geometry import Array
+from executive.plugins import cell_kind
 from executive.record.find_run import LATEST, find_run
 from executive.record.journal import ending_of, read_journal
 from executive.record.recorded_mission import recorded_mission
 from executive.record.replay import compare
 from executive.record.result import disagreement
 from executive.record.resumed_run import resumed_run
-from executive.runtime.cells import cell_kind
-from executive.tape.past import Past
-from executive.testing.disturbances.hand import Hand, Thing
+from executive.replay.input_log import Past
+from executive.testing.faults.hand import Hand, Thing
 from tests.benchmarks.forks import ForkRunner
 from tests.benchmarks.report import Figures, describe, record_run, run_mission_command, show_progress
 from tests.meanwhile import meanwhile

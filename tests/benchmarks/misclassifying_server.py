@@ -11,13 +11,13 @@ from pathlib import Path
 import click
 
 from executive.campaign.pool import do_all
-from executive.cell import Clock, Request
-from executive.cell_config import CellConfig
+from executive.cell.config import CellConfig
+from executive.cell.protocols import Clock, Request
+from executive.cell.values import Answer, Frame
 from executive.cli.options import runs_option, workers_option
 from executive.cli.progress import bar, print_halting
-from executive.messages import Answer, Frame
-from executive.vision.detectors.setting import ClosableDetector
-from executive.vision.envelope.rated_detectors import build_rated_detectors
+from executive.perception.detectors.setting import ClosableDetector
+from executive.perception.envelope.rated_detectors import build_rated_detectors
 from tests.benchmarks.ground_truth import FAULT, AuditedRun, FoundObject, run_audited
 from tests.benchmarks.report import Figures, limit_option, run_command, write_json
 
@@ -54,7 +54,7 @@ class MisclassifyingDetector:
 
 @dataclass(frozen=True, eq=False)
 class MisclassifyingRequest:
-    """A request to the other detector; implements `executive.cell.Request`."""
+    """A request to the other detector; implements `executive.cell.protocols.Request`."""
 
     other: Request
     true_class: str

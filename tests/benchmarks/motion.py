@@ -16,16 +16,16 @@ from typing import Any, TypeVar
 import click
 import numpy as np
 
-from executive.cell_config import CellConfig
-from executive.clock import STEP
+from executive.cell.clock import STEP
+from executive.cell.config import CellConfig
+from executive.cell.layout import travel_height
+from executive.cells.sim.world import World
 from executive.errors import Blocked, InputError, Unreachable
 from executive.geometry import Array
-from executive.layout import travel_height
+from executive.motion.braking import brake
 from executive.motion.planner import Planner
 from executive.motion.state import State
-from executive.motion.stop import brake
 from executive.motion.trajectory import Trajectory, peaks
-from executive.sim.world import World
 from tests.benchmarks import motion_baselines as baselines
 from tests.benchmarks.motion_execution import execute_pairs
 from tests.benchmarks.motion_scenes import Scene, SceneGenerator, open_world

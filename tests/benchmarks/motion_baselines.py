@@ -15,12 +15,12 @@ from toppra import SplineInterpolator
 from toppra.algorithm import TOPPRA
 from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
 
-from executive.arm import Goal
-from executive.clock import STEP
+from executive.cell.arm import Goal
+from executive.cell.clock import STEP
 from executive.geometry import Array
-from executive.motion.free import Connector
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits, rest_to_rest
+from executive.motion.point_to_point import Connector
 from executive.motion.postures import find_postures, upright_line
 from executive.motion.state import State
 from executive.motion.trajectory import Trajectory

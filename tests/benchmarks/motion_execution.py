@@ -7,17 +7,17 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from executive.arm import Goal, Task
-from executive.cell_config import CellConfig
-from executive.clock import STEP
+from executive.cell.arm import Goal, Task
+from executive.cell.clock import STEP
+from executive.cell.config import CellConfig
+from executive.cells.sim.arm import SimArm
+from executive.cells.sim.clock import SimClock
+from executive.cells.sim.collision import FIRST_MOVING, SELF_PAIRS, WRIST
+from executive.cells.sim.tool import SuctionTool
+from executive.cells.sim.world import World, held_part
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Pose
 from executive.motion.planner import Planner
-from executive.sim.arm import SimArm
-from executive.sim.clearance import FIRST_MOVING, SELF_PAIRS, WRIST
-from executive.sim.clock import SimClock
-from executive.sim.tool import SuctionTool
-from executive.sim.world import World, held_part
 from tests.benchmarks.motion_scenes import Scene, SceneGenerator, open_world
 from tests.benchmarks.report import Figures, show_progress
 

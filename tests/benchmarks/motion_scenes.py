@@ -8,20 +8,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from executive.arm import Goal, Task
-from executive.cell_config import CellConfig
+from executive.cell.arm import Goal, Task
+from executive.cell.config import CellConfig
+from executive.cell.layout import as_bin
+from executive.cell.values import Load, ObjectClass, Obstacle
+from executive.cells.sim.collision import PathClearance
+from executive.cells.sim.models import load_mesh, weighed
+from executive.cells.sim.spawn import spawn
+from executive.cells.sim.suction import breakaway, measure
+from executive.cells.sim.tool import TOUCH
+from executive.cells.sim.world import World
 from executive.errors import InputError, Unreachable
 from executive.geometry import tool_down
-from executive.goals import onto, over
-from executive.layout import as_bin
-from executive.messages import Load, ObjectClass, Obstacle
+from executive.manipulation.tool_goals import onto, over
 from executive.motion.planner import Planner
-from executive.sim.clearance import PathClearance
-from executive.sim.models import load_mesh, weighed
-from executive.sim.seal import breakaway, measure
-from executive.sim.spawn import spawn
-from executive.sim.tool import TOUCH
-from executive.sim.world import World
 
 MAX_TRIES = 50
 """Maximum number of scenes drawn to find one whose object can be held and reached."""
@@ -49,8 +49,8 @@ class Scene:
         breakaway_force: Breakaway force of a seal on the object [N].
         target: The object to pick, at its true position.
         others: The other objects on the table, at their true positions.
-        approach: Goal of the motion onto the object, equal to that of `executive.goals.approach`.
-        drop: Goal of the motion into the bin, equal to that of `executive.goals.into` for an empty bin.
+        approach: Goal of the motion onto the object, equal to that of `tool_goals.approach`.
+        drop: Goal of the motion into the bin, equal to that of `tool_goals.into` for an empty bin.
     """
 
     body: int

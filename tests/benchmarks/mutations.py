@@ -29,7 +29,7 @@ EXCLUDED_FOLDERS = (
     "executive/cli/init",
     "executive/view/film",
     "executive/view/live",
-    "executive/vision/training",
+    "executive/training",
 )
 """Code that slow tests cover: projects in processes of their own, whole films, browsers, training."""
 

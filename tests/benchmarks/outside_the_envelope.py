@@ -14,12 +14,12 @@ import click
 import yaml
 
 from executive.campaign.pool import do_all
-from executive.cell_config import CellConfig
+from executive.cell.config import CellConfig
+from executive.cells.sim.scene_file import load_scene
 from executive.cli.options import runs_option, workers_option
 from executive.cli.progress import bar, print_halting
-from executive.discovery import discover
 from executive.mission.load import load_mission
-from executive.sim.scene_file import load_scene
+from executive.plugins import discover
 from tests.benchmarks.ground_truth import FAULT, HUNG, AuditedRun, run_audited
 from tests.benchmarks.report import Figures, limit_option, run_command, write_json
 from tests.benchmarks.scenes_outside import DECLARED, GROUPS, MISSIONS, Case, list_cases

@@ -14,12 +14,12 @@ from pathlib import Path
 import click
 import numpy as np
 
-from executive.cell_config import CellConfig, ToolConfig
+from executive.cell.config import CellConfig, ToolConfig
+from executive.cells.sim.models import load_mesh
+from executive.cells.sim.suction import breakaway
+from executive.cells.sim.suction import measure as measure_seal
+from executive.cells.sim.world import World
 from executive.geometry import Array, Pose, about_z, tool_down
-from executive.sim.models import load_mesh
-from executive.sim.seal import breakaway
-from executive.sim.seal import measure as measure_seal
-from executive.sim.world import World
 from tests.benchmarks.report import CELL_OPTIONS, Figures, run_command
 
 SHIPPED_MAP = Path(__file__).with_name("suction_map.csv")

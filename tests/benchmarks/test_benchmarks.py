@@ -16,15 +16,15 @@ import pytest
 from py_trees.common import Status
 
 from executive.campaign.subject import Subject
-from executive.cell_config import CellConfig
+from executive.cell.clock import STEP
+from executive.cell.config import CellConfig
+from executive.cells.fake.cell import FakeCell
 from executive.cli.subject import load_subject
-from executive.clock import STEP
-from executive.motion.free import Connector
+from executive.motion.braking import brake
 from executive.motion.limits import JointLimits
+from executive.motion.point_to_point import Connector
 from executive.motion.state import State
-from executive.motion.stop import brake
 from executive.motion.trajectory import Trajectory
-from executive.testing.fake_cell import FakeCell
 from tests.benchmarks import halts, journal, kills, report, soak, suction_map, tick
 from tests.benchmarks.forks import ForkRunner
 

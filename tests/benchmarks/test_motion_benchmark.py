@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from executive.arm import Goal
-from executive.cell_config import CellConfig
+from executive.cell.arm import Goal
+from executive.cell.config import CellConfig
+from executive.cell.layout import travel_height
+from executive.cells.sim.world import World
 from executive.cli.cells import load_cells
 from executive.geometry import Pose
-from executive.layout import travel_height
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
 from executive.motion.postures import find_postures
 from executive.motion.trajectory import peaks
-from executive.sim.world import World
 from tests.benchmarks import motion
 from tests.benchmarks import motion_baselines as baselines
 from tests.benchmarks.motion_execution import ClearanceMonitor

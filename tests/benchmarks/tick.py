@@ -23,18 +23,18 @@ from py_trees import composites, decorators
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.cell import Cell
-from executive.control.node import Site
-from executive.control.retry import Retry
-from executive.control.scope import Scope
-from executive.control.sequence import Sequence as SequenceNode
-from executive.control.skill_node import SkillNode, Wiring
-from executive.control.timeout import Timeout
+from executive.cell.protocols import Cell
+from executive.cells.fake.cell import FakeCell
 from executive.events import Event, Observer
 from executive.record.recorder import Recorder
 from executive.record.run_directory import RunDirectory
 from executive.skill import Skill
-from executive.testing.fake_cell import FakeCell
+from executive.tree.blackboard import Scope
+from executive.tree.node import Site
+from executive.tree.retry import Retry
+from executive.tree.sequence import Sequence as SequenceNode
+from executive.tree.skill_leaf import SkillNode, Wiring
+from executive.tree.timeout import Timeout
 from tests.benchmarks.report import Figures, run_command
 
 SIZES = (10, 100, 1000)

@@ -1,8 +1,8 @@
 """Traces of the shipped missions, to show that a refactoring changes no decision.
 
-`--out FILE` writes the trace of every run. `--compare FILE` runs again and lists each run whose trace differs.
-The module uses only the command line of the executive, so `--executive PATH` can record the traces of another
-checkout. Traces can be compared on one kind of processor only.
+`--out FILE` writes the trace of every run. `--compare FILE` runs again and lists each run with another
+trace. The module uses only the command line of the executive, so `--executive PATH` can record the traces of
+another checkout. Traces can be compared on one kind of processor only.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def main() -> int:
         jobs += [(name, "sim", seed) for name in simulated for seed in SIMULATED_SEEDS]
     with ThreadPoolExecutor(2) as pool:
         results = list(pool.map(lambda job: run_mission(options.executive, *job), jobs))
-    traces = {f"{name} {kind} {seed}": result for (name, kind, seed), result in zip(jobs, results, strict=True)}
+    traces = {" ".join(map(str, job)): result for job, result in zip(jobs, results, strict=True)}
     if options.out:
         options.out.write_text(json.dumps(traces, indent=1) + "\n")
     expected = json.loads(options.compare.read_text()) if options.compare else traces
@@ -56,8 +56,9 @@ def main() -> int:
 def run_mission(executive: str, name: str, kind: str, seed: int) -> Sequence[str]:
     """Run a mission in a process of its own; return its status and trace, or the end of its error output."""
     with tempfile.TemporaryDirectory() as runs:
-        command = [executive, "run", str(MISSIONS / f"{name}.yaml"), "--seed", str(seed), "--json", "--quiet"]
-        command += ["--runs", runs, *(word for label in REQUESTS.get(name, ()) for word in ("--request", label))]
+        command = [executive, "run", str(MISSIONS / f"{name}.yaml"), "--seed", str(seed)]
+        command += ["--json", "--quiet", "--runs", runs]
+        command += [f"--request={label}" for label in REQUESTS.get(name, ())]
         if kind == "fake":
             command += ["--set", "cell.kind=fake"]
         done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from executive.arm import Task
 from executive.campaign.halt_checks import check_journal, check_rest, check_tool
-from executive.runtime.outcome import Outcome
-from executive.testing.fake_cell import FakeCell
+from executive.cell.arm import Task
+from executive.cells.fake.cell import FakeCell
+from executive.run.outcome import Outcome
 
 HALTED = Outcome("HALTED", "halted", "halted by the user", "", False, "", 40, 0.166667)
 

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 import pytest
 
 from executive.campaign.pool import do_all
-from executive.runtime.run_control import RunControl
-from executive.runtime.signals import SIGNALS, stopped_by_signals
+from executive.run.run_control import RunControl
+from executive.run.signals import SIGNALS, stopped_by_signals
 
 
 def half(number: int) -> float:

@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 
 from executive.cli.main import main
 from executive.cli.progress import bar
-from executive.vision.dataset import Entry, image_path, save_image, write_annotations
+from executive.training.dataset import Entry, image_path, save_image, write_annotations
 
 FAKE = ("--set", "cell.kind=fake")
 
@@ -103,7 +103,7 @@ def test_train_shows_batches_and_a_line_per_epoch(
             if done % 2 == 0:
                 progress(done // 2, {"loss": 0.51234})
 
-    monkeypatch.setattr("executive.vision.train.train", train)
+    monkeypatch.setattr("executive.training.train.train", train)
     shown = at_terminal("train", "--dataset", "data", "--out", "out", "--epochs", "2")
     assert shown.exit_code == 0, shown.stderr
     assert "training" in shown.stderr and "4/4" in shown.stderr

@@ -17,7 +17,7 @@ from executive.cli import doctor
 from executive.cli.doctor import Finding
 from executive.cli.main import main
 from executive.errors import InputError
-from executive.runtime import versions
+from executive.run import versions
 
 INSTALLED = {
     "executive": "1.0", "pybullet": "3.2", "av": "14.0", "viser": "1.1", "aiohttp": "3.11",
@@ -226,8 +226,8 @@ def test_everything_is_examined_whatever_fails(monkeypatch):
     def fail() -> None:
         raise InputError("the skill is broken; mend it")
 
-    monkeypatch.setattr("executive.discovery.discover", fail)
-    monkeypatch.setitem(sys.modules, "executive.vision.detectors.roboflow.key", None)
+    monkeypatch.setattr("executive.plugins.discover", fail)
+    monkeypatch.setitem(sys.modules, "executive.perception.detectors.roboflow.key", None)
     monkeypatch.setattr(doctor, "measure_frame_time", lambda renderer: (9.0, ""))
     found = shown(doctor.examine())
     assert [line.split(": ")[0].split(" ")[1] for line in found] == [
@@ -235,5 +235,7 @@ def test_everything_is_examined_whatever_fails(monkeypatch):
         "plugins", "renderer", "egl", "roboflow",
     ]  # fmt: skip
     assert found[7] == "problem plugins: the skill is broken; mend it"
-    assert found[-1].startswith("problem roboflow: cannot be checked: import of executive.vision.detectors.r")
+    assert found[-1].startswith(
+        "problem roboflow: cannot be checked: import of executive.perception.detectors.r"
+    )
     assert found[-1].endswith("; run `uv sync`")

@@ -10,9 +10,9 @@ import pytest
 from click.testing import CliRunner
 
 from executive.cli.main import main
-from executive.vision.dataset import Entry, image_path, save_image, write_annotations
-from executive.vision.detectors.embedded import LABELS, MODEL
-from executive.vision.envelope.measurement import StoredErrorRates, read_measurements
+from executive.perception.detectors.embedded import LABELS, MODEL
+from executive.perception.envelope.measurement import StoredErrorRates, read_measurements
+from executive.training.dataset import Entry, image_path, save_image, write_annotations
 
 
 @pytest.fixture

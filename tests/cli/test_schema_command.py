@@ -8,9 +8,9 @@ import pytest
 from click.testing import CliRunner
 
 from executive.cli.main import main
-from executive.discovery import discover
 from executive.mission.schema.files import library_schema, mission_schema
 from executive.mission.schema.types import cell_schema
+from executive.plugins import discover
 
 
 @pytest.mark.parametrize(

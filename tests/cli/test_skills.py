@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from executive.cli.main import main
-from executive.discovery import discover
+from executive.plugins import discover
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Out, Skill, param, port
 
 
@@ -48,7 +48,7 @@ class Rest(Skill):
 
 @pytest.fixture(autouse=True)
 def installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("executive.discovery.discover", lambda: {"PlaceNeatly": PlaceNeatly, "Rest": Rest})
+    monkeypatch.setattr("executive.plugins.discover", lambda: {"PlaceNeatly": PlaceNeatly, "Rest": Rest})
 
 
 def shown(*words: str) -> Result:

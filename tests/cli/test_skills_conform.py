@@ -7,7 +7,7 @@ import json
 import pytest
 from click.testing import CliRunner, Result
 
-from executive.cell import Cell, Steps
+from executive.cell.protocols import Cell, Steps
 from executive.cli.main import main
 from executive.skill import In, Metres, Skill, param, port
 from executive.testing.conformance.check import RULES
@@ -37,7 +37,7 @@ class Dream(Rest):
 
 @pytest.fixture(autouse=True)
 def installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("executive.discovery.discover", lambda: {"Rest": Rest, "Nap": Nap, "Dream": Dream})
+    monkeypatch.setattr("executive.plugins.discover", lambda: {"Rest": Rest, "Nap": Nap, "Dream": Dream})
 
 
 def conform(*words: str) -> Result:

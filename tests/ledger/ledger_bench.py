@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from executive.cell_config import LedgerConfig, TableConfig
-from executive.error_rates import ErrorRates
-from executive.ledger.ledger import ItemLedger
-from executive.messages import Bin, Detection, Detections, Frame, Glimpse, Target
+from executive.cell.config import LedgerConfig, TableConfig
+from executive.cell.error_rates import ErrorRates
+from executive.cell.values import Bin, Detection, Detections, Frame, Glimpse, Target
+from executive.ledger.tracker import ItemLedger
 from tests.camera_poses import looking_down
 
 EYE = ErrorRates(threshold=0.5, misses=0.03, confused=0.004, invented=0.02, jitter=1.0)

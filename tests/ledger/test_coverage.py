@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from ledger_bench import area_of, take_frame
 
-from executive.cell_config import TableConfig
-from executive.error_rates import ErrorRates
+from executive.cell.config import TableConfig
+from executive.cell.error_rates import ErrorRates
+from executive.cell.values import Detections
 from executive.ledger.coverage import (
     MIN_PROBABILITY,
     PRIOR_INSIDE,
@@ -17,7 +18,6 @@ from executive.ledger.coverage import (
     PRIOR_OUTSIDE_AFTER_CHANGE,
     Coverage,
 )
-from executive.messages import Detections
 
 TABLE = TableConfig()
 MIDDLE, CORNER = np.array([0.53, 0.0, 0.025]), np.array([0.43, 0.21, 0.025])

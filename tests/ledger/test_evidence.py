@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.error_rates import ErrorRates
+from executive.cell.error_rates import ErrorRates
 from executive.ledger.item import Record
-from executive.ledger.looks import reach
+from executive.ledger.update import reach
 
 GOOD = ErrorRates(threshold=0.5, misses=0.02, confused=0.0025, invented=0.02, jitter=0.7)
 BAD = ErrorRates(threshold=0.5, misses=0.2, confused=0.1, invented=0.5, jitter=5.0)

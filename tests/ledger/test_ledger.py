@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from ledger_bench import Bench, Thing
 
-from executive.error_rates import ErrorRates
+from executive.cell.error_rates import ErrorRates
+from executive.cell.values import Target
 from executive.errors import Fault
-from executive.messages import Target
 
 CUBE: Thing = ("cube", 0.5, 0.0)
 FAR: Thing = ("cube", 0.6, 0.2)

@@ -19,10 +19,9 @@ from click.testing import CliRunner
 
 from executive.cli.main import main
 from executive.cli.output import stdout_kept_clean
-from executive.discovery import discover
 from executive.mission.findings import CODES, Finding, MissionError
 from executive.mission.load import Kinds, load_mission
-from executive.runtime.cells import cell_kind
+from executive.plugins import cell_kind, discover
 from executive.skill import Skill
 
 FOLDER = Path(__file__).parent / "broken"

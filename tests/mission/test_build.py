@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 from py_trees.common import Status
 
-from executive.control.scope import Scope
 from executive.events import ignore
 from executive.mission.build import build
 from executive.mission.load import LoadedMission
 from executive.mission.outline import outline
 from executive.skill import Skill
+from executive.tree.blackboard import Scope
 
 HEAD = "mission: m\ncell: cells/small.yaml\n"
 

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from executive.discovery import discover
 from executive.errors import InputError
 from executive.mission.load import load_mission
-from executive.runtime.cells import cell_kind
+from executive.plugins import cell_kind, discover
 
 MISSION = "mission: m\ncell: cells/own.yaml\nroutes: {cube: red_bin}\ntree: Detect\n"
 CELL = "base: cells/overhead.yaml\ncell: own\ndetectors:\n  eye: {kind: roboflow, model_id: a/1, KEY}\n"

@@ -11,9 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from py_trees.common import Status
 
-from executive.cell import Cell, Steps
-from executive.control.halting import halt
-from executive.control.scope import Scope
+from executive.cell.protocols import Cell, Steps
 from executive.events import ignore
 from executive.mission.build import Builder
 from executive.mission.check.case import Case
@@ -25,6 +23,8 @@ from executive.mission.parse.mission_file import parse_mission
 from executive.mission.source import Source
 from executive.mission.text.yaml_text import parse_yaml
 from executive.skill import ANY, EMPTY, HOLDING, In, Out, Skill, port
+from executive.tree.blackboard import Scope
+from executive.tree.halting import halt
 
 MOST_TICKS = 400
 

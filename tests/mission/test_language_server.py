@@ -15,9 +15,9 @@ from collections.abc import Iterator
 import pytest
 from editor import Editor
 
-from executive.discovery import discover
 from executive.mission.model import grammar
 from executive.mission.text.files import shipped_folder
+from executive.plugins import discover
 
 SERVER = os.environ.get("YAML_LANGUAGE_SERVER") or shutil.which("yaml-language-server")
 pytestmark = [

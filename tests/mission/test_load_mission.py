@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from executive.cell_config import CellConfig
+from executive.cell.config import CellConfig
+from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission
 from executive.mission.model import nodes
 from executive.mission.model.values import Reference
 from executive.mission.text.files import find_mission, shipped_folder
-from executive.testing.fake_cell import FakeCell
 
 Load = Callable[..., LoadedMission]
 

@@ -17,17 +17,16 @@ from unittest import mock
 import pytest
 import yaml
 
-from executive.control.scope import Scope
-from executive.discovery import discover
+from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.mission.findings import Finding, MissionError
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.model.grammar import CONTROL
-from executive.runtime import run as run_module
-from executive.runtime.cells import cell_kind
-from executive.runtime.run import Run
+from executive.plugins import cell_kind, discover
+from executive.run import run as run_module
+from executive.run.run import Run
 from executive.skill import Skill
-from executive.testing.fake_cell import FakeCell
+from executive.tree.blackboard import Scope
 from tests.mission.mutations import places
 from tests.mission.mutator import Base, Mutator
 from tests.mission.unkind_cell import UnkindCell

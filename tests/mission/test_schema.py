@@ -11,7 +11,6 @@ import pytest
 from jsonschema import Draft7Validator
 from referencing import Registry
 
-from executive.discovery import discover
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission
 from executive.mission.model import grammar
@@ -20,6 +19,7 @@ from executive.mission.schema.types import cell_schema
 from executive.mission.source import Source
 from executive.mission.text.files import shipped_folder
 from executive.mission.text.yaml_text import parse_yaml, plain
+from executive.plugins import discover
 from executive.skill import Skill
 
 MISSIONS = shipped_folder()

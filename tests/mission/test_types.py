@@ -7,7 +7,7 @@ from typing import Any, Optional
 
 import pytest
 
-from executive.messages import Detection, Target
+from executive.cell.values import Detection, Target
 from executive.mission.model.port_types import called, element_of, fits
 
 

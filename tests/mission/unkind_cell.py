@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from executive.cell_config import CellConfig
+from executive.cell.config import CellConfig
+from executive.cell.values import Detection
+from executive.cells.fake.cell import FakeCell
 from executive.errors import Unreachable
-from executive.messages import Detection
-from executive.testing.fake_cell import FakeCell
 
 LONGEST = 4000
 """Control steps after which a run is halted as by Ctrl-C; one in five is halted earlier."""

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 
 from py_trees.common import Status
 
-from executive.control.scope import Scope
 from executive.events import Event
 from executive.mission.flow.analysis import Analysis
 from executive.mission.load import LoadedMission
 from executive.mission.model.nodes import SkillNode
-from executive.runtime.run import Outcome, Run
+from executive.run.run import Outcome, Run
 from executive.skill import EMPTY, HOLDING, Skill
+from executive.tree.blackboard import Scope
 from tests.mission.unkind_cell import UnkindCell
 
 

@@ -12,17 +12,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from executive.cell import Clock
-from executive.cell_config import CameraConfig, CellConfig, DetectorConfig
-from executive.discovery import discover
-from executive.messages import Detection, Frame
+from executive.cell.config import CameraConfig, CellConfig, DetectorConfig
+from executive.cell.protocols import Clock
+from executive.cell.values import Detection, Frame
+from executive.cell.workcell import Workcell
+from executive.cells.fake.cell import FakeCell
+from executive.cells.sim.cell import SimCell
 from executive.mission.load import load_mission
+from executive.perception.detectors.requests import Pending
+from executive.plugins import cell_kind, discover
 from executive.record.recorded_run import recorded_run
-from executive.runtime.cells import cell_kind
-from executive.sim.cell import SimCell
-from executive.testing.fake_cell import FakeCell
-from executive.vision.detectors.requests import Pending
-from executive.workcell import Workcell
 
 LABELS = ("cube", "sphere", "duck")
 MAX_WALL_TIME = 60.0
@@ -32,7 +31,7 @@ MAX_JOURNAL_ENTRIES = 150
 
 
 class CrowdedDetector:
-    """Returns `count` boxes of known classes in every look; implements `executive.cell.Detector`.
+    """Returns `count` boxes of known classes in every look; implements `executive.cell.protocols.Detector`.
 
     Args:
         count: Number of boxes.

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from executive.messages import Answer, Detection
-from executive.runtime.cells import cell_kind
-from executive.testing.disturbances import Disturbance, after, during, object_bumped, with_probability
-from executive.testing.disturbances.detector import DetectorDisturbed
-from executive.testing.disturbances.effect import Effect, Occasion
-from executive.testing.fake_cell import FakeCell
+from executive.cell.values import Answer, Detection
+from executive.cells.fake.cell import FakeCell
+from executive.plugins import cell_kind
+from executive.testing.faults import Disturbance, after, during, object_bumped, with_probability
+from executive.testing.faults.detector import DetectorDisturbed
+from executive.testing.faults.effect import Effect, Occasion
 from executive.testing.run_mission import MissionResult, run_mission
 
 X_RANGE, Y_RANGE = (0.42, 0.64), (-0.22, 0.22)

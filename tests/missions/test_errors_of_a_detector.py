@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from executive.discovery import discover
+from executive.cells.fake.cell import FakeCell
+from executive.cells.fake.noisy_detector import NoisyDetector
 from executive.mission.load import LoadedMission, load_mission
+from executive.perception.detectors.setting import Setting
+from executive.plugins import cell_kind, discover
 from executive.record.result import agrees
-from executive.runtime.cells import cell_kind
-from executive.runtime.run import Run
-from executive.testing.fake_cell import FakeCell
-from executive.testing.noisy_detector import NoisyDetector
-from executive.vision.detectors.setting import Setting
+from executive.run.run import Run
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 LONGEST = 200.0

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 import yaml
 
-from executive.cell_config import CellConfig
+from executive.cell.config import CellConfig
+from executive.cells.fake.cell import FakeCell
 from executive.mission.parse.cell_file import load_cell
-from executive.runtime.cells import cell_kind
-from executive.testing.fake_cell import FakeCell
-from executive.vision.envelope.rated_detectors import find_unmeasured
+from executive.perception.envelope.rated_detectors import find_unmeasured
+from executive.plugins import cell_kind
 
 CELLS = sorted((Path(__file__).parents[2] / "missions" / "cells").glob("*.yaml"))
 

@@ -10,15 +10,14 @@ from typing import Any
 
 import pytest
 
-from executive.discovery import discover
+from executive.cell.workcell import Workcell
+from executive.cells.fake.cell import FakeCell
 from executive.events import Event
 from executive.mission.load import LoadedMission, load_mission
+from executive.plugins import cell_kind, discover
 from executive.record.result import agrees
-from executive.runtime.cells import cell_kind
-from executive.runtime.run import Outcome, Run
-from executive.testing.fake_cell import FakeCell
+from executive.run.run import Outcome, Run
 from executive.testing.oracle import oracle_cell
-from executive.workcell import Workcell
 
 MISSIONS = {path.stem: path for path in sorted((Path(__file__).parents[2] / "missions").glob("*.yaml"))}
 REHEARSED = {"kit_fasteners", "recycle", "sort_fruit", "tray_instruments"}

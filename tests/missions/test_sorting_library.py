@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from executive.testing.disturbances import after, between, detector_dead
+from executive.testing.faults import after, between, detector_dead
 from executive.testing.run_mission import run_mission
 
 LONGEST_RESTART = 40.0

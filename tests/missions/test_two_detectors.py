@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from executive.messages import Detection
-from executive.testing.fake_cell import FakeCell
+from executive.cell.values import Detection
+from executive.cells.fake.cell import FakeCell
 from executive.testing.run_mission import MissionResult, run_mission
 
 Answers = Callable[[int, Sequence[Detection]], Sequence[Detection] | str]

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from executive.messages import Detection
-from executive.testing.fake_cell import FakeCell
+from executive.cell.values import Detection
+from executive.cells.fake.cell import FakeCell
 from executive.testing.run_mission import MissionResult, run_mission
 
 OBJECTS = (("cube", 0.46, -0.12), ("sphere", 0.58, 0.0), ("cube", 0.5, 0.14), ("duck", 0.6, 0.16))

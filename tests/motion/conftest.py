@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import yaml
 
-from executive.cell_config import CellConfig
+from executive.cell.config import CellConfig
 from executive.geometry import Array
-from executive.motion.free import Connector
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
+from executive.motion.point_to_point import Connector
 
 
 @pytest.fixture(scope="session")

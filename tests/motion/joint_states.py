@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
-from executive.arm import Goal
+from executive.cell.arm import Goal
 from executive.geometry import Array
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import LIMITS, shares
 
-from executive.motion.free import Connector
 from executive.motion.limits import JointLimits, rest_to_rest
+from executive.motion.point_to_point import Connector
 from executive.motion.state import State
 
 CONNECTOR = Connector(LIMITS)

@@ -8,14 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import SOONER, passed, peaks, tool_velocities
 
-from executive.arm import Goal, Task
-from executive.cell_config import CellConfig
+from executive.cell.arm import Goal, Task
+from executive.cell.config import CellConfig
+from executive.cell.values import Load, ObjectClass, Obstacle
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
-from executive.messages import Load, ObjectClass, Obstacle
 from executive.motion.kinematics import fold
+from executive.motion.payload import GRAVITY
 from executive.motion.planner import SPACING, Planner
-from executive.motion.seal import GRAVITY
 from executive.motion.trajectory import Trajectory
 
 CUBE = ObjectClass("cube", 0.05, 0.0354)

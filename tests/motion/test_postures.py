@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import LIMITS
 
-from executive.arm import Goal
+from executive.cell.arm import Goal
 from executive.errors import Unreachable
 from executive.motion.kinematics import Kinematics
 from executive.motion.postures import find_postures, upright_line

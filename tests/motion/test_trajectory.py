@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import LIMITS, positions, states
 
-from executive.clock import STEP
+from executive.cell.clock import STEP
+from executive.cells.sim.rebuild import sampled
 from executive.errors import Fault, Unreachable
-from executive.motion.free import Connector, NoProfile
+from executive.motion.point_to_point import Connector, NoProfile
 from executive.motion.state import State
 from executive.motion.trajectory import Trajectory, peaks, thinned
-from executive.sim.rebuild import sampled
 
 CONNECTOR = Connector(LIMITS)
 A, B, C = np.radians([[0, 20, 0, -90, 0, 70, 0], [40, 40, 20, -60, 10, 60, 90], [40, 45, 20, -60, 0, 60, 90]])

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from joint_states import LIMITS, positions, shares
 
 from executive.geometry import Array
-from executive.motion.free import Connector
+from executive.motion.point_to_point import Connector
 from executive.motion.state import State
 from executive.motion.transcription import SAMPLES, STEPS, Course, Demand, Transcription
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.testing.fake_cell import FakeCell
+from executive.cells.fake.cell import FakeCell
 
 MISSION = """\
 mission: bring_one
@@ -35,5 +35,5 @@ def cells(monkeypatch: pytest.MonkeyPatch) -> list[FakeCell]:
             super().__init__(*args, **options)
             made.append(self)
 
-    monkeypatch.setattr("executive.runtime.run.cell_kind", lambda name: Cell)
+    monkeypatch.setattr("executive.run.run.cell_kind", lambda name: Cell)
     return made

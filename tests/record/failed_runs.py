@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from executive.discovery import discover
+from executive.cells.fake.cell import FakeCell
 from executive.mission.load import load_mission
-from executive.record.story.story import Story
-from executive.runtime.run import Run
-from executive.testing.fake_cell import FakeCell
+from executive.plugins import discover
+from executive.record.diagnosis.diagnosis import Story
+from executive.run.run import Run
 
 HEAD = """\
 mission: trial

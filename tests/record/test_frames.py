@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
+from executive.cell.values import Frame
 from executive.events import Event
 from executive.geometry import Pose
-from executive.messages import Frame
 from executive.record import frames as module
 from executive.record.frames import KEPT, Frames, picture_of
 from executive.record.pictures.drawer import Drawer

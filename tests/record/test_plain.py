@@ -14,10 +14,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.error_rates import ErrorRates
+from executive.cell.error_rates import ErrorRates
+from executive.cell.values import Detection, Frame
 from executive.events import Exact
 from executive.geometry import Pose
-from executive.messages import Detection, Frame
 from executive.record.plain import LONGEST, plain
 
 

@@ -7,13 +7,13 @@ import json
 import py_trees
 import pytest
 
-from executive.discovery import discover
+from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.mission.load import load_mission
+from executive.plugins import discover
 from executive.record.journal import Journal, read_journal
 from executive.record.recorded_run import recorded_run
-from executive.runtime.run import Run
-from executive.testing.fake_cell import FakeCell
+from executive.run.run import Run
 
 
 class Watcher:

@@ -7,17 +7,17 @@ from typing import Any
 
 import pytest
 
-from executive.discovery import discover
+from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.mission.load import load_mission
+from executive.plugins import discover
 from executive.record.entry import entry_of
 from executive.record.find_run import find_run
 from executive.record.journal import read_journal
 from executive.record.recorded_run import recorded_run
 from executive.record.replay import Replay, compare, replay
-from executive.tape.past import Past
-from executive.testing.disturbances import during, seal_fails
-from executive.testing.fake_cell import FakeCell
+from executive.replay.input_log import Past
+from executive.testing.faults import during, seal_fails
 from executive.testing.oracle import oracle_cell
 from executive.testing.run_mission import run_mission
 

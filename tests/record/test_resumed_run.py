@@ -11,17 +11,17 @@ from typing import Any
 
 import pytest
 
-from executive.discovery import discover
+from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.events import Event
 from executive.mission.load import LoadedMission, load_mission
+from executive.plugins import discover
 from executive.record.find_run import find_run
 from executive.record.journal import read_journal
 from executive.record.recorded_run import recorded_run
 from executive.record.replay import replay
 from executive.record.resumed_run import resumed_run
-from executive.testing.disturbances.hand import Hand
-from executive.testing.fake_cell import FakeCell
+from executive.testing.faults.hand import Hand
 from executive.testing.oracle import oracle_cell
 from executive.testing.substitutes import raising
 from tests.meanwhile import meanwhile

@@ -7,15 +7,15 @@ from functools import partial
 import at_hand
 import pytest
 
-from executive.messages import Target
-from executive.testing.fake_cell import FakeCell
+from executive.cell.values import Target
+from executive.cells.fake.cell import FakeCell
 
 
 @pytest.fixture(autouse=True)
 def no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing here can import the simulator, though tests of other folders may have done so before."""
     for name in [*sys.modules]:
-        if name.startswith("executive.sim."):
+        if name.startswith("executive.cells.sim."):
             monkeypatch.setitem(sys.modules, name, None)
     monkeypatch.setitem(sys.modules, "pybullet", None)
 

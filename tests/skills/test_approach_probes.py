@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from executive.messages import Target
-from executive.testing.fake_cell import FakeCell
+from executive.cell.values import Target
+from executive.cells.fake.cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
 

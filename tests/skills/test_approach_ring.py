@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from executive.messages import Target
+from executive.cell.values import Target
+from executive.cells.fake.cell import FakeCell
 from executive.mission.parse.cell_file import load_cell
-from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
 

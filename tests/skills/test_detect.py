@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from executive.messages import Detection
-from executive.testing.fake_cell import FakeCell
+from executive.cell.values import Detection
+from executive.cells.fake.cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.detect import Detect
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from executive.testing.fake_cell import FakeCell
+from executive.cells.fake.cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.is_holding import IsHolding
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from executive.cell.values import Detection, Detections, Frame, Glimpse, Target
+from executive.cells.fake.cell import FakeCell
 from executive.errors import NoDepth
 from executive.geometry import Array
-from executive.messages import Detection, Detections, Frame, Glimpse, Target
-from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.detect import Detect
 from skills.localize import Localize

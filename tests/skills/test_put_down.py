@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
+from executive.cells.fake.cell import FakeCell
 from executive.errors import Blocked, Unreachable
 from executive.skill import EMPTY, SkillFailed
-from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.put_down import PutDown
 from skills.transit import Transit

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from executive.arm import Goal
-from executive.testing.fake_cell import FakeCell
+from executive.cell.arm import Goal
+from executive.cells.fake.cell import FakeCell
 from executive.testing.run_skill import SkillResult, run_skill
 from skills.select_target import SelectTarget
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from executive.discovery import discover
+from executive.plugins import discover
 from executive.skill import Skill
 from skills.approach import Approach
 from skills.detect import Detect

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from at_hand import look
 
-from executive.messages import Target
-from executive.testing.fake_cell import FakeCell
+from executive.cell.values import Target
+from executive.cells.fake.cell import FakeCell
 
 
 @pytest.fixture

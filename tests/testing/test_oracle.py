@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from executive.cell.workcell import CellOptions
+from executive.cells.fake.cell import ROUTES, SilentOperator
 from executive.events import ignore
 from executive.geometry import Pose
 from executive.mission.parse.cell_file import load_cell
-from executive.testing.fake_cell import ROUTES, SilentOperator
 from executive.testing.oracle import oracle_cell
-from executive.workcell import CellOptions
 
 
 @pytest.fixture

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from executive.cells.fake.cell import FakeCell
 from executive.testing import run_mission as missions
 from executive.testing import run_skill as skills
-from executive.testing.fake_cell import FakeCell
 
 HEAVY = ("pybullet", "cv2", "py_trees", "scipy", "onnxruntime", "numpy", "pydantic")
 
@@ -59,7 +59,7 @@ def test_its_fixtures_work_in_a_project_that_only_installs_the_executive(tmp_pat
     [
         ("import executive.testing.plugin", HEAVY),
         pytest.param(
-            "import executive.testing.run_mission; from executive.testing.disturbances import *",
+            "import executive.testing.run_mission; from executive.testing.faults import *",
             ("pybullet",),
             marks=pytest.mark.slow,
         ),

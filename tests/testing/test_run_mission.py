@@ -7,14 +7,14 @@ from typing import Any
 
 import pytest
 
-from executive.discovery import discover
+from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault, InputError
 from executive.events import Event
 from executive.mission.load import load_mission
-from executive.runtime.run import Run
+from executive.plugins import discover
+from executive.run.run import Run
 from executive.testing.bounded_cell import BoundedCell
-from executive.testing.disturbances import after, detector_dead, during, seal_fails
-from executive.testing.fake_cell import FakeCell
+from executive.testing.faults import after, detector_dead, during, seal_fails
 from executive.testing.run_mission import run_mission
 from executive.testing.substitutes import endless
 from skills.detect import Detect

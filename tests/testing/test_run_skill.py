@@ -7,11 +7,11 @@ from typing import Any, ClassVar
 
 import pytest
 
-from executive.arm import Goal
+from executive.cell.arm import Goal
+from executive.cell.values import Target
+from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault, InputError
-from executive.messages import Target
 from executive.skill import In, Out, Skill, param
-from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
 from skills.await_request import AwaitRequest

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import pytest
 
+from executive.cell.values import Target
+from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault, InputError
-from executive.messages import Target
-from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from executive.testing.substitutes import endless, failing, raising, raising_when_halted, succeeding
 from skills.approach import Approach

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from executive.campaign.faults.fault import Breakage, InjectedError
-from executive.cell import Cell, Steps
+from executive.cell.protocols import Cell, Steps
+from executive.manipulation.drops import slipped
 from executive.skill import EMPTY, Skill
-from executive.slip import slipped
 from executive.testing.substitutes import in_place_of, raising, raising_when_halted
 
 WANTED = "as the campaign wants it"

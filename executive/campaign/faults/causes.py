@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from executive.cell_config import TableConfig
+from executive.cell.config import TableConfig
 from executive.skill import Skill
-from executive.testing import disturbances as effects
-from executive.testing.disturbances.effect import Effect
+from executive.testing import faults as effects
+from executive.testing.faults.effect import Effect
 
 
 @dataclass(frozen=True)

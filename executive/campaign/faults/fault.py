@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from executive.testing.disturbances.script import Disturbance
+from executive.testing.faults.script import Disturbance
 
 When = Literal["first", "middle", "late", "lasting"]
 """When something goes wrong: the first time, half-way, towards the end, or again and again."""

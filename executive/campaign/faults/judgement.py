@@ -9,13 +9,13 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.campaign.faults.fault import Fault, InjectedError
+from executive.cell.values import BIN_THICKNESS, Bin, Frame
 from executive.events import Event
 from executive.ledger.accounts import is_balanced
 from executive.ledger.item import State
-from executive.messages import BIN_THICKNESS, Bin, Frame
 from executive.mission.flow.endings import Ending
-from executive.runtime.outcome import Outcome
-from executive.testing.disturbances.hand import Thing
+from executive.run.outcome import Outcome
+from executive.testing.faults.hand import Thing
 
 REACHES = frozenset({"object_removed", "object_moved", "seal_breaks"})
 """What a fault does to an object that may put it out of reach."""

@@ -9,11 +9,11 @@ from executive.campaign.faults.causes import causes
 from executive.campaign.faults.fault import Breakage, Fault, When
 from executive.campaign.faults.rehearsal import Rehearsal
 from executive.campaign.subject import Subject
-from executive.messages import Target
+from executive.cell.values import Target
 from executive.mission.model import nodes
 from executive.skill import HOLDING, Direction, Skill
-from executive.testing import disturbances as effects
-from executive.testing.disturbances.script import Disturbance, after, between, during
+from executive.testing import faults as effects
+from executive.testing.faults.script import Disturbance, after, between, during
 
 SHORT, LONG = 0.5, 5.0
 """How long a detector is slow, hangs or is dead [s]; the longer is also the deadline of one that hangs."""

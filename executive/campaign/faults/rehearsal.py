@@ -12,7 +12,7 @@ from executive.campaign.subject import Subject
 from executive.errors import InputError
 from executive.events import Event
 from executive.record.result import agrees
-from executive.runtime.run import Run
+from executive.run.run import Run
 
 
 @dataclass(frozen=True)

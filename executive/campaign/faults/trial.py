@@ -16,19 +16,19 @@ from executive.campaign.faults.listing import skill_nodes
 from executive.campaign.faults.rehearsal import Activations, Rehearsal
 from executive.campaign.halt_checks import check_journal, check_rest, check_tool
 from executive.campaign.subject import Subject
+from executive.cell.workcell import Workcell
 from executive.events import Event
+from executive.plugins import cell_kind
 from executive.record.recorded_run import Recording, new_directory
 from executive.record.recorder import Recorder
-from executive.runtime.cells import cell_kind
-from executive.runtime.outcome import Outcome
-from executive.runtime.run import Run
+from executive.run.outcome import Outcome
+from executive.run.run import Run
 from executive.testing.bounded_cell import BoundedCell
 from executive.testing.cell_wrapper import CellWrapper
-from executive.testing.disturbances import DisturbedCell, disturbed
-from executive.testing.disturbances.objects import ObjectRemoved
+from executive.testing.faults import DisturbedCell, disturbed
+from executive.testing.faults.objects import ObjectRemoved
 from executive.view.figures.fault_trials import Trial
 from executive.view.report.page import leave_report
-from executive.workcell import Workcell
 
 Numbered = Mapping[int, Fault]
 """Faults by their numbers in the list, in the order in which they are told."""

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from executive.cell import LeastTimes
-from executive.cell_config import CellConfig
+from executive.cell.config import CellConfig
+from executive.cell.protocols import LeastTimes
 from executive.mission.findings import alternatives
 from executive.mission.flow.analysis import Analysis
 from executive.mission.model.mission import Mission

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from executive.cell import LeastTimes
+from executive.cell.protocols import LeastTimes
 from executive.mission.check.case import Case
 from executive.mission.findings import Finding, error
 from executive.mission.model import nodes

@@ -8,7 +8,8 @@ from collections.abc import Mapping as Mapped
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from executive.cell_config import CellConfig
+from executive.cell.config import CellConfig
+from executive.cell.paths import leaves_folder, links_out
 from executive.errors import InputError
 from executive.mission.findings import Finding, MissionError, error, in_file_order
 from executive.mission.parse.cell_layout import find_overlaps
@@ -18,7 +19,6 @@ from executive.mission.source import Source
 from executive.mission.text.files import below, read_source
 from executive.mission.text.yaml_text import Entry, Mapping, Node, Scalar, parse_yaml, plain
 from executive.mission.words import describe
-from executive.written_paths import leaves_folder, links_out
 
 BASE = "base"
 """The key that names the file which gives every key of the first level that this one does not."""

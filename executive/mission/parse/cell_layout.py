@@ -7,9 +7,9 @@ from itertools import combinations
 
 import numpy as np
 
-from executive.cell_config import BinConfig, CellConfig
+from executive.cell.config import BinConfig, CellConfig
+from executive.cell.values import BIN_THICKNESS
 from executive.geometry import Array
-from executive.messages import BIN_THICKNESS
 from executive.mission.parse.validate import KeyPath
 
 TOLERANCE = 0.0005

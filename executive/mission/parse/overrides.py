@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping as Mapped
 from dataclasses import replace
 
-from executive.cell_config import CellConfig
+from executive.cell.config import CellConfig
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.source import Mark, Source
 from executive.mission.text.yaml_text import Entry, Mapping, Node, Scalar, parse_yaml

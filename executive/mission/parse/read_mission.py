@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from executive.cell_config import CellConfig
+from executive.cell.config import CellConfig
 from executive.errors import InputError
 from executive.mission.findings import Finding, MissionError, error, in_file_order
 from executive.mission.model.mission import Mission, Subtree

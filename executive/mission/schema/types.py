@@ -10,7 +10,7 @@ from pydantic import TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import to_jsonable_python
 
-from executive.cell_config import CellConfig
+from executive.cell.config import CellConfig
 from executive.mission.model.typed import is_plain
 from executive.skill import Direction, Param, Port, Skill
 

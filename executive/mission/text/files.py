@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 
 import executive
+from executive.cell.paths import leaves_folder, links_out
 from executive.errors import InputError
 from executive.mission.findings import alternatives
 from executive.mission.source import Source
-from executive.written_paths import leaves_folder, links_out
 
 _LARGEST = 1_000_000
 

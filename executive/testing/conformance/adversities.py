@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from executive.cells.fake.arm import FakeMotion
 from executive.skill import Skill
-from executive.testing import disturbances as effects
-from executive.testing.disturbances.effect import Effect, Occasion
-from executive.testing.fake_arm import FakeMotion
+from executive.testing import faults as effects
+from executive.testing.faults.effect import Effect, Occasion
 
 SEAL_BREAKS = 20
 """Number of moments, spread over a run, at which the seal breaks."""

@@ -115,7 +115,7 @@ def arm_left_at_rest(runs: SkillRuns) -> Iterator[str]:
     for rehearsal in _first_wrong([*runs.complete_runs, *runs.halted_runs], _leaves_arm_moving):
         yield (
             f"{rehearsal.end}, and the arm still moves. "
-            "Call cell.arm.stop() in finally, or use follow of executive.moving."
+            "Call cell.arm.stop() in finally, or use follow of executive.manipulation.motions."
         )
 
 

@@ -9,17 +9,17 @@ from time import perf_counter
 from traceback import extract_tb
 from typing import Any
 
-from executive.clock import STEP
+from executive.cell.clock import STEP
 from executive.errors import Fault
 from executive.events import Event
 from executive.skill import Skill, SkillFailed
-from executive.skill_run import SkillRun
 from executive.testing.conformance.adversities import Adversity
 from executive.testing.conformance.patience import Stuck, patience
 from executive.testing.conformance.situations import Arrange, Situation, begin
 from executive.testing.conformance.source import place_in
 from executive.testing.conformance.watch import Watch
-from executive.testing.disturbances import DisturbedCell, during
+from executive.testing.faults import DisturbedCell, during
+from executive.tree.skill_run import SkillRun
 
 MAX_TIME = 60.0
 """Time on the run's clock after which a skill must have ended [s]: nothing takes so long on a fake table."""

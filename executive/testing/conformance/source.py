@@ -11,7 +11,7 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any, get_origin, get_type_hints
 
-from executive.cell import Cell, Clock
+from executive.cell.protocols import Cell, Clock
 from executive.skill import Skill, SkillFailed
 
 _CUSTOMARY: Mapping[str, Any] = {"cell": Cell, "clock": Clock, "skill": Skill}

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from executive.cell.values import Detections, Item, Target
+from executive.cell.workcell import CellOptions
+from executive.cells.fake.cell import ROUTES, FakeCell, SilentOperator, bare_table
 from executive.geometry import tool_down
-from executive.messages import Detections, Item, Target
 from executive.skill import HOLDING, Direction, Skill
-from executive.testing.fake_cell import ROUTES, FakeCell, SilentOperator, bare_table
-from executive.workcell import CellOptions
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from executive.cell import Cell
-from executive.cell_proxy import Access, intercept
+from executive.cell.protocols import Cell
+from executive.cell.proxy import Access, intercept
 
 _ROLES = ("arm", "tool", "camera", "detector", "ledger", "localizer", "operator")
 

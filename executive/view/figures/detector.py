@@ -8,7 +8,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console, RenderableType
 from rich.table import Table
 
-from executive.vision.evaluation.figures import NOTHING, Evaluation
+from executive.training.evaluation.figures import NOTHING, Evaluation
 
 
 def print_figures(where: str, detector: str, evaluation: Evaluation) -> None:

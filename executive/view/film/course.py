@@ -9,7 +9,7 @@ from typing import Any
 from executive.events import Event
 from executive.mission.outline import OutlineNode
 from executive.record.progress import skill_name
-from executive.tape.past import Entry
+from executive.replay.input_log import Entry
 from executive.view.items import ItemTable, Row
 from executive.view.tree.outline import skills
 

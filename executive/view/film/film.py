@@ -9,8 +9,8 @@ from pathlib import Path
 
 from PIL import Image
 
-from executive.sim.shots import Shoot, shots, steps_in
-from executive.sim.viewpoint import overview
+from executive.cells.sim.shots import Shoot, shots, steps_in
+from executive.cells.sim.viewpoint import overview
 from executive.view.film.course import Course
 from executive.view.film.formats import Format
 from executive.view.film.page import STAGE, draw_ending, draw_page

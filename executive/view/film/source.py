@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from executive.cells.sim.command_log import is_log
 from executive.errors import InputError
 from executive.record.journal import read_journal, start_of
 from executive.record.recorded_mission import read_tree, recorded_cell
 from executive.record.result import read_result
 from executive.record.run_directory import RunDirectory
-from executive.sim.command_log import is_log
-from executive.tape.past import Past
+from executive.replay.input_log import Past
 
 
 class Source:

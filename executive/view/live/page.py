@@ -16,12 +16,12 @@ from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from typing import Any
 
+from executive.cell.visuals import Scenery
 from executive.errors import InputError
 from executive.events import Event
 from executive.mission.outline import outline
-from executive.programs import program
-from executive.runtime.run import Run
-from executive.scenery import Scenery
+from executive.processes import program
+from executive.run.run import Run
 from executive.view.live.telling import News, Teller, picture, poses
 from executive.view.tree.svg import Note, svg
 

@@ -12,7 +12,7 @@ import trimesh
 import viser
 import websockets.asyncio.server
 
-from executive.scenery import Shape
+from executive.cell.visuals import Shape
 
 CAMERA, LOOK_AT = (1.35, -0.68, 0.95), (0.33, 0.0, 0.2)
 """Where a person's view begins, and what is in its middle [m]."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import aiohttp
 from aiohttp import WSMsgType, web
 
-from executive.scenery import Shape
+from executive.cell.visuals import Shape
 
 if TYPE_CHECKING:
     from executive.view.live.scene import Scene

@@ -11,7 +11,7 @@ import yaml
 from markupsafe import Markup
 
 from executive.errors import ExecutiveError
-from executive.evidence import describe_unknown
+from executive.perception.evidence import describe_unknown
 from executive.record.pictures.palette import PALETTE
 from executive.record.result import disagreement
 from executive.record.run_directory import RunDirectory, refusing

@@ -9,7 +9,7 @@ import threading
 import tty
 from typing import Any
 
-from executive.runtime.run_control import RunControl
+from executive.run.run_control import RunControl
 
 SLICE = 0.1
 """Longest time until a key is no longer waited for [s]."""

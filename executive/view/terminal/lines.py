@@ -11,7 +11,7 @@ from executive.view.items import ItemTable
 from executive.view.tree.outline import skills
 
 if TYPE_CHECKING:
-    from executive.runtime.run import Run
+    from executive.run.run import Run
 
 _ENDS = {"SUCCESS": "done", "FAILURE": "failed", "INVALID": "halted"}
 

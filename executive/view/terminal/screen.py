@@ -10,11 +10,11 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from executive.errors import escape_control_characters
 from executive.events import Event
 from executive.mission.outline import OutlineNode, outline
-from executive.runtime.run import Run
-from executive.runtime.run_control import RunControl
-from executive.safe_text import escape_control_characters
+from executive.run.run import Run
+from executive.run.run_control import RunControl
 from executive.view.items import ItemTable
 from executive.view.terminal.keys import HELP, HELP_PAUSED, Keys
 from executive.view.tree.outline import branches, opened

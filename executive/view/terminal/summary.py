@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from executive.evidence import describe_unknown
+from executive.perception.evidence import describe_unknown
 from executive.record.result import disagreement
 from executive.view.items import ItemTable
 
@@ -89,7 +89,7 @@ def story_lines(story: Mapping[str, Any], run: str, repeat: str, report: str = "
     """Return the story of a run, the most important first.
 
     Args:
-        story: As `executive.record.story.story.Story.tell` returns it.
+        story: As `executive.record.diagnosis.diagnosis.Story.tell` returns it.
         run: The run directory.
         repeat: The command that repeats the run. Commands are never wrapped, so that they can be copied.
         report: File of its report, or "".

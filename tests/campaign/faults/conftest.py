@@ -6,9 +6,9 @@ import pytest
 
 from executive.campaign.faults.campaign import Campaign
 from executive.campaign.subject import Subject
-from executive.discovery import discover
+from executive.cells.fake.cell import FakeCell
 from executive.mission.load import load_mission
-from executive.testing.fake_cell import FakeCell
+from executive.plugins import discover
 
 
 def subject_of(mission: str, seed: int = 0, **overrides: str) -> Subject:

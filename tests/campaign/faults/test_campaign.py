@@ -15,10 +15,10 @@ import pytest
 from executive.campaign.faults.branches import branches
 from executive.campaign.faults.campaign import Campaign
 from executive.campaign.subject import Subject
-from executive.discovery import discover
+from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.mission.load import load_mission
-from executive.testing.fake_cell import FakeCell
+from executive.plugins import discover
 from executive.view.figures.fault_trials import FaultFigures, Trial
 
 MISSION = """\

@@ -17,11 +17,11 @@ from executive.campaign.faults.judgement import (
     out_of_sight,
     remark,
 )
+from executive.cells.fake.cell import FakeCell
 from executive.events import Event
 from executive.mission.flow.endings import Ending
-from executive.runtime.outcome import Outcome
-from executive.testing.disturbances.hand import Thing
-from executive.testing.fake_cell import FakeCell
+from executive.run.outcome import Outcome
+from executive.testing.faults.hand import Thing
 
 BUG = Fault("tree/Grasp", "Grasp", "", "raises", "first", "", breakages=(Breakage("tree/Grasp", "raises"),))
 MISS = Fault("tree/Grasp", "Grasp", "", "missed", "first", "", reason=True)

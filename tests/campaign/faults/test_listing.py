@@ -9,9 +9,9 @@ import pytest
 from executive.campaign.faults.campaign import Campaign
 from executive.campaign.faults.listing import list_faults, skill_nodes
 from executive.campaign.subject import Subject
-from executive.discovery import discover
+from executive.cells.fake.cell import FakeCell
 from executive.mission.load import load_mission
-from executive.testing.fake_cell import FakeCell
+from executive.plugins import discover
 
 
 @pytest.mark.parametrize(

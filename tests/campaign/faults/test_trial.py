@@ -13,9 +13,9 @@ from executive.campaign.faults.breakages import broken_skills
 from executive.campaign.faults.campaign import Campaign
 from executive.campaign.faults.fault import Breakage
 from executive.campaign.faults.trial import record, try_out
-from executive.discovery import discover
+from executive.cells.fake.cell import FakeCell
+from executive.plugins import discover
 from executive.record.journal import read_journal
-from executive.testing.fake_cell import FakeCell
 from executive.testing.run_mission import run_mission
 from executive.view.figures.fault_trials import Trial
 

@@ -6,10 +6,10 @@ import random
 import sys
 from typing import ClassVar
 
-from executive.arm import Goal
-from executive.cell import Cell, Steps
-from executive.messages import Item, Target
-from executive.moving import carry, follow, heeding, planned
+from executive.cell.arm import Goal
+from executive.cell.protocols import Cell, Steps
+from executive.cell.values import Item, Target
+from executive.manipulation.motions import carry, follow, heeding, planned
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Out, Seconds, Skill, SkillFailed, param, port
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import faulty_skills as faulty
 import pytest
 
-from executive.discovery import discover
+from executive.plugins import discover
 from executive.skill import Skill
 from executive.testing.conformance import conformance
 from executive.testing.conformance.check import RULES, Check, NotConforming
@@ -19,7 +19,7 @@ from executive.testing.conformance.check import RULES, Check, NotConforming
 ARRANGE = "as skills/README.md shows."
 FAULT = " That is a fault, which ends the run: fail with a declared reason where this can happen, or mend it."
 FINALLY = "What finally does must be done at once and cannot fail."
-REST = "Call cell.arm.stop() in finally, or use follow of executive.moving."
+REST = "Call cell.arm.stop() in finally, or use follow of executive.manipulation.motions."
 CHANCE = "Nothing may depend on chance, on time, or on an earlier run; a seed may be a param."
 TOOL = "Leave the tool as declared, or declare how it is left."
 EMPTY = "with an empty tool"

@@ -7,9 +7,9 @@ from typing import Any
 import faulty_skills as faulty
 import pytest
 
-from executive.cell import Cell, Steps
-from executive.discovery import discover
-from executive.messages import Detections, Item, Target
+from executive.cell.protocols import Cell, Steps
+from executive.cell.values import Detections, Item, Target
+from executive.plugins import discover
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, param, port
 from executive.testing.conformance import Stage
 from executive.testing.conformance.check import leave_as_is

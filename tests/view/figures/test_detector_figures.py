@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from executive.training.evaluation.error_rates import MeasuredErrorRates
+from executive.training.evaluation.figures import ClassFigures, Evaluation, Spread
 from executive.view.figures.detector import print_figures
-from executive.vision.evaluation.error_rates import MeasuredErrorRates
-from executive.vision.evaluation.figures import ClassFigures, Evaluation, Spread
 
 MEASURED = Evaluation(
     threshold=0.5, images=300, objects=900, precision=0.991, recall=0.98, map50=0.995, map50_95=0.8,

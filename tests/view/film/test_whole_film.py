@@ -10,13 +10,13 @@ import av
 import numpy as np
 import pytest
 
+from executive.cells.sim.command_log import STEP, read_commands
+from executive.cells.sim.rebuild import Rebuilding
+from executive.cells.sim.shots import steps_in
+from executive.cells.sim.spawn import first_world
+from executive.cells.sim.tool import SuctionTool
 from executive.errors import InputError
 from executive.record.run_directory import RunDirectory
-from executive.sim.command_log import STEP, read_commands
-from executive.sim.rebuild import Rebuilding
-from executive.sim.shots import steps_in
-from executive.sim.spawn import first_world
-from executive.sim.tool import SuctionTool
 from executive.view.film.course import Course
 from executive.view.film.film import film
 from executive.view.film.formats import MP4

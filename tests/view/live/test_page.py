@@ -17,12 +17,12 @@ import aiohttp
 import numpy as np
 import pytest
 
-from executive.discovery import discover
+from executive.cells.fake.cell import FakeCell
 from executive.events import Event
 from executive.mission.load import load_mission
-from executive.runtime.outcome import Outcome
-from executive.runtime.run import Run
-from executive.testing.fake_cell import FakeCell
+from executive.plugins import discover
+from executive.run.outcome import Outcome
+from executive.run.run import Run
 from executive.view.live.page import MAX_QUEUED_NEWS, LivePage
 from tests.record.conftest import MISSION
 

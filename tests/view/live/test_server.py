@@ -14,8 +14,8 @@ import pytest
 from aiohttp import web
 from aiohttp.test_utils import make_mocked_request
 
+from executive.cell.visuals import Shape
 from executive.geometry import Pose
-from executive.scenery import Shape
 from executive.view.live import scene
 from executive.view.live.board import Board
 from executive.view.live.server import HEADERS, POLICY, Server, refusal, understood

@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-from executive.discovery import discover
+from executive.cells.fake.cell import FakeCell
 from executive.mission.load import load_mission
+from executive.plugins import discover
 from executive.record.find_run import find_run
 from executive.record.recorded_run import recorded_run
-from executive.testing.fake_cell import FakeCell
 
 MISSION = """\
 mission: trial

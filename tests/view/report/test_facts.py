@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from executive.discovery import discover
+from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.mission.text.files import shipped_folder
+from executive.plugins import discover
 from executive.record.resumed_run import resumed_run
-from executive.testing.fake_cell import FakeCell
 from executive.view.report.facts import CUT_OFF, Facts
 
 

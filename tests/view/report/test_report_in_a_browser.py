@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from executive.discovery import discover
 from executive.mission.load import load_mission
+from executive.plugins import discover
 from executive.record.recorded_run import recorded_run
 from executive.view.report.page import write_report
 

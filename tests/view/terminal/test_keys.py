@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from executive.runtime.run_control import RunControl
+from executive.run.run_control import RunControl
 from executive.view.terminal.keys import Keys
 
 PATIENCE = 10.0

@@ -13,7 +13,7 @@ from rich.console import Console
 
 from executive.events import Event
 from executive.mission.outline import outline
-from executive.runtime.run_control import RunControl
+from executive.run.run_control import RunControl
 from executive.view.items import ItemTable
 from executive.view.terminal.lines import Lines
 from executive.view.terminal.screen import Terminal

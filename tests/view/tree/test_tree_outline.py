@@ -7,14 +7,14 @@ from typing import Any, ClassVar
 
 from py_trees.behaviour import Behaviour
 
-from executive.control.attempt import Try
-from executive.control.node import Site
-from executive.control.retry import Retry
-from executive.control.scope import Scope
-from executive.control.sequence import Sequence
-from executive.control.skill_node import SkillNode, Wiring
 from executive.mission.outline import Connection, OutlineNode, children, outline
 from executive.skill import In, Metres, Out, Skill, param, port
+from executive.tree.blackboard import Scope
+from executive.tree.node import Site
+from executive.tree.retry import Retry
+from executive.tree.sequence import Sequence
+from executive.tree.skill_leaf import SkillNode, Wiring
+from executive.tree.try_catch import Try
 from executive.view.tree.outline import WIDTH, drawn, folded
 
 CELL: Any = SimpleNamespace()

@@ -1,0 +1,26 @@
+"""The typed content of a cell file: where a mission happens and what stands there.
+
+The model is the file: every field below is a key of `missions/cells/*.yaml`, in SI units. Keys that
+end in `_deg` are in degrees, where the field says so.
+"""
+
+from __future__ import annotations
+
+from executive.cell.config.arm import ArmConfig, LimitsConfig, MotionConfig, ToolConfig
+from executive.cell.config.cameras import (
+    CalibrationConfig,
+    CameraConfig,
+    DepthConfig,
+    NoiseConfig,
+    TransformConfig,
+)
+from executive.cell.config.cell import CellConfig, LedgerConfig
+from executive.cell.config.detectors import DetectorConfig
+from executive.cell.config.objects import BinConfig, ObjectConfig, TableConfig
+from executive.cell.config.section import Colour, Section
+
+__all__ = [
+    "ArmConfig", "BinConfig", "CalibrationConfig", "CameraConfig", "CellConfig", "Colour", "DepthConfig",
+    "DetectorConfig", "LedgerConfig", "LimitsConfig", "MotionConfig", "NoiseConfig", "ObjectConfig",
+    "Section", "TableConfig", "ToolConfig", "TransformConfig",
+]  # fmt: skip

@@ -1,0 +1,50 @@
+"""Detectors: what kind, and what is known of how they err."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import ConfigDict, Field, model_validator
+
+from executive.cell.config.section import Seconds, Section
+from executive.cell.error_rates import ErrorRates
+
+
+class DetectorConfig(Section):
+    """A detector: what kind, and what it needs."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, use_attribute_docstrings=True)
+
+    kind: str
+    """Name of an installed detector (entry-point group `executive.detectors`)."""
+    threshold: float = Field(0.5, gt=0, lt=1)
+    """Confidence from which a detection counts."""
+    floor: float = Field(0.25, gt=0, lt=1)
+    """Confidence under which a box is ignored altogether."""
+    latency: Seconds = 0.05
+    """Time from a frame to its answer on the run's clock [s]."""
+    misses: float = Field(0.03, gt=0, lt=1)
+    """Share of the objects in full view that one look overlooks; this and the next three keys are only for
+    fake detectors, those of others are measured by `executive evaluate`."""
+    confused: float = Field(0.004, gt=0, lt=1)
+    """Share of the objects it finds that it gives a wrong class."""
+    invented: float = Field(0.02, gt=0, le=100)
+    """Objects that are not there, per look."""
+    jitter: float = Field(1.0, gt=0, le=1000)
+    """Standard deviation of the centre of a found box, along each axis [pixel]."""
+
+    @model_validator(mode="after")
+    def _is_floored(self) -> DetectorConfig:
+        if self.floor > self.threshold:
+            raise ValueError(f"needs a floor up to its threshold, {self.threshold:g}, not {self.floor:g}")
+        return self
+
+    @property
+    def error_rates(self) -> ErrorRates:
+        """Error rates that the cell file declares."""
+        return ErrorRates(self.threshold, self.misses, self.confused, self.invented, self.jitter)
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The keys that only this kind of detector knows."""
+        return dict(self.model_extra or {})

@@ -1,0 +1,123 @@
+"""Parts of a cell file as skills use them: bins, object classes, and a cell without hardware."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from executive.cell.config import BinConfig, CellConfig, ObjectConfig
+from executive.cell.protocols import Cell, Ledger, Routes
+from executive.cell.values import BIN_THICKNESS, Bin, ObjectClass, Target
+from executive.cell.workcell import KeyPath
+from executive.errors import Unreachable
+from executive.events import Emit
+from executive.geometry import Array
+
+Triple = tuple[float, float, float]
+
+TOOL_RADIUS = 0.012
+"""Radius of the tool's body [m]."""
+NECK_LENGTH = 0.015
+"""Length of the thin part at the tool's end, as wide as the cup [m]."""
+
+
+def as_bin(name: str, config: BinConfig) -> Bin:
+    """Return the bin of a cell file with its drop slots spread evenly over the floor."""
+    position, size = np.array(config.position), np.array(config.size)
+    columns, rows = config.slots
+    x = position[0] + size[0] * ((np.arange(columns) + 0.5) / columns - 0.5)
+    y = position[1] + size[1] * ((np.arange(rows) + 0.5) / rows - 0.5)
+    slots = np.array([[column, row] for column in x for row in y])
+    return Bin(name, position, size, slots)
+
+
+def object_class(label: str, config: ObjectConfig) -> ObjectClass:
+    """Return an object class of a cell file as skills see it, with the default mass."""
+    return ObjectClass(label, config.height, config.radius, config.ring)
+
+
+def travel_height(config: CellConfig) -> float:
+    """Return the tool height [m] at which the highest load clears the highest wall and the highest pile."""
+    tallest = max(kind.height for kind in config.objects.values())
+    wall = max(bin.position[2] + bin.size[2] for bin in config.bins.values())
+    return max(wall, pile_height(config)) + tallest + config.motion.clearance
+
+
+def pile_height(config: CellConfig) -> float:
+    """Return the greatest height [m] of a pile on the table: the tallest object, doubled if stacked."""
+    tallest = max(kind.height for kind in config.objects.values())
+    return 2 * tallest if config.table.stacked else tallest
+
+
+def bin_walls(size: tuple[float, float, float]) -> Sequence[tuple[Triple, Triple]]:
+    """Return half the extents of a bin's floor and walls and their middles, above the bin's position [m]."""
+    (length, width, height), t = size, BIN_THICKNESS
+    across, along = (t / 2, width / 2 + t, height / 2), (length / 2, t / 2, height / 2)
+    x, y, z = (length + t) / 2, (width + t) / 2, height / 2
+    floor = (length / 2 + t, width / 2 + t, t / 2), (0.0, 0.0, t / 2)
+    sides = (across, (x, 0.0, z)), (across, (-x, 0.0, z)), (along, (0.0, y, z)), (along, (0.0, -y, z))
+    return floor, *sides
+
+
+def places_out_of_reach(
+    config: CellConfig, require: Callable[[Array, float], None]
+) -> Iterator[tuple[KeyPath, str]]:
+    """Yield a key of the cell file and a sentence for each bin, and the safe place, out of reach.
+
+    Args:
+        config: The cell file.
+        require: Raises `Unreachable` for a place `(2,)` on a floor of this height [m].
+    """
+    places: list[tuple[KeyPath, str, Array, float]] = [
+        (("bins", name, "position"), f'the bin "{name}"', as_bin(name, bin).slots, bin.position[2])
+        for name, bin in config.bins.items()
+    ]
+    safe_place = np.array([config.safe_place[:2]])
+    places.append((("safe_place",), "the safe place", safe_place, config.safe_place[2]))
+    for keys, what, slots, floor in places:
+        try:
+            for slot in slots:
+                require(slot, floor)
+        except Unreachable as error:
+            yield keys, f"{what} is out of reach: {error}"
+
+
+def bins_of(config: CellConfig) -> dict[str, Bin]:
+    """Return the bins of a cell file by name."""
+    return {name: as_bin(name, bin) for name, bin in config.bins.items()}
+
+
+def object_classes(config: CellConfig) -> dict[str, ObjectClass]:
+    """Return the classes of a cell file by label, each of the default mass."""
+    return {label: object_class(label, kind) for label, kind in config.objects.items()}
+
+
+def cell_without_hardware(config: CellConfig, routes: Routes, ledger: Ledger, emit: Emit) -> Cell:
+    """Return the cell of a cell file; every hardware part is None until the cell kind replaces it.
+
+    Each target that a skill selects is emitted as a `decision` event.
+    """
+    missing: Any = None
+
+    def emit_decision(target: Target, bin: str) -> None:
+        emit("decision", item=target.item, label=target.label, frame=target.frame, bin=bin)
+
+    return Cell(
+        clock=missing,
+        arm=missing,
+        tool=missing,
+        camera=missing,
+        detectors=dict.fromkeys(config.detectors, missing),
+        ledger=ledger,
+        operator=missing,
+        bins=bins_of(config),
+        classes=object_classes(config),
+        routes=routes,
+        localizer=missing,
+        safe_place=np.array(config.safe_place),
+        descent=config.motion.descent,
+        descent_speed=config.motion.descent_speed,
+        decided=emit_decision,
+    )

@@ -1,0 +1,123 @@
+"""Proxy between a skill and its cell: every attribute read and every call goes through one interceptor.
+
+The tape records and replays through it, the test kit watches through it, and fault scripts change answers
+through it. Proxies can be nested: the cell that `intercept` returns can be intercepted again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import Any
+
+from executive.cell.arm import Arm, Planning
+from executive.cell.protocols import Camera, Cell, Detector, Ledger, Localizer, Operator, Request, Tool
+
+_PROTOCOLS: Mapping[str, type] = {
+    "arm": Arm,
+    "plan": Planning,
+    "tool": Tool,
+    "camera": Camera,
+    "detector": Detector,
+    "request": Request,
+    "ledger": Ledger,
+    "operator": Operator,
+    "localizer": Localizer,
+}
+_RETURNED_ROLES = {"arm.plan": "plan", "detector.request": "request"}
+"""Role of the object that a call returns, by `Access.name`; this object gets a proxy, too."""
+
+IS_METHOD: Mapping[str, Mapping[str, bool]] = {
+    role: {name: callable(member) for name, member in vars(protocol).items() if not name.startswith("_")}
+    for role, protocol in _PROTOCOLS.items()
+}
+"""For every role and member: True for a method, False for an attribute."""
+
+
+@dataclass(frozen=True)
+class Access:
+    """One read of an attribute, or one call of a method, of a part of a cell.
+
+    Attributes:
+        role: Role of the part: `arm`, `tool`, `detector`, ..., `plan` or `request`.
+        detector: Name of the detector that is accessed, or that returned the request; "" for other parts.
+        member: Name of the attribute or method.
+        proceed: Performs the access on the part itself and returns the result.
+        arguments: Positional arguments of the call.
+        keywords: Keyword arguments of the call.
+    """
+
+    role: str
+    detector: str
+    member: str
+    proceed: Callable[[], Any]
+    arguments: tuple[Any, ...] = ()
+    keywords: Mapping[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def name(self) -> str:
+        """Role and member: `arm.start`."""
+        return f"{self.role}.{self.member}"
+
+    @property
+    def all_arguments(self) -> tuple[Any, ...]:
+        """Positional arguments, followed by the values of the keyword arguments."""
+        return (*self.arguments, *self.keywords.values())
+
+    @property
+    def is_call(self) -> bool:
+        """True for the call of a method, False for the read of an attribute."""
+        return IS_METHOD[self.role][self.member]
+
+
+Interceptor = Callable[[Access], Any]
+"""Handles an access and returns its result: the result of `access.proceed()`, or a substitute."""
+
+
+def intercept(cell: Cell, interceptor: Interceptor, roles: Collection[str]) -> Cell:
+    """Return a copy of the cell in which each access to the parts in `roles` goes through the interceptor.
+
+    So does each access to the `Planning` and `Request` objects that these parts return.
+    """
+    parts: dict[str, Any] = {
+        role: _Proxy(role, "", getattr(cell, role), interceptor) for role in roles if role != "detector"
+    }
+    if "detector" in roles:
+        parts["detectors"] = {
+            name: _Proxy("detector", name, detector, interceptor) for name, detector in cell.detectors.items()
+        }
+    return replace(cell, **parts)
+
+
+class _Proxy:
+    """A part of a cell that offers the members of its protocol, each through an interceptor.
+
+    The part may be None if the interceptor never proceeds.
+    """
+
+    def __init__(self, role: str, detector: str, part: Any, interceptor: Interceptor) -> None:
+        self._role, self._detector, self._part, self._intercept = role, detector, part, interceptor
+        self._attribute_accesses: dict[str, Access] = {}
+
+    def __getattr__(self, member: str) -> Any:
+        if member.startswith("_") or member not in IS_METHOD[self._role]:
+            # Names with an underscore are tested first: `copy` looks them up before `_role` is set.
+            raise AttributeError(f"{type(self).__name__} has no attribute {member!r}")
+        if IS_METHOD[self._role][member]:
+            return partial(self._call, member)
+        if member not in self._attribute_accesses:
+            self._attribute_accesses[member] = Access(
+                self._role, self._detector, member, partial(getattr, self._part, member)
+            )
+        return self._intercept(self._attribute_accesses[member])
+
+    def _call(self, member: str, /, *arguments: Any, **keywords: Any) -> Any:
+        def proceed() -> Any:
+            return getattr(self._part, member)(*arguments, **keywords)
+
+        access = Access(self._role, self._detector, member, proceed, arguments, keywords)
+        answer = self._intercept(access)
+        if returned := _RETURNED_ROLES.get(access.name):
+            return _Proxy(returned, self._detector, answer, self._intercept)
+        return answer

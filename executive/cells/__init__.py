@@ -1,0 +1,1 @@
+"""Kinds of cells: the simulated one, and the fake one for tests."""

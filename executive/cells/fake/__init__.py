@@ -1,0 +1,1 @@
+"""Fake cell: a kinematic cell without physics, for tests and rehearsals."""

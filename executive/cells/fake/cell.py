@@ -1,0 +1,266 @@
+"""A whole work cell without physics: the real ledger and localizer around fake parts."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from executive.cell.clock import StepClock
+from executive.cell.config import CellConfig
+from executive.cell.layout import bins_of, cell_without_hardware, object_classes
+from executive.cell.protocols import Cell, LeastTimes, Routes
+from executive.cell.values import BIN_THICKNESS
+from executive.cell.workcell import PLACES, CellOptions, KeyPath
+from executive.cells.fake.arm import FakeArm, FakeTool, out_of_reach
+from executive.cells.fake.camera import FakeCamera, FakeDetector
+from executive.cells.fake.command_log import FakeLog, read_state, restore
+from executive.cells.fake.least_times import FakeTimes
+from executive.cells.fake.visuals import FakeScenery
+from executive.cells.fake.world import FakeObject, FakeWorld
+from executive.errors import InputError
+from executive.events import Emit, ignore
+from executive.geometry import Pose
+from executive.ledger.item import State
+from executive.ledger.tracker import ItemLedger
+from executive.mission.parse.cell_file import load_cell
+from executive.mission.text.files import shipped_folder
+from executive.perception.evidence import classes_distinct_by_touch
+from executive.perception.localization.plane import PlaneLocalizer
+
+ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
+"""Where the classes of the shipped cells go."""
+
+
+class SilentOperator:
+    """Asks for what a list says, then quits."""
+
+    def __init__(self, requests: Sequence[str] = ()) -> None:
+        self._requests = list(requests)
+
+    def ask(self, choices: Sequence[str]) -> str | None:
+        """Return the next request, or None."""
+        del choices
+        return self._requests.pop(0) if self._requests else None
+
+
+class FakeCell:
+    """A cell file brought to life without physics; implements `executive.cell.workcell.Workcell`.
+
+    Bins, classes, table, poses, camera, detectors and ledger are as the cell file says. The arm goes in
+    straight lines, table and bins are solid, the tool seals always, and every detector sees everything,
+    whatever its kind.
+
+    Args:
+        config: The cell file; by default `bare_table`.
+        seed: Decides which objects lie where.
+        routes: Class label to the bins that are right for it.
+        emit: Tells the run what happens.
+        options: How the run wants its cell; by default with an operator who wants nothing.
+
+    Attributes:
+        world, arm, tool, camera, detectors, ledger, routes: The parts, for a test to arrange and inspect.
+        detector: The first detector.
+
+    Raises:
+        InputError: The workspace has no room for the objects, or a window was asked for.
+    """
+
+    def __init__(
+        self,
+        config: CellConfig | None = None,
+        *,
+        seed: int = 0,
+        routes: Routes = ROUTES,
+        emit: Emit = ignore,
+        options: CellOptions | None = None,
+    ) -> None:
+        config = config or bare_table()
+        options = options or CellOptions(SilentOperator(), base=Path())
+        if options.gui:
+            raise InputError(f'cell {config.cell} is of kind "fake" and has no window; run it without --gui')
+        self._config = config
+        self._gate = config.ledger.gate
+        self.routes = dict(routes)
+        classes = object_classes(config)
+        self.world = FakeWorld(classes)
+        scatter(self.world, config, seed)
+        clock = StepClock(lambda: self.world.now)
+        self.arm = FakeArm(self.world, config, clock, emit)
+        self.tool = FakeTool(self.world, lambda: self.arm.tool_pose.position)
+        bins = bins_of(config)
+        self.world.bins = tuple(bins.values())
+        self.ledger = ItemLedger(
+            config.ledger, config.table, bins, self.routes, emit, classes_distinct_by_touch(config)
+        )
+        name, camera = next(iter(config.cameras.items()))
+        X_TF = Pose.of((0.0, 0.0, -config.tool.length))
+        self.camera = FakeCamera(
+            name,
+            camera,
+            config.table,
+            self.world,
+            flange=lambda: self.arm.tool_pose @ X_TF,
+            epoch=lambda: self.ledger.epoch,
+        )
+        self.detectors = {
+            name: FakeDetector(name, detector, self.world, clock, self.camera.area)
+            for name, detector in config.detectors.items()
+        }
+        self.detector = next(iter(self.detectors.values()))
+        self._log: FakeLog | None = None
+        if options.past is not None:
+            restore(read_state(options.past.log), self.world, self.arm)
+            self.camera.skip(options.past.frames, options.past.turns)
+            self.log_to(options.past.log)
+        self._cell = replace(
+            cell_without_hardware(config, self.routes, self.ledger, emit),
+            clock=clock,
+            arm=self.arm,
+            tool=self.tool,
+            camera=self.camera,
+            detectors=self.detectors,
+            operator=options.operator,
+            localizer=PlaneLocalizer(classes),
+        )
+
+    @staticmethod
+    def check(config: CellConfig, base: Path) -> Iterable[tuple[KeyPath, str]]:
+        """Return findings for places that the fake arm cannot reach, and for more objects than fit."""
+        del base
+        problem = _find_lack_of_room(config, config.table.objects[1])
+        return (*out_of_reach(config), *([(("table", "objects"), problem)] if problem else []))
+
+    @staticmethod
+    def labels(config: CellConfig, base: Path) -> Mapping[str, tuple[str, ...] | None]:
+        """Return None for every detector: a fake one knows whatever lies there."""
+        del base
+        return dict.fromkeys(config.detectors)
+
+    @staticmethod
+    def least_times(config: CellConfig) -> LeastTimes:
+        """Return what things take at the very least in a cell like this."""
+        return FakeTimes(config)
+
+    @property
+    def cell(self) -> Cell:
+        """What skills see."""
+        return self._cell
+
+    @property
+    def accounts(self) -> ItemLedger:
+        """The books of the cell's ledger."""
+        return self.ledger
+
+    @property
+    def steps(self) -> int:
+        """Control steps that its world has made since the run began."""
+        return self.world.steps
+
+    def log_to(self, path: Path) -> None:
+        """Keep in a file, from now on, what the world is like."""
+        self._log = FakeLog(path, self.world, self.arm)
+
+    def note(self) -> None:
+        """Write into the log what the world is like now."""
+        if self._log is not None:
+            self._log.write(self.world, self.arm)
+
+    def advance(self) -> None:
+        """Let one control step pass."""
+        self.arm.advance()
+        self.world.steps += 1
+        self.note()
+
+    def scenery(self) -> FakeScenery:
+        """Return what there is to be seen, for people only."""
+        return FakeScenery(self._config, self.world, lambda: self.arm.tool_pose)
+
+    def audit(self) -> dict[str, int]:
+        """Return what became of the objects.
+
+        `elsewhere` counts what was taken away, if it was seen before, and what fell into a wrong bin, which
+        `fell_in_wrong_bin` counts again; `unseen` counts what lies there and was never seen. An object that
+        was taken out of a bin counts as if it still lay there.
+        """
+        counts = dict.fromkeys(PLACES, 0)
+        for thing in self.world.objects:
+            place = self._find_place(thing)
+            fell = place == "wrong_bin" and thing.fell
+            counts["elsewhere" if fell else place] += 1
+            counts["fell_in_wrong_bin"] += fell
+            counts["unseen"] += not self._was_seen(thing)
+        for thing in self.world.removed:
+            place = "elsewhere" if thing.fell else self._find_place(thing)
+            counts["elsewhere" if place == "left" else place] += self._was_seen(thing)
+        return counts
+
+    def _find_place(self, thing: FakeObject) -> str:
+        """Return `right`, `wrong_bin` or `left`, for an object on the table or in the tool."""
+        if thing is self.world.held:
+            return "left"
+        # Nothing stands on a wall: what does here would have fallen in, if not into the next bin.
+        wall = BIN_THICKNESS + self._cell.classes[thing.label].radius / 2
+        for beside in (0.0, wall):
+            for name, bin in self._cell.bins.items():
+                if bin.contains(thing.position, beside):
+                    return "right" if name in self.routes.get(thing.label, ()) else "wrong_bin"
+        return "left"
+
+    def close(self) -> None:
+        """Close the log."""
+        if self._log is not None:
+            self._log.close()
+            self._log = None
+
+    def _was_seen(self, thing: FakeObject) -> bool:
+        """Tell whether an item of the ledger was first seen where an object stood at some time."""
+        return any(
+            float(np.linalg.norm((record.first - place)[:2])) <= self._gate
+            for record in self.ledger.records
+            if record.state is not State.PHANTOM
+            for place in thing.stood
+        )
+
+
+@functools.cache
+def bare_table() -> CellConfig:
+    """Return the shipped overhead cell with nothing on its table: where a skill is tried out."""
+    path = shipped_folder() / "cells" / "overhead.yaml"
+    return load_cell(path, {"cell.kind": "fake", "cell.table.objects": "[0, 0]"})
+
+
+def scatter(world: FakeWorld, config: CellConfig, seed: int) -> None:
+    """Put as many objects as the cell file says on the table, of random classes on a grid of places.
+
+    Raises:
+        InputError: The workspace has no room for so many.
+    """
+    random = np.random.default_rng(seed)
+    count = int(random.integers(*config.table.objects, endpoint=True))
+    if problem := _find_lack_of_room(config, count):
+        raise InputError(problem)
+    places, _ = _grid(config)
+    for index in random.permutation(len(places))[:count]:
+        world.put(str(random.choice(list(config.objects))), *places[index])
+
+
+def _grid(config: CellConfig) -> tuple[list[tuple[float, float]], float]:
+    """Return the places for objects on the table and their distance [m]."""
+    pitch = 2 * max(kind.radius for kind in config.objects.values()) + config.table.gap
+    sides = config.table.x, config.table.y
+    xs, ys = (np.linspace(low, high, 1 + int((high - low) / pitch)) for low, high in sides)
+    return [(float(x), float(y)) for x in xs for y in ys], pitch
+
+
+def _find_lack_of_room(config: CellConfig, count: int) -> str:
+    """Return a message if the table has not enough places for `count` objects, or ""."""
+    places, pitch = _grid(config)
+    message = (
+        f"{count} objects find no room on the workspace of cell {config.cell}, which has {len(places)} "
+        f"places {pitch:.3f} m apart; ask for fewer or widen table.x and table.y"
+    )
+    return message if count > len(places) else ""

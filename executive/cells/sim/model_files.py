@@ -1,0 +1,155 @@
+"""Files of models: URDF and Wavefront meshes, checked before PyBullet opens them."""
+
+from __future__ import annotations
+
+import os
+from itertools import pairwise
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pybullet_data
+from numpy.typing import NDArray
+
+from executive.cell.paths import leaves_folder, links_out
+from executive.errors import InputError
+from executive.geometry import Array
+
+MAX_MODEL_SIZE = 20_000_000
+"""Largest size of a model file [byte]: larger ones take longer to check than a mission should."""
+MAX_TRIANGLES = 20_000
+"""Largest number of triangles of a mesh: PyBullet takes 3 s to collide with 20,000, and 60 s with 300,000."""
+
+
+def find_model(name: str) -> Path:
+    """Return the path of a model: a full path as it is, any other name as one of pybullet_data's.
+
+    Raises:
+        InputError: There is no such file.
+    """
+    path = os.path.join(pybullet_data.getDataPath(), name)
+    # Path.is_file raises an error for names that no file can have; os.path.isfile returns False.
+    if os.path.isfile(path):
+        if os.path.getsize(path) > MAX_MODEL_SIZE:
+            raise InputError(f"the model {name} is larger than {MAX_MODEL_SIZE // 1_000_000} MB")
+        return Path(path).resolve()
+    raise InputError(f"there is no model {name}, neither beside the cell file nor in pybullet_data")
+
+
+def read_urdf(path: Path) -> ElementTree.Element:
+    """Return the root of an object's URDF.
+
+    Raises:
+        InputError: The file is no URDF, or it names a mesh that is no file in its folder.
+    """
+    try:
+        root = ElementTree.parse(path).getroot()
+    except (ElementTree.ParseError, OSError, ValueError, LookupError) as error:
+        raise InputError(f"the model {path.name} is no URDF: {error}") from None
+    if root.tag != "robot":
+        raise InputError(f"the model {path.name} is no URDF: its root is <{root.tag}>, not <robot>")
+    for element in root.iter():
+        if element.tag.startswith("{"):
+            raise InputError(f"the model {path.name} has an XML namespace, {element.tag}; remove it")
+        if "filename" in element.attrib:
+            _check_name(path, element.attrib["filename"])
+        if element.tag == "mesh":
+            find_mesh(path, element)
+    return root
+
+
+def find_mesh(urdf: Path, mesh: ElementTree.Element) -> Path:
+    """Return the path of a mesh that a URDF names.
+
+    Raises:
+        InputError: The mesh is no file in the folder of the URDF, is too large, or has too many triangles.
+    """
+    path = find_model(str(urdf.parent / _check_name(urdf, mesh.get("filename", ""))))
+    if _count_triangles(path) > MAX_TRIANGLES:
+        raise InputError(f"the model {path.name} has more than {MAX_TRIANGLES} triangles; simplify the mesh")
+    return path
+
+
+def _check_name(urdf: Path, name: str) -> str:
+    """Return the name of a file in a URDF without a leading `package://`.
+
+    Raises:
+        InputError: The file is outside of the folder of the URDF.
+    """
+    name = name.removeprefix("package://")
+    if leaves_folder(name) or links_out(urdf.parent, name):
+        raise InputError(f'the model {urdf.name} names the file "{name}", which is outside of its folder')
+    return name
+
+
+def _count_triangles(path: Path) -> int:
+    """Return the number of triangles of a mesh in Wavefront or STL format, and 0 for other formats."""
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"the model {path.name} cannot be read: {error.strerror}") from error
+    if path.suffix.lower() == ".stl":
+        # A binary file states the number after 80 bytes, and has 50 bytes for each triangle.
+        number = int.from_bytes(content[80:84], "little")
+        return number if len(content) == 84 + 50 * number else content.count(b"endfacet")
+    words = (line.split() for line in content.splitlines())
+    return sum(len(face) - 3 for face in words if face[:1] == [b"f"])
+
+
+def read_obj(path: Path) -> tuple[Array, NDArray[np.intp]]:
+    """Return vertices `(N, 3)` and triangles `(M, 3)` of a Wavefront file; polygons are cut into fans.
+
+    Raises:
+        InputError: It holds no mesh.
+    """
+    vertices: list[list[float]] = []
+    triangles: list[tuple[int, int, int]] = []
+    try:
+        for line in path.read_text(encoding="utf-8").splitlines():
+            key, *values = line.split() or [""]
+            if key == "v":
+                vertices.append([float(value) for value in values[:3]])
+            elif key == "f":
+                corners = [int(value.split("/")[0]) for value in values]
+                corners = [i - 1 if i > 0 else len(vertices) + i for i in corners]
+                triangles += [(corners[0], a, b) for a, b in pairwise(corners[1:])]
+        if len(triangles) > MAX_TRIANGLES:
+            raise InputError(
+                f"the model {path.name} has more than {MAX_TRIANGLES} triangles; simplify the mesh"
+            )
+        faces = np.array(triangles, dtype=np.intp).reshape(-1, 3)
+        return _check_mesh(np.array(vertices, dtype=float), faces)
+    except (OSError, ValueError, IndexError, OverflowError) as error:
+        raise InputError(f"the model {path.name} is no Wavefront mesh: {error}") from None
+
+
+def read_numbers(text: str | None, default: tuple[float, ...]) -> tuple[float, ...]:
+    """Return the numbers in an attribute of a URDF.
+
+    Raises:
+        InputError: They are no numbers, not finite, or not as many as in `default`.
+    """
+    if text is None:
+        return default
+    try:
+        numbers = tuple(map(float, text.split()))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != len(default) or not np.isfinite(numbers).all():
+        raise InputError(f'a URDF has "{text}" in place of {len(default)} finite number(s)')
+    return numbers
+
+
+def _check_mesh(vertices: Array, triangles: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
+    """Return vertices and triangles if they are a mesh.
+
+    Raises:
+        ValueError: They are no mesh.
+    """
+    if not triangles.size:
+        raise ValueError("it has no faces (lines beginning with f)")
+    if vertices.shape != (len(vertices), 3) or not np.isfinite(vertices).all():
+        raise ValueError("a vertex (lines beginning with v) needs three finite numbers")
+    if triangles.min() < 0 or triangles.max() >= len(vertices):
+        raise ValueError(f"a face names a vertex that is not there; there are {len(vertices)}")
+    return vertices, triangles

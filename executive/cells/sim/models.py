@@ -1,0 +1,214 @@
+"""Models of objects: the mesh that a camera sees, read from a file, and the body that collides."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+from pybullet_utils.bullet_client import BulletClient
+
+from executive.cell.config import CellConfig, ObjectConfig
+from executive.cell.layout import object_class
+from executive.cell.values import ObjectClass
+from executive.cell.workcell import KeyPath
+from executive.cells.sim.model_files import find_mesh, find_model, read_numbers, read_obj, read_urdf
+from executive.errors import InputError
+from executive.geometry import Array, Pose
+
+TOLERANCE = 0.003
+"""Difference between a cell file's figure and the model's own from which it counts as wrong [m]."""
+FRICTION = 0.0005
+"""Rolling and spinning friction: without it a ball at rest creeps, and a released one never stops."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A triangle mesh in the object's frame O: z up as the object stands, origin as `upright` says.
+
+    Attributes:
+        vertices: `(N, 3)` [m].
+        triangles: `(M, 3)` indices into `vertices`.
+    """
+
+    vertices: Array
+    triangles: NDArray[np.intp]
+
+    @property
+    def bottom(self) -> float:
+        """Height of the lowest vertex over the origin [m], negative where it lies below."""
+        return float(self.vertices[:, 2].min())
+
+    @property
+    def top(self) -> float:
+        """Height of the highest vertex over the origin [m]."""
+        return float(self.vertices[:, 2].max())
+
+    @property
+    def radius(self) -> float:
+        """Radius [m] of the circle around the outline seen from above, about the middle of its extents."""
+        outline = self.vertices[:, :2]
+        return float(np.linalg.norm(outline - (outline.min(axis=0) + outline.max(axis=0)) / 2, axis=1).max())
+
+    @cached_property
+    def centroid(self) -> Array:
+        """Centre of the enclosed volume `(3,)` [m]; the middle of the extents where it encloses none."""
+        a, b, c = (self.vertices[self.triangles[:, i]] for i in range(3))
+        volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+        if abs(volumes.sum()) < 1e-12:
+            return (self.vertices.min(axis=0) + self.vertices.max(axis=0)) / 2
+        return np.asarray(volumes @ (a + b + c) / 4 / volumes.sum())
+
+    @cached_property
+    def convex(self) -> bool:
+        """True where no vertex lies more than 0.1 mm outside of any triangle's plane."""
+        a, b, c = (self.vertices[self.triangles[:, i]] for i in range(3))
+        normals = np.cross(b - a, c - a)
+        lengths = np.linalg.norm(normals, axis=1)
+        normals, a = (normals / lengths[:, None].clip(1e-12))[lengths > 0], a[lengths > 0]
+        outside = self.vertices @ normals.T - (a * normals).sum(axis=1)
+        return bool(outside.max() < 1e-4)
+
+
+def add_body(client: BulletClient, config: ObjectConfig, X_WO: Pose) -> int:
+    """Put an object at `X_WO` (z up as it stands) and return its body.
+
+    Raises:
+        InputError: Its model is not there, or is no mesh.
+    """
+    X_WL = X_WO @ upright(config)
+    body = _add_mesh(client, config, X_WL) if config.mesh else _add_urdf(client, config, X_WL)
+    client.changeDynamics(body, -1, rollingFriction=FRICTION, spinningFriction=FRICTION)
+    return body
+
+
+def _add_urdf(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
+    path = str(find_model(config.urdf))
+    try:
+        return int(client.loadURDF(path, X_WL.position, X_WL.quaternion, globalScaling=config.scale))
+    except pybullet.error as error:
+        raise InputError(f"PyBullet cannot load the model {config.urdf}: {error}") from error
+
+
+def _add_mesh(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
+    """Add a mesh of uniform density; to collide, its groups become convex and grow by Bullet's 1 mm."""
+    shape = {"fileName": str(find_model(config.mesh)), "meshScale": [config.scale] * 3}
+    centre = upright(config).inverse().apply(load_mesh(config).centroid)
+    return int(
+        client.createMultiBody(
+            baseMass=config.mass,
+            baseCollisionShapeIndex=client.createCollisionShape(pybullet.GEOM_MESH, **shape),
+            baseVisualShapeIndex=client.createVisualShape(pybullet.GEOM_MESH, **shape),
+            basePosition=X_WL.position,
+            baseOrientation=X_WL.quaternion,
+            baseInertialFramePosition=centre,
+        )
+    )
+
+
+def mass_of(config: ObjectConfig) -> float:
+    """Return what an object weighs in simulation [kg]: as the cell file or its URDF says."""
+    if config.mesh:
+        return config.mass
+    masses = read_urdf(find_model(config.urdf)).iterfind(".//inertial/mass")
+    return sum(sum(read_numbers(mass.get("value"), (0.0,))) for mass in masses)
+
+
+def weighed(label: str, config: ObjectConfig) -> ObjectClass:
+    """Return what skills know of a class of objects of a cell file, with what it weighs in simulation."""
+    return replace(object_class(label, config), mass=mass_of(config))
+
+
+def missing_models(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Yield the key of every model of a cell file that is missing or not as the file says, and a sentence."""
+    try:
+        find_model(config.arm.urdf)
+    except InputError as error:
+        yield ("arm", "urdf"), str(error)
+    for label, kind in config.objects.items():
+        key: KeyPath = ("objects", label)
+        try:
+            if kind.mesh:
+                load_mesh(kind)
+            else:
+                mass_of(kind)
+        except InputError as error:
+            yield (*key, "mesh" if kind.mesh else "urdf"), str(error)
+        else:
+            yield from (((*key, name), sentence) for name, sentence in _wrong_sizes(label, kind))
+
+
+def _wrong_sizes(label: str, kind: ObjectConfig) -> Iterator[tuple[str, str]]:
+    """Yield height and radius where they are not the model's, with a sentence.
+
+    Everything that is known of an object's place hangs on them: where its middle is, where its surface,
+    what is free beside it. A model without a mesh cannot be measured.
+    """
+    try:
+        mesh = load_mesh(kind)
+    except InputError:
+        return
+    for name, actual in (("height", mesh.top - mesh.bottom), ("radius", mesh.radius)):
+        stated = getattr(kind, name)
+        if not abs(stated - actual) <= TOLERANCE:  # True if the size is not a number
+            yield (
+                name,
+                f"the model of {label} has a {name} of {actual:.4f} m, not {stated:g} m; "
+                "correct the figure, scale or upright_deg",
+            )
+
+
+@lru_cache(maxsize=64)
+def upright(config: ObjectConfig) -> Pose:
+    """Return `X_OL`: how the model's own frame L lies in the object's frame O.
+
+    A URDF keeps its origin. A mesh has it anywhere; there O stands in the middle of the extents.
+    """
+    turned = Pose(_rotation(*(math.radians(angle) for angle in config.upright_deg)), np.zeros(3))
+    if not config.mesh:
+        return turned
+    corners = turned.apply(read_obj(find_model(config.mesh))[0] * config.scale)
+    return Pose(turned.rotation, -(corners.min(axis=0) + corners.max(axis=0)) / 2)
+
+
+@lru_cache(maxsize=64)
+def load_mesh(config: ObjectConfig) -> Mesh:
+    """Return the visual mesh of a class of objects, scaled and upright.
+
+    Raises:
+        InputError: The model has no mesh in Wavefront format to look at.
+    """
+    if config.mesh:
+        corners, faces = read_obj(find_model(config.mesh))
+        return Mesh(upright(config).apply(corners * config.scale), faces)
+    path = find_model(config.urdf)
+    vertices: list[Array] = []
+    triangles: list[NDArray[np.intp]] = []
+    for visual in read_urdf(path).iter("visual"):
+        mesh = visual.find("geometry/mesh")
+        if mesh is None or not mesh.get("filename", "").endswith(".obj"):
+            raise InputError(f"{path}: only visuals made of .obj meshes can be labelled")
+        corners, faces = read_obj(find_mesh(path, mesh))
+        scale = np.array(read_numbers(mesh.get("scale"), (1.0, 1.0, 1.0)))
+        origin = visual.find("origin")
+        rpy = read_numbers(None if origin is None else origin.get("rpy"), (0.0, 0.0, 0.0))
+        xyz = read_numbers(None if origin is None else origin.get("xyz"), (0.0, 0.0, 0.0))
+        X_LV = Pose(_rotation(*rpy), np.array(xyz) * config.scale)
+        triangles.append(faces + sum(map(len, vertices)))
+        vertices.append((upright(config) @ X_LV).apply(corners * scale * config.scale))
+    if not vertices:
+        raise InputError(f"the model {path.name} has no visual, so no camera would see it")
+    return Mesh(np.concatenate(vertices), np.concatenate(triangles))
+
+
+def _rotation(roll: float, pitch: float, yaw: float) -> Array:
+    """Return the rotation of URDF's fixed-axis angles [rad]: about x, then y, then z."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
+    about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+    about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
+    about_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
+    return np.asarray(about_z @ about_y @ about_x)

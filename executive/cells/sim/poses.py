@@ -1,0 +1,106 @@
+"""Places and poses of a cell file that cannot serve: out of reach, too near to something, without a view."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+
+import numpy as np
+import pybullet
+
+from executive.cell.arm import Goal
+from executive.cell.clock import STEP
+from executive.cell.config import CellConfig
+from executive.cell.layout import places_out_of_reach
+from executive.cell.workcell import KeyPath
+from executive.cells.sim.arm import SimArm
+from executive.cells.sim.camera import camera_pose
+from executive.cells.sim.clock import SimClock
+from executive.cells.sim.collision import PathClearance
+from executive.cells.sim.view import ArmShadow
+from executive.cells.sim.world import World
+from executive.geometry import Array
+from executive.motion.planner import Planner
+from executive.perception.camera_model import calibrated
+
+POINTS_PER_SIDE = 9
+"""Number of places along each side of the workspace where every camera must see an object."""
+
+
+def out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Yield a key of the cell file and a sentence for every place the tool has to go to and cannot.
+
+    Asked for are every drop slot of every bin and the safe place, from travel height down to where a load is
+    let go in one posture, and every named pose within the joint limits.
+    """
+    planner = Planner(config)
+    load = max(kind.height for kind in config.objects.values())
+
+    def require(place: Array, floor: float) -> None:
+        planner.require_reachable(Goal((float(place[0]), float(place[1]), floor + load)))
+
+    for name, pose in config.arm.poses_deg.items():
+        for joint, (angle, limit) in enumerate(
+            zip(pose, config.arm.limits.position_deg, strict=True), start=1
+        ):
+            if abs(angle) > limit:
+                yield (
+                    ("arm", "poses_deg", name),
+                    f'joint {joint} of the pose "{name}" is at {angle:g} degrees; its limit is {limit:g}',
+                )
+    yield from places_out_of_reach(config, require)
+
+
+def unfit_poses(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Yield a key of the cell file and a sentence for every pose that cannot serve.
+
+    No named pose may bring arm or tool nearer to table, bins or the arm itself than the margin, for there
+    is no motion to it then; and from every scan pose the camera must see the whole workspace.
+    """
+    try:
+        clearance = PathClearance(config)
+    except pybullet.error as error:
+        yield ("arm", "urdf"), f"the model {config.arm.urdf} cannot be loaded as an iiwa 14: {error}"
+        return
+    with contextlib.closing(clearance):
+        for name, pose in config.arm.poses_deg.items():
+            near = clearance.too_near(np.radians(pose))
+            if near:
+                yield (
+                    ("arm", "poses_deg", name),
+                    f'the pose "{name}" brings {near}; {config.motion.margin:.3f} m must stay free',
+                )
+        yield from _blind_poses(config, clearance.world)
+
+
+def _blind_poses(config: CellConfig, world: World) -> Iterator[tuple[KeyPath, str]]:
+    """Yield the scan poses and the bins that keep a camera from seeing the whole workspace."""
+    planner = Planner(config)
+    shadow = ArmShadow(SimArm(world, planner, config, SimClock(world, STEP)), planner.kinematics, config)
+    for name, camera in config.cameras.items():
+        matrix, _ = calibrated(camera)
+        for index, pose in enumerate(camera.scan_poses):
+            if pose not in config.arm.poses_deg:
+                continue
+            world.set_arm(np.radians(config.arm.poses_deg[pose]))
+            if not shadow.sees_table(matrix, camera_pose(world, camera), (camera.width, camera.height)):
+                yield (
+                    ("cameras", name, "scan_poses", index),
+                    f'from the pose "{pose}" the camera {name} does not see the whole workspace: a part '
+                    "of it is outside of the image or behind the arm",
+                )
+            elif bin := _find_hiding_bin(config, world, camera_pose(world, camera).position):
+                yield (
+                    ("bins", bin, "position"),
+                    f'the bin "{bin}" hides a part of the workspace from the camera {name} in the pose '
+                    f'"{pose}"; move or lower the bin',
+                )
+
+
+def _find_hiding_bin(config: CellConfig, world: World, camera: Array) -> str | None:
+    """Return the name of a bin that hides the centre of the flattest object in the workspace, or None."""
+    xs, ys = (np.linspace(*side, POINTS_PER_SIDE) for side in (config.table.x, config.table.y))
+    height = min(kind.height for kind in config.objects.values()) / 2
+    points = [(x, y, height) for x in xs for y in ys]
+    hit = {ray[0] for ray in world.client.rayTestBatch(points, [tuple(camera)] * len(points))}
+    return next((name for name, bodies in world.bins.items() if hit.intersection(bodies)), None)

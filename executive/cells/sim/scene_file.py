@@ -1,0 +1,220 @@
+"""Schema of scene files: changes to the simulated world that the cell file does not declare."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import AfterValidator, Field
+
+from executive.cell.config import CameraConfig, CellConfig, Colour, NoiseConfig, Section
+from executive.cell.config.section import Natural, check_ascending
+from executive.cells.sim.arrangements import DAMAGED_MODEL, UNKNOWN_COUNT
+from executive.cells.sim.table_top import PATTERN_COUNT, PLAIN, TEXTURES, WOOD
+from executive.errors import InputError
+from executive.mission.findings import Finding, MissionError, alternatives, error, in_file_order
+from executive.mission.parse.validate import mark_of, validate
+from executive.mission.text.files import read_source
+from executive.mission.text.yaml_text import Node, parse_yaml
+from executive.perception.camera_model import calibrated, field_of_view
+
+ANY = "any"
+"""Key of `objects` for every class without a section."""
+MAX_FOV_DEG = 178.0
+"""Largest vertical field of view of a camera [degree]."""
+
+
+def check_texture(name: str) -> str:
+    """Return the name of a texture unchanged.
+
+    Raises:
+        ValueError: There is no such texture.
+    """
+    if name not in TEXTURES:
+        known = f'"{WOOD}", "{PLAIN}", or "pattern 0" to "pattern {PATTERN_COUNT - 1}"'
+        raise ValueError(f'must be {known}, not "{name}"')
+    return name
+
+
+def check_models(numbers: tuple[int, int]) -> tuple[int, int]:
+    """Return a range of model numbers unchanged.
+
+    Raises:
+        ValueError: The range contains only the damaged model.
+    """
+    if numbers == (DAMAGED_MODEL, DAMAGED_MODEL):
+        raise ValueError(f"contains only number {DAMAGED_MODEL}, whose mesh is damaged; name a wider range")
+    return numbers
+
+
+def check_palette(colours: tuple[Colour, ...]) -> tuple[Colour, ...]:
+    """Return the colours of a palette unchanged.
+
+    Raises:
+        ValueError: The palette has no colour.
+    """
+    if not colours:
+        raise ValueError("needs at least one colour [r, g, b], each 0 to 1")
+    return colours
+
+
+Share = Annotated[float, Field(ge=0, le=1)]
+RgbColour = tuple[Share, Share, Share]
+Reflection = Annotated[float, Field(ge=0, le=3)]
+Shift = Annotated[float, Field(ge=-1, le=1)]
+AngleDeg = Annotated[float, Field(ge=-90, le=90)]
+Counts = Annotated[tuple[Natural, Natural], AfterValidator(check_ascending)]
+ModelId = Annotated[int, Field(ge=0, lt=UNKNOWN_COUNT)]
+Models = Annotated[tuple[ModelId, ModelId], AfterValidator(check_ascending), AfterValidator(check_models)]
+Palette = Annotated[tuple[RgbColour, ...], AfterValidator(check_palette)]
+
+
+class LightConfig(Section):
+    """The lamp and the ambient light; the defaults apply to every simulated cell."""
+
+    brightness: float = Field(1.0, ge=0, le=5)
+    """Factor on `ambient`, `diffuse` and `specular`."""
+    direction: tuple[float, float, Annotated[float, Field(gt=0)]] = (0.3, 0.2, 1.0)
+    """Direction x, y, z in the world from the table to the lamp; z is above 0, the length is ignored."""
+    colour: RgbColour = (1.0, 1.0, 1.0)
+    """Colour of the lamp's light: r, g, b, each 0 to 1."""
+    ambient: Reflection = 0.6
+    """Ambient coefficient of the Phong model, 0 to 3."""
+    diffuse: Reflection = 0.35
+    """Diffuse coefficient of the Phong model, 0 to 3."""
+    specular: Reflection = 0.05
+    """Specular coefficient of the Phong model, 0 to 3."""
+    shadow: bool = False
+    """True if objects cast shadows."""
+
+
+class SceneTableConfig(Section):
+    """The surface of the table and the arrangement of the objects; None: the value of the cell file."""
+
+    colour: RgbColour = (1.0, 1.0, 1.0)
+    """Factor on the brightness of the texture: r, g, b, each 0 to 1."""
+    texture: Annotated[str, AfterValidator(check_texture)] = WOOD
+    """`wood`, `plain` (white), or a generated texture, `pattern 0` to `pattern 23`."""
+    objects: Counts | None = None
+    """Range of the number of objects of the cell's classes."""
+    gap: float | None = Field(None, ge=0, le=0.5)
+    """Smallest distance between the outlines of two objects [m]; 0: outlines may touch."""
+    stacked: Share | None = None
+    """Share of the objects that are put on top of another one, 0 to 1; unstable stacks are undone."""
+
+
+class SceneObjectConfig(Section):
+    """Colours and size of one object class."""
+
+    colours: Palette | None = None
+    """Colours (r, g, b, each 0 to 1) of which each object gets one; None: those of the cell file."""
+    scale: float = Field(1.0, ge=0.2, le=3)
+    """Factor on the size that the cell file declares."""
+
+
+class UnknownConfig(Section):
+    """Objects without a class, in addition to the other objects; they are never stacked."""
+
+    count: Counts
+    """Range of their number."""
+    models: Models = (800, 999)
+    """First and last number of the random shapes in pybullet_data, 0 to 999; the shipped detector was
+    trained with 0 to 799."""
+    scale: float = Field(0.6, ge=0.1, le=2)
+    """Factor on the size of the shapes; most shapes are 0.12 m long at 1."""
+    colours: Palette = ((1.0, 1.0, 1.0),)
+    """Colours (r, g, b, each 0 to 1) of which each object gets one."""
+
+
+class SceneCameraConfig(Section):
+    """Errors of the camera; its frames carry the matrix and the pose that the cell file declares."""
+
+    shift: tuple[Shift, Shift, Shift] = (0.0, 0.0, 0.0)
+    """Displacement x, y, z [m], each -1 to 1: in the world, or for a wrist camera in the flange frame."""
+    turn_deg: tuple[AngleDeg, AngleDeg, AngleDeg] = (0.0, 0.0, 0.0)
+    """Rotation vector about the optical centre [degree], each -90 to 90; axes of the camera: x to the
+    right, y down, z forwards."""
+    orbit_deg: tuple[AngleDeg, AngleDeg, AngleDeg] = (0.0, 0.0, 0.0)
+    """Rotation vector about the point where the optical axis meets the table top [degree], each -90 to 90;
+    axes of the world. Only for a fixed camera."""
+    fov_factor: float = Field(1.0, ge=0.3, le=3)
+    """Factor on the vertical field of view."""
+    noise: NoiseConfig | None = None
+    """Sensor noise; None: the value of the cell file."""
+
+
+class SceneConfig(Section):
+    """A scene file; a missing key leaves the world as the cell file declares it."""
+
+    scene: str = Field(min_length=1)
+    """Name of the scene."""
+    light: LightConfig = LightConfig()
+    table: SceneTableConfig = SceneTableConfig()
+    objects: dict[str, SceneObjectConfig] = Field(default_factory=dict)
+    """Colours and sizes by class; `any`: every class without a section."""
+    unknown: UnknownConfig | None = None
+    camera: SceneCameraConfig = SceneCameraConfig()
+
+
+DECLARED_SCENE = SceneConfig(scene="as declared")
+"""The scene that changes nothing."""
+
+
+def load_scene(path: Path | None, config: CellConfig) -> SceneConfig:
+    """Return the content of a scene file, checked against the cell whose world it changes.
+
+    Args:
+        path: The file; None: `DECLARED_SCENE` is returned.
+        config: The cell file.
+
+    Raises:
+        MissionError: The file is invalid; the error lists each finding.
+        InputError: There is no such file, or the cell is not simulated.
+    """
+    if path is None:
+        return DECLARED_SCENE
+    if config.kind != "sim":
+        raise InputError(
+            f"the scene {path} changes the simulated world of a cell of kind sim, and the cell {config.cell} "
+            f"is of kind {config.kind}; leave --scene out, or name a mission on a cell of kind sim"
+        )
+    source = read_source(path)
+    root, findings = parse_yaml(source)
+    if root is None:
+        raise MissionError(in_file_order(findings, source.path))
+    validated = validate(root, SceneConfig)
+    scene = validated.model
+    mismatches = () if scene is None else _find_mismatches(scene, root, config)
+    found = (*findings, *validated.findings, *mismatches)
+    if scene is None or found:
+        raise MissionError(in_file_order(found, source.path))
+    return scene
+
+
+def _find_mismatches(scene: SceneConfig, root: Node, config: CellConfig) -> Iterator[Finding]:
+    """Yield a finding for every value that does not fit the cell."""
+    for label in scene.objects:
+        if label not in (ANY, *config.objects):
+            mark = mark_of(root, ("objects", label), of_key=True)
+            hint = alternatives(label, (*config.objects, ANY), "Valid keys")
+            yield error(mark, "unknown-class", f'the cell {config.cell} has no class "{label}"', hint)
+    name, camera = next(iter(config.cameras.items()))
+    if any(scene.camera.orbit_deg) and camera.mount != "fixed":
+        yield error(
+            mark_of(root, ("camera", "orbit_deg")), "wrong-value",
+            f"camera.orbit_deg moves a fixed camera, and the camera {name} of the cell {config.cell} is "
+            "mounted on the wrist; use shift and turn_deg",
+        )  # fmt: skip
+    yield from _check_field_of_view(scene, root, camera)
+
+
+def _check_field_of_view(scene: SceneConfig, root: Node, camera: CameraConfig) -> Iterator[Finding]:
+    """Yield a finding if the field of view of the scene exceeds `MAX_FOV_DEG`."""
+    declared = field_of_view(calibrated(camera)[0], camera.height)
+    if declared * scene.camera.fov_factor > MAX_FOV_DEG:
+        yield error(
+            mark_of(root, ("camera", "fov_factor")), "out-of-range",
+            f"camera.fov_factor must be at most {MAX_FOV_DEG / declared:.2f}, for the declared field of "
+            f"view is {declared:.1f} degrees, and no lens has more than {MAX_FOV_DEG:g}",
+        )  # fmt: skip

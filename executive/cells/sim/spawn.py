@@ -1,0 +1,220 @@
+"""The world that a run begins with: its seeds, and random objects at rest, some on top of others."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from executive.cell.config import CellConfig
+from executive.cell.workcell import KeyPath
+from executive.cells.sim.arrangements import UNKNOWN
+from executive.cells.sim.models import load_mesh
+from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, UnknownConfig
+from executive.cells.sim.scene_world import paint_table, true_cell, unknown_objects
+from executive.cells.sim.world import World
+from executive.errors import InputError
+from executive.geometry import Array, Pose, about_z
+
+TRIES = 2000
+"""Places tried for one set of objects before the workspace counts as too small for it."""
+LAYOUTS = 5
+"""Number of random sets of objects tried before `find_lack_of_room` reports a lack of room."""
+DROP = 0.002
+"""Height over what carries it at which an object is let go [m]."""
+STILL = 0.002
+"""Speed under which an object counts as still [m/s]."""
+LEAST, MOST = 60, 480
+"""Physics steps given to settle: at least, for nothing moves in the first ones, and at most."""
+OFFSET = 0.004
+"""Largest distance of an object's axis from that of the one it is put on, along x and y [m]."""
+NUDGE = 0.1
+"""Speed at which it is pushed aside to see whether it stays [m/s]; friction stops that within 1 mm."""
+MOVED = 0.005
+"""Distance beyond which an object counts as moved [m]."""
+
+
+@dataclass(frozen=True)
+class PartSeeds:
+    """Random seeds of the parts of a simulated cell.
+
+    Attributes:
+        objects: Decides which objects lie where.
+        camera: Decides the camera's noise.
+        detectors: Decides what detectors leave to chance.
+    """
+
+    objects: int
+    camera: int
+    detectors: int
+
+    @staticmethod
+    def of(seed: int) -> PartSeeds:
+        """Return the seeds that follow from a run's."""
+        parts = np.random.SeedSequence(seed).spawn(3)
+        return PartSeeds(*(int(part.generate_state(1)[0]) for part in parts))
+
+
+def first_world(
+    config: CellConfig, seed: int, *, gui: bool = False, scene: SceneConfig = DECLARED_SCENE
+) -> World:
+    """Return the world as a run of this seed finds it: arm at `home`, its objects at rest on the table.
+
+    The attribute `config` of the world is the cell as the scene changes it.
+
+    Raises:
+        InputError: The workspace has no room for the objects.
+    """
+    world = World(true_cell(config, scene), gui=gui)
+    paint_table(world, scene)
+    spawn(world, world.config, PartSeeds.of(seed).objects, unknown=scene.unknown)
+    world.stood.clear()
+    return world
+
+
+def spawn(
+    world: World,
+    config: CellConfig,
+    seed: int,
+    count: int | None = None,
+    unknown: UnknownConfig | None = None,
+) -> tuple[int, ...]:
+    """Put objects on the table, let them come to rest and return their bodies.
+
+    Args:
+        world: Where they go.
+        config: Says how many, which classes and where.
+        seed: Decides everything random.
+        count: How many, or None for a random number in the cell file's range.
+        unknown: Objects of no class that lie beside them; None: none do.
+
+    Raises:
+        InputError: The workspace has no room for so many.
+    """
+    rng = np.random.default_rng(seed)
+    table = config.table
+    if count is None:
+        count = int(rng.integers(table.objects[0], table.objects[1], endpoint=True))
+    labels = [str(label) for label in rng.choice(list(config.objects), count)]
+    kinds = [(label, config.objects[label]) for label in labels]
+    kinds += [(UNKNOWN, model) for model in unknown_objects(unknown, rng)]
+    places = _places(config, [model.radius for _, model in kinds], rng)
+    bodies = []
+    for (label, model), place in zip(kinds, places, strict=True):
+        height = DROP - load_mesh(model).bottom
+        X_WO = Pose(about_z(rng.uniform(0, math.tau)), np.array([*place, height]))
+        colour = model.colours[int(rng.integers(len(model.colours)))]
+        bodies.append(world.add_object(label, X_WO, colour, model))
+    _come_to_rest(world, bodies)
+    if table.stacked:
+        _stack(world, bodies[:count], table.stacked, rng)
+    return tuple(bodies)
+
+
+def find_lack_of_room(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Yield a finding if none of `LAYOUTS` random sets of the maximum size fits the workspace."""
+    problem = ""
+    for seed in range(LAYOUTS):
+        rng = np.random.default_rng(seed)
+        labels = [str(label) for label in rng.choice(list(config.objects), config.table.objects[1])]
+        try:
+            _places(config, [config.objects[label].radius for label in labels], rng)
+        except InputError as error:
+            problem = str(error)
+        else:
+            return
+    yield ("table", "objects"), problem
+
+
+def count_that_fits(config: CellConfig, most: int) -> int:
+    """Return the largest number of objects, up to `most`, for which the workspace has room."""
+    for count in range(most, 0, -1):
+        table = config.table.model_copy(update={"objects": (0, count)})
+        if not any(find_lack_of_room(config.model_copy(update={"table": table}))):
+            return count
+    return 0
+
+
+def _places(config: CellConfig, radii: Sequence[float], rng: np.random.Generator) -> list[Array]:
+    """Return places `(2,)` [m] for outlines of these radii [m] that keep the gap.
+
+    The whole set is drawn again when one gets stuck.
+    """
+    low, high = np.array([config.table.x, config.table.y]).T
+    places: list[Array] = []
+    for _ in range(TRIES):
+        if len(places) == len(radii):
+            return places
+        place, radius = rng.uniform(low, high), radii[len(places)]
+        gaps = [np.linalg.norm(place - p) - radius - r for p, r in zip(places, radii, strict=False)]
+        if min(gaps, default=math.inf) >= config.table.gap:
+            places.append(place)
+        elif rng.random() < 0.02:
+            places = []
+    raise InputError(
+        f"{len(radii)} objects found no room on the workspace of cell {config.cell}, "
+        f"{high[0] - low[0]:.2f} m by {high[1] - low[1]:.2f} m, {config.table.gap * 1000:.0f} mm apart; "
+        "ask for fewer or widen table.x and table.y"
+    )
+
+
+def _stack(world: World, bodies: Sequence[int], share: float, rng: np.random.Generator) -> None:
+    """Put each object on another one with probability `share`, if there is one that carries it.
+
+    Which others do is found out by trying: what falls, also when nudged, is put back where it lay, and all
+    else too. So a ball is carried by nothing and carries nothing. No object gets on one that lies on
+    another, and none has two on top.
+
+    Args:
+        world: Where they lie, at rest.
+        bodies: The objects.
+        share: 0 to 1.
+        rng: Decides which, where, and how they are turned.
+    """
+    free = set(bodies)
+    for upper in bodies:
+        if rng.random() >= share or upper not in free:
+            continue
+        for lower in map(int, rng.permutation(sorted(free - {upper}))):
+            if _put_on(world, upper, lower, rng):
+                free -= {upper, lower}
+                break
+
+
+def _put_on(world: World, upper: int, lower: int, rng: np.random.Generator) -> bool:
+    """Put one object on another, and tell whether it stayed; if not, all is again as it was."""
+    before = {body: world.object_pose(body) for body in world.bodies}
+    base = before[lower].position
+    below, above = (load_mesh(world.models[body]) for body in (lower, upper))
+    height = base[2] + below.top - above.bottom + DROP
+    place = np.array([*(base[:2] + rng.uniform(-OFFSET, OFFSET, 2)), height])
+    goal = {**before, upper: Pose(about_z(rng.uniform(0, math.tau)), place)}
+    world.place_object(upper, goal[upper])
+    _come_to_rest(world, list(goal), lambda: _moved(world, goal))
+    heading = rng.uniform(0, math.tau)
+    world.client.resetBaseVelocity(upper, [NUDGE * math.cos(heading), NUDGE * math.sin(heading), 0.0])
+    _come_to_rest(world, list(goal), lambda: _moved(world, goal))
+    if not _moved(world, goal):
+        return True
+    for body, X_WO in before.items():
+        world.place_object(body, X_WO)
+    return False
+
+
+def _moved(world: World, goal: Mapping[int, Pose]) -> bool:
+    """Tell whether any body is far from where it should be."""
+    return any(
+        float(np.linalg.norm(world.object_pose(body).position - X_WO.position)) > MOVED
+        for body, X_WO in goal.items()
+    )
+
+
+def _come_to_rest(world: World, bodies: Sequence[int], enough: Callable[[], bool] = lambda: False) -> None:
+    """Step until every body has come to rest, or for two seconds, or until `enough` holds."""
+    for step in range(MOST):
+        world.step()
+        speeds = [np.linalg.norm(world.client.getBaseVelocity(body)[0]) for body in bodies]
+        if (step >= LEAST and max(speeds, default=0.0) < STILL) or enough():
+            return

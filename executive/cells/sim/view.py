@@ -1,0 +1,61 @@
+"""What the simulated arm hides from its camera, from joint positions and kinematics alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from executive.cell.config import CellConfig
+from executive.cell.layout import pile_height
+from executive.cells.sim.arm import SimArm
+from executive.geometry import Array, Pose
+from executive.motion.kinematics import Kinematics
+from executive.perception.visibility import LINK_SHADOW, TOOL_SHADOW, Bone, hidden, outline
+
+OFF_CENTRE = 0.015
+"""How far beside the cup's axis the middle of what it holds may hang [m]."""
+
+
+class ArmShadow:
+    """Tells which pixels show the scene and whether the whole workspace is among them.
+
+    Args:
+        arm: The arm.
+        kinematics: Its kinematics.
+        config: The cell file.
+        loaded: Tells whether the tool holds something, which then hides as much as the largest object.
+    """
+
+    def __init__(
+        self,
+        arm: SimArm,
+        kinematics: Kinematics,
+        config: CellConfig,
+        loaded: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self._arm = arm
+        self._kinematics = kinematics
+        self._loaded = loaded
+        self._load = max(kind.radius for kind in config.objects.values()) + OFF_CENTRE
+        self._top = max(kind.height for kind in config.objects.values())
+        top = pile_height(config)
+        self._corners = np.array(
+            [(x, y, z) for x in config.table.x for y in config.table.y for z in (0.0, top)]
+        )
+
+    def visible(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> NDArray[np.bool_]:
+        """Return `(H, W)` bool: True where the arm cannot be in front of the scene."""
+        q = self._arm.q
+        flange, X_WT = self._kinematics.flange(q).position, self._kinematics.forward(q)
+        joints = [np.zeros(3), *(frame.position for frame in self._kinematics.joint_frames(q)), flange]
+        bones: list[Bone] = [(joints, LINK_SHADOW), ([flange, X_WT.position], TOOL_SHADOW)]
+        if self._loaded():
+            bones.append(([X_WT.position, X_WT.apply(np.array([0.0, 0.0, self._top]))], self._load))
+        return ~hidden(bones, matrix, X_WC, size)
+
+    def sees_table(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> bool:
+        """Tell whether the whole workspace is in view and the arm not in front of it."""
+        table = outline(self._corners, matrix, X_WC, size)
+        return table is not None and bool(np.all(self.visible(matrix, X_WC, size)[table]))

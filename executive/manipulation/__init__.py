@@ -1,0 +1,1 @@
+"""Functions that skills share: tool goals, motions, obstacles, drops."""

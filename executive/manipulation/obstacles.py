@@ -1,0 +1,67 @@
+"""What stands in the cell beyond what its file says: objects on the table and in the bins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from executive.cell.protocols import Cell
+from executive.cell.values import BIN_THICKNESS, Bin, Item, Obstacle, Target
+from executive.geometry import Array
+
+ROLLED = 0.002
+"""How far an object in a bin may lie from where it was let go [m]."""
+
+
+def around(cell: Cell, but: Item | None = None) -> tuple[Obstacle, ...]:
+    """Return what stands in the cell beyond what its file says, the item `but` left out.
+
+    That is what the ledger believes on the table, and what lies in the bins (`slots_taken`).
+    """
+    return (
+        *(obstacle_of(cell, target) for target in cell.ledger.standing() if target.item != but),
+        *_filled(cell, but),
+    )
+
+
+def is_in_bin(cell: Cell, position: Array) -> bool:
+    """Return True if a position `(3,)` [m] is inside a bin or its walls."""
+    return any(bin.contains(position, BIN_THICKNESS) for bin in cell.bins.values())
+
+
+def slots_taken(cell: Cell, bin: str, but: Item | None = None) -> int:
+    """Return how many objects lie in `bin`, the item `but` not counted: the number of its next free slot.
+
+    What the tool carries into the bin counts, so that a plan made meanwhile still holds when it was let go.
+    """
+    held = cell.ledger.in_tool()
+    coming = held not in (None, but) and cell.bins[bin].contains(cell.arm.destination)
+    return cell.ledger.objects_in(bin) + coming
+
+
+def obstacle_of(cell: Cell, target: Target) -> Obstacle:
+    """Return what is in the way where a target stands."""
+    x, y, middle = (float(value) for value in target.position)
+    kind = cell.classes[target.label]
+    return Obstacle(x, y, kind.radius, middle + kind.height / 2, target.item)
+
+
+def tallest(cell: Cell) -> float:
+    """Return the height of the tallest class of objects [m]."""
+    return max(kind.height for kind in cell.classes.values())
+
+
+def level(bin: Bin, layer: int, tallest: float) -> float:
+    """Return the height on which a layer of objects in a bin lies at most [m]; layer 0 is on the floor."""
+    return float(bin.position[2]) + BIN_THICKNESS + layer * tallest
+
+
+def _filled(cell: Cell, but: Item | None) -> Iterator[Obstacle]:
+    """Yield what stands on the slots of bins that were used, the item `but` left out."""
+    widest, highest = max(kind.radius for kind in cell.classes.values()), tallest(cell)
+    for name, box in cell.bins.items():
+        count, slots = slots_taken(cell, name, but), len(box.slots)
+        for number, (x, y) in enumerate(box.slots[:count]):
+            top = level(box, (count - 1 - number) // slots + 1, highest)
+            yield Obstacle(
+                float(x), float(y), widest + ROLLED, top, f"what lies in slot {number + 1} of {name}"
+            )

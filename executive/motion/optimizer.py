@@ -1,0 +1,153 @@
+"""The fastest way from one state to another over what stands between.
+
+Sequential quadratic programming: linearize how near the last course comes to everything, let the program
+choose the shortest course near it, and again. The first course follows, as well as it can, a way that
+stops at every corner high above everything: so it is settled what is passed above and what beside, and
+every step leads from a slow way that is clear to a faster one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from executive.geometry import Array
+from executive.motion.clearance_model import Discs, Surroundings
+from executive.motion.kinematics import Kinematics
+from executive.motion.limits import JointLimits
+from executive.motion.payload import Hold
+from executive.motion.point_to_point import Connector, Free, NoProfile
+from executive.motion.state import JOINTS, State
+from executive.motion.transcription import SAMPLES, STEPS, WEIGHT, Course, Demand, Transcription
+
+NEAR = 0.03
+"""Distance up to which a state is part of the program [m]."""
+TRUST, CALMER = 0.3, 0.9
+"""Share of the limits by which accelerations change in the first step; from step to step it gets less."""
+FIT = 0.8
+"""Share of the time of the way that stops at every corner which the first course takes."""
+INSIDE = 0.01
+"""Distance from the joints' position limits [rad]."""
+_DIFFERENCE = 1e-4  # [rad]
+
+
+@dataclass(frozen=True, eq=False)
+class Gap:
+    """What lies between two states.
+
+    Attributes:
+        start, end: The states.
+        connector: Joins states.
+        kinematics: The arm.
+        surroundings: What stands around.
+        discs: What hangs under the flange.
+        hold: What the seal of a load demands, or None.
+    """
+
+    start: State
+    end: State
+    connector: Connector
+    kinematics: Kinematics
+    surroundings: Surroundings
+    discs: Discs
+    hold: Hold | None = None
+
+    def slack(self, qs: Array) -> Array:
+        """Return by how much joint positions `(N, 7)` keep their distance [m] and limits [rad] `(N,)`."""
+        tips, axes = self.kinematics.tips(qs)
+        return np.minimum(self.surroundings.slack(tips, axes, self.discs), self._inside(qs).min(axis=1))
+
+    def slopes(self, qs: Array, slack: Array) -> Array:
+        """Return how the slack `(N,)` at joint positions `(N, 7)` depends on each joint `(N, 7)` [m/rad]."""
+        tips, axes = self.kinematics.tips(qs)
+        moved = self.kinematics.tips((qs[:, None] + _DIFFERENCE * np.eye(JOINTS)).reshape(-1, JOINTS))
+        shaped = moved[0].reshape(-1, JOINTS, 3), moved[1].reshape(-1, JOINTS, 3)
+        slopes = self.surroundings.slopes(tips, axes, self.discs, shaped) / _DIFFERENCE
+        inside = self._inside(qs)
+        joint = np.argmin(inside, axis=1)
+        number = np.arange(len(qs))
+        limited = inside[number, joint] <= slack
+        slopes[limited] = 0.0
+        slopes[number[limited], joint[limited]] = -np.sign(qs[number[limited], joint[limited]])
+        return slopes
+
+    def _inside(self, qs: Array) -> Array:
+        return np.asarray(self.kinematics.position_limit - INSIDE - np.abs(qs))
+
+
+class Detour:
+    """Looks for the fastest way over a gap, a few steps at a time.
+
+    Args:
+        gap: The gap.
+        first: A way over it `(M, 7)` [rad] at the places that a course is looked at, however slow.
+        duration: Of that way [s].
+
+    Attributes:
+        cost: Duration of the best course so far, and what it is too near to something [s].
+
+    Raises:
+        NoProfile: No course is anywhere near that way.
+    """
+
+    def __init__(self, gap: Gap, first: Array, duration: float) -> None:
+        self._gap = gap
+        self._transcription = Transcription(gap.start, gap.end, gap.connector.limits)
+        course = self._transcription.fit(FIT * duration / STEPS, first)
+        if course is None:
+            raise NoProfile("no motion follows the way that stops at every corner")
+        self._best, self.cost, self._trust = course, np.inf, TRUST
+        self._gentle: list[Demand] = []
+        self._look(course)
+
+    def improve(self, steps: int) -> None:
+        """Take up to `steps` steps."""
+        for _ in range(steps):
+            rows = np.nonzero(self._slack < NEAR)[0]
+            slack = self._slack[rows]
+            slopes = self._gap.slopes(self._last.qs[rows], slack)
+            clear = Demand(slack, rows[:, None], slopes[:, None], np.zeros(len(rows)))
+            course = self._transcription.shorten(self._last, [clear, *self._gentle], self._trust)
+            if course is None:
+                return
+            self._trust *= CALMER
+            self._look(course)
+
+    def _look(self, course: Course) -> None:
+        """Take `course` as the last one, and as the best one if it is."""
+        self._last, self._slack = course, self._gap.slack(course.qs)
+        lacks = [-float(self._slack.min())]
+        self._gentle = []
+        if self._gap.hold is not None:
+            self._gentle = [self._gap.hold.demand(course.qs, course.step / SAMPLES, NEAR)]
+            lacks.append(-float(self._gentle[0].slack.min(initial=NEAR)))
+        cost = course.duration + WEIGHT * max(0.0, *lacks)
+        if cost < self.cost:
+            self._best, self.cost = course, cost
+
+    def fly(self, exactly: bool) -> tuple[Free, ...]:
+        """Return the best course as motions between states on it.
+
+        `exactly`: between half steps, each as long as it takes on the course; else between whole steps, each
+        as long as it must, which is a little less, on a path that is a little different.
+
+        Raises:
+            NoProfile: It cannot be flown.
+        """
+        least = self._best.step / 2 if exactly else None
+        states = [
+            _flyable(state, self._gap.connector.limits)
+            for state in self._transcription.states(self._best)[:: 1 if exactly else 2]
+        ]
+        return tuple(self._gap.connector.connect(a, b, least) for a, b in pairwise(states))
+
+
+def _flyable(state: State, limits: JointLimits) -> State:
+    """Return the nearest state that can be entered and left without exceeding a velocity limit.
+
+    Whoever has an acceleration gains `a² / 2 j` before it is gone.
+    """
+    most = limits.velocity - state.qdd**2 / (2 * limits.jerk)
+    return state._replace(qd=np.clip(state.qd, -most, most))

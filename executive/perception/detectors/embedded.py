@@ -1,0 +1,48 @@
+"""The detector that comes with this project: a small RF-DETR trained on its own rendered scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from executive.cell.config import DetectorConfig, Section
+from executive.perception.detectors.onnx_model import OnnxModel, read_labels
+from executive.perception.detectors.options import OptionFaults, read_options, wrong_options
+from executive.perception.detectors.rfdetr import RfdetrDetector
+from executive.perception.detectors.setting import Setting
+
+WEIGHTS = Path(__file__).parent.parent / "weights"
+MODEL = WEIGHTS / "embedded.onnx"
+LABELS = WEIGHTS / "embedded.labels.txt"
+
+
+class EmbeddedDetector(RfdetrDetector):
+    """Finds cubes, spheres and ducks with the shipped weights; see `weights/embedded.card.md`."""
+
+    @classmethod
+    def from_config(cls, config: DetectorConfig, setting: Setting) -> EmbeddedDetector:
+        """Return the detector; its weights are the project's own.
+
+        Raises:
+            InputError: An option was given: there are none.
+        """
+        read_options(Section, config)
+        return cls(OnnxModel(MODEL, read_labels(LABELS)), config, setting)
+
+    @staticmethod
+    def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionFaults:
+        """Yield every option that was given, with a sentence: there are none."""
+        del base, others
+        yield from wrong_options(Section, config)
+
+    @staticmethod
+    def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
+        """Return the classes that the shipped weights were trained on."""
+        del config, base
+        return read_labels(LABELS)
+
+    @staticmethod
+    def weights(config: DetectorConfig, base: Path) -> Path | None:
+        """Return the path of the shipped model."""
+        del config, base
+        return MODEL

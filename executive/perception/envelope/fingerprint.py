@@ -1,0 +1,69 @@
+"""Fingerprint of a detector in its cell: the declared properties on which its errors depend."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+from executive.cell.config import CameraConfig, CellConfig, DetectorConfig
+from executive.perception.camera_model import calibrated
+from executive.perception.detectors.registry import installed
+
+Fingerprint = Mapping[str, str]
+"""Text of each property by its name. A measurement applies to a detector if all texts are equal."""
+
+
+def take_fingerprint(config: CellConfig, detector: str, base: Path) -> Fingerprint:
+    """Return the fingerprint of a detector in its cell.
+
+    It contains the weights and settings of the detector, the localization method, the classes and their
+    sizes, and the pose, intrinsics, image size, `table_view` and depth settings of the camera. Bins, the
+    number of objects, light and colours are not part of it.
+
+    Args:
+        config: The cell.
+        detector: Name of one of its detectors.
+        base: Folder to which paths in the cell file are relative.
+    """
+    section = config.detectors[detector]
+    options = {key: value for key, value in section.options.items() if key != "threads"}
+    return {
+        "detector": f"{section.kind} {json.dumps(options, sort_keys=True)}",
+        "weights": _digest_weights(section, base),
+        "threshold": f"{section.threshold:g}",
+        "localization": config.localization,
+        **{
+            f"class {label}": f"{kind.height * 1000:.1f} mm high, radius {kind.radius * 1000:.1f} mm"
+            for label, kind in config.objects.items()
+        },
+        **_describe_camera(next(iter(config.cameras.values())), config),
+    }
+
+
+def describe_change(measured: Fingerprint, current: Fingerprint) -> str:
+    """Return the names of the properties that have changed since a measurement, or ""."""
+    return ", ".join(
+        name for name in dict.fromkeys([*measured, *current]) if measured.get(name) != current.get(name)
+    )
+
+
+def _digest_weights(section: DetectorConfig, base: Path) -> str:
+    """Return a digest of a detector's model file, "" for a detector without one."""
+    find_weights = getattr(installed()[section.kind].load(), "weights", None)
+    path = find_weights(section, base) if find_weights else None
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:16] if path and path.is_file() else ""
+
+
+def _describe_camera(camera: CameraConfig, config: CellConfig) -> dict[str, str]:
+    matrix, X_MC = calibrated(camera)
+    poses = (
+        {name: config.arm.poses_deg[name] for name in camera.scan_poses} if camera.mount == "wrist" else {}
+    )
+    return {
+        "camera pose": f"{camera.mount} {X_MC.rounded(4)} {json.dumps(poses)}",
+        "camera lens": f"{matrix.round(2).tolist()}",
+        "camera image": f"{camera.width} x {camera.height}, searched {list(camera.table_view)}",
+        "camera depth": "" if camera.depth is None else camera.depth.model_dump_json(),
+    }

@@ -1,0 +1,101 @@
+"""Stored measurements of detectors: the files `CELL.measured.json`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field, ValidationError
+
+from executive.cell.config import Section
+from executive.cell.error_rates import ErrorRates
+from executive.errors import InputError
+from executive.perception.envelope.frame_statistics import FrameRange
+
+SUFFIX = ".measured.json"
+"""Suffix of a measurement file; the name of the cell comes before it."""
+MAX_FILE_SIZE = 1_000_000
+"""Largest accepted size of a measurement file [byte]."""
+
+
+class StoredErrorRates(Section):
+    """Stored fields of `executive.cell.error_rates.ErrorRates`."""
+
+    misses: float = Field(gt=0, lt=1)
+    confused: float = Field(gt=0, lt=1)
+    invented: float = Field(gt=0)
+    jitter: float = Field(gt=0)
+    repeated: float = Field(ge=0, lt=1)
+    bias: float = Field(ge=0)
+
+    def build_error_rates(self, threshold: float) -> ErrorRates:
+        """Return these rates with `threshold`, the confidence from which detections count."""
+        return ErrorRates(threshold, **self.model_dump())
+
+
+class ErrorCounts(Section):
+    """Numbers of objects and errors, for one class or one number of objects per scene."""
+
+    objects: int
+    missed: int
+    confused: int
+    invented: int
+
+
+class Measurement(Section):
+    """Errors of one detector in one cell, and the conditions under which they were measured."""
+
+    detector: str
+    """Name of the detector in the cell."""
+    fingerprint: dict[str, str]
+    """Declared properties on which its errors depend, by name."""
+    command: str
+    """Command line that repeats the measurement."""
+    seconds: float
+    """Duration of the measurement [s]."""
+    images: int
+    rates: StoredErrorRates
+    """`misses`, `confused`, `invented`: upper 95 % bounds; `repeated`: Laplace estimate; `jitter`, `bias`:
+    standard deviations."""
+    classes: dict[str, ErrorCounts]
+    """Errors by class; a false detection counts for the class that it was given."""
+    counts: dict[str, ErrorCounts]
+    """Errors by the number of objects in the scene."""
+    frames: FrameRange | None
+    """Ranges of the statistics of the frames; None if no frame showed the whole workspace."""
+
+
+class MeasurementFile(Section):
+    """Content of a file `CELL.measured.json`."""
+
+    version: Literal[1] = 1
+    measurements: tuple[Measurement, ...] = ()
+
+
+def read_measurements(path: Path) -> tuple[Measurement, ...]:
+    """Return the measurements in a file; empty if there is no such file.
+
+    Raises:
+        InputError: The file cannot be read or is invalid.
+    """
+    if not path.is_file():
+        return ()
+    try:
+        if path.stat().st_size > MAX_FILE_SIZE:
+            raise InputError(f"{path} is larger than {MAX_FILE_SIZE} bytes; it is not a measurement file")
+        return MeasurementFile.model_validate_json(path.read_bytes()).measurements
+    except (OSError, ValidationError) as error:
+        raise InputError(
+            f"the measurements in {path} cannot be read: {str(error).splitlines()[0]}; remove the file and "
+            "measure again with `executive evaluate --cell`"
+        ) from error
+
+
+def format_measurements(measurements: Iterable[Measurement], new: Measurement) -> str:
+    """Return the text of a measurement file in which `new` replaces the measurement of its detector."""
+    others = [one for one in measurements if one.detector != new.detector]
+    ordered = sorted((*others, new), key=lambda one: one.detector)
+    content = MeasurementFile(measurements=tuple(ordered)).model_dump(mode="json")
+    return json.dumps(content, indent=1, ensure_ascii=False) + "\n"

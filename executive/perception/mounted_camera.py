@@ -1,0 +1,52 @@
+"""Part of a camera that follows from its section of the cell file alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from executive.cell.config import CameraConfig
+from executive.cell.values import Box
+from executive.geometry import Pose
+from executive.perception.camera_model import calibrated
+
+
+class MountedCamera:
+    """Base of the cameras of cells, whose frames are numbered from 1; part of `cell.protocols.Camera`.
+
+    Args:
+        name: Its name in the cell file.
+        config: Its section of the cell file.
+        flange: Returns the pose of the arm's flange, on which it may be mounted.
+
+    Attributes:
+        name: Its name in the cell file.
+        config: Its section of the cell file.
+        matrix: Camera matrix `(3, 3)` [pixel].
+    """
+
+    def __init__(self, name: str, config: CameraConfig, flange: Callable[[], Pose]) -> None:
+        self.name, self.config = name, config
+        self.matrix, self._X_MC = calibrated(config)
+        self._flange = flange
+        self._frames = self._turn = 0
+
+    @property
+    def scan_poses(self) -> Sequence[str]:
+        """Names of the arm poses from which it sees the table, best first."""
+        return self.config.scan_poses
+
+    def next_pose(self) -> str:
+        """Return the scan pose after the one this returned last, for a look from elsewhere."""
+        self._turn += 1
+        return self.scan_poses[self._turn % len(self.scan_poses)]
+
+    def area(self, view: str) -> Box:
+        """Return the part of the image [pixel] that `view` (`table` or `full`) means."""
+        return self.config.area(view)
+
+    def skip(self, frames: int, turns: int) -> None:
+        """Go on as if so many frames had been taken and next poses been asked for."""
+        self._frames, self._turn = frames, turns
+
+    def _pose(self) -> Pose:
+        return self._X_MC if self.config.mount == "fixed" else self._flange() @ self._X_MC

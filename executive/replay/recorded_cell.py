@@ -1,0 +1,81 @@
+"""Cell that the tree of a run uses: the answers of the real cell are recorded, or replayed from a record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from executive.cell.clock import StepClock
+from executive.cell.protocols import Cell
+from executive.cell.proxy import Access, intercept
+from executive.events import Emit
+from executive.replay.codec import ANSWER, ARRAY, BOX, FRAME, MOTION, PLAIN, POSE, TEXTS, Codec
+from executive.replay.input_recorder import Tape
+
+
+class InputFormat(NamedTuple):
+    """Name and codec of one kind of recorded input.
+
+    Attributes:
+        name: Name of the input in the record; `{detector}` stands for the name of the detector, `{0}` for
+            the first argument.
+        codec: Codec of the value.
+    """
+
+    name: str
+    codec: Codec = PLAIN
+
+
+INPUT_FORMATS: Mapping[str, InputFormat] = {
+    "arm.q": InputFormat("arm.q", ARRAY),
+    "arm.tool_pose": InputFormat("arm.tool_pose", POSE),
+    "arm.tool_velocity": InputFormat("arm.tool_velocity", ARRAY),
+    "arm.destination": InputFormat("arm.destination", ARRAY),
+    "arm.at_rest": InputFormat("arm.at_rest"),
+    "arm.met": InputFormat("arm.met"),
+    "plan.ready": InputFormat("plan.ready"),
+    "plan.result": InputFormat("plan", MOTION),
+    "tool.touching": InputFormat("tool.touching"),
+    "tool.holding": InputFormat("tool.holding"),
+    "tool.bears": InputFormat("tool.bears"),
+    "camera.name": InputFormat("camera.name"),
+    "camera.scan_poses": InputFormat("camera.scan_poses", TEXTS),
+    "camera.next_pose": InputFormat("camera.next_pose"),
+    "camera.area": InputFormat("camera.area.{0}", BOX),
+    "camera.sees_table": InputFormat("camera.sees_table"),
+    "camera.capture": InputFormat("camera.frame", FRAME),
+    "camera.displacement": InputFormat("camera.displacement"),
+    "request.ready": InputFormat("detector.{detector}.ready"),
+    "request.result": InputFormat("detector.{detector}", ANSWER),
+    "operator.ask": InputFormat("operator"),
+    "localizer.locate": InputFormat("localizer", ARRAY),
+}
+"""Name and codec of the recorded input of each access that is not a command, by `Access.name`."""
+
+COMMANDS = frozenset(
+    {"arm.plan", "arm.plan_ahead", "arm.start", "arm.stop", "tool.close", "tool.open", "detector.request"}
+)
+"""Accesses that command the cell; a replay skips them."""
+
+RECORDED_ROLES = ("arm", "tool", "camera", "detector", "operator", "localizer")
+"""Roles whose answers are recorded. A replay builds its own ledger, and reads the cell file for the rest."""
+
+
+def cell_on_tape(cell: Cell, tape: Tape, emit: Emit) -> Cell:
+    """Return a copy of the cell that uses the tape's clock, and whose answers the tape records or replays.
+
+    Each action of the tool is emitted as an `intent` before the action.
+    """
+
+    def answer(access: Access) -> Any:
+        if access.name in COMMANDS:
+            if access.role == "tool":
+                emit("intent", action=access.member)
+            return tape.command(access.proceed)
+        name, codec = INPUT_FORMATS[access.name]
+        if "{" in name:
+            name = name.format(*access.all_arguments, detector=access.detector)
+        return tape.sense(name, access.proceed, codec)
+
+    return replace(intercept(cell, answer, RECORDED_ROLES), clock=StepClock(tape.clock, tape.step))

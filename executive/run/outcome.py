@@ -1,0 +1,102 @@
+"""How a run ended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from executive.cell.workcell import Accounts
+from executive.errors import ExecutiveError, Fault
+from executive.ledger.accounts import is_balanced
+from executive.tree.failure import Failure
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How the tick loop ended; see `Outcome`.
+
+    Attributes:
+        traceback: Traceback of the exception that caused a fault, or "".
+    """
+
+    status: str
+    reason: str = ""
+    message: str = ""
+    node: str = ""
+    traceback: str = ""
+
+
+HALTED = Ending("HALTED", "halted", "halted by the user")
+"""Somebody wanted the run to end."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended.
+
+    Attributes:
+        status: `SUCCESS`; `INCOMPLETE`, if the tree succeeded and items were rejected; `FAILURE`, `FAULT` or
+            `HALTED`.
+        reason: What failed, for instance `Transit.dropped`; "" on success.
+        message: One sentence with numbers.
+        node: Path of the deciding node, or "".
+        empty: True if the run reported the table as empty: the ledger believed that nothing with a route was
+            left, and no look had shown a label that the cell does not know.
+        holds: What the tool holds now that the arm is at rest: an item, `something` that nobody knows, or "".
+        ticks: Control steps taken.
+        robot_time: Time on the run's clock [s].
+    """
+
+    status: str
+    reason: str
+    message: str
+    node: str
+    empty: bool
+    holds: str
+    ticks: int
+    robot_time: float
+
+
+def end_of_tree(failure: Failure | None) -> Ending:
+    """Return the end of a run whose tree ended with a failure or None; its items are not judged yet."""
+    if failure is None:
+        return Ending("SUCCESS")
+    return Ending("FAILURE", str(failure), failure.message, failure.path)
+
+
+def problems_of(do: Callable[[], None]) -> list[str]:
+    """Do one part of the end of a run and return its error, if any, so that the other parts are done, too."""
+    try:
+        do()
+    except Exception as error:
+        return [str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"]
+    return []
+
+
+def judge_items(accounts: Accounts) -> Ending:
+    """Return the end of a run whose tree succeeded: its items decide whether it is a success."""
+    rows = accounts.rows()
+    lost = [str(row["item"]) for row in rows if row["state"] == "lost"]
+    if lost:
+        message = f"{len(lost)} object(s) were lost and not found again: {', '.join(lost)}"
+        return Ending("FAILURE", "lost", message)
+    rejected = [f"{row['item']} ({row['why']})" for row in rows if row["state"] == "rejected"]
+    if rejected:
+        message = f"{len(rejected)} object(s) were not sorted: {', '.join(rejected)}"
+        return Ending("INCOMPLETE", "rejected", message)
+    return Ending("SUCCESS")
+
+
+def close_books(accounts: Accounts, *, completed: bool) -> None:
+    """Have the ledger decide the final state of each item, and check the balance.
+
+    Raises:
+        Fault: The number of items seen is not the sum of those placed, rejected, skipped and lost.
+    """
+    accounts.close(completed=completed)
+    counts = accounts.balance()
+    if not is_balanced(counts):
+        listed = ", ".join(f"{number} {state}" for state, number in counts.items())
+        raise Fault(
+            f"the books do not balance: {listed}; seen must be what was placed, rejected, skipped and lost"
+        )

@@ -1,0 +1,82 @@
+"""Base of everything that can disturb a cell, and one occurrence of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from executive.errors import InputError
+from executive.testing.faults.hand import Thing
+from executive.testing.faults.scene import Scene
+
+
+class Effect:
+    """Something that happens to a cell while it lasts; a subclass defines it.
+
+    An effect is a value without state: the state of one occurrence is in its `Occasion`. A subclass acts by
+    itself (`act`), or between the skills and the cell: it then defines `close`, `open` (tool), `plan` (arm),
+    `sees_table`, `capture` (camera), `request` (detector), `locate` (localizer) or `ask` (operator). Each of
+    these methods gets a function that asks the cell, and the occasion, and returns the answer.
+
+    Attributes:
+        name: Name of the effect in the record.
+    """
+
+    name: str
+
+    def act(self, now: Occasion) -> bool:
+        """Do something to the cell, once; return False as long as it cannot be done yet.
+
+        Called when the effect begins, and after every control step until it is done or over.
+        """
+        del now
+        return False
+
+
+@dataclass(eq=False)
+class Occasion:
+    """One occurrence of an effect.
+
+    Attributes:
+        effect: The effect.
+        scene: The cell and its world.
+        node: Path of the node during which it happens, or "".
+        item: Item that this node is about, or "".
+        until: Time at which it ends [s].
+        done: True once it has acted.
+        over: True once it is over.
+    """
+
+    effect: Effect
+    scene: Scene
+    node: str = ""
+    item: str = ""
+    until: float = math.inf
+    done: bool = False
+    over: bool = False
+    _told: float = -math.inf
+
+    def tell(self, thing: Thing | None = None) -> None:
+        """Emit a `disturbance` of the cell, or of one object in it; at most one per control step."""
+        if self._told == self.scene.now:
+            return
+        self._told = self.scene.now
+        self.scene.emit(
+            "disturbance",
+            what=self.effect.name,
+            node=self.node,
+            item=self.item,
+            object=thing.label if thing else "",
+            position=[round(float(value), 4) for value in thing.position] if thing else [],
+        )
+
+
+def checked_share(share: float | None) -> float:
+    """Return the share of its motion after which the arm is disturbed; 0 for None: at once, at rest too.
+
+    Raises:
+        InputError: It is not more than 0 and less than 1.
+    """
+    if share is not None and not 0.0 < share < 1.0:
+        raise InputError(f"a share of a motion is more than 0 and less than 1, not {share:g}")
+    return share or 0.0

@@ -1,0 +1,255 @@
+"""Annotations of labelled images on disk, in COCO or YOLO format, checked before any image is read."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, TypeVar
+
+import yaml
+from pydantic import BaseModel, Field, FiniteFloat, ValidationError
+
+from executive.cell.paths import leaves_folder, links_out
+from executive.cell.values import Box
+from executive.errors import MAX_QUOTED, InputError
+
+COCO_FILE_NAME = "_annotations.coco.json"
+YOLO_CLASS_FILES = ("data.yaml", "data.yml")
+"""Files that name the classes of a YOLO data set."""
+IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp")
+"""Suffixes of images."""
+BOX_VALUES = 4
+"""Number of values of a YOLO box: centre x, centre y, width and height."""
+MAX_OBJECTS = 1_000
+"""Largest number of labelled objects in an image; RF-DETR finds at most 300 (its number of queries)."""
+MAX_COCO_SIZE, MAX_LABEL_SIZE, MAX_CLASS_FILE_SIZE = 500_000_000, 10_000_000, 100_000
+"""Largest COCO file, YOLO label file and YOLO class file [byte]: the annotations of COCO 2017 have 470 MB."""
+NORMALIZED_TOLERANCE = 1e-6
+"""Accepted amount by which a normalized coordinate may lie outside of 0 to 1, because of rounding."""
+
+
+@dataclass(frozen=True)
+class ImageAnnotation:
+    """The labelled objects of an image.
+
+    Attributes:
+        labels: Class of each object.
+        boxes: Left, top, right and bottom of each object.
+        is_normalized: True if the boxes are in normalized coordinates (0 to 1); False if they are in pixels.
+        polygon_count: Number of boxes that were made from polygons.
+    """
+
+    labels: tuple[str, ...] = ()
+    boxes: tuple[Box, ...] = ()
+    is_normalized: bool = False
+    polygon_count: int = 0
+
+    def boxes_in_pixels(self, width: int, height: int) -> tuple[Box, ...]:
+        """Return the boxes in pixels for an image of `width` by `height` pixels."""
+        if not self.is_normalized:
+            return self.boxes
+        return tuple((x0 * width, y0 * height, x1 * width, y1 * height) for x0, y0, x1, y1 in self.boxes)
+
+
+Annotations = Mapping[Path, ImageAnnotation]
+"""The annotations of a folder by image, sorted by path."""
+NonNegative = Annotated[FiniteFloat, Field(ge=0)]
+ContentT = TypeVar("ContentT", bound=BaseModel)
+
+
+class _CocoImage(BaseModel):
+    id: int
+    file_name: str
+
+
+class _CocoObject(BaseModel):
+    image_id: int
+    category_id: int
+    bbox: tuple[FiniteFloat, FiniteFloat, NonNegative, NonNegative]
+
+
+class _CocoCategory(BaseModel):
+    id: int
+    name: str
+
+
+class _CocoFile(BaseModel):
+    images: list[_CocoImage]
+    annotations: list[_CocoObject]
+    categories: list[_CocoCategory]
+
+
+class _YoloClassFile(BaseModel):
+    names: dict[int, str] | list[str]
+
+
+@dataclass
+class _Objects:
+    """Mutable lists in which the objects of one image are collected while its file is read."""
+
+    labels: list[str] = field(default_factory=list)
+    boxes: list[Box] = field(default_factory=list)
+    polygon_count: int = 0
+
+
+def is_split(folder: Path) -> bool:
+    """Return True if a folder holds labelled images."""
+    return (folder / COCO_FILE_NAME).is_file() or (
+        (folder / "images").is_dir() and (folder / "labels").is_dir()
+    )
+
+
+def read_annotations(split: Path) -> Annotations:
+    """Return the annotations of a folder with one split of a data set.
+
+    Raises:
+        InputError: A file is damaged, or an image is missing or lies outside of the folder; the text names
+            the file and the line or the key.
+    """
+    images = _read_coco(split) if (split / COCO_FILE_NAME).is_file() else _read_yolo(split)
+    return dict(sorted(images, key=lambda image: str(image[0])))
+
+
+def _read_coco(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
+    file = split / COCO_FILE_NAME
+    content = _parse(file, MAX_COCO_SIZE, lambda text: _CocoFile.model_validate_json(text))
+    names = {category.id: category.name for category in content.categories}
+    objects = {image.id: _Objects() for image in content.images}
+    for what, values in (
+        ("images have the same id", [image.id for image in content.images]),
+        ("images have the same file_name", [split / image.file_name for image in content.images]),
+        ("categories have the same id", [category.id for category in content.categories]),
+    ):
+        if len(set(values)) < len(values):
+            raise InputError(f"{file}: two {what}")
+    for number, one in enumerate(content.annotations):
+        if one.image_id not in objects:
+            raise InputError(f"{file}: annotations[{number}].image_id: there is no image {one.image_id}")
+        if one.category_id not in names:
+            raise InputError(
+                f"{file}: annotations[{number}].category_id: there is no category {one.category_id}; "
+                f"there are {', '.join(map(str, names))[:MAX_QUOTED] or 'none'}"
+            )
+        left, top, width, height = one.bbox
+        if len(objects[one.image_id].labels) == MAX_OBJECTS:
+            raise InputError(
+                f"{file}: annotations[{number}].image_id: image {one.image_id} has more than {MAX_OBJECTS} "
+                "objects; divide the image"
+            )
+        objects[one.image_id].labels.append(names[one.category_id])
+        objects[one.image_id].boxes.append((left, top, left + width, top + height))
+    for number, image in enumerate(content.images):
+        path = _find_image(split, image.file_name, f"{file}: images[{number}].file_name")
+        found = objects[image.id]
+        yield path, ImageAnnotation(tuple(found.labels), tuple(found.boxes))
+
+
+def _read_yolo(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
+    data = next((split.parent / name for name in YOLO_CLASS_FILES if (split.parent / name).is_file()), None)
+    if data is None:
+        raise InputError(f"{split.parent} has no data.yaml, which names the classes of a YOLO data set")
+    content = _parse(
+        data,
+        MAX_CLASS_FILE_SIZE,
+        lambda text: _YoloClassFile.model_validate(yaml.load(text, Loader=yaml.BaseLoader)),
+    )
+    names = dict(enumerate(content.names)) if isinstance(content.names, list) else content.names
+    folder = split / "images"
+    for path in folder.iterdir():
+        if path.suffix.lower() in IMAGE_SUFFIXES:
+            image = _find_image(folder, path.name, str(path))
+            yield image, _read_labels(split / "labels" / f"{path.stem}.txt", names)
+
+
+def _read_labels(file: Path, names: Mapping[int, str]) -> ImageAnnotation:
+    """Return the objects in the label file of a YOLO image; an image without a file has none."""
+    if not os.path.lexists(file):
+        return ImageAnnotation(is_normalized=True)
+    objects = _Objects()
+    for number, line in enumerate(_read_text(file, MAX_LABEL_SIZE).splitlines(), start=1):
+        if not line.strip():
+            continue
+        try:
+            label, *values = line.split()
+            numbers = [float(value) for value in values]
+            name = names[int(label)]
+        except KeyError:
+            raise InputError(f"{file}:{number}: there is no class {label}; there are {len(names)}") from None
+        except ValueError:
+            raise InputError(
+                f'{file}:{number}: a line has a class number and normalized coordinates, not "{line}"'
+            ) from None
+        is_polygon = len(numbers) > BOX_VALUES and len(numbers) % 2 == 0
+        if len(numbers) != BOX_VALUES and not is_polygon:
+            raise InputError(
+                f"{file}:{number}: a box has {BOX_VALUES} values and a polygon at least 6, an even number, "
+                f"not {len(numbers)}"
+            )
+        # The comparison is False for numbers that are not finite.
+        if not all(-NORMALIZED_TOLERANCE <= value <= 1 + NORMALIZED_TOLERANCE for value in numbers):
+            raise InputError(f'{file}:{number}: coordinates must be normalized (0 to 1), not "{line}"')
+        if len(objects.labels) == MAX_OBJECTS:
+            raise InputError(f"{file}:{number}: an image has at most {MAX_OBJECTS} objects; divide the image")
+        objects.labels.append(name)
+        objects.boxes.append(_polygon_to_box(numbers) if is_polygon else _centre_to_corner_box(numbers))
+        objects.polygon_count += is_polygon
+    return ImageAnnotation(tuple(objects.labels), tuple(objects.boxes), True, objects.polygon_count)
+
+
+def _polygon_to_box(polygon: list[float]) -> Box:
+    xs, ys = polygon[0::2], polygon[1::2]
+    return min(xs), min(ys), max(xs), max(ys)
+
+
+def _centre_to_corner_box(box: list[float]) -> Box:
+    x, y, width, height = box
+    return x - width / 2, y - height / 2, x + width / 2, y + height / 2
+
+
+def _find_image(folder: Path, name: str, place: str) -> Path:
+    """Return the path of an image; `place` is the file and the key that list it, for error messages.
+
+    Raises:
+        InputError: The image is missing, is not a regular file, or lies outside of the folder.
+    """
+    path = folder / name
+    if not name or leaves_folder(name):
+        raise InputError(f'{place}: "{name}" is not below {folder}')
+    if not os.path.isfile(path):
+        raise InputError(f'{place}: "{name}" is not a file in {folder}')
+    if links_out(folder, name):
+        raise InputError(f'{place}: "{name}" is a link to a file outside of {folder}')
+    return path
+
+
+def _read_text(file: Path, max_size: int) -> str:
+    if not os.path.isfile(file):
+        raise InputError(f"{file} is no file")
+    if file.stat().st_size > max_size:
+        raise InputError(f"{file} has more than {max_size / 1e6:g} MB, the limit of such a file")
+    try:
+        return file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{file} cannot be read: {error}") from error
+
+
+def _parse(file: Path, max_size: int, parse: Callable[[str], ContentT]) -> ContentT:
+    """Return the parsed content of a file of at most `max_size` [byte].
+
+    Raises:
+        InputError: The file is too large, cannot be read, is not valid, or lacks a required key; the message
+        names the line or the key.
+    """
+    try:
+        return parse(_read_text(file, max_size))
+    except yaml.MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else 1
+        raise InputError(f"{file}:{line}: invalid YAML: {error.problem}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        keys = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in first["loc"])
+        raise InputError(f"{file}: {keys.removeprefix('.') or 'content'}: {first['msg']}") from error
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise InputError(f"{file} cannot be read: {error}") from error

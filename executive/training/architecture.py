@@ -1,0 +1,59 @@
+"""The small RF-DETR this project trains: Nano with three encoder layers and fifty queries."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from pathlib import Path
+from typing import Any
+
+from executive.training.torchvision_ops import declare_missing
+
+RESOLUTION = 256
+"""Side of the square input [pixel]."""
+
+ARCHITECTURE: dict[str, Any] = {
+    "resolution": RESOLUTION,
+    # The encoder is read after its layers 1 and 3 and stops there: deeper ones vanish on export.
+    "out_feature_indexes": [1, 3],
+    # A table holds a handful of objects; 300 queries, the stock figure, would be paid for in every step.
+    "num_queries": 50,
+    "num_select": 50,
+    "group_detr": 5,
+    "dec_layers": 2,
+}
+
+
+def create(classes: int, start: Path | None = None, device: str = "cpu") -> Any:
+    """Return an `rfdetr.RFDETRNano` of this architecture.
+
+    Args:
+        classes: Number of object classes.
+        start: Checkpoint whose weights it starts from; None for random ones.
+        device: Torch device its weights live on.
+
+    """
+    # albumentations, where installed, would ask a package index for its newest version at import.
+    os.environ.setdefault("NO_ALBUMENTATIONS_UPDATE", "1")
+    declare_missing()
+    from rfdetr import RFDETRNano
+
+    with warnings.catch_warnings():
+        # It warns that training from random weights needs more data than fine-tuning. We bring it.
+        warnings.simplefilter("ignore")
+        return RFDETRNano(
+            # Bare names would be looked for among rfdetr's own downloads.
+            pretrain_weights=None if start is None else str(start.resolve()),
+            num_classes=classes,
+            device=device,
+            **ARCHITECTURE,
+        )
+
+
+def describe() -> dict[str, str]:
+    """Return the architecture as texts for a model card."""
+    return {
+        "architecture": "RF-DETR Nano (rfdetr), "
+        + ", ".join(f"{name} {value}" for name, value in ARCHITECTURE.items()),
+        "input": f"{RESOLUTION} x {RESOLUTION} pixel, RGB",
+    }

@@ -1,0 +1,137 @@
+"""Labelled images on disk, in the two layouts that detectors are trained from.
+
+`coco` is Roboflow's: `train|valid|test/_annotations.coco.json` beside the images. `yolo` is
+`data.yaml` with `train|valid|test/images` and `…/labels`. Images are written by whoever makes them
+(see `image_path`), annotations once all are there.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from executive.cell.values import Box
+from executive.errors import InputError
+
+SPLITS = ("train", "valid", "test")
+QUALITY = 95
+"""JPEG quality of the images."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What is known of one image of a dataset.
+
+    Attributes:
+        split: `train`, `valid` or `test`.
+        file: File name of the image.
+        size: Width and height [pixel].
+        labels: Class of each labelled object.
+        boxes: Their boxes, one to one.
+        ignored: Boxes of objects that are neither labelled nor background.
+        truth: Anything else worth keeping for measurements, as plain values.
+    """
+
+    split: str
+    file: str
+    size: tuple[int, int]
+    labels: tuple[str, ...]
+    boxes: tuple[Box, ...]
+    ignored: tuple[Box, ...] = ()
+    truth: Mapping[str, Any] = field(default_factory=dict)
+
+
+def image_path(root: Path, layout: str, split: str, file: str) -> Path:
+    """Return where an image of a dataset belongs."""
+    return root / split / file if layout == "coco" else root / split / "images" / file
+
+
+def save_image(path: Path, image: NDArray[np.uint8]) -> None:
+    """Write an RGB image `(H, W, 3)`.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if not cv2.imwrite(str(path), image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY]):
+        raise InputError(f"the image {path} could not be written; is the disk full or the folder read-only?")
+
+
+def write_annotations(root: Path, layout: str, entries: Sequence[Entry], classes: Sequence[str]) -> None:
+    """Write the annotations of a whole dataset, the classes numbered from 0 in the order given.
+
+    Beside them each split gets `ignored.json` (boxes by file, for measurements that must neither
+    demand nor punish them) and `truth.json` (the entries' `truth` by file).
+
+    Raises:
+        InputError: The layout is unknown.
+    """
+    if layout not in ("coco", "yolo"):
+        raise InputError(f'the dataset layout "{layout}" is unknown; there are coco and yolo')
+    root.mkdir(parents=True, exist_ok=True)
+    splits = [split for split in SPLITS if any(entry.split == split for entry in entries)]
+    for split in splits:
+        mine = [entry for entry in entries if entry.split == split]
+        if layout == "coco":
+            _write_json(root / split / "_annotations.coco.json", _coco(mine, classes))
+        else:
+            _write_yolo(root / split / "labels", mine, classes)
+        _write_json(root / split / "ignored.json", {entry.file: entry.ignored for entry in mine})
+        _write_json(root / split / "truth.json", {entry.file: entry.truth for entry in mine})
+    if layout == "yolo":
+        names = {"val" if split == "valid" else split: f"{split}/images" for split in splits}
+        data = {"path": ".", **names, "nc": len(classes), "names": list(classes)}
+        (root / "data.yaml").write_text(yaml.safe_dump(data, sort_keys=False))
+
+
+def _coco(entries: Sequence[Entry], classes: Sequence[str]) -> dict[str, Any]:
+    images: list[dict[str, Any]] = []
+    annotations: list[dict[str, Any]] = []
+    for number, entry in enumerate(entries):
+        width, height = entry.size
+        images.append({"id": number, "file_name": entry.file, "width": width, "height": height})
+        for label, (left, top, right, bottom) in zip(entry.labels, entry.boxes, strict=True):
+            annotations.append(
+                {
+                    "id": len(annotations) + 1,
+                    "image_id": number,
+                    "category_id": classes.index(label),
+                    "bbox": [round(value, 3) for value in (left, top, right - left, bottom - top)],
+                    "area": round((right - left) * (bottom - top), 3),
+                    "iscrowd": 0,
+                    "segmentation": [],
+                }
+            )
+    categories = [{"id": i, "name": name, "supercategory": "object"} for i, name in enumerate(classes)]
+    return {
+        "info": {},
+        "licenses": [],
+        "categories": categories,
+        "images": images,
+        "annotations": annotations,
+    }
+
+
+def _write_yolo(folder: Path, entries: Sequence[Entry], classes: Sequence[str]) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for entry in entries:
+        width, height = entry.size
+        lines = [
+            f"{classes.index(label)} {(left + right) / 2 / width:.6f} {(top + bottom) / 2 / height:.6f} "
+            f"{(right - left) / width:.6f} {(bottom - top) / height:.6f}\n"
+            for label, (left, top, right, bottom) in zip(entry.labels, entry.boxes, strict=True)
+        ]
+        (folder / entry.file).with_suffix(".txt").write_text("".join(lines))
+
+
+def _write_json(path: Path, content: Any) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(content))

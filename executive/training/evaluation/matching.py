@@ -1,0 +1,81 @@
+"""Assignment of detections to labelled objects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from executive.cell.values import Box, Detection
+from executive.geometry import Array
+from executive.training.samples import LabelledImage
+
+COVERED = 0.2
+"""Overlap (intersection over union) from which a box covers a part of another object."""
+MATCH = 0.5
+"""Overlap (intersection over union) from which a box is the object's."""
+
+
+@dataclass(frozen=True)
+class Match:
+    """Object that a detection shows.
+
+    Attributes:
+        detection: The detection.
+        number: Number of the object it lies on, or None where there is none.
+        right: True if the detection has the class of that object.
+    """
+
+    detection: Detection
+    number: int | None
+    right: bool
+
+
+def match(found: Sequence[Detection], sample: LabelledImage) -> list[Match]:
+    """Return the object of each detection, the most confident detection first.
+
+    Greedy: each detection takes the object of its own class that it overlaps most, if none has taken it; the
+    detections that remain then take the objects that remain, whatever their class.
+    """
+    ranked = sorted(found, key=lambda one: -one.confidence)
+    overlaps = overlap([one.box for one in ranked], sample.boxes)
+    same_class = np.array([[one.label == label for label in sample.labels] for one in ranked], dtype=bool)
+    taken: dict[int, int] = {}
+    for allowed in (same_class.reshape(overlaps.shape), np.ones_like(overlaps)):
+        for rank in range(len(ranked)):
+            scores = overlaps[rank] * allowed[rank]
+            if rank not in taken and scores.size and scores.max() >= MATCH:
+                taken[rank] = int(scores.argmax())
+                overlaps[:, taken[rank]] = 0.0
+    return [
+        Match(one, taken.get(rank), rank in taken and sample.labels[taken[rank]] == one.label)
+        for rank, one in enumerate(ranked)
+    ]
+
+
+def is_covered(number: int, matches: Sequence[Match], sample: LabelledImage) -> bool:
+    """Return True if a detection of another object overlaps an object: it is looked at again afterwards."""
+    others = [one.detection.box for one in matches if one.number not in (None, number)]
+    return bool(overlap([sample.boxes[number]], others).max(initial=0.0) >= COVERED)
+
+
+def is_ignored(detection: Detection, sample: LabelledImage) -> bool:
+    """Return True for a detection of one of the objects that may be found or not."""
+    best = overlap([detection.box], sample.ignored).max(initial=0.0)
+    return bool(best >= MATCH and best > overlap([detection.box], sample.boxes).max(initial=0.0))
+
+
+def offset_of(one: Match, number: int, sample: LabelledImage) -> Array:
+    """Return the vector from the centre of object `number`'s box to that of the found one, `(2,)` [pixel]."""
+    left, top, right, bottom = sample.boxes[number]
+    return np.array(one.detection.centre) - [(left + right) / 2, (top + bottom) / 2]
+
+
+def overlap(boxes: Sequence[Box], others: Sequence[Box]) -> NDArray[np.float32]:
+    """Return the intersection over union of every box with every other one, `(N, M)`."""
+    # The import takes half a second: only an evaluation pays for it.
+    from supervision import box_iou_batch
+
+    return np.asarray(box_iou_batch(np.array(boxes).reshape(-1, 4), np.array(others).reshape(-1, 4)))

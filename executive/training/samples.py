@@ -1,0 +1,129 @@
+"""Reading labelled images back, to measure a detector with: COCO and YOLO folders, Roboflow's among them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from executive.cell.values import Box
+from executive.errors import InputError
+from executive.geometry import Array
+from executive.training.annotations import COCO_FILE_NAME, is_split, read_annotations
+
+SPLITS = ("test", "valid", "val", "train")
+"""Folders of a data set in which labelled images are sought, those that no training has used first."""
+
+
+@dataclass(frozen=True, eq=False)
+class LabelledImage:
+    """An image and what is on it.
+
+    Attributes:
+        file: File name.
+        image: `(H, W, 3)` uint8, RGB.
+        labels: Class of each object.
+        boxes: Their boxes [pixel], one to one.
+        ignored: Boxes of objects that a detector may find or not.
+        truth: What the renderer knows beyond that: `camera`, `part`, `matrix`, `X_WC`, `positions`, …
+        area: Part of the image [pixel] that is searched and labelled; None: all of it.
+        depth: `(H, W)` [m], as in a `Frame`; None without a depth sensor.
+        second: Another image of the same scene from the same pose; None without one.
+    """
+
+    file: str
+    image: NDArray[np.uint8]
+    labels: tuple[str, ...]
+    boxes: tuple[Box, ...]
+    ignored: tuple[Box, ...] = ()
+    truth: Mapping[str, Any] = field(default_factory=dict)
+    area: Box | None = None
+    depth: Array | None = None
+    second: NDArray[np.uint8] | None = None
+
+
+class Samples:
+    """The labelled images of a split, or of the first of a data set's splits that exists.
+
+    Iteration reads one image after the other.
+
+    Args:
+        folder: The split or the data set.
+
+    Attributes:
+        polygon_count: Number of boxes that are made from polygons.
+
+    Raises:
+        InputError: There are no labelled images, or the annotations are damaged.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._split = _split(folder)
+        self._annotations = read_annotations(self._split)
+        self.polygon_count = sum(one.polygon_count for one in self._annotations.values())
+
+    def __len__(self) -> int:
+        return len(self._annotations)
+
+    def __iter__(self) -> Iterator[LabelledImage]:
+        """Yield the images.
+
+        Raises:
+            InputError: An image cannot be read.
+        """
+        ignored, truth = (_read_json(self._split / name) for name in ("ignored.json", "truth.json"))
+        for path, annotation in self._annotations.items():
+            image = read_image(path)
+            yield LabelledImage(
+                path.name,
+                image,
+                annotation.labels,
+                annotation.boxes_in_pixels(image.shape[1], image.shape[0]),
+                tuple(map(tuple, ignored.get(path.name, ()))),
+                truth.get(path.name, {}),
+            )
+
+
+def read_image(path: Path) -> NDArray[np.uint8]:
+    """Return an image file as `(H, W, 3)` uint8, RGB.
+
+    Raises:
+        InputError: It cannot be read.
+    """
+    image = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    if image is None:
+        raise InputError(f"the image {path} cannot be read; is it missing or damaged?")
+    return np.ascontiguousarray(image[..., ::-1], dtype=np.uint8)
+
+
+def _split(folder: Path) -> Path:
+    """Return the folder in which the labelled images of a data set are, or of a split of one.
+
+    Raises:
+        InputError: There is none.
+    """
+    for split in (folder, *(folder / name for name in SPLITS)):
+        if is_split(split):
+            return split
+    raise InputError(
+        f"{folder} holds no labelled images: {COCO_FILE_NAME} (COCO) or images/ and labels/ (YOLO) were "
+        f"looked for there and in {', '.join(SPLITS)}; make some with `executive dataset`"
+    )
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    if not path.is_file():
+        return {}
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise InputError(f"{path} cannot be read: {error}") from error
+    if not isinstance(content, dict):
+        raise InputError(f"{path} must hold an object with a key for each image")
+    return content

@@ -1,0 +1,86 @@
+"""One run of a skill, driven one step of its generator at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from typing import TYPE_CHECKING, Any
+
+from executive.errors import Fault
+from executive.skill import Direction, Skill, SkillFailed
+
+if TYPE_CHECKING:
+    from executive.cell.protocols import Cell
+
+
+class SkillRun:
+    """One run of a skill, from its first step until it ends or is halted.
+
+    Args:
+        skill: A fresh instance with its params and inputs.
+        cell: Cell that the skill acts on.
+
+    Attributes:
+        skill: The instance that is run.
+    """
+
+    def __init__(self, skill: Skill, cell: Cell) -> None:
+        self.skill = skill
+        self._cell = cell
+        self._steps: Iterator[Any] | None = None
+
+    def step(self) -> bool:
+        """Advance the skill by one step, starting it at the first call; return True once it has succeeded.
+
+        Raises:
+            SkillFailed: It failed with a declared reason.
+            Fault: It failed with an undeclared reason, yielded a value, or left an output unset.
+        """
+        try:
+            if self._steps is None:
+                # A `run` without any yield is a plain function: it has done its work already.
+                self._steps = iter(self.skill.run(self._cell) or ())
+            # `self` is the sentinel for the end of the generator: a skill cannot yield its own `SkillRun`.
+            yielded = next(self._steps, self)
+        except SkillFailed as failed:
+            if failed.reason in self.skill.reasons:
+                raise
+            declared = ", ".join(self.skill.reasons) or "none"
+            message = f'it failed with the undeclared reason "{failed.reason}"; it declares: {declared}'
+            raise _fault(message, failed) from failed
+        if yielded is None:
+            return False
+        if yielded is not self:
+            kind = type(yielded).__name__
+            raise Fault(f'it yielded a {kind}; to run the steps of another generator, write "yield from"')
+        if unset := [name for name in self._output_names if not hasattr(self.skill, name)]:
+            raise Fault(f"it succeeded without setting its output {', '.join(unset)}")
+        return True
+
+    def outputs(self) -> dict[str, Any]:
+        """Return the outputs by name; all are set once the skill has succeeded."""
+        return {name: getattr(self.skill, name) for name in self._output_names}
+
+    def halt(self) -> None:
+        """Close the generator, so that its `finally` runs.
+
+        Raises:
+            Fault: The skill raised, or yielded, while it was being closed.
+        """
+        if not isinstance(self._steps, Generator):
+            return
+        try:
+            self._steps.close()
+        except Exception as error:
+            message = f"{type(error).__name__} while it was halted: {error}"
+            if isinstance(error, RuntimeError) and "GeneratorExit" in str(error):
+                message = 'it yielded while it was halted; nothing may wait in "finally"'
+            raise _fault(message, error) from error
+
+    @property
+    def _output_names(self) -> list[str]:
+        return [name for name, port in self.skill.ports.items() if port.direction is Direction.OUT]
+
+
+def _fault(message: str, error: Exception) -> Fault:
+    """Return a fault whose traceback ends where the error was raised."""
+    return Fault(message).with_traceback(error.__traceback__)

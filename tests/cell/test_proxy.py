@@ -1,0 +1,59 @@
+"""The proxy between a skill and its cell."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from executive.cell.arm import Task
+from executive.cell.proxy import Access, intercept
+from executive.cells.fake.cell import FakeCell
+from executive.testing.conformance.watch import Watch
+
+
+def test_every_access_goes_through_the_interceptor_and_so_do_those_to_what_a_call_returns(
+    fake: FakeCell,
+) -> None:
+    seen: list[tuple[str, str, tuple[Any, ...], bool]] = []
+
+    def ask(access: Access) -> Any:
+        seen.append((access.name, access.detector, access.all_arguments, access.is_call))
+        return access.proceed()
+
+    cell = intercept(fake.cell, ask, ("arm", "detector"))
+    assert cell.arm.at_rest
+    planning = cell.arm.plan("home", task=Task())
+    assert not planning.ready
+    frame = cell.camera.capture()
+    assert not cell.detectors["embedded"].request(frame, view="full").ready
+    assert seen == [
+        ("arm.at_rest", "", (), False),
+        ("arm.plan", "", ("home", Task()), True),
+        ("plan.ready", "", (), False),
+        ("detector.request", "embedded", (frame, "full"), True),
+        ("request.ready", "embedded", (), False),
+    ]
+
+
+def test_an_interceptor_may_answer_in_place_of_the_part(fake: FakeCell) -> None:
+    cell = intercept(fake.cell, lambda access: access.member, ("arm", "tool"))
+    assert (cell.tool.holding, cell.arm.plan("home").result()) == ("holding", "result")
+
+
+def test_only_the_members_of_the_protocol_are_offered(fake: FakeCell) -> None:
+    cell = intercept(fake.cell, lambda access: access.proceed(), ("arm",))
+    for member in ("commanded", "_plans", "__deepcopy__"):
+        with pytest.raises(AttributeError, match=member):
+            getattr(cell.arm, member)
+
+
+def test_a_watch_notes_every_call(fake: FakeCell) -> None:
+    watch = Watch(fake.cell)
+    watch.tick = 7
+    assert watch.cell.operator.ask(["duck"]) is None
+    assert watch.cell.arm.plan("home").ready is False
+    assert [(call.tick, call.name, call.arguments) for call in watch.calls] == [
+        (7, "operator.ask", (["duck"],)),
+        (7, "arm.plan", ("home",)),
+    ]

@@ -1,0 +1,212 @@
+"""The fake cell is the cell of its file, less the physics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from executive.cell.config import CellConfig
+from executive.cell.values import Detections
+from executive.cell.workcell import PLACES, CellOptions
+from executive.cells.fake.cell import FakeCell, SilentOperator
+from executive.errors import InputError
+from executive.mission.load import load_mission
+from executive.mission.parse.cell_file import load_cell
+from executive.plugins import discover
+from executive.run.run import Run
+from executive.testing.run_skill import run_skill
+from skills.approach import Approach
+from skills.detect import Detect
+from skills.grasp import Grasp
+from skills.localize import Localize
+from skills.move_to_scan import MoveToScan
+from skills.transit import Transit
+
+Load = Callable[..., CellConfig]
+
+
+@pytest.fixture
+def load(missions: Path) -> Load:
+    """Load a shipped cell file with some keys changed."""
+
+    def load(name: str = "overhead", **changes: str) -> CellConfig:
+        overrides = {f"cell.{key.replace('__', '.')}": value for key, value in changes.items()}
+        return load_cell(missions / "cells" / f"{name}.yaml", overrides)
+
+    return load
+
+
+def placements(fake: FakeCell) -> list[tuple[str, float, float]]:
+    return [(thing.label, *thing.position[:2]) for thing in fake.world.objects]
+
+
+def test_bins_classes_and_places_are_those_of_the_file(load: Load) -> None:
+    config = load(safe_place="[0.4, -0.2, 0.01]", bins__red_bin__slots="[1, 4]")
+    cell = FakeCell(config).cell
+    assert list(cell.bins) == ["red_bin", "blue_bin", "yellow_bin"]
+    assert cell.bins["red_bin"].slots.shape == (4, 2)
+    assert cell.classes["duck"].height == config.objects["duck"].height
+    assert list(cell.safe_place) == [0.4, -0.2, 0.01]
+    assert (cell.descent, cell.descent_speed) == (config.motion.descent, config.motion.descent_speed)
+
+
+def test_as_many_objects_as_the_file_says_lie_apart_on_its_table(load: Load) -> None:
+    config = load(table__objects="[5, 7]", table__x="[0.3, 0.5]")
+    counts = set()
+    for seed in range(20):
+        things = placements(FakeCell(config, seed=seed))
+        counts.add(len(things))
+        for number, (label, x, y) in enumerate(things):
+            assert 0.3 <= x <= 0.5 and -0.22 <= y <= 0.22
+            for neighbour, u, v in things[:number]:
+                room = config.objects[label].radius + config.objects[neighbour].radius + config.table.gap
+                assert np.hypot(x - u, y - v) >= room - 1e-9
+        assert placements(FakeCell(config, seed=seed)) == things, "a seed decides"
+    assert counts == {5, 6, 7}
+
+
+def test_a_window_too_many_objects_and_unknown_ones_are_refused(load: Load, fake: FakeCell) -> None:
+    options = CellOptions(SilentOperator(), base=Path(), gui=True)
+    with pytest.raises(InputError, match='overhead is of kind "fake" and has no window; run it without'):
+        FakeCell(load(), options=options)
+    with pytest.raises(InputError, match=r'"cub" can be put on the fake table\. Did you mean "cube"'):
+        fake.world.put("cub", 0.5, 0.0)
+    assert not fake.world.objects
+    with pytest.raises(
+        InputError, match=r"90 objects find no room on the workspace of cell overhead, which has 18 places"
+    ):
+        FakeCell(load(table__objects="[90, 90]"))
+
+
+def test_every_detector_of_the_file_sees_everything_with_its_own_latency(load: Load) -> None:
+    late = "{first: {kind: anything, latency: 0.1}, sure: {kind: anything, threshold: 0.95}}"
+    fake = FakeCell(load(detectors=late, table__objects="[4, 4]"))
+    first = run_skill(Detect(), fake)
+    assert first.ticks == 24, "0.1 s at 240 Hz"
+    sure = run_skill(Detect(detector="sure"), fake).outputs["detections"]
+    assert len(sure.found) == len(first.outputs["detections"].found) == 4
+
+
+def test_a_look_at_the_table_alone_shows_nothing_beside_it() -> None:
+    fake = FakeCell()
+    fake.world.put("cube", 0.5, 0.0)
+    fake.world.put("cube", *fake.cell.bins["red_bin"].position[:2])
+    seen = [run_skill(Detect(view=view), fake).outputs["detections"].found for view in ("table", "full")]
+    assert [len(boxes) for boxes in seen] == [1, 2]
+
+
+@pytest.mark.parametrize("pose", ["scan", "scan_left", "scan_right"])
+def test_a_camera_on_the_wrist_sees_the_table_from_its_scan_poses_and_locates_truly(
+    load: Load, pose: str
+) -> None:
+    fake = FakeCell(load("wrist"), seed=1)
+    assert fake.cell.camera.name == "wrist"
+    assert not fake.cell.camera.sees_table(), "home is no scan pose"
+    assert run_skill(MoveToScan(pose=pose), fake).status == "SUCCESS"
+    assert fake.cell.camera.sees_table()
+    detections: Detections = run_skill(Detect(), fake).outputs["detections"]
+    targets = run_skill(Localize(detections=detections), fake).outputs["targets"]
+    assert len(targets) == len(fake.world.objects) >= 3
+    for target, thing in zip(targets, fake.world.objects, strict=True):
+        assert np.allclose(target.position, thing.position, atol=1e-6)
+
+
+def test_each_bin_and_a_safe_place_beyond_the_arm_are_reported(load: Load) -> None:
+    assert FakeCell.check(load(), Path()) == ()
+    far = load(bins__blue_bin__position="[0.2, 0.85, 0.0]", safe_place="[0.9, 0.0, 0.0]")
+    assert FakeCell.check(far, Path()) == (
+        (
+            ("bins", "blue_bin", "position"),
+            'the bin "blue_bin" is out of reach: 0.88 m from the base is more than the arm\'s 0.85 m',
+        ),
+        (
+            ("safe_place",),
+            "the safe place is out of reach: 0.91 m from the base is more than the arm's 0.85 m",
+        ),
+    )
+
+
+def test_more_objects_than_places_are_reported(load: Load) -> None:
+    ((key, text),) = FakeCell.check(load(table__objects="[0, 19]"), Path())
+    assert key == ("table", "objects")
+    assert text == (
+        "19 objects find no room on the workspace of cell overhead, which has 18 places 0.083 m apart; "
+        "ask for fewer or widen table.x and table.y"
+    )
+
+
+def test_nothing_is_done_sooner_than_the_least_times_say(load: Load) -> None:
+    fake, least = FakeCell(), FakeCell.least_times(load())
+    # The corner of the workspace that is nearest to the red bin.
+    fake.world.put("sphere", 0.42, -0.22)
+    look = run_skill(Detect(), fake)
+    (target,) = run_skill(Localize(detections=look.outputs["detections"]), fake).outputs["targets"]
+    approach = run_skill(Approach(target=target), fake)
+    held = run_skill(Grasp(target=target), fake).outputs["held"]
+    transit = run_skill(Transit(held=held, bin="red_bin"), fake)
+    step = fake.cell.clock.step
+    assert 0 < least.answer("") == least.answer("embedded") <= look.ticks * step
+    assert 0 < least.descent <= approach.ticks * step
+    assert 0.2 < least.carry("red_bin") <= transit.ticks * step < 3 * least.carry("red_bin")
+    assert least.carry(None) == min(least.carry(name) for name in load().bins)
+    assert (least.carry("no_bin"), least.answer("no_detector")) == (0.0, 0.0)
+
+
+def test_a_mission_is_rehearsed_in_a_cell_of_kind_fake_and_its_trays_fill_evenly(tmp_path: Path) -> None:
+    file = tmp_path / "kit.yaml"
+    file.write_text(
+        "mission: kit\n"
+        "cell: cells/kitting.yaml\n"
+        "routes: {bolt: [tray_2, tray_1], nut: [tray_2, tray_1], washer: [tray_2, tray_1]}\n"
+        "tree:\n"
+        "  repeat:\n"
+        "    times: 4\n"
+        "    do: [MoveToScan, Detect, Localize, SelectTarget, Approach, Grasp, Transit, Release]\n"
+    )
+    run = Run(load_mission(file, discover()), discover(), seed=1)
+    assert isinstance(run.workcell, FakeCell)
+    outcome = run.execute()
+    assert outcome.status == "SUCCESS", outcome
+    bins = [row["bin"] for row in run.items()["rows"] if row["bin"]]
+    assert (sorted(bins), dict(run.audit() or {})["right"]) == (["tray_1", "tray_1", "tray_2", "tray_2"], 4)
+
+
+@pytest.mark.parametrize(
+    ("x", "what"), [(0.362, "right"), (0.374, "elsewhere"), (0.39, "elsewhere"), (0.34, "right")]
+)
+def test_what_fell_between_two_bins_is_in_the_nearer(load: Load, x: float, what: str) -> None:
+    """The premium crate ends at 0.36 m, and the market crate begins at 0.37 m."""
+    cell = FakeCell(load("fruit", table__objects="[0, 0]"), routes={"banana": ("premium_crate",)})
+    cell.world.put("banana", x, 0.4).fell = True
+    assert {count: n for count, n in cell.audit().items() if n and count not in PLACES[-2:]} == {what: 1}
+
+
+@pytest.mark.parametrize("beside", [None, 0.04], ids=["alone", "beside a cube"])
+def test_what_falls_on_the_wall_of_a_bin_falls_into_the_bin(load: Load, beside: float | None) -> None:
+    cell = FakeCell(load(table__objects="[0, 0]"))
+    bin, radius = cell.cell.bins["red_bin"], cell.cell.classes["cube"].radius
+    x, edge = float(bin.position[0]), float(bin.position[1] + bin.size[1] / 2)
+    if beside is not None:
+        cell.world.put("cube", x, edge + beside)
+    cube = cell.world.put("cube", x, edge + 0.01)
+    cell.world.held = cube
+    cell.tool.part()
+    assert bin.contains(cube.position)
+    assert beside is not None or np.allclose(cube.position[:2], (x, edge - radius))
+
+
+@pytest.mark.parametrize(("in_bin", "what"), [(True, "right"), (False, "elsewhere")])
+def test_what_is_taken_out_of_a_bin_counts_as_if_it_still_lay_there(
+    load: Load, in_bin: bool, what: str
+) -> None:
+    cell = FakeCell(load(table__objects="[0, 0]"), routes={"cube": ("red_bin",)})
+    cube = cell.world.put("cube", 0.5, 0.0)
+    look = run_skill(Detect(), cell)
+    run_skill(Localize(detections=look.outputs["detections"]), cell)
+    if in_bin:
+        cube.position = cell.cell.bins["red_bin"].position
+    cell.world.remove(cube)
+    assert cell.audit() == {**dict.fromkeys(PLACES, 0), what: 1}

@@ -1,0 +1,95 @@
+"""A detector that errs on purpose."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from executive.cell.config import DetectorConfig
+from executive.cell.values import Answer, Detection
+from executive.cells.fake.noisy_detector import NoisyDetector
+from executive.perception.detectors.setting import Setting
+
+CLASSES = ("cube", "sphere", "duck")
+LOOKS = 1000
+TABLE = (192, 100, 448, 356)
+THINGS = tuple(
+    Detection(label, 0.9, (x, 200.0, x + 20, 220.0))
+    for label, x in zip(CLASSES, (210, 300, 400), strict=True)
+)
+KNOWN = SimpleNamespace(
+    request=lambda frame, view: SimpleNamespace(ready=True, result=lambda: Answer("known", THINGS, None))
+)
+"""A detector that always sees the same three things."""
+
+
+def answers(seed=1, view="table", **errors):
+    none = {"misses": 1e-9, "confused": 1e-9, "invented": 1e-9, "jitter": 1e-9}
+    config = DetectorConfig(kind="noisy", of="known", classes=list(CLASSES), **{**none, **errors})
+    setting = Setting("noisy", SimpleNamespace(table_view=TABLE), None, Path(), seed, lambda name: KNOWN)
+    detector = NoisyDetector.from_config(config, setting)
+    frames = [SimpleNamespace(id=number, image=np.zeros((480, 640, 3))) for number in range(LOOKS)]
+    return [detector.request(frame, view).result() for frame in frames]
+
+
+def test_without_errors_it_says_what_the_other_says_in_its_own_name_with_its_own_figures():
+    answer = answers()[0]
+    assert (answer.detector, answer.error_rates.misses) == ("noisy", 1e-9)
+    assert [one.label for one in answer.found] == list(CLASSES)
+
+
+def test_it_overlooks_as_many_as_it_says():
+    share = 1 - np.mean([len(answer.found) for answer in answers(misses=0.2)]) / len(THINGS)
+    assert share == pytest.approx(0.2, abs=0.02)
+
+
+def test_it_confuses_as_many_as_it_says_and_is_then_not_confident():
+    found = [one for answer in answers(confused=0.1) for one in answer.found]
+    wrong = [one for one in found if one.confidence != 0.9]
+    assert len(wrong) / len(found) == pytest.approx(0.1, abs=0.015)
+    assert max(one.confidence for one in wrong) <= 0.75
+    assert all(abs(THINGS[CLASSES.index(one.label)].box[0] - one.box[0]) > 1 for one in wrong)
+
+
+def test_its_boxes_are_off_by_as_much_as_it_says_and_keep_their_size():
+    moved = {thing.label: thing.centre for thing in THINGS}
+    found = [one for answer in answers(jitter=5.0) for one in answer.found]
+    shifts = [np.subtract(one.centre, moved[one.label]) for one in found]
+    assert np.std(shifts, axis=0) == pytest.approx([5.0, 5.0], rel=0.05)
+    assert np.mean(shifts, axis=0) == pytest.approx([0.0, 0.0], abs=0.3)
+    assert [one.box[2] - one.box[0] for one in found] == pytest.approx([20.0] * len(found))
+
+
+@pytest.mark.parametrize(("view", "part"), [("table", TABLE), ("full", (0, 0, 640, 480))])
+def test_what_it_invents_lies_in_the_searched_part(view, part):
+    found = [one for answer in answers(invented=0.5, view=view) for one in answer.found]
+    invented = [one for one in found if one.confidence != 0.9]
+    assert len(invented) / LOOKS == pytest.approx(0.5, abs=0.06)
+    centres = np.array([one.centre for one in invented])
+    assert np.all(centres >= part[:2])
+    assert np.all(centres <= part[2:])
+    assert {one.label for one in invented} == set(CLASSES)
+
+
+def test_it_errs_the_same_for_the_same_seed_and_otherwise_for_another():
+    errors = {"misses": 0.2, "confused": 0.1, "invented": 0.5, "jitter": 5.0}
+    first = answers(seed=3, **errors)
+    assert first == answers(seed=3, **errors)
+    assert first != answers(seed=4, **errors)
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"of": "eye", "classes": ["cube"]}, 'the cell has no detector "eye"; it has: noisy, known'),
+        ({"classes": ["cube"]}, 'option "of" of a detector of kind noisy: field required'),
+    ],
+)
+def test_what_keeps_it_from_being_built_is_told(options, sentence):
+    wrong = DetectorConfig(kind="noisy", **options)
+    others = {"noisy": wrong, "known": DetectorConfig(kind="embedded")}
+    ((_, told),) = NoisyDetector.check(wrong, Path(), others)
+    assert told.startswith(sentence)

@@ -1,0 +1,170 @@
+"""The simulated arm's driver: what it plans, follows and refuses."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from rig import Rig
+
+from executive.cell.arm import Goal, Motion, Task
+from executive.cell.values import Obstacle
+from executive.errors import Fault, Unreachable
+
+OVER = Goal((0.5, 0.1, 0.15))
+BESIDE = Goal((0.5, -0.1, 0.15))
+
+
+def test_it_follows_a_motion_to_a_hundredth_of_a_degree(rig: Rig) -> None:
+    motion = rig.planned(OVER)
+    rig.arm.start(motion)
+    for step in range(1, math.ceil(motion.duration * 240) + 1):
+        rig.step()
+        assert np.max(np.abs(rig.arm.q - motion.at(step / 240).q)) < math.radians(0.01)
+    assert rig.arm.at_rest
+    assert rig.arm.met is None
+    assert np.allclose(rig.arm.tool_pose.position, OVER.position, atol=1e-4)
+
+
+def test_a_plan_takes_its_time_on_the_clock_and_is_told(rig: Rig) -> None:
+    planning = rig.arm.plan(OVER)
+    waited = 0
+    while not planning.ready:
+        rig.step()
+        waited += 1
+    assert waited == round(rig.config.motion.planning * 240) == 24
+    duration = round(planning.result().duration, 4)
+    assert rig.events == [{"kind": "plan", "ahead": False, "waits": 0.1, "duration": duration}]
+
+
+def test_a_motion_planned_ahead_is_known_at_once_and_begins_where_the_running_one_ends(rig: Rig) -> None:
+    first = rig.planned(OVER)
+    rig.arm.start(first)
+    rig.step(30)
+    rig.arm.plan_ahead(BESIDE)
+    rig.run()
+    planning = rig.arm.plan(BESIDE)
+    assert planning.ready
+    assert rig.events[-1]["ahead"] is True
+    assert rig.events[-1]["waits"] == 0.0
+    second = planning.result()
+    assert np.array_equal(second.start, first.end)
+    rig.arm.start(second)
+    rig.run()
+    assert np.allclose(rig.arm.tool_pose.position, BESIDE.position, atol=1e-4)
+
+
+def test_a_motion_planned_ahead_too_late_is_waited_for_as_long_as_it_takes(rig: Rig) -> None:
+    rig.arm.start(rig.planned(OVER))
+    rig.run()
+    rig.arm.plan_ahead("home")
+    rig.step(4)
+    assert not rig.arm.plan("home").ready
+    assert rig.events[-1]["waits"] == pytest.approx(20 / 240, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("goal", "task"),
+    [
+        (OVER, Task()),
+        (Goal(BESIDE.position, yaw=0.0), Task()),
+        ("home", Task()),
+        (BESIDE, Task(around=(Obstacle(0.6, 0.2, 0.03, 0.05, "cube-1"),))),
+    ],
+    ids=["another place", "another yaw", "a pose", "other surroundings"],
+)
+def test_what_was_planned_ahead_answers_no_other_question(rig: Rig, goal: Goal | str, task: Task) -> None:
+    rig.arm.plan_ahead(BESIDE)
+    rig.step(20)
+    assert not rig.arm.plan(goal, task).ready
+    assert rig.events[-1]["ahead"] is False
+
+
+def test_what_was_planned_ahead_is_of_no_use_once_the_arm_was_stopped_on_its_way(rig: Rig) -> None:
+    rig.arm.start(rig.planned(OVER))
+    rig.step(24)
+    rig.arm.plan_ahead(BESIDE)
+    rig.arm.stop()
+    rig.arm.plan_ahead(BESIDE)  # from where it will stop, which nobody knows yet
+    rig.run()
+    planning = rig.arm.plan(BESIDE)
+    assert not planning.ready
+    rig.step(12)
+    assert np.allclose(planning.result().start, rig.arm.q, atol=1e-4)
+
+
+def test_its_destination_is_where_the_running_motion_ends_or_where_it_stands(rig: Rig) -> None:
+    assert np.allclose(rig.arm.destination, rig.arm.tool_pose.position, atol=1e-4)
+    rig.arm.start(rig.planned(OVER))
+    rig.step(30)
+    assert rig.arm.destination == pytest.approx(OVER.position, abs=1e-9)
+    rig.arm.stop()
+    rig.run()
+    assert np.allclose(rig.arm.destination, rig.arm.tool_pose.position, atol=1e-4)
+
+
+def test_what_cannot_be_reached_is_said_by_the_result_in_its_time(rig: Rig) -> None:
+    planning = rig.arm.plan(Goal((0.9, 0.0, 0.114)))
+    assert not planning.ready
+    rig.step(24)
+    assert planning.ready
+    with pytest.raises(Unreachable, match=r"the tool cannot reach \(0\.900, 0\.000, 0\.114\) m"):
+        planning.result()
+    assert rig.events[-1]["duration"] == 0.0
+
+
+def test_an_unknown_pose_is_a_fault_that_lists_the_known_ones(rig: Rig) -> None:
+    for ask in (rig.arm.plan, rig.arm.plan_ahead):
+        with pytest.raises(Fault, match='the cell file has no arm pose "hime"; it has aside, home'):
+            ask("hime")
+
+
+def test_starting_or_planning_while_moving_is_a_fault(rig: Rig) -> None:
+    motion = rig.planned(OVER)
+    rig.arm.start(motion)
+    rig.step(10)
+    with pytest.raises(Fault, match=r"start a motion while moving \(\d\.\d\d s to go\); wait for `at_rest`"):
+        rig.arm.start(motion)
+    with pytest.raises(Fault, match="plan a motion while moving"):
+        rig.arm.plan(OVER)
+
+
+def test_a_motion_that_starts_elsewhere_is_a_fault_with_numbers(rig: Rig) -> None:
+    motion = rig.go(OVER)
+    with pytest.raises(Fault, match=r"starts \d+\.\d\d° away from where joint \d of the arm is; 0\.2° are"):
+        rig.arm.start(motion)
+    rig.go("home")
+
+
+def test_a_motion_of_another_arm_is_a_fault(rig: Rig) -> None:
+    class Hop:
+        duration = 1.0
+
+    hop: Motion = Hop()
+    with pytest.raises(Fault, match="follows its own planned motions, not a Hop"):
+        rig.arm.start(hop)
+
+
+def test_an_arm_pushed_off_its_path_brakes_and_says_so(rig: Rig) -> None:
+    rig.arm.start(rig.planned(OVER))
+    rig.step(30)
+    rig.world.set_arm(rig.arm.q + np.radians([0, 3, 0, 0, 0, 0, 0]))
+    rig.step(2)
+    with pytest.raises(Fault, match=r"the command is \d\.\d\d° away from where joint 2 of the arm is; 0\.5°"):
+        _ = rig.arm.at_rest
+    assert rig.run() <= 120
+
+
+def test_its_tool_velocity_is_how_far_the_tool_gets_in_a_control_step(rig: Rig) -> None:
+    rig.arm.start(rig.planned(Goal((0.55, -0.2, 0.2))))
+    fastest = 0.0
+    while not rig.arm.at_rest:
+        before = rig.arm.tool_pose.position
+        rig.step()
+        gone = (rig.arm.tool_pose.position - before) * 240
+        assert rig.arm.tool_velocity == pytest.approx(gone, abs=0.02)
+        fastest = max(fastest, float(np.linalg.norm(gone)))
+    assert fastest > 0.3
+    rig.step(30)
+    assert rig.arm.tool_velocity == pytest.approx(np.zeros(3), abs=1e-3)

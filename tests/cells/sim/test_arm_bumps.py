@@ -1,0 +1,107 @@
+"""What the arm runs into although nothing was known to be there."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from rig import Rig
+
+from executive.cell.arm import Goal, Task
+from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, object_class
+from executive.cell.values import Load
+from executive.geometry import Array
+from executive.motion.trajectory import Trajectory
+from tests.benchmarks.halts import measure_distance
+
+LEFT, RIGHT = Goal((0.5, 0.25, 0.15)), Goal((0.5, -0.2, 0.15))
+LONG_DESCENT = Goal(RIGHT.position, guarded=0.1, speed=0.05)
+
+
+def float_at(rig: Rig, label: str, place: Array, mass: float = 0.1) -> int:
+    """Put an object into the air, where it stays until something runs into it."""
+    rig.world.client.setGravity(0, 0, 0)
+    body = rig.add(label, *place)
+    rig.world.client.changeDynamics(body, -1, mass=mass)
+    return body
+
+
+def tool_at(rig: Rig, motion: Trajectory, share: float) -> Array:
+    """Return where the tool is after a share of the time of a motion `(3,)` [m]."""
+    return rig.planner.kinematics.forward(motion.at(share * motion.duration).q).position
+
+
+def on_the_way_down(rig: Rig, motion: Trajectory) -> Array:
+    """Return where the tool is in the middle of the guarded part of a motion `(3,)` [m]."""
+    return tool_at(rig, motion, (motion.guarded / motion.duration + 1) / 2)
+
+
+def bump(rig: Rig, motion: Trajectory, earliest: float = 0.0) -> str:
+    """Follow a motion until the arm runs into something; return what it says when it is at rest again.
+
+    Before the path time `earliest` [s] nothing may be met.
+    """
+    rig.arm.start(motion)
+    while rig.arm.met is None:
+        assert not rig.arm.at_rest, "it ran into nothing"
+        s = rig.arm._time
+        rig.step()
+    assert s >= earliest, rig.arm.met
+    assert rig.run() <= 120
+    assert measure_distance(rig.arm._command, motion) < 1e-9
+    assert rig.arm.met is not None
+    return rig.arm.met
+
+
+def test_an_object_in_the_way_of_the_tool_makes_the_arm_brake_along_its_path(rig: Rig) -> None:
+    rig.go(LEFT)
+    motion = rig.planned(RIGHT)
+    place = tool_at(rig, motion, 0.5)
+    body = float_at(rig, "cube", place)
+    said = bump(rig, motion)
+    found = re.fullmatch(r"the tool ran into a cube, with the tool at \((.*), (.*), (.*)\) m", said)
+    assert found, said
+    assert np.linalg.norm(np.array([float(value) for value in found.groups()]) - place) < 0.05
+    assert rig.arm.destination == pytest.approx(rig.arm.tool_pose.position, abs=1e-4)
+    rig.world.remove_object(body)
+    rig.go(RIGHT)
+    assert rig.arm.met is None, "the next motion begins where the bump left the arm, and forgets it"
+    assert rig.arm.tool_pose.position == pytest.approx(RIGHT.position, abs=1e-4)
+
+
+def test_it_counts_on_the_guarded_part_of_a_motion_as_well(rig: Rig) -> None:
+    """What the tool is meant to touch there, the wrist is not."""
+    rig.go(LEFT)
+    motion = rig.planned(LONG_DESCENT)
+    under_the_flange = np.add(on_the_way_down(rig, motion), (0, -0.045, rig.config.tool.length - 0.025))
+    float_at(rig, "cube", under_the_flange, mass=1.0)
+    said = bump(rig, motion, earliest=motion.guarded)
+    assert re.match(r"link 7 ran into a cube, with the tool at", said)
+
+
+def test_what_the_held_object_runs_into_counts_but_neither_the_tool_nor_the_table_it_lay_on(rig: Rig) -> None:
+    held = rig.add("cube", 0.5, 0.1)
+    rig.step(60)
+    rig.touch_down(Goal((0.5, 0.1, 0.045), guarded=0.012, speed=0.035))
+    rig.tool.close()
+    assert rig.tool.held_body == held
+    task = Task(Load(object_class("cube", rig.config.objects["cube"]), rig.tool.bears))
+    rig.go(LEFT, task)
+    assert rig.arm.met is None
+    motion = rig.planned(RIGHT, task)
+    # So light that the seal does not break, so heavy that it is felt.
+    float_at(rig, "sphere", tool_at(rig, motion, 0.5) - (0, 0, 0.06), mass=0.02)
+    assert bump(rig, motion).startswith("the held cube ran into a sphere, with the tool at")
+    assert rig.tool.holding
+
+
+def test_the_shaft_of_the_tool_feels_a_bump_on_a_guarded_motion_too(rig: Rig) -> None:
+    """Only the lip is meant to touch something."""
+    rig.go(LEFT)
+    motion = rig.planned(LONG_DESCENT)
+    # Its edge lies beside the thin end of the tool, under the wider shaft.
+    beside = 0.025 + (rig.config.tool.cup_radius + TOOL_RADIUS) / 2
+    float_at(rig, "cube", np.add(on_the_way_down(rig, motion), (0, -beside, NECK_LENGTH - 0.025)), mass=1.0)
+    said = bump(rig, motion, earliest=motion.guarded)
+    assert said.startswith("the tool ran into a cube, with the tool at")

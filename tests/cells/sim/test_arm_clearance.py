@@ -1,0 +1,139 @@
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from executive.cell.arm import Task
+from executive.cell.config import CellConfig
+from executive.cell.values import Load, ObjectClass, Obstacle
+from executive.cells.sim.collision import PathClearance
+from executive.errors import Blocked
+from executive.motion.kinematics import Kinematics, fold
+from tests.motion.joint_states import reach
+
+DUCK = Task(Load(ObjectClass("duck", 0.05, 0.04)))
+TOWER = Obstacle(0.5, 0.1, 0.03, 0.2, "cube-3")
+COIN = Obstacle(0.5, 0.1, 0.03, 0.0005, "a coin")
+
+
+@pytest.fixture(scope="module")
+def clearance(overhead: CellConfig) -> Iterator[PathClearance]:
+    clearance = PathClearance(overhead)
+    yield clearance
+    clearance.close()
+
+
+@pytest.fixture(scope="module")
+def kinematics(overhead: CellConfig) -> Kinematics:
+    return Kinematics(overhead.tool.length, np.radians(overhead.arm.limits.position_deg))
+
+
+@pytest.fixture
+def at(overhead: CellConfig, kinematics: Kinematics):
+    """Joint positions with the tool centre point at a place."""
+    home = np.radians(overhead.arm.poses_deg["home"])
+    return lambda x, y, z: reach(kinematics, (x, y, z), home)
+
+
+NAMED = re.escape(
+    "the motion would bring the tool 0.036 m into cube-3, with the tool at (0.500, 0.100, 0.150) m; "
+    "0.005 m must stay free"
+)
+RED_BIN = 0.24, -0.48, 0.15
+"""Centre of a bin and the distance of its wall along y [m]."""
+
+
+def straight(*heights: float) -> list[tuple[float, float, float]]:
+    return [(0.5, 0.0, height) for height in heights]
+
+
+def into_the_bin(height: float, *distances: float) -> list[tuple[float, float, float]]:
+    """Places at so many distances from the wall of the red bin [m]."""
+    x, y, half = RED_BIN
+    return [(x, y - half - distance, height) for distance in distances]
+
+
+@pytest.mark.parametrize(
+    ("places", "task", "said"),
+    [
+        (straight(0.2, 0.1, 0.03), Task(), ""),
+        (straight(0.1, 0.003), Task(), r"the tool 0\.00\d m from the table, with the tool at \(0\.500"),
+        (into_the_bin(0.04, -0.15, 0.0), Task(), r"the tool 0\.\d+ m into red_bin"),
+        (straight(0.05, 0.1, 0.05), DUCK, ""),
+        (straight(0.1, 0.03), DUCK, r"the held duck 0\.0\d\d m into the table"),
+        (into_the_bin(0.09, 0.08, 0.04, 0.0), Task(), ""),
+        (into_the_bin(0.09, 0.08, 0.04, 0.0), DUCK, r"the held duck .* red_bin"),
+        ([(*RED_BIN[:2], z) for z in (0.15, 0.057)], DUCK, ""),
+        (straight(0.003, 0.004, 0.1), Task(), ""),
+        (straight(0.003, 0.001), Task(), "the table"),
+        ([(0.5, y, 0.23) for y in (-0.1, 0.1)], Task(around=(TOWER,)), ""),
+        ([(0.5, y, 0.15) for y in (0.0, 0.1)], Task(), ""),
+        ([(0.5, y, 0.15) for y in (0.0, 0.1)], Task(around=(TOWER,)), NAMED),
+        ([(0.5, y, 0.23) for y in (-0.1, 0.1)], Task(DUCK.load, (TOWER,)), r"held duck 0\.020 m into cube-3"),
+        ([(0.5, 0.1, z) for z in (0.1, 0.0505)], DUCK, ""),
+        ([(0.5, 0.1, z) for z in (0.1, 0.0505)], Task(DUCK.load, (COIN,)), r"the held duck .* a coin"),
+        ([(0.5, 0.1, z) for z in (0.202, 0.203, 0.25)], Task(around=(TOWER,)), ""),
+        ([(0.5, 0.1, z) for z in (0.202, 0.201)], Task(around=(TOWER,)), r"the tool 0\.001 m from cube-3"),
+    ],
+)
+def test_a_path_keeps_the_margin_but_a_load_may_lie_on_table_and_floor(
+    clearance: PathClearance, at, places, task: Task, said: str
+) -> None:
+    """A motion may leave a place that is too near to something, but not come nearer."""
+    path = np.array([at(*place) for place in places])
+    if said:
+        with pytest.raises(Blocked, match=said):
+            clearance.check(path, task)
+    else:
+        clearance.check(path, task)
+
+
+def test_a_long_tool_may_meet_the_upper_arm(overhead: CellConfig) -> None:
+    tool = overhead.tool.model_copy(update={"length": 0.3})
+    clearance = PathClearance(overhead.model_copy(update={"tool": tool}))
+    folded = np.radians([(0, -65, 60, -90, 0, 60, 0), (0, -65, 105, -120, 0, 100, 0)])
+    with pytest.raises(Blocked, match=r"the tool 0\.009 m into link 2, with the tool at"):
+        clearance.check(folded)
+    clearance.close()
+
+
+def test_the_margin_is_kept_above_and_beside_what_stands_around(clearance: PathClearance, at) -> None:
+    def passes(*end: float) -> bool:
+        try:
+            clearance.check(np.array([at(0.5, -0.1, 0.25), at(*end)]), Task(around=(TOWER,)))
+        except Blocked as error:
+            assert "the tool 0.004 m from cube-3" in str(error)
+            return False
+        return True
+
+    assert [passes(0.5, 0.1, 0.2 + gap) for gap in (0.006, 0.004)] == [True, False]
+    beside = TOWER.radius + 0.012
+    assert [passes(0.5, 0.1 - beside - gap, 0.15) for gap in (0.006, 0.004)] == [True, False]
+
+
+def test_several_things_of_one_size_stand_around_at_once(clearance: PathClearance, at) -> None:
+    towers = tuple(Obstacle(0.5, y, 0.03, 0.2, f"cube-{y}") for y in (-0.1, 0.0, 0.1))
+    for tower in towers:
+        with pytest.raises(Blocked, match=f"into {tower.name}, "):
+            clearance.check(np.array([at(0.5, 0.2, 0.25), at(0.5, tower.y, 0.15)]), Task(around=towers))
+
+
+def test_a_held_object_keeps_clear_of_the_arm(clearance: PathClearance) -> None:
+    path = np.radians([(0, -65, 60, -90, 0, 60, 0), (0, -100, 65, -110, 0, 105, 0)])
+    clearance.check(path)
+    with pytest.raises(Blocked, match=r"the held rod 0\.004 m into link 2, with the tool at"):
+        clearance.check(path, Task(Load(ObjectClass("rod", 0.2, 0.03))))
+
+
+@pytest.mark.parametrize("distance", [-0.01, 0.0, 0.0035, 0.006, 0.012, 0.02])
+def test_the_wrist_may_fold_as_far_as_links_5_and_7_stay_apart(clearance, distance) -> None:
+    world, rng = clearance.world, np.random.default_rng(6)
+    for side in (-1, 1):
+        q = rng.uniform(-2, 2, 7)
+        q[5] = side * fold(distance)
+        world.set_arm(q)
+        points = world.client.getClosestPoints(world.arm, world.arm, 0.05, linkIndexA=4, linkIndexB=6)
+        assert min(point[8] for point in points) == pytest.approx(distance, abs=5e-4)

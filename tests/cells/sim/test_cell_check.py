@@ -1,0 +1,158 @@
+"""Findings of a simulated cell about its cell file, and the labels of its detectors."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from executive.cell.config import CellConfig
+from executive.cells.sim.cell import SimCell
+from executive.cells.sim.poses import out_of_reach, unfit_poses
+from executive.mission.parse.cell_file import load_cell
+from executive.motion.kinematics import Kinematics
+from tests.cells.sim.conftest import shipped_cell
+from tests.motion.joint_states import reach
+
+
+def posed(config: CellConfig, **poses: Any) -> CellConfig:
+    """Return the cell with other named poses [degree] beside its own, or instead of them."""
+    arm = config.arm.model_copy(update={"poses_deg": {**config.arm.poses_deg, **poses}})
+    return config.model_copy(update={"arm": arm})
+
+
+def moved(config: CellConfig, bin: str, *position: float) -> CellConfig:
+    """Return the cell with a bin elsewhere [m]."""
+    section = config.bins[bin].model_copy(update={"position": position})
+    return config.model_copy(update={"bins": {**config.bins, bin: section}})
+
+
+def reaching(config: CellConfig, *place: float) -> Sequence[float]:
+    """Return the pose [degree] with the tool straight down at a place [m]."""
+    kinematics = Kinematics(config.tool.length, np.radians(config.arm.limits.position_deg))
+    home = np.radians(config.arm.poses_deg["home"])
+    return tuple(np.degrees(reach(kinematics, place, home)))
+
+
+@pytest.mark.parametrize("name", ["overhead", "wrist", "depth"])
+def test_nothing_is_wrong_with_a_shipped_cell(missions: Path, name: str) -> None:
+    assert list(SimCell.check(shipped_cell(name), missions / "cells")) == []
+
+
+def test_all_that_is_wrong_is_said_at_once(overhead: CellConfig, tmp_path: Path) -> None:
+    yolo = overhead.detectors["embedded"].model_copy(update={"kind": "yolo"})
+    config = posed(overhead, down=(0, 118, 0, 0, 0, 0, 0), turned=(0, 0, 0, 0, 0, 0, 180))
+    far = moved(config, "red_bin", 1.5, 0.0, 0.0).bins["red_bin"]
+    changes = {"bins": {"red_bin": far}, "detectors": {"yolo": yolo}, "localization": "depth"}
+    found = dict(SimCell.check(config.model_copy(update=changes), tmp_path))
+    assert list(found) == [
+        ("localization",),
+        ("detectors", "yolo", "kind"),
+        ("arm", "poses_deg", "turned"),
+        ("bins", "red_bin", "position"),
+        ("arm", "poses_deg", "down"),
+    ]
+    said = found["localization",]
+    assert said.startswith('localization "depth" needs a camera with depth, and overhead has none; give')
+
+
+def test_a_missing_model_is_found_before_anything_is_loaded(missions: Path) -> None:
+    overrides = {"cell.objects.duck.urdf": "unicorn.urdf"}
+    config = load_cell(missions / "cells" / "overhead.yaml", overrides)
+    sentence = "there is no model unicorn.urdf, neither beside the cell file nor in pybullet_data"
+    assert list(SimCell.check(config, missions / "cells")) == [(("objects", "duck", "urdf"), sentence)]
+
+
+def test_the_labels_are_those_of_its_detectors(overhead: CellConfig, tmp_path: Path) -> None:
+    own = {"model_path": "own.onnx", "labels": ["red", "blue"], "class_map": {"red": "cube"}}
+    detectors = {
+        **overhead.detectors,
+        "own": overhead.detectors["embedded"].model_validate({"kind": "rfdetr", **own}),
+        "yolo": overhead.detectors["embedded"].model_copy(update={"kind": "yolo"}),
+    }
+    labels = SimCell.labels(overhead.model_copy(update={"detectors": detectors}), tmp_path)
+    assert set(labels["embedded"] or ()) == {"cube", "sphere", "duck"}
+    assert labels["own"] == ("cube", "blue")
+    assert labels["yolo"] is None
+
+
+@pytest.mark.slow
+def test_a_check_loads_no_model_and_none_of_what_runs_one(missions: Path) -> None:
+    """onnxruntime alone takes a tenth of a second and 40 MB."""
+    program = (
+        "import sys; from pathlib import Path; from executive.mission.parse.cell_file import load_cell; "
+        "from executive.cells.sim.cell import SimCell; path = Path(sys.argv[1]); config = load_cell(path); "
+        "SimCell.check(config, path.parent); SimCell.labels(config, path.parent); "
+        "SimCell.least_times(config).carry(None); "
+        "loaded = {'onnxruntime', 'PIL', 'supervision', 'rich', 'torch'} & set(sys.modules); "
+        # What pybullet prints on stdout may come out after everything else.
+        "print('loaded:', *sorted(loaded), file=sys.stderr)"
+    )
+    arguments = [sys.executable, "-c", program, str(missions / "cells" / "overhead.yaml")]
+    done = subprocess.run(arguments, capture_output=True, text=True, check=True)
+    assert done.stderr.splitlines() == ["loaded:"], "pybullet's greeting is not among it"
+
+
+def test_a_pose_too_near_to_something_is_named_with_the_distance(overhead: CellConfig) -> None:
+    near, inside, fit = (reaching(overhead, 0.5, 0.0, z) for z in (0.003, -0.01, 0.0055))
+    folded = (0, -40, 0, -120, 0, -120, 0)
+    found = dict(unfit_poses(posed(overhead, near=near, inside=inside, fit=fit, folded=folded)))
+    free = "0.005 m must stay free"
+    assert found == {
+        ("arm", "poses_deg", "near"): f'the pose "near" brings the tool 0.003 m from the table; {free}',
+        ("arm", "poses_deg", "inside"): f'the pose "inside" brings the tool 0.010 m into the table; {free}',
+        ("arm", "poses_deg", "folded"): f'the pose "folded" brings link 5 0.013 m into link 7; {free}',
+    }
+
+
+def test_a_scan_pose_without_a_view_of_it_all_is_found(overhead: CellConfig, wrist: CellConfig) -> None:
+    assert list(unfit_poses(posed(overhead, aside=reaching(overhead, 0.53, 0.0, 0.2)))) == [
+        (
+            ("cameras", "overhead", "scan_poses", 1),
+            'from the pose "aside" the camera overhead does not see the whole workspace: a part of it is '
+            "outside of the image or behind the arm",
+        )
+    ]
+    turned = (40.0, *wrist.arm.poses_deg["scan"][1:])
+    assert [key for key, _ in unfit_poses(posed(wrist, scan=turned))] == [
+        ("cameras", "wrist", "scan_poses", 0)
+    ]
+
+
+def test_a_model_that_is_no_iiwa_is_a_finding_and_no_traceback(overhead: CellConfig) -> None:
+    config = overhead.model_copy(update={"arm": overhead.arm.model_copy(update={"urdf": "r2d2.urdf"})})
+    assert list(unfit_poses(config)) == [
+        (("arm", "urdf"), "the model r2d2.urdf cannot be loaded as an iiwa 14: Cannot load URDF file.")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("position", "why"),
+    [
+        ((0.6, -0.6, 0.0), "farther than the arm is long (0.82 m)"),
+        ((0.24, -0.25, 0.0), "nearer than joint 4 can fold (0.41 m)"),
+    ],
+)
+def test_a_bin_with_one_slot_out_of_reach_is_named_with_the_distance(
+    overhead: CellConfig, position: tuple[float, float, float], why: str
+) -> None:
+    ((keys, sentence),) = out_of_reach(moved(overhead, "red_bin", *position))
+    assert keys == ("bins", "red_bin", "position")
+    assert sentence.startswith('the bin "red_bin" is out of reach: the tool cannot reach (')
+    assert sentence.endswith(why)
+
+
+def test_the_safe_place_and_poses_must_be_within_reach(overhead: CellConfig) -> None:
+    config = posed(overhead, turned=(0, 33, 0, -88, 0, 59, 180)).model_copy(
+        update={"safe_place": (0.9, 0.0, 0.0)}
+    )
+    pose, (keys, sentence) = out_of_reach(config)
+    text = 'joint 7 of the pose "turned" is at 180 degrees; its limit is 175'
+    assert pose == (("arm", "poses_deg", "turned"), text)
+    assert keys == ("safe_place",)
+    assert sentence.startswith("the safe place is out of reach: the tool cannot reach (0.900, 0.000, ")

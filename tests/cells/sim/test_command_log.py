@@ -1,0 +1,86 @@
+"""The log of what was done to a world, torn or not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from executive.cell.arm import Goal
+from executive.cell.config import CellConfig
+from executive.cells.sim import command_log as log
+from executive.cells.sim.command_log import CommandLog, read_commands, states_of
+from executive.errors import InputError
+from executive.motion.planner import Planner
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "world.log"
+
+
+def test_it_reads_what_was_written_bit_by_bit(path: Path) -> None:
+    written = CommandLog(path)
+    joints = (1 / 3, *np.random.default_rng(1).normal(size=7))
+    written.note(log.CLOSE)
+    written.note(log.JOINTS_TO, *joints)
+    written.note(log.STEP)
+    written.note(log.PLACE, 7, *joints[:7])
+    written.close()
+    again = CommandLog(path, again=True)
+    again.note(log.IDLE)
+    again.close()
+    read = list(read_commands(path))
+    assert [one.kind for one in read] == [
+        log.CLOSE, log.JOINTS_TO, log.STEP, log.PLACE, log.IDLE,
+    ]  # fmt: skip
+    assert read[1].numbers == joints
+    assert read[3].numbers == (7, *joints[:7])
+
+
+def test_a_command_that_was_torn_is_left_out_wherever_it_was(path: Path, overhead: CellConfig) -> None:
+    planner = Planner(overhead)
+    written = CommandLog(path)
+    written.note(log.STEP)
+    whole = path.stat().st_size
+    written.note(log.JOINTS_TO, *range(8))
+    motion = planner.plan(np.radians(overhead.arm.poses_deg["home"]), Goal((0.5, 0.0, 0.1)))
+    written.motion(motion)
+    written.close()
+    *_, command = read_commands(path)
+    assert command.numbers[:2] == (motion.duration, motion.guarded)
+    for one, other in zip(states_of(command), motion.samples, strict=True):
+        assert np.array_equal(one, other)
+    content = path.read_bytes()
+    for length in (whole, whole + 1, whole + 64, whole + 65, whole + 70, len(content) - 1):
+        path.write_bytes(content[:length])
+        kinds = [one.kind for one in read_commands(path)]
+        assert kinds == [log.STEP] + [log.JOINTS_TO] * (length >= whole + 65), length
+
+
+def test_what_goes_on_begins_after_the_last_whole_command(path: Path) -> None:
+    written = CommandLog(path)
+    written.note(log.STEP)
+    written.note(log.JOINTS_TO, *range(8))
+    written.close()
+    written.close()
+    path.write_bytes(path.read_bytes()[:-5])
+    again = CommandLog(path, again=True)
+    again.note(log.OPEN)
+    again.close()
+    CommandLog().note(log.STEP)  # nothing is kept without a path
+    assert [one.kind for one in read_commands(path)] == [log.STEP, log.OPEN]
+
+
+def test_a_file_that_is_no_log_says_so(path: Path) -> None:
+    with pytest.raises(InputError, match=r"cannot read the log of the world .*without it a simulated run"):
+        list(read_commands(path))
+    path.write_bytes(b"something else")
+    with pytest.raises(InputError, match=r"is no log of a world: it does not begin with 'executive world 1'"):
+        list(read_commands(path))
+    with pytest.raises(InputError, match=r"cannot write .*: not a directory"):
+        CommandLog(path / "below")
+    assert not log.is_log(path)
+    CommandLog(path).close()
+    assert log.is_log(path)

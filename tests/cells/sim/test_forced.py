@@ -1,0 +1,64 @@
+"""What a fault script does to the simulated tool and arm."""
+
+from __future__ import annotations
+
+import pytest
+from rig import Rig
+
+from executive.cell.arm import Goal, Task
+from executive.cell.layout import object_class
+from executive.cell.values import Load
+
+CUBE = (0.5, 0.1)
+OVER = Goal((*CUBE, 0.15))
+ONTO = Goal((*CUBE, 0.04), guarded=0.015, speed=0.035)
+
+
+@pytest.fixture
+def held(rig: Rig) -> int:
+    """A cube that hangs at the tool, in the air."""
+    body = rig.add("cube", *CUBE)
+    rig.step(60)
+    rig.touch_down(ONTO)
+    rig.tool.close()
+    assert rig.tool.held_body == body
+    rig.go(OVER, Task(load=Load(object_class("cube", rig.config.objects["cube"]), rig.tool.bears)))
+    return body
+
+
+def height(rig: Rig, body: int) -> float:
+    return float(rig.world.object_pose(body).position[2])
+
+
+def test_a_seal_gives_way_and_the_object_falls(rig: Rig, held: int) -> None:
+    rig.tool.leaks = True
+    rig.step(24)
+    assert rig.tool.held_body == held, "a leak takes nothing that is held"
+    rig.tool.leaks = False
+    assert height(rig, held) > 0.1
+    rig.tool.part()
+    assert not rig.tool.holding
+    rig.step(120)
+    assert height(rig, held) == pytest.approx(0.025, abs=0.002)
+    assert not rig.tool.holding, "the vacuum is on and nothing is near"
+    rig.tool.part()
+    assert not rig.tool.holding, "where there is no seal none gives way"
+
+
+def test_an_arm_that_runs_into_something_brakes_and_says_what(rig: Rig) -> None:
+    rig.arm.start(rig.planned(OVER))
+    rig.step(60)
+    rig.arm.run_into("a hand")
+    assert not rig.arm.at_rest
+    assert rig.run() <= 120
+    assert rig.arm.met == "a hand"
+    rig.go("home")
+    assert rig.arm.met is None
+    rig.arm.run_into("a hand")
+    assert (rig.arm.met, rig.arm.at_rest) == (None, True), "at rest or braking it runs into nothing"
+    rig.arm.start(rig.planned(OVER))
+    rig.step(60)
+    rig.arm.stop()
+    rig.arm.run_into("a hand")
+    rig.run()
+    assert rig.arm.met is None

@@ -1,0 +1,121 @@
+"""Models that are no models: garbage, other XML, wrong numbers, names that no file can have."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from executive.cell.config import ObjectConfig
+from executive.cells.sim.model_files import find_model
+from executive.cells.sim.models import load_mesh, mass_of
+from executive.errors import InputError
+
+LEVELS = "".join(f"<!ENTITY a{number + 1} '{f'&a{number};' * 10}'>" for number in range(9))
+BOMB = f"<!DOCTYPE r [<!ENTITY a0 'ha'>{LEVELS}]><robot name='&a9;'/>"
+
+
+@pytest.mark.parametrize(
+    ("content", "error"),
+    [
+        ("garbage", "the model m.urdf is no URDF: syntax error"),
+        ("", "the model m.urdf is no URDF: no element found"),
+        (BOMB, "the model m.urdf is no URDF: "),
+        ("<svg/>", "the model m.urdf is no URDF: its root is <svg>, not <robot>"),
+        ("<?xml version='1.0' encoding='none'?><robot/>", "the model m.urdf is no URDF: "),
+        ("<robot><inertial><mass value='nan'/></inertial></robot>", 'a URDF has "nan" in place of 1 finite'),
+        ("<robot><inertial><mass value='1 2'/></inertial></robot>", 'a URDF has "1 2" in place of 1 finite'),
+    ],
+    ids=["garbage", "empty", "XML bomb", "other XML", "encoding", "not finite", "two numbers"],
+)
+def test_a_file_that_is_no_urdf_is_an_error(content: str, error: str, tmp_path: Path) -> None:
+    (tmp_path / "m.urdf").write_text(content)
+    config = ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03)
+    with pytest.raises(InputError) as raised:
+        mass_of(config)
+    assert str(raised.value).startswith(error)
+
+
+@pytest.mark.parametrize(
+    "content", ["", "f 1 2 3\n", "v a b c\n", "v 0 0 0\nf\n", "v 0 0 nan\nf 1 1 1\n", f"f {10**20} 1 2\n"]
+)
+def test_a_file_that_is_no_mesh_is_an_error(content: str, tmp_path: Path) -> None:
+    (tmp_path / "m.obj").write_text(content)
+    config = ObjectConfig(mesh=str(tmp_path / "m.obj"), height=0.05, radius=0.03)
+    with pytest.raises(InputError, match=r"^the model m\.obj is no Wavefront mesh: "):
+        load_mesh(config)
+
+
+@pytest.mark.parametrize("mesh", ["/etc/x.obj", "../x.obj", "link.obj"])
+def test_a_mesh_outside_of_the_folder_of_its_urdf_is_not_opened(mesh: str, tmp_path: Path) -> None:
+    (tmp_path / "link.obj").symlink_to("/etc/passwd")
+    visual = f"<visual><geometry><mesh filename='{mesh}'/></geometry></visual>"
+    (tmp_path / "m.urdf").write_text(f"<robot>{visual}</robot>")
+    with pytest.raises(InputError, match=r"names the file .*, which is outside of its folder$"):
+        load_mesh(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
+
+
+@pytest.mark.parametrize("part", ["visual", "collision"])
+def test_a_mesh_that_is_no_file_is_not_opened(part: str, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.obj")
+    shape = f"<{part}><geometry><mesh filename='pipe.obj'/></geometry></{part}>"
+    (tmp_path / "m.urdf").write_text(f"<robot>{shape}</robot>")
+    with pytest.raises(InputError, match=r"^there is no model .*pipe\.obj, neither beside the cell file nor"):
+        mass_of(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
+
+
+@pytest.mark.parametrize(
+    ("part", "error"),
+    [
+        (
+            "<mesh xmlns='q' filename='../m.obj'/>",
+            "the model m.urdf has an XML namespace, {q}mesh; remove it",
+        ),
+        ("<texture filename='../m.png'/>", 'the model m.urdf names the file "../m.png", which is outside of'),
+    ],
+)
+def test_no_element_of_a_urdf_names_a_file_outside_of_its_folder(
+    part: str, error: str, tmp_path: Path
+) -> None:
+    (tmp_path / "m.urdf").write_text(f"<robot><visual><geometry>{part}</geometry></visual></robot>")
+    with pytest.raises(InputError) as raised:
+        mass_of(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
+    assert str(raised.value).startswith(error)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"\0" * 80 + (20_001).to_bytes(4, "little") + b"\0" * 50 * 20_001, b"solid\n" + b"endfacet\n" * 20_001],
+    ids=["binary", "text"],
+)
+def test_an_stl_mesh_of_more_than_20000_triangles_is_refused(content: bytes, tmp_path: Path) -> None:
+    (tmp_path / "m.stl").write_bytes(content)
+    shape = "<collision><geometry><mesh filename='m.stl'/></geometry></collision>"
+    (tmp_path / "m.urdf").write_text(f"<robot>{shape}</robot>")
+    with pytest.raises(InputError, match=r"^the model m\.stl has more than 20000 triangles; simplify"):
+        mass_of(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
+
+
+@pytest.mark.parametrize("model", ["m.urdf", "m.obj"])
+def test_a_mesh_of_more_than_20000_triangles_is_refused(model: str, tmp_path: Path) -> None:
+    (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "f 1 2 3\n" * 20_001)
+    shape = "<collision><geometry><mesh filename='m.obj'/></geometry></collision>"
+    (tmp_path / "m.urdf").write_text(f"<robot>{shape}</robot>")
+    key = {"mesh" if model.endswith("obj") else "urdf": str(tmp_path / model)}
+    with pytest.raises(
+        InputError, match=r"^the model m\.obj has more than 20000 triangles; simplify the mesh$"
+    ):
+        load_mesh(ObjectConfig(**key, height=0.05, radius=0.03))
+
+
+def test_a_name_that_no_file_can_have_is_no_model() -> None:
+    with pytest.raises(InputError, match=r"^there is no model uuu"):
+        find_model("u" * 300)
+
+
+def test_a_model_of_more_than_20_megabytes_is_not_read(tmp_path: Path) -> None:
+    with (tmp_path / "m.obj").open("wb") as file:
+        file.truncate(20_000_001)
+    with pytest.raises(InputError, match=r"m\.obj is larger than 20 MB$"):
+        find_model(str(tmp_path / "m.obj"))

@@ -1,0 +1,141 @@
+"""Objects of one's own, given as meshes: where they lie, what is solid of them, what is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from executive.cell.config import CellConfig, ObjectConfig
+from executive.cells.sim.model_files import read_obj
+from executive.cells.sim.models import load_mesh, missing_models
+from executive.cells.sim.world import World
+from executive.errors import InputError
+from executive.geometry import Pose, about_z
+from tests.cells.sim.conftest import shipped_cell
+
+Build = Callable[[CellConfig], World]
+
+# A wedge 20 mm long, 10 mm wide and 30 mm high, its origin in a corner of its underside; one face is a quad.
+WEDGE = """
+v 0 0 0
+v 0.02 0 0
+v 0.02 0.01 0
+v 0 0.01 0
+v 0 0 0.03
+v 0 0.01 0.03
+f 4 3 2 1
+f 1/1/1 2/2/1 5/3/1
+f 3 4 6
+f -2 -5 -4 -1
+f 1 5 6 4
+"""
+
+ADVICE = "correct the figure, scale or upright_deg"
+
+
+@pytest.fixture(scope="module")
+def fasteners() -> CellConfig:
+    return shipped_cell("fasteners")
+
+
+@pytest.fixture
+def wedge(tmp_path: Path) -> ObjectConfig:
+    path = tmp_path / "wedge.obj"
+    path.write_text(WEDGE)
+    return ObjectConfig(mesh=str(path), height=0.03, radius=0.0112, mass=0.2)
+
+
+def with_objects(config: CellConfig, **objects: ObjectConfig) -> CellConfig:
+    return config.model_copy(update={"objects": objects})
+
+
+def put(world: World, label: str, x: float, y: float, yaw: float = 0.0) -> int:
+    bottom = load_mesh(world.config.objects[label]).bottom
+    body = world.add_object(label, Pose(about_z(yaw), np.array([x, y, 0.001 - bottom])), (1, 1, 1))
+    for _ in range(240):
+        world.step()
+    return body
+
+
+def hit(world: World, x: float, y: float) -> int:
+    ((body, *_),) = world.client.rayTest([x, y, 1], [x, y, -1])
+    return int(body)
+
+
+@pytest.mark.parametrize(("label", "hole", "ring"), [("washer", 0.006, 0.017), ("nut", 0.003, 0.0125)])
+def test_a_hole_is_a_hole_and_the_ring_around_it_is_not(
+    build: Build, fasteners: CellConfig, label: str, hole: float, ring: float
+) -> None:
+    world = build(fasteners)
+    body = put(world, label, 0.5, 0.1)
+    around = [(np.cos(angle), np.sin(angle)) for angle in np.linspace(0, 2 * np.pi, 24)]
+    assert {hit(world, 0.5 + hole * x, 0.1 + hole * y) for x, y in around} == {world.table}
+    assert {hit(world, 0.5 + ring * x, 0.1 + ring * y) for x, y in around} == {body}
+
+
+def test_a_mesh_stands_around_its_middle_and_weighs_about_the_middle_of_its_volume(
+    build: Build, overhead: CellConfig, wedge: ObjectConfig
+) -> None:
+    mesh = load_mesh(wedge)
+    assert mesh.vertices.min(axis=0) == pytest.approx([-0.01, -0.005, -0.015])
+    assert mesh.vertices.max(axis=0) == pytest.approx([0.01, 0.005, 0.015])
+    # A third of the way from its upright edge, and from its underside.
+    assert mesh.centroid == pytest.approx([-0.01 + 0.02 / 3, 0.0, -0.005])
+    laid = wedge.model_copy(update={"scale": 2.0, "upright_deg": (90.0, 0.0, 0.0)})
+    assert np.ptp(load_mesh(laid).vertices, axis=0) == pytest.approx([0.04, 0.06, 0.02])
+    world = build(with_objects(overhead, wedge=wedge, laid=laid))
+    X_WO = Pose(about_z(0.7), np.array([0.5, 0.1, 0.2]))
+    body, other = (
+        world.add_object("wedge", X_WO, (1, 1, 1)),
+        world.add_object("laid", Pose.of([0.3, 0, 0.3]), (1, 1, 1)),
+    )
+    assert world.object_pose(body).rounded() == pytest.approx(X_WO.rounded(), abs=1e-6)
+    assert world.client.getDynamicsInfo(body, -1)[0] == 0.2
+    centre, _ = world.client.getBasePositionAndOrientation(body)
+    assert centre == pytest.approx(X_WO.apply(mesh.centroid))
+    low, high = world.client.getAABB(other)
+    assert np.subtract(high, low) == pytest.approx([0.04, 0.06, 0.02], abs=0.005)
+    assert (np.array(low) + high) / 2 == pytest.approx([0.3, 0, 0.3], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\n", r"it has no faces \(lines beginning with f\)"),
+        ("v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "a vertex .* needs three finite numbers"),
+        ("v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n", "a vertex .* needs three finite numbers"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "a face names a vertex that is not there; there are 3"),
+        ("v 0 0 zero\n", "could not convert string to float: 'zero'"),
+        ("solid washer\n", "it has no faces"),
+    ],
+)
+def test_what_is_no_mesh_is_refused_with_the_reason(text: str, complaint: str, tmp_path: Path) -> None:
+    path = tmp_path / "thing.obj"
+    path.write_text(text)
+    with pytest.raises(InputError, match=rf"the model thing\.obj is no Wavefront mesh: {complaint}"):
+        read_obj(path)
+
+
+def test_missing_and_broken_meshes_and_wrong_sizes_are_named_with_their_keys(
+    overhead: CellConfig, wedge: ObjectConfig, tmp_path: Path
+) -> None:
+    (tmp_path / "empty.obj").write_text("")
+    config = with_objects(
+        overhead,
+        gone=wedge.model_copy(update={"mesh": "gone.obj"}),
+        empty=wedge.model_copy(update={"mesh": str(tmp_path / "empty.obj")}),
+        flat=wedge.model_copy(update={"height": 0.02, "radius": 0.03}),
+        cube=overhead.objects["cube"].model_copy(update={"scale": 0.5}),
+    )
+    found = {".".join(map(str, key[1:])): sentence for key, sentence in missing_models(config)}
+    assert found == {
+        "gone.mesh": "there is no model gone.obj, neither beside the cell file nor in pybullet_data",
+        "empty.mesh": "the model empty.obj is no Wavefront mesh: it has no faces (lines beginning with f)",
+        "flat.height": f"the model of flat has a height of 0.0300 m, not 0.02 m; {ADVICE}",
+        "flat.radius": f"the model of flat has a radius of 0.0112 m, not 0.03 m; {ADVICE}",
+        "cube.height": f"the model of cube has a height of 0.0250 m, not 0.05 m; {ADVICE}",
+        "cube.radius": f"the model of cube has a radius of 0.0177 m, not 0.0354 m; {ADVICE}",
+    }

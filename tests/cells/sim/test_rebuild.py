@@ -1,0 +1,167 @@
+"""A world rebuilt from its log is the world, to the last bit; its arm brakes on the path it was on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from executive.cell.clock import STEP
+from executive.cell.workcell import CellOptions, CellPast
+from executive.cells.fake.cell import SilentOperator
+from executive.cells.sim.cell import SimCell
+from executive.cells.sim.command_log import JOINTS_TO, CommandLog
+from executive.events import ignore
+from executive.geometry import Array
+from executive.mission.load import load_mission
+from executive.motion.limits import JointLimits
+from executive.motion.trajectory import Trajectory
+from executive.plugins import discover
+from executive.run.run import Run
+from executive.testing.faults.hand import hand_of
+from executive.testing.oracle import oracle_cell
+from tests.meanwhile import meanwhile
+
+SEED = 3
+TICKS = (1, 400, 777)
+
+
+class Cut(BaseException):
+    """Ends a run as a kill does: nothing is cleaned up."""
+
+
+@dataclass(frozen=True)
+class Left:
+    """What a run that was cut off left: its world's log, and what the world was like."""
+
+    log: Path
+    state: str
+    tick: int
+    motion: Trajectory | None
+    time: float
+
+
+def state_of(cell: SimCell | SimpleNamespace) -> str:
+    """Everything that moves, and the seal."""
+    world, tool = cell._world, cell._tool
+    joints = [joint[:2] for joint in world.client.getJointStates(world.arm, range(7))]
+    bodies = [
+        (body, world.client.getBasePositionAndOrientation(body), world.client.getBaseVelocity(body))
+        for body in world.bodies
+    ]
+    return repr((joints, bodies, tool.held_body, tool.pull, cell.steps))
+
+
+@pytest.fixture(scope="module")
+def mission(missions: Path):
+    return load_mission(missions / "sort_overhead.yaml", discover())
+
+
+@pytest.fixture(scope="module")
+def left(mission, tmp_path_factory: pytest.TempPathFactory) -> list[Left]:
+    """One run, and what it would have left at some of its control steps."""
+    folder = tmp_path_factory.mktemp("logs")
+    run = Run(mission, discover(), seed=SEED, kind=oracle_cell())
+    cell = run.workcell
+    assert isinstance(cell, SimCell)
+    run.log_to(folder / "log")
+    snapshots: list[Left] = []
+    advance = cell.advance
+
+    def advanced() -> None:
+        advance()
+        if cell.steps in TICKS:
+            copy = folder / str(cell.steps)
+            copy.write_bytes((folder / "log").read_bytes())
+            snapshots.append(Left(copy, state_of(cell), cell.steps, cell._arm._motion, cell._arm._time))
+        if cell.steps == max(TICKS):
+            raise Cut
+
+    cell.advance = advanced  # type: ignore[method-assign]
+    with pytest.raises(Cut):
+        run.execute()
+    run.close()
+    return snapshots
+
+
+def rebuilt(mission, log: Path) -> SimCell:
+    options = CellOptions(SilentOperator(), base=mission.cell_path.parent, past=CellPast(log))
+    return oracle_cell()(mission.cell_config, seed=SEED, routes=mission.routes, emit=ignore, options=options)
+
+
+@pytest.fixture
+def cells(mission, left: list[Left], tmp_path: Path) -> Iterator[list[tuple[Left, SimCell]]]:
+    pairs = []
+    for number, one in enumerate(left):
+        log = tmp_path / str(number)
+        log.write_bytes(one.log.read_bytes())
+        pairs.append((one, rebuilt(mission, log)))
+    yield pairs
+    for _, cell in pairs:
+        cell.close()
+
+
+def test_it_is_the_same_to_the_last_bit(cells: list[tuple[Left, SimCell]]) -> None:
+    assert len(cells) == len(TICKS)
+    assert any(one.motion is not None for one, _ in cells)
+    for one, cell in cells:
+        assert state_of(cell) == one.state, one.tick
+
+
+def test_the_arm_brakes_on_the_path_it_was_on(cells: list[tuple[Left, SimCell]], mission) -> None:
+    limits = JointLimits.of(mission.cell_config.arm.limits)
+    for one, cell in cells:
+        commands = [] if one.motion is None else [one.motion.at(one.time - k * STEP).q for k in (2, 1, 0)]
+        for _ in range(240):
+            if cell.cell.arm.at_rest:
+                break
+            cell.advance()
+            assert one.motion is not None
+            on_path = one.motion.at(cell._arm._time).q
+            assert np.abs(cell._arm._command - on_path).max() < 1e-7, one.tick
+            commands.append(cell._arm._command)
+        assert cell.cell.arm.at_rest, one.tick
+        if len(commands) > 3:
+            accelerations = np.diff(commands, 2, axis=0) / STEP**2
+            assert np.max(np.abs(accelerations) / limits.stop_acceleration) <= 1.001, one.tick
+
+
+def test_a_command_that_no_physics_step_has_followed_is_not_skipped(
+    mission, left: list[Left], tmp_path: Path
+) -> None:
+    one = next(one for one in left if one.motion is not None)
+    log = tmp_path / "log"
+    log.write_bytes(one.log.read_bytes())
+    time = one.time + STEP
+    CommandLog(log, again=True).note(JOINTS_TO, time, *one.motion.at(time).q)
+    cell = rebuilt(mission, log)
+    cell.advance()
+    assert cell._arm._time == pytest.approx(time, abs=STEP / 10)
+    cell.close()
+
+
+def test_what_happened_meanwhile_is_there_and_took_none_of_the_runs_time(
+    mission, left, tmp_path: Path
+) -> None:
+    log = tmp_path / "log"
+    log.write_bytes(left[1].log.read_bytes())
+    moved: list[tuple[int, Array]] = []
+
+    def act(hand) -> None:
+        held = hand.held.body if hand.held else None
+        one, other = [thing for thing in hand.things if thing.body != held][:2]
+        hand.remove(other)
+        hand.move(one, (0.0, 0.3))
+        moved.extend([(one.body, one.position + np.array([0.0, 0.3, 0.0])), (other.body, np.zeros(3))])
+
+    meanwhile(log, mission, SEED, act, oracle_cell())
+    cell = rebuilt(mission, log)
+    things = {thing.body: thing.position for thing in hand_of(cell).things}
+    assert np.abs(things[moved[0][0]] - moved[0][1]).max() < 0.01
+    assert moved[1][0] not in things
+    assert (cell.steps, cell.cell.arm.at_rest) == (left[1].tick, True)
+    cell.close()

@@ -1,0 +1,369 @@
+# ruff: noqa: E501 - findings are quoted as they are printed
+"""Scene files: the effect of each key on world and image, what stays declared, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from textwrap import dedent
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+
+from executive.cell.config import CellConfig, NoiseConfig
+from executive.cell.values import Frame
+from executive.cell.workcell import CellOptions
+from executive.cells.fake.cell import ROUTES, SilentOperator
+from executive.cells.sim.arrangements import UNKNOWN
+from executive.cells.sim.camera import CELL_LIGHT
+from executive.cells.sim.cell import SimCell
+from executive.cells.sim.models import load_mesh
+from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, load_scene
+from executive.cells.sim.scene_world import build_light, true_cell
+from executive.cells.sim.scenes import SceneRenderer
+from executive.cells.sim.spawn import first_world
+from executive.cells.sim.world import World
+from executive.errors import InputError
+from executive.events import ignore
+from executive.geometry import Pose
+from executive.mission.findings import MissionError
+from executive.perception.camera_model import calibrated, project
+from executive.testing.oracle import TrueFrame, oracle_cell
+
+Build = Callable[..., World]
+SEED = 3
+BLACK = (0.06, 0.06, 0.06)
+TABLE = np.s_[100:160, 60:200]
+"""Part of the overhead image that shows nothing but the table."""
+
+
+def scene(**sections: Any) -> SceneConfig:
+    """Return a scene with these sections."""
+    return SceneConfig.model_validate({"scene": "changed", **sections})
+
+
+@pytest.fixture
+def cell(overhead: CellConfig, tmp_path: Path, request: pytest.FixtureRequest) -> Callable[..., SimCell]:
+    """Build cells in the world of a scene with these sections; without noise unless the scene has some."""
+
+    def build(config: CellConfig = overhead, **sections: Any) -> SimCell:
+        path = tmp_path / "scene.yaml"
+        quiet = {"noise": {"gain": 0, "read": 0}}
+        sections["camera"] = {**quiet, **sections.get("camera", {})}
+        path.write_text(yaml.safe_dump({"scene": "changed", **sections}))
+        options = CellOptions(SilentOperator(), base=tmp_path, scene=path)
+        make = oracle_cell(jitter=0.0, rendered=True)
+        made = make(config, seed=SEED, routes=ROUTES, emit=ignore, options=options)
+        request.addfinalizer(made.close)
+        return made
+
+    return build
+
+
+@pytest.fixture
+def world(overhead: CellConfig) -> Iterator[Callable[..., World]]:
+    """Build the first world of a scene with these sections."""
+    worlds: list[World] = []
+
+    def build(**sections: Any) -> World:
+        worlds.append(first_world(overhead, SEED, scene=scene(**sections)))
+        return worlds[-1]
+
+    yield build
+    for made in worlds:
+        made.close()
+
+
+def capture(made: SimCell) -> Frame:
+    return made.cell.camera.capture()
+
+
+def placed(world: World) -> list[tuple[str, list[float]]]:
+    """Return label and pose of every object."""
+    return [(label, world.object_pose(body).rounded(5)) for body, label in world.bodies.items()]
+
+
+def test_a_scene_without_changes_is_the_declared_world(world: Build, overhead: CellConfig) -> None:
+    assert true_cell(overhead, scene()) == overhead
+    assert build_light(DECLARED_SCENE.light) == CELL_LIGHT
+    declared = first_world(overhead, SEED)
+    assert placed(world()) == placed(declared)
+    declared.close()
+    assert load_scene(None, overhead) == DECLARED_SCENE
+
+
+def test_the_lamp_changes_brightness_colour_and_shadows(cell: Callable[..., SimCell]) -> None:
+    usual, dim, red = (
+        capture(cell(light=light)).image[TABLE].astype(float).mean(axis=(0, 1))
+        for light in ({}, {"brightness": 0.3}, {"colour": [1.0, 0.5, 0.5]})
+    )
+    assert dim / usual == pytest.approx(0.3, abs=0.02)
+    assert red[1] / red[0] < 0.9 * usual[1] / usual[0]
+    low = {"direction": [1.0, 0.0, 0.3], "diffuse": 0.6}
+    flat, shaded = (capture(cell(light={**low, "shadow": shadow})).image for shadow in (False, True))
+    assert (flat != shaded).any(axis=2).mean() > 0.01
+
+
+def test_the_table_gets_a_colour_and_a_texture_and_the_objects_keep_theirs(
+    cell: Callable[..., SimCell],
+) -> None:
+    usual = capture(cell()).image
+    made = cell(table={"colour": [0.2, 0.2, 0.4], "texture": "plain"})
+    red, green, blue = capture(made).image[TABLE].mean(axis=(0, 1))
+    assert (red / blue, green / blue) == (pytest.approx(0.5, abs=0.05), pytest.approx(0.5, abs=0.05))
+    wood, striped = (
+        image[TABLE].astype(float).std(axis=1).max()
+        for image in (usual, capture(cell(table={"texture": "pattern 1"})).image)
+    )
+    assert striped > 1.5 * wood
+    frame = capture(made)
+    assert isinstance(frame, TrueFrame)
+    for true in frame.truth:
+        column, row = (int(value) for value in true.centre)
+        assert (frame.image[row, column] == usual[row, column]).all()
+
+
+def test_number_gap_and_stacks_are_those_of_the_scene(world: Build, overhead: CellConfig) -> None:
+    made = world(table={"objects": [7, 7], "gap": 0.05})
+    places = [made.object_pose(body).position[:2] for body in made.bodies]
+    kinds = [overhead.objects[label].radius for label in made.bodies.values()]
+    gaps = [np.linalg.norm(places[a] - places[b]) - kinds[a] - kinds[b] for a in range(7) for b in range(a)]
+    assert (len(places), min(gaps) > 0.045) == (7, True)
+    piled = world(table={"objects": [6, 6], "stacked": 1})
+    assert max(piled.object_pose(body).position[2] for body in piled.bodies) > 0.06
+
+
+def test_looks_change_no_place_and_size_is_the_truth_that_the_ledger_is_not_told(
+    world: Build, cell: Callable[..., SimCell], overhead: CellConfig
+) -> None:
+    looks = {"objects": {"any": {"colours": [BLACK]}, "duck": {}}, "light": {"brightness": 0.3}}
+    usual, black = world(), world(**looks)
+    assert placed(usual) == placed(black)
+    for body, label in black.bodies.items():
+        colour = black.client.getVisualShapeData(body)[0][7][:3]
+        assert (tuple(round(value, 3) for value in colour) == BLACK) == (label != "duck")
+    large = world(objects={"sphere": {"scale": 1.3}}, table={"objects": [6, 6]})
+    for body, label in large.bodies.items():
+        factor = 1.3 if label == "sphere" else 1.0
+        mesh, declared = load_mesh(large.models[body]), load_mesh(overhead.objects[label])
+        assert mesh.top - mesh.bottom == pytest.approx(factor * (declared.top - declared.bottom))
+        if label == "sphere":
+            low, high = large.client.getAABB(body)
+            assert high[2] - low[2] == pytest.approx(0.078, abs=0.005)
+    made = cell(objects={"sphere": {"scale": 1.3}})
+    assert made.cell.classes["sphere"].height == overhead.objects["sphere"].height
+
+
+def test_unknown_objects_lie_beside_the_others_and_no_detector_knows_them(
+    cell: Callable[..., SimCell], overhead: CellConfig
+) -> None:
+    unknown = {"count": [2, 2], "models": [168, 169], "scale": 0.5, "colours": [[0.0, 0.9, 0.0]]}
+    made = cell(unknown=unknown, table={"objects": [3, 3], "stacked": 1.0})
+    world = made._world
+    strange = [body for body, label in world.bodies.items() if label == UNKNOWN]
+    assert (len(world.bodies), len(strange)) == (5, 2)
+    others = [body for body in world.bodies if body not in strange]
+    for body in strange:
+        model, place = world.models[body], world.object_pose(body).position
+        assert "169.urdf" in model.urdf
+        assert model.radius == pytest.approx(load_mesh(model).radius)
+        for other in others:
+            apart = np.linalg.norm(world.object_pose(other).position[:2] - place[:2])
+            assert apart > model.radius, "neither on nor under an object"
+    frame = capture(made)
+    assert isinstance(frame, TrueFrame)
+    assert {true.label for true in frame.truth} <= overhead.objects.keys()
+    green = (frame.image[..., 1] > 90) & (frame.image[..., [0, 2]].max(axis=2) < 60)
+    assert cv2.connectedComponents(green.astype(np.uint8), connectivity=8)[0] == 1 + 2
+    assert UNKNOWN not in made.cell.classes
+
+
+def middles(made: SimCell, matrix: np.ndarray, X_WC: Pose) -> np.ndarray:
+    """Return where a camera sees the middle of the outline of each object `(N, 2)` [pixel]."""
+    found = []
+    for body, model in made._world.models.items():
+        pixels = project(matrix, X_WC, made._world.object_pose(body).apply(load_mesh(model).vertices))
+        found.append((pixels.min(axis=0) + pixels.max(axis=0)) / 2)
+    return np.array(found)
+
+
+def turned(axis: str, angle: float) -> np.ndarray:
+    """Return the rotation about an axis of the world by an angle [degree]."""
+    vector = np.radians(angle) * np.eye(3)["xyz".index(axis)]
+    return np.asarray(cv2.Rodrigues(vector)[0])
+
+
+@pytest.mark.parametrize(
+    ("error", "zoom", "moved"),
+    [
+        ({"shift": [0.02, 0.0, 0.03]}, 1.0, lambda X: Pose.of([0.02, 0.0, 0.03]) @ X),
+        ({"turn_deg": [0.0, 0.0, 4.0]}, 1.0, lambda X: Pose(X.rotation @ turned("z", 4.0), X.position)),
+        (
+            {"orbit_deg": [0.0, 15.0, 0.0]}, 1.0,
+            lambda X: Pose(turned("y", 15.0), [0.5, 0, 0]) @ Pose(np.eye(3), [-0.5, 0, 0]) @ X,
+        ),
+        ({"fov_factor": 1.1}, math.tan(math.radians(27.5)) / math.tan(math.radians(1.1 * 27.5)), lambda X: X),
+    ],
+    ids=["shift", "turn", "orbit", "lens"],
+)  # fmt: skip
+def test_the_image_is_from_the_true_camera_and_the_frame_says_the_declared_one(
+    cell: Callable[..., SimCell], overhead: CellConfig, error: dict[str, Any], zoom: float, moved: Any
+) -> None:
+    made = cell(camera=error)
+    frame = capture(made)
+    assert isinstance(frame, TrueFrame)
+    matrix, X_WC = calibrated(overhead.cameras["overhead"])
+    assert (frame.matrix == matrix).all()
+    assert frame.X_WC.rounded() == X_WC.rounded()
+    true = np.diag([zoom, zoom, 1.0]) @ matrix
+    true[:2, 2] = matrix[:2, 2]
+    expected = middles(made, true, moved(X_WC))
+    assert np.array([each.centre for each in frame.truth]) == pytest.approx(expected, abs=1e-6)
+    assert np.linalg.norm(expected - middles(made, matrix, X_WC), axis=1).max() > 3
+    # The rendered image agrees: the objects are where the truth says, and nowhere else.
+    plain = capture(cell(camera=error, table={"objects": [0, 0]}))
+    seen = (frame.image != plain.image).any(axis=2)
+    rows, columns = np.nonzero(seen)
+    boxes = np.array([each.box for each in frame.truth])
+    around = [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
+    assert around == pytest.approx([*boxes[:, :2].min(axis=0), *boxes[:, 2:].max(axis=0)], abs=1.5)
+
+
+def test_the_error_of_a_camera_on_the_wrist_moves_with_the_arm(
+    cell: Callable[..., SimCell], wrist: CellConfig
+) -> None:
+    made = cell(wrist, camera={"shift": [0.0, 0.01, 0.0]})
+    camera = wrist.cameras["wrist"]
+    for pose in ("scan", "aside_left"):
+        made._world.set_arm(np.radians(wrist.arm.poses_deg[pose]))
+        flange, X_FC = made._world.flange_pose(), calibrated(camera)[1]
+        assert capture(made).X_WC.rounded() == (flange @ X_FC).rounded()
+        true = made.cell.camera._true_view()[1]  # type: ignore[attr-defined]
+        assert true.rounded() == (flange @ Pose.of([0.0, 0.01, 0.0]) @ X_FC).rounded()
+
+
+def test_the_noise_is_that_of_the_scene(cell: Callable[..., SimCell]) -> None:
+    clean, noisy = (capture(cell(camera={"noise": {"gain": 0, "read": read}})).image for read in (0, 16))
+    assert (noisy[TABLE].astype(float) - clean[TABLE]).std() == pytest.approx(16, abs=0.5)
+
+
+def test_evaluated_frames_are_of_the_scene_and_say_what_the_cell_declares(overhead: CellConfig) -> None:
+    changed = scene(
+        camera={"shift": [0.02, 0.0, 0.0]}, unknown={"count": [1, 1]}, objects={"any": {"colours": [BLACK]}}
+    )
+    usual, other = (
+        SceneRenderer(overhead, "overhead", randomized=False, scene=s) for s in (DECLARED_SCENE, changed)
+    )
+    one, sample = usual.sample(1), other.sample(1)
+    assert (sample.X_WC.rounded(), UNKNOWN in sample.labels) == (one.X_WC.rounded(), False)
+    scale = (sample.part[2] - sample.part[0]) / 256
+    boxes = sample.boxes * scale + [*sample.part[:2], *sample.part[:2]]
+    for box, centre in zip(boxes, sample.centres, strict=True):
+        middle = np.array([(box[0] + box[2]) / 2, (box[1] + box[3]) / 2])
+        declared = project(sample.matrix, sample.X_WC, centre)
+        # 0.02 m along x is up in the image, at 461 pixels focal length and 1.17 m distance.
+        assert middle - declared == pytest.approx([0.0, 0.02 * 461 / 1.17], abs=3.0)
+    usual.close()
+    other.close()
+
+
+WRONG = {
+    "a key that there is not": (
+        "light: {brightnes: 0.3}\n",
+        """
+        scene.yaml:2:9: error[unknown-key]: light has no key "brightnes"
+           2 | light: {brightnes: 0.3}
+             |         ^^^^^^^^^
+          Did you mean "brightness"? light takes: brightness, direction, colour, ambient, diffuse, specular, shadow.
+        """,
+    ),
+    "a key of a section that may be missing": (
+        "unknown: {count: [1, 2], size: 0.5}\n",
+        """
+        scene.yaml:2:26: error[unknown-key]: unknown has no key "size"
+           2 | unknown: {count: [1, 2], size: 0.5}
+             |                          ^^^^
+          unknown takes: count, models, scale, colours.
+        """,
+    ),
+    "a class that the cell lacks": (
+        "objects: {cubes: {scale: 0.8}}\n",
+        """
+        scene.yaml:2:11: error[unknown-class]: the cell overhead has no class "cubes"
+           2 | objects: {cubes: {scale: 0.8}}
+             |           ^^^^^
+          Did you mean "cube"? Valid keys: cube, sphere, duck, any.
+        """,
+    ),
+    "a texture that there is not": (
+        "table: {texture: pattern 24}\n",
+        """
+        scene.yaml:2:18: error[wrong-value]: table.texture must be "wood", "plain", or "pattern 0" to "pattern 23", not "pattern 24"
+           2 | table: {texture: pattern 24}
+             |                  ^^^^^^^^^^
+        """,
+    ),
+    "a colour out of range": (
+        "objects: {any: {colours: [[0.5, 0.5, 255]]}}\n",
+        """
+        scene.yaml:2:38: error[out-of-range]: objects.any.colours[0][2] must be at most 1, not 255
+           2 | objects: {any: {colours: [[0.5, 0.5, 255]]}}
+             |                                      ^^^
+        """,
+    ),
+    "nothing but the damaged model": (
+        "unknown: {count: [1, 1], models: [168, 168]}\n",
+        """
+        scene.yaml:2:26: error[wrong-value]: unknown.models contains only number 168, whose mesh is damaged; name a wider range
+           2 | unknown: {count: [1, 1], models: [168, 168]}
+             |                          ^^^^^^
+        """,
+    ),
+    "no colour": (
+        "objects: {any: {colours: []}}\n",
+        """
+        scene.yaml:2:17: error[wrong-value]: objects.any.colours needs at least one colour [r, g, b], each 0 to 1
+           2 | objects: {any: {colours: []}}
+             |                 ^^^^^^^
+        """,
+    ),
+}
+
+
+@pytest.mark.parametrize(("section", "expected"), WRONG.values(), ids=WRONG)
+def test_a_mistake_is_told_with_its_place_and_what_is_allowed(
+    overhead: CellConfig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, section: str, expected: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("scene.yaml").write_text(f"scene: wrong\n{section}")
+    with pytest.raises(MissionError) as caught:
+        load_scene(Path("scene.yaml"), overhead)
+    assert str(caught.value) == dedent(expected).strip()
+
+
+def test_a_scene_that_does_not_fit_the_cell_is_refused(
+    overhead: CellConfig, wrist: CellConfig, tmp_path: Path
+) -> None:
+    path = tmp_path / "scene.yaml"
+    with pytest.raises(InputError, match=f"there is no file {path}"):
+        load_scene(path, overhead)
+    path.write_text("scene: tilted\ncamera: {orbit_deg: [0, 5, 0]}\n")
+    with pytest.raises(MissionError, match=r"orbit_deg moves a fixed camera, and .* use shift and turn_deg"):
+        load_scene(path, wrist)
+    path.write_text("scene: fish eye\ncamera: {fov_factor: 3}\n")
+    with pytest.raises(MissionError, match=r"must be at most 2.97, .* is 60.0 degrees, and no lens has more"):
+        load_scene(path, wrist)
+    path.write_text("light: {}\n- 1\n")
+    with pytest.raises(MissionError, match=r"error\[yaml\]"):
+        load_scene(path, overhead)
+    fake = overhead.model_copy(update={"kind": "fake"})
+    with pytest.raises(InputError, match="of a cell of kind sim, and the cell overhead is of kind fake"):
+        load_scene(path, fake)
+
+
+def test_the_noise_section_is_that_of_a_cell_file() -> None:
+    assert scene(camera={"noise": {"read": 8}}).camera.noise == NoiseConfig(gain=0.02, read=8.0)

@@ -1,0 +1,88 @@
+"""Pictures of a recorded world: of the right moments, whoever takes them."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from executive.cell.config import CellConfig
+from executive.cells.sim import command_log as log
+from executive.cells.sim import shots as module
+from executive.cells.sim.camera import Image
+from executive.cells.sim.command_log import CommandLog
+from executive.cells.sim.shots import GROUND, SKY, Shoot, pictures, shots, steps_in
+from executive.cells.sim.viewpoint import overview
+from executive.errors import InputError
+
+SIZE = (96, 84)
+STEPS = 36
+
+
+def swing(config: CellConfig, path: Path, idle: int) -> Shoot:
+    """A log in which the arm swings for some steps; in the middle some steps of nobody's run."""
+    home = np.radians(config.arm.poses_deg["home"])
+    commands = CommandLog(path)
+    for step in range(STEPS):
+        commands.note(log.JOINTS_TO, step / 240, *(home - 0.02 * step * np.eye(7)[0]))
+        commands.note(log.STEP)
+        if step == 20:
+            for _ in range(idle):
+                commands.note(log.IDLE)
+    commands.close()
+    return Shoot(config, 5, path, overview(config, SIZE, (2, 2, 94, 82)))
+
+
+@pytest.fixture
+def shoot(overhead: CellConfig, tmp_path: Path) -> Shoot:
+    return swing(overhead, tmp_path / "log", idle=8)
+
+
+def changed(one: Image, other: Image) -> int:
+    """How many pixels differ."""
+    return np.count_nonzero((one != other).any(axis=2))
+
+
+def test_each_picture_is_of_its_moment(shoot: Shoot, tmp_path: Path) -> None:
+    assert steps_in(shoot.log) == STEPS
+    with pytest.raises(InputError, match="can neither be taken up again nor filmed"):
+        steps_in(tmp_path / "none")
+    first, same, middle, last = pictures(shoot, [0, 0, 18, STEPS])
+    assert first.shape == (SIZE[1], SIZE[0], 3)
+    assert (first == same).all()
+    assert 0 < changed(first, middle) < changed(first, last)
+    (alone,) = pictures(shoot, [18])
+    assert (alone == middle).all()
+    image = first.astype(int)  # without the floor
+    assert np.abs(image[0] - SKY).max() <= 1
+    assert np.abs(image[-1, -1] - GROUND).max() <= 1
+
+
+@pytest.mark.slow
+def test_several_processes_take_the_same_pictures_in_the_same_order(
+    shoot: Shoot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "BLOCK", 4)
+    steps = [0, 3, 6, 9, 12, 15, 24, 30, STEPS]
+    with closing(shots(shoot, steps, workers=2)) as taken:
+        together = list(taken)
+    for here, there in zip(pictures(shoot, steps), together, strict=True):
+        assert (here == there).all()
+
+
+def test_a_viewpoint_has_arm_workspace_and_bins_in_the_given_part_of_the_image(overhead: CellConfig) -> None:
+    view = overview(overhead, (800, 720), (20, 60, 780, 640))
+    assert view.matrix == pytest.approx(np.array([[1215.34, 0, 400], [0, 1215.34, 360], [0, 0, 1]]), rel=1e-5)
+    pose = [1.8486, -1.1888, 1.3928, -0.7711, -0.3845, 0.2265, 0.4542]
+    assert (view.X_WC.rounded(4), view.size) == (pytest.approx(pose, abs=2e-4), (800, 720))
+
+
+def test_a_picture_is_of_the_world_of_the_scene(shoot: Shoot, tmp_path: Path) -> None:
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("scene: green\ntable: {colour: [0.2, 0.9, 0.2]}\nlight: {brightness: 0.1}\n")
+    (usual,), (other,) = (pictures(each, [0]) for each in (shoot, replace(shoot, scene=scene)))
+    greener = (other[..., 1] > 1.5 * other[..., 0]) & (usual[..., 1] <= usual[..., 0])
+    assert greener.mean() > 0.1

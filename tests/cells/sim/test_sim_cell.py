@@ -1,0 +1,177 @@
+"""The simulated cell as a whole: what a seed decides, what the audit counts, what the camera can see."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from executive.cell.arm import Goal
+from executive.cell.values import Detections
+from executive.cell.workcell import CellOptions
+from executive.cells.fake.cell import ROUTES, SilentOperator
+from executive.cells.sim.cell import SimCell
+from executive.events import ignore
+from executive.geometry import Pose
+from executive.mission.parse.cell_file import load_cell
+from executive.testing.oracle import TrueFrame, oracle_cell
+
+Build = Callable[..., SimCell]
+
+
+@pytest.fixture
+def build_cell(missions: Path, request: pytest.FixtureRequest) -> Build:
+    """Build simulated cells whose detectors are oracles; they are closed after the test."""
+
+    def build_cell(name: str = "overhead", seed: int = 4, **changes: Any) -> SimCell:
+        path = missions / "cells" / f"{name}.yaml"
+        config = load_cell(path).model_copy(update=changes)
+        options = CellOptions(SilentOperator(), base=path.parent)
+        made = oracle_cell(jitter=0.0)(config, seed=seed, routes=ROUTES, emit=ignore, options=options)
+        request.addfinalizer(made.close)
+        return made
+
+    return build_cell
+
+
+def placements(made: SimCell) -> list[tuple[str, list[float]]]:
+    world = made._world
+    poses = [(label, world.object_pose(body)) for body, label in world.bodies.items()]
+    return [(label, [*pose.position, *pose.rotation.ravel()]) for label, pose in poses]
+
+
+def look(made: SimCell) -> None:
+    """Let the ledger see everything the camera sees."""
+    cell = made.cell
+    frame = cell.camera.capture()
+    request = cell.detectors["embedded"].request(frame, "full")
+    while not request.ready:
+        made.advance()
+    answer = request.result()
+    found = answer.found
+    positions = [cell.localizer.locate(detection, frame) for detection in found]
+    detections = Detections(
+        frame, found, answer.detector, answer.error_rates, "full", cell.camera.area("full")
+    )
+    cell.ledger.observe(detections, positions)
+
+
+def put(made: SimCell, body: int, place: tuple[float, float, float]) -> None:
+    made._world.place_object(body, Pose.of(place))
+
+
+NONE_FELL = {"fell_in_wrong_bin": 0, "unseen": 0}
+
+
+def test_the_audit_counts_every_body_once_by_where_it_really_is(build_cell: Build) -> None:
+    made = build_cell(seed=0)
+    look(made)
+    assert made.audit() == {
+        "right": 0,
+        "wrong_bin": 0,
+        "left": 4,
+        "elsewhere": 0,
+        "fell_in_wrong_bin": 0,
+        "unseen": 0,
+    }
+
+    one, two, three, _ = made._world.bodies
+    home = made.cell.bins[ROUTES[made._world.bodies[one]][0]].position
+    put(made, one, (home[0] + 0.05, home[1] - 0.05, 0.04))
+    assert made.audit() == {
+        "right": 1,
+        "wrong_bin": 0,
+        "left": 3,
+        "elsewhere": 0,
+        "fell_in_wrong_bin": 0,
+        "unseen": 0,
+    }
+
+    strange = next(b for n, b in made.cell.bins.items() if n not in ROUTES[made._world.bodies[two]]).position
+    put(made, two, (strange[0], strange[1] + 0.03, 0.04))
+    assert made.audit() == {
+        "right": 1,
+        "wrong_bin": 1,
+        "left": 2,
+        "elsewhere": 0,
+        "fell_in_wrong_bin": 0,
+        "unseen": 0,
+    }
+
+    put(made, three, (1.4, 0.0, -0.6))
+    assert made.audit() == {
+        "right": 1,
+        "wrong_bin": 1,
+        "left": 1,
+        "elsewhere": 1,
+        "fell_in_wrong_bin": 0,
+        "unseen": 0,
+    }
+
+    # Under a bin is not in it.
+    put(made, one, (home[0], home[1], -0.6))
+    assert made.audit() == {
+        "right": 0,
+        "wrong_bin": 1,
+        "left": 1,
+        "elsewhere": 2,
+        "fell_in_wrong_bin": 0,
+        "unseen": 0,
+    }
+
+
+def test_what_the_ledger_never_saw_is_unseen_wherever_it_ends(build_cell: Build) -> None:
+    made = build_cell(seed=0)
+    assert made.audit()["unseen"] == 4
+    hidden, *_ = made._world.bodies
+    lay = made._world.object_pose(hidden)
+    put(made, hidden, (0.0, 0.0, 0.03))  # in the foot of the arm, where no camera looks
+    look(made)
+    made._world.place_object(hidden, lay)
+    assert made.audit()["unseen"] == 1
+
+
+def test_the_table_is_hidden_while_the_arm_is_over_it(build_cell: Build) -> None:
+    made = build_cell()
+    cell = made.cell
+    assert cell.camera.sees_table()
+    planning = cell.arm.plan(Goal((0.53, 0.0, 0.16)))
+    while not planning.ready:
+        made.advance()
+    cell.arm.start(planning.result())
+    while not cell.arm.at_rest:
+        made.advance()
+    assert not cell.camera.sees_table()
+    frame = cell.camera.capture()
+    left, top, right, bottom = (int(side) for side in cell.camera.area("table"))
+    hidden = ~frame.visible[top:bottom, left:right]
+    assert 0.05 < hidden.mean() < 0.9
+    x, y, z = frame.matrix @ frame.X_WC.inverse().apply(cell.arm.tool_pose.position)
+    assert not frame.visible[int(y / z), int(x / z)]
+
+
+@pytest.mark.parametrize("name", ["overhead", "fasteners"])
+def test_a_class_weighs_what_its_objects_do(build_cell: Build, name: str) -> None:
+    made = build_cell(name)
+    for body, label in made._world.bodies.items():
+        mass = made._world.client.getDynamicsInfo(body, -1)[0]
+        assert made.cell.classes[label].mass == pytest.approx(mass), label
+
+
+@pytest.mark.parametrize(("way", "raised"), [("depth", 0.05), ("ray", 0.05), ("plane", 0.0)])
+def test_only_depth_and_ray_find_what_does_not_stand_on_the_table(
+    build_cell: Build, way: str, raised: float
+) -> None:
+    made = build_cell("depth", localization=way)
+    body = next(body for body, label in made._world.bodies.items() if label == "cube")
+    put(made, body, (0.6, 0.15, 0.075))
+    frame = made.cell.camera.capture()
+    assert isinstance(frame, TrueFrame)
+    found = [made.cell.localizer.locate(true, frame) for true in frame.truth if true.label == "cube"]
+    error = min(float(np.linalg.norm(place[:2] - (0.6, 0.15))) for place in found)
+    assert (error < 0.003) == (way != "plane")
+    height = min(found, key=lambda place: float(np.linalg.norm(place[:2] - (0.6, 0.15))))[2]
+    assert height - 0.025 == pytest.approx(raised, abs=0.006)

@@ -1,0 +1,35 @@
+"""What the arm and its load hide from the camera."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from executive.cell.clock import STEP
+from executive.cell.config import CellConfig
+from executive.cells.sim.arm import SimArm
+from executive.cells.sim.camera import camera_pose
+from executive.cells.sim.clock import SimClock
+from executive.cells.sim.view import ArmShadow
+from executive.cells.sim.world import World
+from executive.motion.planner import Planner
+from executive.perception.camera_model import calibrated, project
+
+Build = Callable[[CellConfig], World]
+
+
+def test_what_the_tool_holds_hides_what_lies_under_it(build: Build, overhead: CellConfig) -> None:
+    world, planner, holds = build(overhead), Planner(overhead), False
+    arm = SimArm(world, planner, overhead, SimClock(world, STEP))
+    shadow = ArmShadow(arm, planner.kinematics, overhead, lambda: holds)
+    camera = overhead.cameras["overhead"]
+    matrix, X_WC = calibrated(camera)[0], camera_pose(world, camera)
+    x, y, z = world.tool_pose().position
+    column, row = project(matrix, X_WC, np.array((x, y - 0.045, z - 0.03))).astype(int)
+    empty = shadow.visible(matrix, X_WC, (camera.width, camera.height))
+    holds = True
+    loaded = shadow.visible(matrix, X_WC, (camera.width, camera.height))
+    assert empty[row, column]
+    assert not loaded[row, column], "the load is as large as the largest object, off centre as far as it gets"
+    assert loaded.sum() < empty.sum()

@@ -1,0 +1,49 @@
+"""The simulated world as a person sees it, against what the simulator itself says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from executive.cell.config import CellConfig
+from executive.cells.sim.spawn import spawn
+from executive.cells.sim.visuals import SimScenery
+from executive.cells.sim.world import World
+
+
+@pytest.fixture
+def world(overhead: CellConfig):
+    world = World(overhead)
+    spawn(world, overhead, 3)
+    yield world
+    world.close()
+
+
+def test_the_arm_is_where_its_joints_put_it(world: World) -> None:
+    scenery = SimScenery(world)
+    before = scenery.poses()
+    assert np.allclose(before["link 8"].position, world.flange_pose().position, atol=1e-6)
+    for body in world.bodies:
+        assert before[f"object {body}"].position[:2] == pytest.approx(
+            world.object_pose(body).position[:2], abs=1e-6
+        )
+    world.set_arm(np.radians([20, 40, 10, -70, 5, 60, 15]))
+    after = scenery.poses()
+    assert np.allclose(after["link 8"].position, world.flange_pose().position, atol=1e-6)
+    assert not np.allclose(before["link 4"].position, after["link 4"].position, atol=0.01)
+
+
+def test_shapes_have_the_sizes_of_the_cell(world: World, overhead: CellConfig) -> None:
+    shapes = SimScenery(world).shapes
+    walls = [shape for shape in shapes if shape.kind == "box"]
+    assert len(walls) == 5 * len(overhead.bins)
+    red = next(shape for shape in walls if np.allclose(shape.colour, overhead.bins["red_bin"].colour))
+    length, width, _ = overhead.bins["red_bin"].size
+    assert red.size == pytest.approx((length + 0.01, width + 0.01, 0.005))
+    assert red.X_BS.position == pytest.approx((0.24, -0.48, 0.0025))
+    body, neck = [shape for shape in shapes if shape.kind == "cylinder"]
+    assert neck.size[0] == pytest.approx(2 * overhead.tool.cup_radius)
+    assert body.size[2] + neck.size[2] == pytest.approx(overhead.tool.length)
+    assert all(Path(shape.file).is_file() for shape in shapes if shape.kind == "mesh")

@@ -1,0 +1,42 @@
+"""What skills do with the arm: planning, following, and what they do when it runs into something."""
+
+from __future__ import annotations
+
+import pytest
+
+from executive.cell.arm import Goal, Task
+from executive.cell.values import Obstacle, Target
+from executive.cells.fake.cell import FakeCell
+from executive.manipulation.motions import planned
+from executive.testing.run_skill import run_skill
+from skills.move_to_scan import MoveToScan
+
+
+def test_an_arm_that_runs_into_something_stops_and_the_whole_table_is_in_doubt(
+    fake: FakeCell, targets: list[Target]
+) -> None:
+    fake.arm.runs_into = "link 4 ran into the lamp"
+    result = run_skill(MoveToScan(pose="aside"), fake)
+    assert (result.reason, result.message) == ("blocked", "link 4 ran into the lamp")
+    assert fake.arm.at_rest
+    assert not any(fake.ledger.is_fresh(target) for target in targets)
+    assert run_skill(MoveToScan(pose="aside"), fake).status == "SUCCESS", "only that motion was broken off"
+
+
+def test_what_a_look_shows_while_a_motion_is_planned_is_heeded(fake: FakeCell) -> None:
+    asked: list[Task] = []
+
+    def ask() -> tuple[Goal, Task]:
+        stands = (Obstacle(0.5, 0.1, 0.03, 0.05, "cube-9"),) if len(asked) > 0 else ()
+        asked.append(Task(around=stands))
+        return Goal((0.5, -0.1, 0.1)), asked[-1]
+
+    steps = planned(MoveToScan(), fake.cell.arm, ask)
+    ticks = 0
+    with pytest.raises(StopIteration):
+        while True:
+            next(steps)
+            fake.advance()
+            ticks += 1
+    assert len(asked) == 4, "planned, and found changed; planned anew, and found the same"
+    assert ticks == pytest.approx(2 * 0.1 * 240, abs=2)

@@ -1,0 +1,88 @@
+"""Where the arm goes to: onto an object, into a bin, to a free place."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from at_hand import look, pick
+
+from executive.cell.arm import Goal
+from executive.cell.values import BIN_THICKNESS, ObjectClass
+from executive.cells.fake.cell import FakeCell
+from executive.manipulation.tool_goals import DROP, SIDE_BY_SIDE, approach, aside, onto, over
+from executive.testing.run_skill import run_skill
+from skills.put_down import PutDown
+
+SAFE = (0.45, -0.30)
+
+
+@pytest.fixture
+def held(fake: FakeCell) -> str:
+    """A cube in the tool."""
+    return picked(fake, fake.world.put("cube", 0.5, 0.0).label)
+
+
+def picked(fake: FakeCell, label: str) -> str:
+    """Pick the first object of that class that a look shows in the workspace; return its item."""
+    target = next(one for one in look(fake, "full") if one.label == label and one.position[1] > -0.2)
+    return pick(fake, target)
+
+
+def test_it_is_the_safe_place_if_that_is_free(fake: FakeCell, held: str) -> None:
+    assert aside(fake.cell, held, 0.01).position == pytest.approx((*SAFE, 0.05 + 0.01))
+
+
+def test_what_is_put_down_one_after_another_stands_side_by_side(fake: FakeCell, held: str) -> None:
+    places = []
+    item = held
+    for _ in range(4):
+        run_skill(PutDown(held=item), fake)
+        places.append(tuple(next(row for row in fake.ledger.rows() if row["item"] == item)["position"][:2]))
+        fake.world.put("cube", 0.5, 0.1)
+        item = picked(fake, "cube")
+    assert places[0] == pytest.approx(SAFE)
+    radius = fake.cell.classes["cube"].radius
+    gaps = [math.dist(a, b) for n, a in enumerate(places) for b in places[:n]]
+    assert min(gaps) >= 2 * radius + SIDE_BY_SIDE - 1e-6
+    assert max(math.dist(place, SAFE) for place in places) < 0.2
+    assert not any(bin.contains(place) for place in map(np.array, places) for bin in fake.cell.bins.values())
+
+
+def test_where_nothing_is_free_it_is_the_safe_place_all_the_same(
+    fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("executive.manipulation.tool_goals.ROWS", 0)
+    run_skill(PutDown(held=held), fake)
+    fake.world.put("cube", 0.5, 0.1)
+    assert aside(fake.cell, picked(fake, "cube"), 0.01).position[:2] == pytest.approx(SAFE)
+
+
+def test_the_goal_of_an_approach_lies_below_the_surface_and_the_last_part_is_slow(fake: FakeCell) -> None:
+    fake.world.put("cube", 0.5, 0.0)
+    goal, _ = approach(fake.cell, look(fake, "full")[0])
+    assert goal.position == pytest.approx((0.5, 0.0, 0.035))
+    assert goal.position[2] + goal.guarded == pytest.approx(0.05 + fake.cell.descent)
+    assert goal.speed == fake.cell.descent_speed
+
+
+def test_an_approach_never_feels_below_the_middle_of_what_it_is_to_touch() -> None:
+    washer = ObjectClass("washer", 0.006, 0.025, ring=0.017)
+    goal = onto(washer, np.array([0.5, 0.1, 0.013]), 0.02, 0.05)  # on another one
+    assert goal.position == pytest.approx((0.517, 0.1, 0.013))
+    assert (goal.guarded, goal.speed) == pytest.approx((0.003 + 0.02, 0.05))
+    further = onto(washer, np.array([0.5, 0.1, 0.013]), 0.02, 0.05, attempt=1, overtravel=0.001)
+    assert further.position[2] == pytest.approx(0.015)
+    assert np.hypot(further.position[0] - 0.5, further.position[1] - 0.1) == pytest.approx(0.017)
+
+
+def test_what_goes_onto_a_layer_hangs_as_far_above_it_as_the_first_ones_above_the_floor(
+    fake: FakeCell,
+) -> None:
+    box = fake.cell.bins["red_bin"]
+    first, second = (over(box, number, 0.05, tallest=0.07) for number in (1, len(box.slots) + 1))
+    floor = float(box.position[2]) + BIN_THICKNESS
+    assert first == Goal((*map(float, box.slots[1]), floor + 0.05 + DROP))
+    assert second.position == pytest.approx((*box.slots[1], floor + 0.07 + 0.05 + DROP))
+    assert over(box, 1, 0.05, 0.07, drop=0.03).position[2] == pytest.approx(floor + 0.05 + 0.03)

@@ -1,0 +1,89 @@
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from joint_states import LIMITS, SOONER, passed, peaks, tool_velocities
+
+from executive.cell.arm import Goal
+from executive.geometry import Array
+from executive.motion.cartesian_line import SAMPLES, Line
+from executive.motion.kinematics import Kinematics
+from executive.motion.postures import find_postures, line_chain
+
+ARM = Kinematics(0.12, LIMITS.position)
+
+
+class Descent(NamedTuple):
+    """Joint positions evenly spread along a way down, and how long and fast that may be."""
+
+    chain: Array
+    length: float
+    speed: float
+
+
+@st.composite
+def descents(draw: st.DrawFn) -> Descent:
+    """Ways down to places on the workspace, in any posture."""
+    place = draw(st.tuples(st.floats(0.42, 0.64), st.floats(-0.22, 0.22), st.floats(0.03, 0.1)))
+    length = draw(st.floats(0.005, 0.2))
+    postures = find_postures(ARM, Goal(place), length, np.zeros(7))
+    number = draw(st.integers(0, len(postures) - 1))
+    posture = int(postures.branch[number]), float(postures.swivel[number])
+    chain = line_chain(ARM, postures.low[number], length, SAMPLES, *posture)[::-1]
+    return Descent(chain, length, draw(st.sampled_from([0.03, 0.2, math.inf])))
+
+
+@given(descents(), st.booleans())
+@settings(max_examples=20)
+def test_the_tool_goes_straight_down_inside_all_limits(descent: Descent, enters: bool) -> None:
+    line = Line(descent.chain, descent.length, LIMITS, descent.speed, enters=enters)
+    states = passed(line)
+    tips, axes = ARM.tips(states.q)
+    assert np.max(np.linalg.norm(tips[:, :2] - tips[-1, :2], axis=1)) < 1e-4
+    assert axes[:, 2].max() < -1 + 1e-6
+    assert np.all(np.diff(tips[:, 2]) < 1e-9)
+    assert tips[0, 2] - tips[-1, 2] == pytest.approx(descent.length, abs=1e-5)
+    assert max(peaks(states, LIMITS)) <= 1 + 1e-6
+    speeds = np.linalg.norm(tool_velocities(ARM, states), axis=1)
+    assert speeds.max() <= descent.speed * 1.003
+    for state, place in ((line.at(0.0), 0), (line.at(line.duration), -1)):
+        assert np.allclose(state.q, descent.chain[place], atol=1e-9)
+        assert np.allclose(state.qd, 0, atol=1e-6) is not (enters and place == 0)
+        assert place == 0 or np.allclose(state.qdd, 0, atol=1e-6)
+    times = np.linspace(0, line.duration, 9)
+    for values, alone in zip(line.over(times), zip(*map(line.at, times), strict=True), strict=True):
+        assert np.allclose(values, np.array(alone), atol=1e-12)
+
+
+@given(descents())
+@settings(max_examples=20)
+def test_velocity_and_acceleration_are_the_derivatives_of_the_way(descent: Descent) -> None:
+    states = passed(Line(descent.chain, descent.length, LIMITS, descent.speed, enters=True))
+    middle = slice(1, -2)  # the last sample is not a whole step after the one before
+    measured = (states.q[2:-1] - states.q[:-3]) / (2 * SOONER)
+    assert np.allclose(measured, states.qd[middle], atol=1e-4)
+    measured = (states.qd[2:-1] - states.qd[:-3]) / (2 * SOONER)
+    assert np.allclose(measured, states.qdd[middle], atol=2 * SOONER * LIMITS.jerk.max())
+
+
+@given(descents())
+@settings(max_examples=20)
+def test_leaving_it_is_the_same_way_mirrored_in_time(descent: Descent) -> None:
+    down = Line(descent.chain, descent.length, LIMITS, descent.speed, enters=True)
+    up = Line(descent.chain[::-1], descent.length, LIMITS, descent.speed, leaves=True)
+    assert up.duration == pytest.approx(down.duration, abs=1e-6)
+    gentle = Line(descent.chain[::-1], descent.length, LIMITS, acceleration=0.5, leaves=True)
+    assert gentle.acceleration == 0.5 < up.acceleration
+    heights = ARM.tips(passed(gentle).q)[0][:-1, 2]
+    # The spline through four places advances up to 5 % faster than its parameter.
+    assert np.diff(heights, n=2).max() / SOONER**2 <= 0.5 * 1.06
+    for s in np.linspace(0, down.duration, 7):
+        one, other = down.at(s), up.at(max(0.0, up.duration - s))
+        assert np.allclose(one.q, other.q, atol=1e-6)
+        assert np.allclose(one.qd, -other.qd, atol=1e-5)
+        assert np.allclose(one.qdd, other.qdd, atol=1e-3)

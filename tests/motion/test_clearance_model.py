@@ -1,0 +1,193 @@
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from executive.cell.config import CellConfig
+from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, pile_height
+from executive.cell.values import BIN_THICKNESS, Load, ObjectClass, Obstacle
+from executive.errors import Blocked
+from executive.geometry import Array
+from executive.motion.clearance_model import (
+    BETWEEN,
+    LOOKED_AT,
+    SLANT,
+    TOLERANCE,
+    Discs,
+    Surroundings,
+    hanging,
+)
+
+DOWN = np.array([0.0, 0.0, -1.0])
+AWAY = np.array([[-0.6, 0.0]])
+"""Ends of a motion far from everything."""
+POST = Obstacle(-0.5, 0.1, 0.03, 0.30, "the post")
+"""Where nothing else is near."""
+CUBE = Load(ObjectClass("cube", 0.05, 0.0354))
+ROUND = np.array([[0.0, 0.0], *((r * math.cos(a), r * math.sin(a)) for r in (0.25, 0.5, 0.75, 1.0)
+                                for a in np.linspace(0, 2 * math.pi, 120, endpoint=False))])  # fmt: skip
+"""Points of a disc of radius 1."""
+
+
+def discs_of(tip: Array, axis: Array, discs: Discs) -> list[Array]:
+    """Points of every disc `(S, 3)` [m]."""
+    one = np.cross(axis, [1.0, 0.0, 0.0])
+    one /= np.linalg.norm(one)
+    both = np.stack([one, np.cross(axis, one)])
+    places = zip(discs.offset, discs.radius, strict=True)
+    return [tip + offset * axis + radius * ROUND @ both for offset, radius in places]
+
+
+def to_cylinder(points: Array, thing: Obstacle) -> Array:
+    """Distances of points `(S, 3)` from the outside of an obstacle [m]; 0 inside."""
+    across = np.linalg.norm(points[:, :2] - (thing.x, thing.y), axis=1) - thing.radius
+    return np.hypot(np.maximum(across, 0.0), np.maximum(points[:, 2] - thing.top, 0.0))
+
+
+def to_box(points: Array, low: Array, high: Array) -> Array:
+    """Distances of points `(S, 3)` from the outside of a box [m]; 0 inside."""
+    return np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0.0), axis=1)
+
+
+def slack(surroundings: Surroundings, tip, axis=DOWN, discs: Discs | None = None) -> float:
+    """Of one state."""
+    assert discs is not None
+    return float(surroundings.slack(np.array([tip], dtype=float), np.array([axis], dtype=float), discs)[0])
+
+
+near_the_post = st.tuples(st.floats(-0.15, 0.15), st.floats(-0.15, 0.15), st.floats(0.15, 0.42)).map(
+    lambda off: np.array([POST.x, POST.y, 0.0]) + off
+)
+
+
+@given(near_the_post, st.booleans())
+@settings(max_examples=60)
+def test_distances_from_a_cylinder_are_what_geometry_says(config: CellConfig, tip, loaded: bool) -> None:
+    discs = hanging(config, CUBE if loaded else None)
+    without = slack(Surroundings(config, (), AWAY), tip, discs=discs)
+    found = slack(Surroundings(config, (POST,), AWAY), tip, discs=discs)
+    points = np.concatenate(discs_of(tip, DOWN, discs))
+    grown = Obstacle(POST.x, POST.y, POST.radius + TOLERANCE, POST.top, "")
+    nearest = float(to_cylinder(points, grown).min())
+    if nearest > 0:
+        assert found == pytest.approx(min(nearest - (config.motion.margin + BETWEEN), without), abs=5e-4)
+    else:
+        assert found <= -(config.motion.margin + BETWEEN) + 1e-9
+
+
+@given(st.tuples(st.floats(0.08, 0.38), st.floats(-0.66, -0.32), st.floats(0.01, 0.2)).map(np.array))
+@settings(max_examples=80)
+def test_distances_from_a_bin_are_what_geometry_says(config: CellConfig, tip) -> None:
+    discs = hanging(config, None)
+    bin, t = config.bins["red_bin"], BIN_THICKNESS
+    low, high = np.array(bin.position[:2]), np.array(bin.position[:2])
+    low, high = low - np.array(bin.size[:2]) / 2, high + np.array(bin.size[:2]) / 2
+    top = bin.size[2]
+    boxes = [
+        ((low[0] - t, low[1] - t, 0), (low[0], high[1] + t, top)),
+        ((high[0], low[1] - t, 0), (high[0] + t, high[1] + t, top)),
+        ((low[0], low[1] - t, 0), (high[0], low[1], top)),
+        ((low[0], high[1], 0), (high[0], high[1] + t, top)),
+        ((low[0], low[1], 0), (high[0], high[1], t)),
+        ((-2, -2, -1), (2, 2, 0)),
+    ]
+    points = np.concatenate(discs_of(tip, DOWN, discs))
+    nearest = min(float(to_box(points, np.array(a), np.array(b)).min()) for a, b in boxes)
+    # Its end is here, so that the workspace beside does not count.
+    found = slack(Surroundings(config, (), tip[None, :2]), tip, discs=discs)
+    if nearest > 0:
+        spare = SLANT * (1 - discs.upright)
+        assert found == pytest.approx(min(nearest - (config.motion.margin + BETWEEN), spare), abs=5e-4)
+    else:
+        assert found <= -(config.motion.margin + BETWEEN) + 1e-9
+
+
+def test_a_load_hangs_below_the_tool_and_is_as_wide_as_its_ring_puts_it(config: CellConfig) -> None:
+    empty, washer = hanging(config, None), hanging(config, Load(ObjectClass("washer", 0.006, 0.02, 0.015)))
+    assert np.allclose(empty.offset, [0.0, -NECK_LENGTH])
+    assert np.allclose(empty.radius, [config.tool.cup_radius, TOOL_RADIUS])
+    wide = 0.02 + 0.015 + TOLERANCE
+    assert np.allclose(washer.offset, [0.006, 0.0, -NECK_LENGTH]), "its underside, its top, the tool above it"
+    assert np.allclose(washer.radius, [wide, wide, TOOL_RADIUS])
+    assert washer.upright > empty.upright
+
+
+@given(st.floats(0.42, 0.64), st.floats(-0.22, 0.22), st.floats(0.01, 0.06))
+@settings(max_examples=60)
+def test_the_workspace_is_not_entered_low_but_where_it_was_looked_at(config, x, y, z) -> None:
+    end = np.array([[0.53, 0.0]])
+    tip, discs = (x, y, min(z, pile_height(config))), hanging(config, None)
+    away = math.hypot(x - end[0, 0], y - end[0, 1])
+    if away > LOOKED_AT + pile_height(config):
+        assert slack(Surroundings(config, (), end), tip, discs=discs) < 0
+    elif away < LOOKED_AT - 1e-9:
+        wanted = min(tip[2] - (config.motion.margin + BETWEEN), SLANT * (1 - discs.upright))
+        assert slack(Surroundings(config, (), end), tip, discs=discs) == pytest.approx(wanted, abs=1e-9)
+
+
+def test_near_an_end_what_is_unavoidable_there_is_allowed_and_elsewhere_it_is_not(config) -> None:
+    discs = hanging(config, None)
+    beside = np.array([POST.x + POST.radius + TOLERANCE + TOOL_RADIUS + 0.002, POST.y, 0.1])
+    opposite = np.array([2 * POST.x - beside[0], POST.y, 0.1])
+    surroundings = Surroundings(config, (POST,), beside[None, :2])
+    assert slack(surroundings, beside, discs=discs) == pytest.approx(0.002 - (config.motion.margin + BETWEEN))
+    surroundings.relax(beside[None], DOWN[None], discs)
+    assert slack(surroundings, beside, discs=discs) == pytest.approx(0.0, abs=1e-9)
+    assert slack(surroundings, beside - (0.001, 0, 0), discs=discs) == pytest.approx(-0.001, abs=1e-9)
+    assert np.linalg.norm(opposite - beside) > LOOKED_AT
+    assert slack(surroundings, opposite, discs=discs) == pytest.approx(
+        0.002 - (config.motion.margin + BETWEEN)
+    )
+    inside = np.array([[POST.x, POST.y, POST.top - 0.01]])
+    surroundings.relax(inside, DOWN[None], discs)
+    surroundings.require_clear(inside, DOWN[None], discs)  # what is entered already may be left
+
+
+def test_an_error_names_the_thing_the_lack_and_the_place(config: CellConfig) -> None:
+    discs, surroundings = hanging(config, None), Surroundings(config, (POST,), AWAY)
+
+    def require(tip, axis=DOWN) -> None:
+        tips = np.array([[-0.6, 0.0, 0.4], tip, [-0.6, 0.0, 0.4]])
+        surroundings.require_clear(tips, np.array([DOWN, axis, DOWN]), discs)
+
+    require((-0.6, 0.0, 0.4))
+    text = "would bring tool or load 16 mm too near to the post, with the tool at (-0.500, 0.100, 0.290) m"
+    with pytest.raises(Blocked, match=re.escape(text)):
+        require((POST.x, POST.y, 0.29))
+    for more, passes in ((-1e-4, True), (1e-4, False)):  # what is known may be off by the tolerance
+        tip = (POST.x, POST.y, POST.top + config.motion.margin - TOLERANCE - more)
+        if passes:
+            require(tip)
+        else:
+            with pytest.raises(Blocked, match="4 mm too near to the post"):
+                require(tip)
+    with pytest.raises(Blocked, match="too near to the table, with"):
+        require((-0.6, 0.0, -0.01))
+    with pytest.raises(Blocked, match="too near to what may lie on the workspace, with"):
+        require((0.5, 0.0, 0.05))
+    with pytest.raises(Blocked, match="too near to yellow_bin, with"):
+        require((0.49, 0.308, 0.05))
+    with pytest.raises(Blocked, match="too near to the floor of blue_bin, with"):
+        require((0.24, 0.48, 0.0))
+    with pytest.raises(Blocked, match=re.escape("would tilt the tool too far, with the tool at (-0.600")):
+        require((-0.6, 0.0, 0.4), (0.9, 0.0, -math.sqrt(1 - 0.81)))
+
+
+@given(near_the_post, st.floats(-0.4, 0.4), st.floats(-0.4, 0.4), st.booleans())
+@settings(max_examples=80)
+def test_slopes_are_the_differences_of_slack(config, tip, tilt, turn, loaded: bool) -> None:
+    axis = np.array([math.sin(tilt), math.cos(tilt) * math.sin(turn), -math.cos(tilt) * math.cos(turn)])
+    discs, surroundings = hanging(config, CUBE if loaded else None), Surroundings(config, (POST,), AWAY)
+    h = 1e-5
+    tips, axes = tip + h * np.eye(3), np.broadcast_to(axis, (3, 3))
+    found = surroundings.slopes(tip[None], axis[None], discs, (tips[None], axes[None]))[0] / h
+    here = slack(surroundings, tip, axis, discs)
+    forward = (surroundings.slack(tips, axes, discs) - here) / h
+    backward = (here - surroundings.slack(2 * tip - tips, axes, discs)) / h
+    smooth = np.abs(forward - backward) < 1e-2  # no kink between
+    assert np.allclose(found[smooth], forward[smooth], atol=1e-6)

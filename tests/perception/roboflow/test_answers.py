@@ -1,0 +1,194 @@
+"""Answers of a server, checked before anybody believes them, and sentences about those that are none."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from executive.cell.values import Detection
+from executive.perception.detectors.roboflow.answers import read_answer, read_output
+from executive.perception.detectors.roboflow.complaints import failed, late, plain, unbelievable
+from executive.perception.detectors.roboflow.options import RoboflowOptions
+
+CUBE = {"x": 50.0, "y": 40.0, "width": 20, "height": 10.0, "confidence": 0.9, "class": "cube", "class_id": 0}
+
+
+def answer(*predictions, **further):
+    return {"time": 0.1, "image": {"width": 100, "height": 80}, "predictions": list(predictions), **further}
+
+
+def test_boxes_by_centre_and_size_become_boxes_by_corners_cut_off_where_they_stick_out():
+    found = read_answer(answer(CUBE, {**CUBE, "x": 2.0}), (100, 80))
+    assert found[0] == Detection("cube", 0.9, (40.0, 35.0, 60.0, 45.0))
+    assert found[1].box == (0.0, 35.0, 12.0, 45.0)
+    assert read_answer({"predictions": []}, (100, 80)) == []
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "text"),
+    [
+        (None, "of type NoneType, not an object with predictions"),
+        ([1, 2], "of type list, not an object with predictions"),
+        ({"foo": 1}, "predictions: field required"),
+        ({"predictions": None}, "predictions: input should be a valid list"),
+        (answer(7), r"predictions\[0\]: input should be a valid dictionary$"),
+        (answer(CUBE, {**CUBE, "x": float("nan")}), r"predictions\[1\].x: input should be a finite number"),
+        (answer({**CUBE, "y": None}), r"predictions\[0\].y: input should be a valid number"),
+        (answer({**CUBE, "x": "12"}), r"predictions\[0\].x: input should be a valid number"),
+        (answer({**CUBE, "x": True}), r"predictions\[0\].x: input should be a valid number"),
+        (answer({**CUBE, "x": 10**400}), r"predictions\[0\].x: .*number"),
+        (answer({**CUBE, "width": -5.0}), r"predictions\[0\].width: input should be greater than 0"),
+        (answer({**CUBE, "width": 0.0}), r"predictions\[0\].width: input should be greater than 0"),
+        (answer({**CUBE, "height": float("inf")}), r"predictions\[0\].height: input should be a finite"),
+        (answer({**CUBE, "confidence": 1.1}), r"predictions\[0\].confidence: .* less than or equal to 1"),
+        (answer({**CUBE, "class": 3}), r"predictions\[0\].class: input should be a valid string"),
+        (answer({**CUBE, "class": ""}), r"predictions\[0\].class: string should have at least 1"),
+        (answer({**CUBE, "width": 150.0}), r"box from \(-25, 35\) to \(125, 45\) in an image of 100 x 80"),
+        (answer({**CUBE, "x": 4.0, "width": 30.0}), r"box from \(-11, 35\) to \(19, 45\)"),
+        (answer({**CUBE, "x": 96.0, "width": 30.0}), r"box from \(81, 35\) to \(111, 45\)"),
+        (answer({**CUBE, "y": 4.0, "height": 26.0}), r"box from \(40, -9\) to \(60, 17\)"),
+        (answer({**CUBE, "y": 76.0, "height": 26.0}), r"box from \(40, 63\) to \(60, 89\)"),
+        (answer({**CUBE, "x": -5.0, "width": 8.0}), r"box from \(-9, 35\) to \(-1, 45\)"),
+        (answer(*[CUBE] * 301), "predictions: list should have at most 300 items"),
+        (answer(CUBE, image={"width": 1, "height": 1}), "an image of 1 x 1 pixels, and 100 x 80 were sent"),
+        (answer(CUBE, image={"width": None, "height": 1}), "image.width: input should be a valid number"),
+    ],
+)
+def test_what_cannot_be_is_refused_with_its_place(spoilt, text):
+    with pytest.raises(ValueError, match=text):
+        read_answer(spoilt, (100, 80))
+
+
+@pytest.mark.parametrize(
+    "output",
+    [
+        answer(CUBE),
+        [CUBE],
+        {"inference_id": "1", "predictions": answer(CUBE)},
+        {"image": {"width": 100, "height": 80}, "predictions": [CUBE]},
+    ],
+    ids=["answer", "predictions", "outputs of a step", "serialized detections"],
+)
+def test_the_output_of_a_workflow_is_read_in_every_form_that_it_has(output):
+    assert read_output(output, (100, 80)) == read_answer(answer(CUBE), (100, 80))
+
+
+def test_an_output_without_predictions_has_an_image_without_a_size():
+    assert read_output({"image": {"width": None, "height": None}, "predictions": []}, (100, 80)) == []
+    with pytest.raises(ValueError, match=r"image\.width: input should be a valid number"):
+        read_output({"image": {"width": None, "height": 80}, "predictions": []}, (100, 80))
+
+
+@pytest.mark.parametrize(
+    ("output", "text"),
+    [
+        ("ball", "of type str, not an object with predictions"),
+        (None, "of type NoneType, not an object with predictions"),
+        ({"top": "ball"}, "predictions: field required"),
+        ([answer(CUBE), answer()], r"predictions\[0\].x: field required"),
+        ([[CUBE]], r"predictions\[0\]: input should be a valid dictionary"),
+        (answer(answer(CUBE)), r"predictions\[0\].x: field required"),
+        ({"predictions": answer({**CUBE, "x": -30.0})}, r"box from \(-40, 35\) to \(-20, 45\)"),
+        (answer(CUBE, image={"width": 50, "height": 40}), "image of 50 x 40 pixels, and 100 x 80 were sent"),
+    ],
+)
+def test_an_output_that_holds_no_boxes_in_the_image_that_was_sent_is_refused(output, text):
+    with pytest.raises(ValueError, match=text):
+        read_output(output, (100, 80))
+
+
+def test_values_are_not_repeated_for_they_may_be_secret():
+    with pytest.raises(ValueError) as caught:
+        read_answer(answer({**CUBE, "x": "SECRET"}), (100, 80))
+    assert "SECRET" not in str(caught.value)
+
+
+NUMBERS = st.one_of(st.integers(), st.floats(), st.floats(-20, 120))
+SCALARS = st.one_of(st.none(), st.booleans(), st.text(max_size=3), NUMBERS)
+PREDICTIONS = st.fixed_dictionaries(
+    {key: st.one_of(NUMBERS, SCALARS) for key in ("x", "y", "width", "height")},
+    optional={"confidence": st.one_of(st.floats(0, 1), SCALARS), "class": st.one_of(st.text(), SCALARS)},
+)
+ANYTHING = st.recursive(
+    SCALARS, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner)
+)
+
+
+@given(
+    st.one_of(
+        ANYTHING,
+        st.fixed_dictionaries({"predictions": st.one_of(st.lists(PREDICTIONS, max_size=3), ANYTHING)}),
+    )
+)
+def test_whatever_a_server_says_only_sound_boxes_get_in(said):
+    try:
+        found = read_output(said, (100, 80))
+    except ValueError:
+        return
+    for detection in found:
+        left, top, right, bottom = detection.box
+        assert 0 <= left <= right <= 100
+        assert 0 <= top <= bottom <= 80
+        assert 0 <= detection.confidence <= 1 <= len(detection.label)
+
+
+HOST = "https://serverless.roboflow.com"
+OPTIONS = RoboflowOptions(url=f"{HOST}/", model_id="shapes/1")
+WORKFLOW = RoboflowOptions(api="workflow", workspace="acme", workflow_id="sorting", workflow_output="boxes")
+
+
+def test_somebody_elses_words_become_one_short_line():
+    assert plain("<html>\n\x1b[31m  red\x00 </html>") == "<html> [31m red </html>"
+    assert plain("a" * 1000) == "a" * 100 + "..."
+
+
+def test_a_sentence_says_what_where_and_what_to_look_at():
+    refused = {"failure": "status", "status": 404, "said": "no such\nmodel"}
+    assert failed(refused, OPTIONS) == (
+        f"{HOST} has no model shapes/1 (404: no such model); check model_id and url"
+    )
+    unknown = {"failure": "status", "status": 599, "said": ""}
+    assert failed(unknown, OPTIONS) == f"{HOST} gave no answer (599); look at its log"
+
+
+@pytest.mark.parametrize(
+    ("failure", "sentence"),
+    [
+        (
+            {"failure": "status", "status": 404, "said": "no such workflow"},
+            "has no workflow acme/sorting (404: no such workflow); check workspace and workflow_id and url",
+        ),
+        (
+            {"failure": "status", "status": 400, "said": ""},
+            "could not use the request (400); check workspace and workflow_id and api",
+        ),
+        (
+            {"failure": "no output", "said": "it has: picture, top"},
+            'ran workflow acme/sorting, which has no output "boxes" (it has: picture, top); '
+            "check workflow_output",
+        ),
+    ],
+)
+def test_a_sentence_about_a_workflow_names_its_options(failure, sentence):
+    assert failed(failure, WORKFLOW) == f"{HOST} {sentence}"
+
+
+def test_an_answer_that_cannot_be_right_is_told_with_what_to_check():
+    beginning = f"{HOST} gave an answer that cannot be right: no box; "
+    assert unbelievable("no box", OPTIONS) == f"{beginning}is shapes/1 a model that detects objects?"
+    question = 'is "boxes" the predictions of a model that detects objects?'
+    assert unbelievable("no box", WORKFLOW) == beginning + question
+
+
+def test_a_deadline_that_has_passed_is_told_with_what_the_server_said_meanwhile():
+    for repeats, end in (
+        ((), "; look at its log and the network, or give it a longer deadline"),
+        (
+            (None, 429),
+            ", which has been asked too often (429); ask less often, or look at the plan of the account",
+        ),
+        ((599,), ", which gave no answer (599); look at its log"),
+        ((None,), ", to which there was no connection; is it running, and is url right?"),
+    ):
+        assert late(repeats, OPTIONS) == f"no answer within 1.0 s from {HOST}{end}"

@@ -1,0 +1,173 @@
+"""The helper process is always there, whatever happens to it, and never keeps anybody waiting."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from executive.errors import Fault, Unavailable
+from executive.perception.detectors.roboflow import helper as module
+from executive.perception.detectors.roboflow.helper import Helper, NoAnswer
+from executive.perception.detectors.roboflow.key import ApiKey
+
+HERE = Path(__file__).parent
+SECRET = "SECRET1234567890"
+IMAGE = np.zeros((500, 500, 3), np.uint8)
+"""More bytes than a pipe holds."""
+
+
+@pytest.fixture
+def start(monkeypatch):
+    """Starts a helper whose program misbehaves in a way."""
+    monkeypatch.setattr(module, "PROGRAM", "scripted_program")
+    key = ApiKey({**os.environ, "PYTHONPATH": str(HERE), "ROBOFLOW_API_KEY": SECRET})
+    started = []
+
+    def start(how):
+        started.append(Helper({"how": how}, key))
+        return started[-1]
+
+    yield start
+    for helper in started:
+        helper.close()
+
+
+def children():
+    """The processes of this one that have not been waited for."""
+    return Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+
+
+def ask(helper, patience=0.05):
+    helper.wait_until_ready()
+    return helper.ask(IMAGE, time.monotonic() + patience)
+
+
+@pytest.mark.parametrize("how", ["deaf", "mute"])
+def test_without_an_answer_it_gives_up_in_time_and_has_another_process(start, how):
+    helper = start(how)
+    helper.wait_until_ready()
+    first, began = helper._process.pid, time.monotonic()
+    assert os.getsid(first) != os.getsid(0), "Ctrl-C reaches it"
+    with pytest.raises(NoAnswer):
+        helper.ask(IMAGE, began + 0.2)
+    assert 0.2 <= time.monotonic() - began < 1.0
+    assert helper._process.pid != first
+    with pytest.raises(ProcessLookupError):
+        os.kill(first, 0)
+
+
+def test_failures_leave_no_process_thread_or_pipe_behind(start):
+    helper = start("mute")
+    with pytest.raises(NoAnswer):
+        ask(helper)
+
+    def held():
+        return len(children()), threading.active_count(), len(os.listdir("/proc/self/fd"))
+
+    before = held()
+    for _ in range(10):
+        with pytest.raises(NoAnswer):
+            ask(helper, 0.005)
+    assert held() == before
+    helper.close()
+    assert len(children()) == before[0] - 1
+
+
+@pytest.mark.parametrize(
+    ("how", "kind", "text"),
+    [
+        ("never ready", Unavailable, "was not ready within 0 s"),
+        ("unusable", Unavailable, "cannot be used: ImportError: no inference_sdk; `exec"),
+        ("is killed", Unavailable, "ended by signal 9"),
+        ("ends", Fault, r"ended with status 3: ZeroDivisionError: \*\*\*"),
+    ],
+)
+def test_a_process_that_ends_or_is_never_ready_is_told_without_the_key_and_replaced(
+    start, monkeypatch, how, kind, text
+):
+    if how == "never ready":
+        monkeypatch.setattr(module, "STARTUP_TIMEOUT", 0.1)
+    helper = start(how)
+    for _ in range(2):
+        with pytest.raises(kind, match=text):
+            ask(helper, 5.0)
+
+
+def test_neither_what_it_prints_nor_an_answer_too_deep_to_read_stops_it(start, capfd):
+    assert ask(start("talks"), 5.0)["answer"] == {"width": 500, "height": 500}
+    assert capfd.readouterr() == ("", "")
+    assert ask(start("nests"), 5.0) == {"failure": "garbled", "said": "it is nested too deeply"}
+
+
+def test_without_room_for_a_process_it_is_unavailable_until_there_is(start, monkeypatch):
+    def full(*args, **options):
+        raise OSError(11, "Resource temporarily unavailable")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(subprocess, "Popen", full)
+        helper = start("talks")
+        with pytest.raises(Unavailable, match="not running: resource temporarily unavailable"):
+            ask(helper)
+    assert "answer" in ask(helper, 5.0)
+
+
+def test_stopping_it_ends_a_call_under_way(start):
+    helper = start("mute")
+    helper.wait_until_ready()
+    with ThreadPoolExecutor(1) as thread:
+        call = thread.submit(helper.ask, IMAGE, time.monotonic() + 60)
+        helper.stop()
+        assert str(call.exception(5.0)) == "its helper process was ended by signal 9"
+    with pytest.raises(Unavailable, match="not running: the detector is closed"):
+        helper.wait_until_ready()
+
+
+def test_what_the_sdk_prints_is_no_line_of_the_programs():
+    noise = "from {} import _mouth; say = _mouth(); print('noise', flush=True); say(a=1)"
+    ended = subprocess.run(
+        [sys.executable, "-c", noise.format(f"{module.PROGRAM}.__main__")], capture_output=True, text=True
+    )
+    assert (ended.stdout, ended.stderr) == ('{"a": 1}\n', "noise\n")
+
+
+@pytest.mark.slow
+def test_it_ends_with_its_parent_though_its_server_hangs():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        url = f"http://127.0.0.1:{server.getsockname()[1]}"
+        parent = subprocess.Popen(
+            [sys.executable, "-c", ORPHANING, url], stdout=subprocess.PIPE, cwd=HERE.parents[2], text=True
+        )
+        with parent.stdout:
+            child = os.pidfd_open(json.loads(parent.stdout.readline()))
+        connection, _ = server.accept()
+        with connection:
+            parent.send_signal(signal.SIGKILL)
+            parent.wait()
+            ended = select.select([child], [], [], 10.0)[0]
+            os.close(child)
+    assert ended, "the helper outlives its parent"
+
+
+ORPHANING = """
+import sys, time
+import numpy as np
+from executive.perception.detectors.roboflow.helper import Helper
+from executive.perception.detectors.roboflow.key import ApiKey
+
+helper = Helper({"url": sys.argv[1], "model_id": "a/1", "api": "v1", "confidence": 0.5}, ApiKey())
+print(helper._process.pid, flush=True)
+helper.wait_until_ready()
+helper.ask(np.zeros((8, 8, 3), np.uint8), time.monotonic() + 60)
+"""

@@ -1,0 +1,289 @@
+"""Detections from a Roboflow inference server, whatever it does."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import threading
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from stub_server import BODIES, MODEL, SPOILT, WORKFLOW, StubServer
+
+from executive.cell.config import DetectorConfig
+from executive.errors import DeadlinePassed, Unavailable
+from executive.perception.detectors.roboflow.detector import RoboflowDetector
+from executive.perception.detectors.setting import Setting
+
+SECRET = "SECRET1234567890"
+DEADLINE = 2.0
+"""Time for an answer [s]: more than inference-sdk takes for the three times that it asks."""
+V1 = {"api": "v1", "class_map": {"ball": "sphere"}}
+NAMES = {"workspace": "acme", "workflow_id": "sorting", "workflow_input": "photo", "workflow_output": "boxes"}
+APIS = {"v1": V1, "v0": {**V1, "api": "v0"}, "workflow": {**V1, "api": "workflow", **NAMES}}
+"""Options of a detector by its interface."""
+CAMERA = SimpleNamespace(table_view=(192, 100, 448, 356))
+
+
+def coloured(image):
+    """Yield the bounding box of what is red, a cube, and of what is blue, a ball."""
+    for channel, label in ((0, "cube"), (2, "ball")):
+        rows, columns = np.nonzero(image[..., channel] > 127)
+        if len(rows):
+            left, right, top, bottom = columns.min(), columns.max() + 1, rows.min(), rows.max() + 1
+            yield {
+                "x": float(left + right) / 2, "y": float(top + bottom) / 2, "width": float(right - left),
+                "height": float(bottom - top), "confidence": 0.9, "class": label,
+            }  # fmt: skip
+
+
+def spot(left=300, top=200, channel=0):
+    image = np.zeros((480, 640, 3), np.uint8)
+    image[top : top + 20, left : left + 30, channel] = 255
+    return SimpleNamespace(image=image)
+
+
+def build(name, **options):
+    config = DetectorConfig(kind="roboflow", **{"model_id": MODEL, "deadline": DEADLINE, **options})
+    setting = Setting(name, CAMERA, SimpleNamespace(now=0.0), None, 0, None)
+    return RoboflowDetector.from_config(config, setting)
+
+
+@pytest.fixture(scope="module")
+def stub():
+    stub = StubServer(lambda image: list(coloured(image)))
+    yield stub
+    stub.stop()
+
+
+@pytest.fixture
+def server(stub):
+    stub.faults = lambda look: ""
+    stub.asked.clear()
+    return stub
+
+
+@pytest.fixture(scope="module")
+def make(stub):
+    """Returns a detector with options; one with the same is made once, for it takes seconds to start."""
+    made = {}
+    with pytest.MonkeyPatch.context() as patch:
+
+        def make(key=SECRET, **options):
+            called = repr((key, sorted(options.items())))
+            if called not in made:
+                patch.setenv("ROBOFLOW_API_KEY", key)
+                made[called] = build("server", **{"url": stub.url, **options})
+            return made[called]
+
+        yield make
+        for detector in made.values():
+            detector.close()
+
+
+@pytest.fixture
+def detector(make, server):
+    return make(**V1)
+
+
+def search(detector, frame, view="table"):
+    request = detector.request(frame, view)
+    detector._setting.clock.now += detector._options.deadline
+    assert request.ready
+    return request.result()
+
+
+def assert_unavailable(detector, *patterns):
+    with pytest.raises(Unavailable) as caught:
+        search(detector, spot())
+    text = str(caught.value)
+    assert SECRET not in text
+    for pattern in patterns:
+        assert re.search(pattern, text), text
+
+
+@pytest.mark.parametrize("view", ["table", "full"])
+@pytest.mark.parametrize("api", ["v1", pytest.param("v0", marks=pytest.mark.slow), "workflow"])
+def test_a_box_is_returned_in_the_frames_pixels_and_renamed(make, server, api, view):
+    detector = make(**APIS[api])
+    answer = search(detector, spot(channel=2), view)
+    ((label, box),) = [(found.label, found.box) for found in answer.found]
+    assert (label, answer.detector) == ("sphere", "server")
+    assert box == pytest.approx((300, 200, 330, 220), abs=1.0)
+    assert [found.label for found in search(detector, spot(channel=0)).found] == ["cube"]
+    assert len(search(detector, spot(20, 20), view).found) == (view == "full")
+    path, headers, body = server.asked[-1]
+    assert headers["Authorization"] == f"Bearer {SECRET}"
+    assert all(SECRET not in path and SECRET.encode() not in body for path, _, body in server.asked)
+    if api == "workflow":
+        assert path == WORKFLOW
+    else:
+        assert "confidence=0.25" in path if api == "v0" else json.loads(body)["confidence"] == 0.25
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("api", "requests"), [("v0", 1), ("v1", 2), ("workflow", 1)])
+def test_an_image_takes_the_requests_and_a_full_frame_the_images_that_the_options_state(
+    make, server, api, requests
+):
+    detector = make(**{**APIS[api], "full": "tiles", "deadline": 5.0})
+    server.loaded.clear()
+    (found,) = search(detector, spot(180, 240), "full").found
+    assert found.box == pytest.approx((180, 240, 210, 260), abs=1.0)
+    # A server that has not loaded the model is asked to load it.
+    assert len(server.asked) == 9 * requests + (api == "v1")
+    server.asked.clear()
+    search(detector, spot(), "table")
+    assert len(server.asked) == requests
+    server.asked.clear()
+    search(make(**APIS[api]), spot(), "full")
+    assert len(server.asked) == requests
+
+
+@pytest.mark.slow
+def test_one_deadline_covers_the_images_of_all_tiles(make, server):
+    detector = make(**{**V1, "full": "tiles", "deadline": 1.0})
+    detector._helper.wait_until_ready()
+    server.delay, began = 0.2, time.monotonic()
+    with pytest.raises(DeadlinePassed, match=r"^no answer within 1\.0 s from"):
+        search(detector, spot(), "full")
+    assert 1.0 <= time.monotonic() - began < 2.0
+    server.delay = 0.0
+
+
+def test_an_output_that_a_workflow_lacks_is_named_with_those_that_it_has(make, server):
+    detector = make(**{**APIS["workflow"], "workflow_output": "circles"})
+    assert_unavailable(
+        detector,
+        f'^{server.url} ran workflow acme/sorting, which has no output "circles" '
+        r"\(it has: picture, boxes\); check workflow_output$",
+    )
+
+
+def test_what_is_below_the_floor_is_left_out_and_a_class_nobody_asked_for_is_not(detector, server):
+    server.faults = lambda look: "doubtful"
+    assert search(detector, spot()).found == ()
+    server.faults = lambda look: "strangers"
+    assert "cube" in [found.label for found in search(detector, spot()).found]
+
+
+REFUSED = {
+    "400": "could not use the request",
+    "401": r"does not accept the key \(401: key \*\*\* is no good\); set ROBOFLOW_API_KEY to a key",
+    "402": "wants to be paid .* look at the plan",
+    "403": "does not accept the key .* set ROBOFLOW_API_KEY",
+    "404": "has no model shapes/1 .* check model_id and url",
+    "413": "finds the image too large",
+    "418": "gave no answer",
+    "429": "asked too often",
+    "500": "has an error of its own .* look at its log",
+    "502": "has lost the server behind it",
+    "503": "is not ready, or cannot load model shapes/1",
+}
+GARBLED = "(answered with something that|gave an answer that)"
+ABSURD = "gave an answer that cannot be right: .*shapes/1"
+FAULTS = {
+    **REFUSED,
+    **dict.fromkeys(sorted(BODIES), GARBLED),
+    **dict.fromkeys(sorted(set(SPOILT) - {"strangers", "doubtful"}), ABSURD),
+}
+
+
+def asked_for(sentence, api):
+    """Return a sentence about a model for another interface."""
+    if api != "workflow":
+        return sentence
+    words = {
+        "right: .*shapes/1": 'right: .*"boxes"',
+        "model shapes/1": "workflow acme/sorting",
+        "model_id": "workspace and workflow_id",
+    }
+    for model, workflow in words.items():
+        sentence = sentence.replace(model, workflow)
+    return sentence
+
+
+QUICK = ("401", "404", "html", "deep", "nan")
+"""Faults of every kind; the others are slow tests, and units in test_answers.py and test_complaints.py."""
+
+
+@pytest.mark.parametrize("fault", QUICK)
+@pytest.mark.parametrize("api", ["v1", "workflow"])
+def test_a_fault_of_the_server_is_unavailable_with_what_to_do(make, server, fault, api):
+    server.faults = lambda look: fault
+    assert_unavailable(make(**APIS[api]), f"^{server.url}", asked_for(FAULTS[fault], api))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("api", APIS)
+def test_every_fault_of_the_server_is_unavailable_with_what_to_do(make, server, fault, api):
+    server.faults = lambda look: fault
+    expected = asked_for(FAULTS[fault], api)
+    assert_unavailable(make(**APIS[api]), f"^{server.url}|no answer within", expected)
+
+
+def test_a_server_that_is_gone_and_comes_back(detector, server):
+    server.stop()
+    try:
+        assert_unavailable(detector, f"^{server.url} refused the connection .*; is it running")
+    finally:
+        server.start()
+    server.faults = lambda look: "stop"
+    try:
+        assert_unavailable(detector, "broke off|refused the connection")
+    finally:
+        server.over.wait(5)
+        server.start()
+    server.faults = lambda look: ""
+    assert len(search(detector, spot()).found) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"url": "http://nobody.invalid:9001"}, "http://nobody.invalid:9001 is not known by this name"),
+        ({"url": "https://127.0.0.1:{port}"}, r"https://127.0.0.1:\d+ cannot be trusted \(TLS\)"),
+        ({"key": "", "api": "v0"}, "wants a key .*; set ROBOFLOW_API_KEY"),
+    ],
+)
+def test_an_address_or_key_that_does_not_work_is_said(make, server, options, text):
+    told = {name: value.format(port=server.port) for name, value in options.items()}
+    assert_unavailable(make(deadline=30.0, **told), text)
+
+
+def test_closing_does_not_wait_for_a_server_that_hangs(server):
+    def children():
+        return Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+
+    before = children()
+    detector = build("closing", url=server.url, deadline=60.0)
+    assert len(children()) == len(before) + 1
+    detector.request(spot(), "table")
+    began = time.monotonic()
+    detector.close()
+    assert time.monotonic() - began < 2.0
+    assert not [thread for thread in threading.enumerate() if "closing" in thread.name]
+    assert children() == before
+
+
+@pytest.mark.parametrize("fault", ["hang", pytest.param("drip", marks=pytest.mark.slow)])
+def test_a_server_that_never_answers_costs_its_deadline_and_shows_it_on_the_runs_clock(
+    detector, server, fault
+):
+    detector._helper.wait_until_ready()
+    server.faults = lambda look: fault
+    clock = detector._setting.clock
+    clock.now, began = 10.0, time.monotonic()
+    request = detector.request(spot(), "table")
+    clock.now = 10.05
+    assert not request.ready
+    assert DEADLINE - 0.05 < time.monotonic() - began < DEADLINE + 1.5
+    clock.now = 10.0 + DEADLINE
+    with pytest.raises(DeadlinePassed, match=r"^no answer within 2\.0 s from http://127"):
+        request.result()

@@ -1,0 +1,141 @@
+"""Displaced cameras are found by the outlines of the bins, in images drawn without the simulator."""
+
+from __future__ import annotations
+
+import re
+
+import cv2
+import numpy as np
+import pytest
+
+from executive.cell.config import BinConfig
+from executive.cell.layout import as_bin
+from executive.cell.values import BIN_THICKNESS, Bin, Frame
+from executive.geometry import Array, Pose
+from executive.perception.camera_check import MAX_DISTANCE, describe_displacement, estimate_offset
+from executive.perception.camera_model import camera_matrix, project
+from tests.camera_poses import looking_down
+
+MATRIX = camera_matrix(640, 480, 55.0)
+DECLARED = looking_down([0.5, 0.0, 1.2])
+COLOURS = {"red": (190, 40, 40), "blue": (40, 60, 190), "yellow": (215, 190, 40)}
+PLACES = {"red": (0.24, -0.48, 0.0), "blue": (0.24, 0.48, 0.0), "yellow": (0.49, 0.46, 0.0)}
+BINS = [
+    as_bin(name, BinConfig(position=place, size=(0.24, 0.30, 0.06), colour=(1.0, 1.0, 1.0), slots=(1, 1)))
+    for name, place in PLACES.items()
+]
+
+
+def draw(X_WC: Pose, *, light: float = 1.0, bins: list[Bin] = BINS, matrix: Array = MATRIX) -> Frame:
+    """Return a noisy frame of bins on a table from `X_WC` that claims to be taken from `DECLARED`."""
+    image = np.full((480, 640, 3), (190, 165, 130), dtype=np.float32)
+    for bin in bins:
+        colour = np.array(COLOURS[bin.name], dtype=float)
+        x, y = bin.size[:2] / 2 + BIN_THICKNESS
+        base = np.array([(-x, -y, 0), (-x, y, 0), (x, y, 0), (x, -y, 0)])
+        rim, height = base + np.array([0, 0, bin.size[2]]), bin.size[2]
+        inner = np.array([1 - 2 * BIN_THICKNESS / bin.size[0], 1 - 2 * BIN_THICKNESS / bin.size[1], 1])
+        hull = cv2.convexHull(on_image(X_WC, bin, np.concatenate([base, rim]), matrix))[:, 0]
+        opening = on_image(X_WC, bin, rim * inner, matrix)
+        floor = on_image(X_WC, bin, rim * inner - (0, 0, height - BIN_THICKNESS), matrix)
+        fill(image, hull, 0.6 * colour)
+        fill(image, on_image(X_WC, bin, rim, matrix), 0.95 * colour)
+        fill(image, opening, 0.7 * colour)
+        # The walls hide the rest of the floor.
+        fill(image, cv2.intersectConvexConvex(opening, floor)[1][:, 0], 0.95 * colour)
+    noise = np.random.default_rng(1).normal(0, 2, image.shape)
+    shown = np.clip(light * image + noise, 0, 255).astype(np.uint8)
+    return Frame(1, "top", shown, None, MATRIX, DECLARED, 0.0, np.ones((480, 640), np.bool_), 0)
+
+
+def on_image(X_WC: Pose, bin: Bin, corners: Array, matrix: Array) -> np.ndarray:
+    """Return corners in the frame of a bin `(N, 3)` [m] as OpenCV's pixels."""
+    return (project(matrix, X_WC, corners + bin.position) - 0.5).astype(np.float32)
+
+
+def fill(image: np.ndarray, polygon: np.ndarray, colour: Array) -> None:
+    """Fill a convex polygon to a sixteenth of a pixel."""
+    cv2.fillConvexPoly(image, np.round(16 * polygon).astype(np.int32), colour.tolist(), cv2.LINE_8, 4)
+
+
+def moved(
+    shift: tuple[float, float, float] = (0, 0, 0), turn_deg: tuple[float, float, float] = (0, 0, 0)
+) -> Pose:
+    """Return the declared pose, shifted in the world [m] and turned about the camera's axes [degree]."""
+    turn = Pose(np.asarray(cv2.Rodrigues(np.radians(turn_deg))[0]), np.zeros(3))
+    return Pose.of(shift) @ DECLARED @ turn
+
+
+@pytest.mark.parametrize("light", [1.0, 0.15])
+def test_a_camera_in_its_place_is_believed_to_be_there(light: float) -> None:
+    frame = draw(DECLARED, light=light)
+    offset = estimate_offset(frame, BINS)
+    assert offset is not None
+    assert offset.distance < MAX_DISTANCE / 3 and offset.support > 0.8
+    assert describe_displacement(frame, BINS) == ""
+
+
+@pytest.mark.parametrize(
+    "shift",
+    [(0.01, 0.0, 0.0), (0.0, -0.03, 0.0), (0.03, 0.04, 0.0), (0.0, 0.0, 0.12), (0.0, 0.0, -0.12)],
+)
+def test_a_shift_is_measured(shift: tuple[float, float, float]) -> None:
+    offset = estimate_offset(draw(moved(shift)), BINS)
+    assert offset is not None and offset.distance > MAX_DISTANCE
+    assert offset.shift == pytest.approx(shift, abs=0.015)
+    assert np.all(np.abs(offset.shift - shift) < 3 * offset.shift_std + 0.001)
+    assert offset.rotation_deg < 1.0
+
+
+@pytest.mark.parametrize("turn_deg", [(2, 0, 0), (0, -6, 0), (0, 0, 2), (0, 0, -10), (5, 5, 3)])
+def test_a_rotation_is_measured(turn_deg: tuple[float, float, float]) -> None:
+    offset = estimate_offset(draw(moved(turn_deg=turn_deg)), BINS)
+    assert offset is not None and offset.distance > MAX_DISTANCE
+    assert offset.rotation_deg == pytest.approx(np.linalg.norm(turn_deg), abs=1.0)
+
+
+@pytest.mark.parametrize("fov", [0.85 * 55, 1.15 * 55])
+def test_another_lens_is_found(fov: float) -> None:
+    assert describe_displacement(draw(DECLARED, matrix=camera_matrix(640, 480, fov)), BINS)
+
+
+def test_the_words_say_where_the_bins_are_and_how_the_camera_has_moved() -> None:
+    words = describe_displacement(draw(moved((0.0, -0.03, 0.0))), BINS)
+    assert re.fullmatch(
+        r"camera top is not where the cell file says: the outlines of red, blue, yellow appear 12 pixels "
+        r"\((29|30|31) mm\) away from their expected positions, as if the camera had moved by "
+        r"\(\S+, -\d+, \S+\) mm "
+        r"\(standard deviation \d+ mm\) and turned by \S+ degrees; limit 5 mm; mount camera and bins as "
+        r"declared, or measure the pose again",
+        words,
+    )
+
+
+def test_a_bin_that_somebody_moved_is_no_moved_camera() -> None:
+    away = [
+        *BINS[:2],
+        Bin("yellow", BINS[2].position + np.array([0.05, -0.04, 0.0]), BINS[2].size, BINS[2].slots),
+    ]
+    assert describe_displacement(draw(DECLARED, bins=away), BINS) == ""
+
+
+@pytest.mark.parametrize("light", [0.0, 0.005])
+def test_a_dark_image_shows_nothing(light: float) -> None:
+    assert estimate_offset(draw(moved((0.03, 0.0, 0.0)), light=light), BINS) is None
+
+
+def test_bins_out_of_view_or_behind_the_arm_show_nothing() -> None:
+    frame = draw(moved((0.03, 0.0, 0.0)))
+    assert estimate_offset(frame, []) is None
+    frame.visible[:] = False
+    assert estimate_offset(frame, BINS) is None
+
+
+def test_one_straight_line_does_not_say_where_a_camera_is() -> None:
+    frame = draw(moved((0.03, 0.0, 0.0)))
+    frame.visible[:, :560] = False
+    assert estimate_offset(frame, BINS) is None
+
+
+def test_an_empty_table_shows_nothing() -> None:
+    assert estimate_offset(draw(DECLARED, bins=[]), BINS) is None

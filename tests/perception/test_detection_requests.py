@@ -1,0 +1,74 @@
+"""Detections run beside the tick loop and show on the run's clock."""
+
+from __future__ import annotations
+
+import threading
+from concurrent.futures import Future, ThreadPoolExecutor
+from types import SimpleNamespace
+
+import pytest
+
+from executive.cell.error_rates import ErrorRates
+from executive.cell.values import Answer, Detection
+from executive.errors import DeadlinePassed, Unavailable
+from executive.perception.detectors.requests import Pending
+
+FOUND = [Detection("cube", 0.9, (0.0, 0.0, 1.0, 1.0))]
+ERROR_RATES = ErrorRates(threshold=0.5, misses=0.1, confused=0.1, invented=0.1, jitter=1.0)
+
+
+@pytest.fixture
+def clock():
+    return SimpleNamespace(now=0.0)
+
+
+@pytest.fixture
+def ended(clock):
+    """Returns a request, due at 0.05 s, whose search has ended with detections or an error."""
+
+    def ended(result, **options):
+        work = Future()
+        (work.set_exception if isinstance(result, Exception) else work.set_result)(result)
+        return Pending(work, 0.05, clock, "eye", ERROR_RATES, **options)
+
+    return ended
+
+
+def test_an_answer_that_is_in_early_shows_only_when_it_is_due(ended, clock):
+    request = ended(FOUND)
+    assert not request.ready
+    with pytest.raises(RuntimeError, match=r"due at 0\.050 s and it is 0\.000 s"):
+        request.result()
+    clock.now = 0.05 - 1e-12
+    assert request.ready
+    assert request.result() == Answer("eye", tuple(FOUND), ERROR_RATES)
+
+
+def test_the_clock_waits_for_an_answer_that_is_late(clock):
+    release = threading.Event()
+    clock.now = 0.05
+    with ThreadPoolExecutor(1) as thread:
+        request = Pending(thread.submit(release.wait), 0.05, clock, "eye", ERROR_RATES)
+        threading.Timer(0.08, release.set).start()
+        assert request.ready
+        assert release.is_set()
+
+
+@pytest.mark.parametrize("error", [Unavailable("the model is gone"), ZeroDivisionError("a bug")])
+def test_what_the_search_raises_comes_out_of_the_result_as_it_is(ended, clock, error):
+    request = ended(error, given_up=1.0)
+    clock.now = 0.05
+    assert request.ready
+    with pytest.raises(type(error)) as raised:
+        request.result()
+    assert raised.value is error
+
+
+def test_that_a_deadline_has_passed_shows_when_it_has_passed_on_the_runs_clock_too(ended, clock):
+    request = ended(DeadlinePassed("no answer within 1.0 s"), given_up=1.0)
+    clock.now = 0.9
+    assert not request.ready
+    clock.now = 1.0 - 1e-12
+    assert request.ready
+    with pytest.raises(DeadlinePassed, match=r"within 1\.0 s"):
+        request.result()

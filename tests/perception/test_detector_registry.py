@@ -1,0 +1,108 @@
+"""Which detectors are installed, and what is known of them before a run."""
+
+from __future__ import annotations
+
+from importlib.metadata import EntryPoint
+from typing import ClassVar
+
+import pytest
+
+from executive.cell.config import DetectorConfig
+from executive.errors import InputError
+from executive.perception.detectors import registry
+from executive.perception.detectors.registry import build_detectors, find_problems, known_labels
+
+INSTALLED = ", ".join(sorted(registry.installed()))
+
+
+class Oracle:
+    """A kind of detector of somebody else's, that says nothing about itself."""
+
+    made: ClassVar = []
+
+    def __init__(self, config, setting):
+        self.config, self.setting, self.closed = config, setting, False
+        self.other = setting.other(config.options["beside"]) if "beside" in config.options else None
+        Oracle.made.append(self)
+        if config.options.get("broken"):
+            raise InputError("it is broken")
+
+    @classmethod
+    def from_config(cls, config, setting):
+        return cls(config, setting)
+
+    def close(self):
+        self.closed = True
+
+
+def oracle(**options):
+    return DetectorConfig(kind="oracle", **options)
+
+
+def build(base=None, **configs):
+    return build_detectors(configs, camera=None, clock=None, base=base, seed=7)
+
+
+@pytest.fixture
+def oracle_installed(monkeypatch):
+    """The kind `oracle` is installed beside the shipped ones."""
+    found = registry.installed()
+    oracle = EntryPoint("oracle", f"{__name__}:Oracle", registry.GROUP)
+    monkeypatch.setattr(registry, "installed", lambda: {**found, "oracle": oracle})
+    monkeypatch.setattr(Oracle, "made", [])
+
+
+def test_a_kind_that_is_not_installed_is_found_before_and_at_the_start(tmp_path):
+    configs = {"first": DetectorConfig(kind="embedded"), "second": DetectorConfig(kind="yolo")}
+    sentence = f'detector "second" is of kind "yolo", which is not installed; installed: {INSTALLED}'
+    assert list(find_problems(configs, tmp_path)) == [(("detectors", "second", "kind"), sentence)]
+    with pytest.raises(InputError) as caught:
+        build(second=configs["second"])
+    assert str(caught.value) == sentence
+
+
+def test_a_wrong_option_is_found_at_its_key(tmp_path):
+    configs = {"mine": DetectorConfig(kind="rfdetr", model_path="m.onnx", labels=["cube"])}
+    ((keys, sentence),) = find_problems(configs, tmp_path)
+    assert keys == ("detectors", "mine", "model_path")
+    assert sentence.startswith(f"there is no model file {tmp_path / 'm.onnx'}; check the path")
+
+
+def test_the_labels_of_a_kind_that_does_not_say_them_are_not_known(tmp_path, oracle_installed):
+    configs = {kind: DetectorConfig(kind=kind) for kind in ("embedded", "oracle", "yolo")}
+    known = known_labels(configs, tmp_path)
+    assert known == {"embedded": ("cube", "sphere", "duck"), "oracle": None, "yolo": None}
+    assert [keys for keys, _ in find_problems(configs, tmp_path)] == [("detectors", "yolo", "kind")]
+
+
+def test_a_kind_of_somebody_elses_is_found_by_its_entry_point(tmp_path, monkeypatch):
+    info = tmp_path / "theirs-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[{registry.GROUP}]\noracle = {__name__}:Oracle\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    mine = build(tmp_path, mine=oracle(wish=3))["mine"]
+    assert mine.config.options == {"wish": 3}
+    assert (mine.setting.name, mine.setting.base, mine.setting.seed) == ("mine", tmp_path, 7)
+
+
+def test_detectors_are_built_once_in_the_files_order_whoever_needs_them(oracle_installed):
+    built = build(first=oracle(beside="second"), second=oracle())
+    assert list(built) == ["first", "second"]
+    assert built["first"].other is built["second"]
+    assert len(Oracle.made) == 2
+
+
+@pytest.mark.parametrize(
+    ("beside", "text"),
+    [("a", "the detectors a -> b -> a rest on each other"), ("c", 'no detector "c"; it has: a, b')],
+)
+def test_a_detector_cannot_rest_on_itself_or_on_nobody(oracle_installed, beside, text):
+    with pytest.raises(InputError, match=text):
+        build(a=oracle(beside="b"), b=oracle(beside=beside))
+
+
+def test_where_one_cannot_be_built_the_others_are_closed(oracle_installed):
+    with pytest.raises(InputError, match="it is broken"):
+        build(a=oracle(), b=oracle(broken=True))
+    assert Oracle.made[0].closed

@@ -1,0 +1,56 @@
+"""The shipped weights: small enough to ship, and as good as their cards say, on scenes drawn afresh."""
+
+from __future__ import annotations
+
+import pytest
+
+from executive.cells.sim.scenes import SceneRenderer
+from executive.mission.parse.cell_file import load_cell
+from executive.perception.detectors.embedded import LABELS, MODEL, WEIGHTS
+from executive.perception.detectors.onnx_model import read_labels
+from executive.training.evaluation.asking import CellDetector
+from executive.training.evaluation.evaluate import evaluate
+from executive.training.samples import LabelledImage
+
+
+def test_the_weights_fit_into_a_package_and_a_card_goes_with_them(missions):
+    fasteners = missions / "cells" / "fasteners"
+    for cell, model, labels, card in (
+        ("overhead", MODEL, LABELS, WEIGHTS / "embedded.card.md"),
+        ("fasteners", fasteners / "model.onnx", fasteners / "labels.txt", fasteners / "card.md"),
+    ):
+        assert model.stat().st_size < 20_000_000
+        assert "## Measured" in card.read_text(encoding="utf-8")
+        assert set(read_labels(labels)) == set(load_cell(missions / "cells" / f"{cell}.yaml").objects)
+
+
+# Seeds that no training image was drawn from; the cards' figures, less two mistakes.
+@pytest.mark.parametrize(
+    ("name", "scenes", "randomized", "precision", "recall"),
+    [
+        ("overhead", range(1000, 1020), True, 0.90, 0.80),
+        pytest.param("wrist", range(1000, 1020), True, 0.90, 0.80, marks=pytest.mark.slow),
+        ("fasteners", range(2000, 2008), False, 0.95, 0.94),
+    ],
+)
+def test_fresh_scenes_of_a_shipped_cell_are_read_almost_without_error(
+    missions, name, scenes, randomized, precision, recall
+):
+    config = load_cell(missions / "cells" / f"{name}.yaml")
+    renderer = SceneRenderer(config, next(iter(config.cameras)), randomized=randomized)
+    samples = []
+    for seed in scenes:
+        drawn = renderer.sample(seed)
+        boxes, ignored = (tuple(map(tuple, found.tolist())) for found in (drawn.boxes, drawn.ignored))
+        truth = {
+            "part": drawn.part, "matrix": drawn.matrix.tolist(), "X_WC": drawn.X_WC.rounded(9),
+            "positions": drawn.positions.tolist(),
+        }  # fmt: skip
+        samples.append(LabelledImage(str(seed), drawn.image, drawn.labels, boxes, ignored, truth))
+    renderer.close()
+    detector = CellDetector(config.detectors, next(iter(config.detectors)), base=missions / "cells")
+    measured = evaluate(detector, samples)
+    detector.close()
+    assert measured.objects > 20
+    assert (measured.precision >= precision, measured.recall >= recall) == (True, True)
+    assert (measured.centre.median < 1.0, measured.position.median < 3.0) == (True, True)

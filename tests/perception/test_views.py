@@ -1,0 +1,95 @@
+"""Parts of a frame that are searched, and overlapping answers that become one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from executive.cell.values import Detection
+from executive.errors import InputError
+from executive.perception.detectors.views import Finding, merge, parts_of, search_parts, without_duplicates
+
+TABLE = (192, 100, 448, 356)
+SIZE = (640, 480)
+
+
+def found(box, confidence=0.9, part=(0, 0, 256, 256), label="cube"):
+    return Finding(Detection(label, confidence, box), part)
+
+
+def test_the_table_view_is_the_square_of_the_cell_file_and_a_smaller_frame_is_one_tile():
+    assert parts_of("table", TABLE, SIZE) == [TABLE]
+    assert parts_of("full", TABLE, (200, 150)) == [(0, 0, 200, 150)]
+    with pytest.raises(InputError, match='no view "ceiling"; there are table and full'):
+        parts_of("ceiling", TABLE, SIZE)
+
+
+def test_a_detection_keeps_the_confidence_of_its_second_class_and_gets_the_name_of_the_cell():
+    ball = Detection("ball", 0.6, (1, 2, 3, 4), rival=0.5)
+    (kept,) = search_parts(
+        np.zeros((480, 640, 3), np.uint8), [TABLE], lambda part: [ball], {"ball": "sphere"}
+    )
+    assert kept == Detection("sphere", 0.6, (193, 102, 195, 104), rival=0.5)
+
+
+@given(
+    st.integers(64, 300).flatmap(
+        lambda side: st.tuples(st.just(side), st.integers(side, 900), st.integers(side, 900))
+    ),
+    st.data(),
+)
+def test_every_small_object_is_whole_in_some_tile_of_the_full_view(sizes, data):
+    side, width, height = sizes
+    extent = side // 5
+    left = data.draw(st.integers(0, width - extent))
+    top = data.draw(st.integers(0, height - extent))
+    parts = parts_of("full", (0, 0, side, side), (width, height))
+    assert all(part[2] - part[0] == side and part[3] - part[1] == side for part in parts)
+    assert any(
+        part[0] <= left and part[1] <= top and left + extent <= part[2] and top + extent <= part[3]
+        for part in parts
+    )
+
+
+OTHER = (192, 0, 448, 256)
+"""A part that overlaps with the one from 0 to 256."""
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "kept"),
+    [
+        # A whole view wins over one that is cut off, though less confident.
+        (found((240, 100, 256, 130), 0.95), found((240, 100, 270, 130), 0.80, OTHER), (1,)),
+        (found((240, 226, 270, 256), 0.95), found((240, 226, 270, 257), 0.8, (0, 112, 640, 480)), (1,)),
+        # Of two whole views the more confident wins.
+        (found((200, 100, 230, 130), 0.80), found((201, 101, 231, 131), 0.90, OTHER), (1,)),
+        # A view that the frame itself cuts off is not called cut.
+        (found((0, 100, 20, 130), 0.9), found((0, 101, 20, 131), 0.8, (0, 112, 256, 368)), (0,)),
+        (found((620, 100, 640, 130), 0.9, (384, 0, 640, 256)), found((620, 100, 640, 131), 0.8, OTHER), (0,)),
+        # A view that lies in the other to more than 0.7 shows the same object, one to 0.6 another one.
+        (found((200, 100, 230, 130), 0.9), found((208, 100, 248, 140), 0.8, OTHER), (0,)),
+        (found((200, 100, 230, 130), 0.9), found((212, 100, 252, 140), 0.8, OTHER), (0, 1)),
+        # Two objects that overlap in one tile stay two.
+        (found((10, 10, 40, 40), 0.9), found((15, 10, 45, 40), 0.8), (0, 1)),
+    ],
+)
+def test_an_object_in_two_tiles_is_reported_once(one, other, kept):
+    expected = [(one, other)[number].detection for number in kept]
+    assert merge([one, other], SIZE) == expected
+    assert merge([other, one], SIZE) == expected
+
+
+def test_of_boxes_that_overlap_by_more_than_seven_tenths_the_most_confident_is_kept():
+    detections = [
+        Detection("first", 0.9, (0, 0, 10, 10)),
+        Detection("again", 0.8, (0, 0, 10, 14)),
+        Detection("beside", 0.7, (0, 0, 10, 15)),
+        Detection("far", 0.6, (50, 0, 60, 9)),
+    ]
+    assert [one.label for one in without_duplicates(detections)] == ["first", "beside", "far"]
+    assert [one.label for one in without_duplicates(detections[1:])] == ["again", "far"]
+    equals = [Detection(label, 0.9, (0, 0, 10, 10)) for label in "abc"]
+    assert without_duplicates(equals) == equals[:1]
+    assert without_duplicates([]) == merge([], SIZE) == []

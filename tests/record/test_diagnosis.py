@@ -1,0 +1,211 @@
+"""What a story says of runs that went wrong, and that it forgets what it does not need."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from failed_runs import PICK, FailedRun
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from executive.events import Event, Exact
+from executive.plugins import discover
+from executive.record.diagnosis.course import Course
+
+CUBE = [("cube", 0.5, 0.1)]
+
+
+@pytest.fixture(autouse=True)
+def somewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def test_a_success_has_no_story() -> None:
+    assert FailedRun("sort_overhead").tell() is None
+
+
+@pytest.mark.parametrize(
+    ("tree", "expected"),
+    [
+        ("  retry: {attempts: $attempts, do: IsHolding}\n",
+         "retry: all 3 attempts failed: 3 x IsHolding.empty"),
+        ("  retry: {attempts: 1, do: IsHolding}\n", "retry: has no second attempt"),
+        ("  retry: {attempts: 4, on: [grip.empty], do: {IsHolding: {}, as: grip}}\n",
+         "retry: all 4 attempts failed: 4 x IsHolding.empty"),
+        ("  - MoveToScan\n  - Detect\n  - Localize\n"
+         "  - retry: {attempts: 4, on: [SelectTarget.unseen], do: [SelectTarget, IsHolding]}\n",
+         "retry: tries again only after SelectTarget.unseen"),
+        ("  retry: {attempts: 4, recover: {invert: succeed}, do: IsHolding}\n",
+         "retry: gave up after attempt 1 of 4: its recovery failed with invert.inverted: succeed succeeded"),
+        ("  try: IsHolding\n  finally: {Wait: {seconds: 0.1}}\n", "try: has no catch"),
+        ("  try: {timeout: {seconds: 0.2, do: {Wait: {seconds: 0.1}}}}\n  finally: IsHolding\n",
+         "try: its finally failed"),
+        ("  - MoveToScan\n  - try: [Detect, IsHolding]\n    catch: [{on: [Detect.hidden], do: succeed}]\n",
+         "try: catches only Detect.hidden"),
+        ("  try: IsHolding\n  catch: [{on: [IsHolding.empty], do: {invert: succeed}}]\n",
+         "try: caught IsHolding.empty (the sensor feels no seal), but what it did instead failed"),
+        ("  - MoveToScan\n  - repeat: {until: [Detect.hidden], do: [Detect, IsHolding]}\n",
+         "repeat: ends well only with Detect.hidden"),
+        ("  repeat: {times: 3, do: IsHolding}\n", "repeat: a failure ends it before its 3 times are over"),
+        ("  - MoveToScan\n  - while: {condition: Detect, do: IsHolding}\n",
+         "while: a failure of its body ends it"),
+        ("  for_each: {each: label, in: [cube, duck], do: IsHolding}\n",
+         "for_each: failed at element 1 of 2: cube"),
+        ("  timeout: {seconds: 2, do: [{Wait: {seconds: 0.5}}, IsHolding]}\n",
+         "timeout: limits only the time: 0.50 of 2 s had passed"),
+        ("  timeout: {seconds: 2, do: {Wait: {seconds: 3}}}\n", ""),
+        ("  invert: {Wait: {seconds: 0.1}}\n", ""),
+        ("  fallback: [{invert: succeed}, IsHolding]\n",
+         "fallback: all 2 choices failed; the others with invert.inverted (succeed succeeded)"),
+        ("  parallel: [{Wait: {seconds: 0.1}}, IsHolding]\n", "parallel: needs all 2 branches"),
+        ("  parallel:\n    wait_for: any\n    do: [[{Wait: {seconds: 0.1}}, {invert: succeed}], IsHolding]\n",
+         "parallel: needs one of its 2 branches; also failed: invert.inverted"),
+        ("  parallel:\n    wait_for: lead\n    do: [IsHolding, {Wait: {seconds: 1}}]\n",
+         "parallel: ends as its lead does"),
+    ],
+)  # fmt: skip
+def test_every_control_node_says_why_it_did_not_stop_a_failure(tree: str, expected: str) -> None:
+    chain = FailedRun(tree, objects=CUBE).tell()["chain"]
+    assert [f"{link['name']}: {link['why']}" for link in chain if link["why"]] == [expected] * bool(expected)
+
+
+def test_a_recovery_that_failed_in_an_earlier_round_explains_nothing() -> None:
+    run = FailedRun(
+        "  repeat:\n    times: 2\n    do:\n      try:\n        retry:\n          attempts: 2\n"
+        "          on: [IsHolding.empty]\n          recover: {invert: succeed}\n"
+        "          do: [MoveToScan, Detect, IsHolding]\n"
+        "      catch: [{on: [IsHolding.empty], do: succeed}]\n",
+        objects=CUBE,
+    )
+    run.fake.detector.answers = lambda look, true: "gone" if look == 2 else true
+    story = run.tell()
+    assert story["chain"][2]["why"] == "tries again only after IsHolding.empty"
+
+
+def node(name: str, status: str, tick: int, **data: Any) -> Event:
+    return Event("status", tick, tick / 240, {"node": f"tree/{name}", "status": status, **data})
+
+
+def sense(name: str, value: Any, tick: int, **data: Any) -> Event:
+    return Event("sense", tick, tick / 240, {"name": name, "nth": 1, "value": value, **data})
+
+
+def test_a_failure_remembers_what_the_cell_had_answered_until_then_and_no_list_or_picture() -> None:
+    course = Course()
+    for event in (
+        sense("arm.met", Exact(None), 1), sense("arm.q", Exact([0.0] * 7), 1),
+        node("Approach", "RUNNING", 2, item="cube-1"), sense("arm.met", Exact("a wrench"), 3),
+        node("Approach", "FAILURE", 3, item="cube-1", reason="blocked", message="a wrench"),
+        sense("arm.met", Exact(None), 4), sense("tool.holding", Exact(True), 4),
+    ):  # fmt: skip
+        course(event)
+    ran = course.node("tree/Approach")
+    assert [(sense.name, sense.value, sense.tick) for sense in ran.senses] == [("arm.met", "a wrench", 3)]
+
+
+def test_an_undeclared_reason_is_told_at_the_line_of_its_skill() -> None:
+    run = FailedRun(PICK, objects=CUBE)
+
+    def seals() -> bool:
+        raise discover()["MoveToScan"]().failed("tired", "no more")
+
+    run.fake.tool.seals = seals
+    story = run.tell()
+    assert 'raised the undeclared reason "tired"' in story["verdict"]
+    assert re.fullmatch(r"record/test_diagnosis\.py:\d+, in seals", story["raised_at"])
+
+
+@pytest.mark.parametrize(
+    ("at_rest", "arm", "first"),
+    [
+        (lambda: True, "at rest", "mend what is broken"),
+        (lambda: False, "it was told to brake and is not at rest",
+         "keep away from the arm until you have seen it stand still: it"),
+        (lambda: 1 / 0, "it does not say whether it is at rest (ZeroDivisionError: division by zero)",
+         "keep away from the arm"),
+    ],
+)  # fmt: skip
+def test_a_fault_says_where_it_was_raised_and_what_is_known_of_the_arm(at_rest, arm, first) -> None:
+    run = FailedRun(PICK, objects=CUBE)
+
+    def broken() -> bool:
+        raise ZeroDivisionError("vacuum gauge")
+
+    run.fake.tool.seals = broken
+    story = run.story.tell(run.run.execute(), Path(), at_rest)
+    assert (story["arm"], story["verdict"]) == (arm, "Grasp: ZeroDivisionError: vacuum gauge")
+    assert story["next"][0].startswith(first)
+    assert re.fullmatch(r"record/test_diagnosis\.py:\d+, in broken", story["raised_at"])
+    assert story["node"]["path"] == "tree/5:retry/do/Grasp"
+
+
+def test_what_was_let_go_as_the_run_ended_is_to_be_looked_for() -> None:
+    run = FailedRun("sort_overhead", objects=CUBE)
+
+    def let_go_and_stop() -> None:
+        if run.fake.world.held and run.height > 0.1:
+            run.fake.tool.part()
+            run.run.control.stop()
+
+    run.at_every_step(let_go_and_stop)
+    story = run.tell()
+    said = ["see where cube-1 lies: it was let go as the run ended"]
+    assert (story["holds"], story["left"], story["next"]) == ("", ["cube-1"], said)
+
+
+def test_a_halt_at_a_question_says_so() -> None:
+    run = FailedRun("pick_on_request", requests=None)
+    run.run.observe(lambda event: run.run.control.stop() if event.kind == "asking" else None)
+    assert run.tell()["verdict"] == "halted by the user while the operator was asked"
+
+
+@pytest.mark.slow
+def test_the_memory_of_a_run_does_not_grow_with_its_length() -> None:
+    run = FailedRun("sort_overhead")
+    events: list[Event] = []
+    run.run.observe(events.append)
+    run.slip(2)
+    assert run.tell() is None
+    before_the_end = [event for event in events if event.kind not in ("end", "halt")][:-1]
+    course, sizes = Course(), []
+    for round in range(40):
+        for event in before_the_end:
+            data = {key: value for key, value in event.data.items() if key != "frame_object"}
+            if data.get("item"):
+                data["item"] += f"-{round}"
+            course(Event(event.kind, event.tick, event.clock, data))
+        sizes.append(len(pickle.dumps(course)))
+    # The names of the items grow by a digit.
+    assert sizes[-1] < 1.01 * sizes[1]
+    assert len(before_the_end) > 500
+
+
+@pytest.mark.slow
+@settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    breaks=st.randoms(use_true_random=False),
+    slips=st.integers(0, 40),
+    misses=st.floats(0, 0.9),
+    gone=st.sampled_from([0.0, 0.0, 0.5, 1.0]),
+    stop=st.none() | st.integers(0, 1500),
+)  # fmt: skip
+def test_whatever_goes_wrong_its_story_can_be_told(breaks, slips, misses, gone, stop) -> None:
+    run = FailedRun("sort_overhead", overrides={"attempts": "2"})
+    run.fake.tool.seals = lambda: breaks.random() >= misses
+    run.fake.detector.answers = lambda look, true: "gone" if breaks.random() < gone else true
+    run.slip(slips, vanish=breaks.random() < 0.5)
+    if stop is not None:
+        run.at_every_step(lambda: run.run.control.stop() if run.fake.world.steps == stop else None)
+    outcome = run.run.execute()
+    story = run.story.tell(outcome, Path(), lambda: True)
+    assert (story is None) == (outcome.status in ("SUCCESS", "INCOMPLETE"))
+    if story is not None:
+        assert json.loads(json.dumps(story, allow_nan=False)) == story
+        assert story["verdict"]
+        assert [link["path"] for link in story["chain"]][-1:] == ([outcome.node] if outcome.node else [])
+        assert all(link["why"] for link in story["chain"][:-1])

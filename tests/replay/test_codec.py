@@ -1,0 +1,69 @@
+"""Nothing is lost between an answer of a cell and its plain form."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from executive.cell.error_rates import ErrorRates
+from executive.cell.values import Answer, Detection, Frame
+from executive.geometry import Pose, about_z
+from executive.replay.codec import ANSWER, ARRAY, BOX, FRAME, MOTION, POSE, Codec, PlayedMotion
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+few = settings(max_examples=25)
+
+
+def back(codec: Codec, answer: Any) -> Any:
+    """Return an answer after its way through JSON."""
+    return codec.read(json.loads(json.dumps(codec.write(answer))))
+
+
+@few
+@given(arrays(np.float64, (3, 2), elements=finite), st.floats(-4, 4))
+def test_numbers_come_back_bit_by_bit(array: np.ndarray, angle: float) -> None:
+    assert np.array_equal(back(ARRAY, array), array)
+    pose = Pose(about_z(angle), array[:, 0])
+    assert np.array_equal(back(POSE, pose).rotation, pose.rotation)
+    assert np.array_equal(back(POSE, pose).position, pose.position)
+    assert back(MOTION, PlayedMotion(angle)) == PlayedMotion(angle)
+    assert back(BOX, (1, 2, 3.5, angle)) == (1, 2, 3.5, angle)
+
+
+@few
+@given(arrays(np.bool_, st.tuples(st.integers(1, 40), st.integers(1, 40))), st.integers(0, 9))
+def test_a_frame_comes_back_without_its_image(visible: np.ndarray, epoch: int) -> None:
+    size = visible.shape
+    frame = Frame(
+        7, "overhead", np.full((*size, 3), 9, np.uint8), np.ones(size), np.eye(3) / 3, Pose.identity(), 1 / 3,
+        visible, epoch,
+    )  # fmt: skip
+    read = back(FRAME, frame)
+    assert (read.id, read.camera, read.stamp, read.epoch) == (7, "overhead", 1 / 3, epoch)
+    assert np.array_equal(read.visible, visible)
+    assert np.array_equal(read.matrix, frame.matrix)
+    assert (read.image.shape, read.image.any(), read.depth) == ((*size, 3), False, None)
+
+
+@few
+@given(
+    st.lists(st.tuples(st.text(max_size=5), finite, st.tuples(finite, finite, finite, finite), finite)),
+    finite,
+)
+def test_an_answer_comes_back(found: list[tuple], misses: float) -> None:
+    answer = Answer("eye", tuple(Detection(*one) for one in found), ErrorRates(0.5, misses, 0.1, 0.2, 0.7))
+    assert back(ANSWER, answer) == answer
+
+
+def test_an_answer_of_a_journal_without_second_classes_is_read() -> None:
+    old = {
+        "detector": "eye",
+        "found": [["duck", 0.9, [1, 2, 3, 4]]],
+        "reliability": [0.5, 0.1, 0.1, 0.2, 0.7],
+    }
+    assert ANSWER.read(old).found == (Detection("duck", 0.9, (1, 2, 3, 4)),)

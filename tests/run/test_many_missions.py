@@ -1,0 +1,139 @@
+"""Many missions in one process, one after another and side by side: each as if it were alone."""
+
+from __future__ import annotations
+
+import gc
+import multiprocessing
+import sys
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+from py_trees.behaviour import Behaviour
+from py_trees.blackboard import Blackboard
+from py_trees.common import Status
+
+from executive.cells.fake.cell import FakeCell
+from executive.mission.build import build
+from executive.mission.load import LoadedMission, load_mission
+from executive.plugins import discover
+from executive.record.plain import plain
+from executive.record.trace import Trace
+from executive.run.run import Run
+from executive.run.run_context import Plant
+from executive.skill import Skill
+from executive.tree.blackboard import Scope
+from executive.tree.skill_leaf import SkillNode
+
+MISSIONS = Path(__file__).parents[2] / "missions"
+RUNS = [(name, seed) for seed in range(3) for name in ("sort_overhead", "sort_wrist")]
+"""Missions and seeds."""
+
+Story = tuple[Any, ...]
+"""Status, ticks, decisions, variables, books and truth of a run."""
+
+
+class Interleaved:
+    """A mission on a cell of its own, ticked from outside."""
+
+    def __init__(self, loaded: LoadedMission, seed: int) -> None:
+        self._trace = Trace()
+        self._plant = Plant([self._trace])
+        emit = self._plant.emit
+        self._fake = FakeCell(loaded.cell_config, seed=seed, routes=loaded.routes, emit=emit)
+        self._plant.connect(self._fake)
+        self._root = build(loaded, skills(), self._plant.cell, Scope(), emit)
+
+    def tick(self) -> bool:
+        """Go on by one tick; return whether there is more to do."""
+        self._plant.begin_tick()
+        self._root.tick_once()
+        if self._root.status is not Status.RUNNING:
+            return False
+        self._plant.plan_ahead()
+        self._plant.advance()
+        assert self._plant.tick < 5000, "the mission goes on for ever"
+        return True
+
+    def story(self) -> Story:
+        self._fake.accounts.close(completed=self._root.status is Status.SUCCESS)
+        accounts = self._fake.accounts
+        told = {"unknown": accounts.unknown, "doubts": accounts.doubts, "rows": accounts.rows()}
+        items = {**accounts.balance(), **told}
+        return (
+            self._root.status.value, self._plant.tick, self._trace.hexdigest(), variables(self._root), items,
+            self._fake.audit(),
+        )  # fmt: skip
+
+
+@cache
+def skills() -> dict[str, type[Skill]]:
+    """Find the skills once: the search leaves caches of Python's own behind."""
+    return discover()
+
+
+@cache
+def loaded(name: str) -> LoadedMission:
+    """Load a mission once for all runs, with one object on the table."""
+    return load_mission(MISSIONS / f"{name}.yaml", skills(), {"cell.table.objects": "[1, 1]"})
+
+
+def variables(root: Behaviour) -> list[dict[str, Any]]:
+    """Return the variables of every scope of a tree."""
+    scopes = {id(node._scope): node._scope for node in root.iterate() if isinstance(node, SkillNode)}
+    return [plain(scope) for scope in scopes.values()]
+
+
+def story_of(name: str, seed: int) -> Story:
+    trace = Trace()
+    run = Run(loaded(name), skills(), seed=seed, observers=[trace], requests=[], kind=FakeCell)
+    try:
+        outcome = run.execute()
+        return (
+            outcome.status, outcome.ticks, trace.hexdigest(), variables(run.root), run.items(), run.audit(),
+        )  # fmt: skip
+    finally:
+        run.close()
+
+
+@pytest.fixture(scope="module")
+def alone() -> dict[tuple[str, int], Story]:
+    """Tell the story of every run; the last by a process of its own, in which nothing ran before."""
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        last = pool.apply(story_of, RUNS[-1])
+    return {run: story_of(*run) for run in RUNS[:-1]} | {RUNS[-1]: last}
+
+
+def test_the_runs_differ(alone: dict[tuple[str, int], Story]) -> None:
+    assert {story[0] for story in alone.values()} == {"SUCCESS"}
+    assert len({story[2] for story in alone.values()}) == len(RUNS)
+    assert all(story[3] and all(story[3]) for story in alone.values())
+
+
+def test_one_after_another_each_goes_as_if_alone(alone: dict[tuple[str, int], Story]) -> None:
+    Blackboard.clear()
+    assert [run for run in RUNS if story_of(*run) != alone[run]] == []
+    assert (Blackboard.storage, Blackboard.metadata, Blackboard.clients) == ({}, {}, {})
+
+
+def test_side_by_side_each_goes_as_if_alone(alone: dict[tuple[str, int], Story]) -> None:
+    runs = RUNS * 2
+    missions = [Interleaved(loaded(name), seed) for name, seed in runs]
+    active = missions
+    while active:
+        active = [mission for mission in active if mission.tick()]
+    assert [run for run, mission in zip(runs, missions, strict=True) if mission.story() != alone[run]] == []
+
+
+@pytest.mark.slow
+def test_one_after_another_they_leave_less_than_a_block_of_memory_each() -> None:
+    def blocks_after(runs: int) -> int:
+        for number in range(runs):
+            story_of(*RUNS[number % len(RUNS)])
+        gc.collect()
+        return sys.getallocatedblocks()
+
+    # After so many runs every cache is filled, numpy's too.
+    before = blocks_after(140)
+    assert blocks_after(100) - before < 100

@@ -1,0 +1,155 @@
+"""The operator: what words mean, in a script and at the terminal."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from executive.cells.fake.cell import FakeCell
+from executive.errors import InputError, Stopped
+from executive.events import Event
+from executive.mission.load import load_mission
+from executive.plugins import discover
+from executive.record.entry import entry_of
+from executive.record.replay import compare
+from executive.replay.input_log import Past
+from executive.run.operator import ScriptedOperator, TerminalOperator, understood
+from executive.run.run import Run
+
+CHOICES = ("cube", "sphere", "duck")
+
+
+@pytest.mark.parametrize(
+    ("word", "meaning"),
+    [
+        ("0", "cube"), ("2", "duck"), ("sphere", "sphere"), ("DUCK", "duck"),
+        ("s", "rescan"), ("S", "rescan"), ("rescan", "rescan"), ("q", None), ("Quit", None),
+        ("3", ""), ("-1", ""), ("banana", ""), ("", ""), ("²", ""), ("cube duck", ""),
+    ],
+)  # fmt: skip
+def test_what_a_word_means(word: str, meaning: str | None) -> None:
+    assert understood(word, CHOICES) == meaning
+
+
+class Heard(list[tuple[str, dict[str, Any]]]):
+    def __call__(self, kind: str, **data: Any) -> None:
+        self.append((kind, data))
+
+
+def test_a_script_is_followed_and_then_quits_for_good() -> None:
+    heard = Heard()
+    operator = ScriptedOperator(["duck", "0", "s", "q"], CHOICES, heard)
+    answers = [operator.ask(CHOICES) for _ in range(5)]
+    assert answers == ["duck", "cube", "rescan", None, None]
+    assert heard == [("request", {"wanted": answer}) for answer in answers]
+
+
+def test_a_script_with_an_unknown_word_is_refused_before_anything_moves() -> None:
+    with pytest.raises(InputError) as caught:
+        ScriptedOperator(["cube", "banana"], CHOICES, Heard())
+    assert str(caught.value) == 'cannot pick "banana"; ask for one of: cube, sphere, duck'
+
+
+class Keyboard:
+    """What somebody types into the terminal."""
+
+    def __init__(self, text: str, *, closed: bool) -> None:
+        reading, writing = os.pipe()
+        os.write(writing, text.encode())
+        self.writing = None if closed else writing
+        if closed:
+            os.close(writing)
+        # Unbuffered, as select sees only what the pipe still holds.
+        self.stdin = io.TextIOWrapper(io.FileIO(reading), write_through=True)
+
+    def close(self) -> None:
+        self.stdin.close()
+        if self.writing is not None:
+            os.close(self.writing)
+
+
+@pytest.fixture
+def type_in(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Any:
+    def type_in(text: str, *, closed: bool = False) -> None:
+        keyboard = Keyboard(text, closed=closed)
+        request.addfinalizer(keyboard.close)
+        monkeypatch.setattr("sys.stdin", keyboard.stdin)
+
+    return type_in
+
+
+@pytest.mark.parametrize(
+    ("typed", "meant"), [("1\n", "sphere"), (" duck \n", "duck"), ("s\n", "rescan"), ("q\n", None)]
+)
+def test_the_terminal_lists_the_classes_and_takes_numbers_and_names(
+    type_in: Any, capsys: pytest.CaptureFixture[str], typed: str, meant: str | None
+) -> None:
+    type_in(typed)
+    heard = Heard()
+    assert TerminalOperator(heard, interrupted=lambda: False).ask(CHOICES) == meant
+    assert capsys.readouterr().err == "pick what?  0 cube  1 sphere  2 duck  s rescan  q quit > "
+    assert heard == [("asking", {"choices": [*CHOICES]}), ("request", {"wanted": meant})]
+
+
+def test_the_terminal_asks_again_after_an_unknown_word(
+    type_in: Any, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    operator = TerminalOperator(Heard(), interrupted=lambda: False)
+    lines = iter(["banana\n", "2\n"])
+    monkeypatch.setattr(operator, "_line", lambda: next(lines))
+    assert operator.ask(CHOICES) == "duck"
+    first, second = capsys.readouterr().err.splitlines()
+    assert first.endswith('> cannot pick "banana"')
+    assert second.startswith("pick what?")
+
+
+def test_the_end_of_the_input_means_quit(type_in: Any) -> None:
+    type_in("", closed=True)
+    heard = Heard()
+    assert TerminalOperator(heard, interrupted=lambda: False).ask(CHOICES) is None
+    assert heard[-1] == ("request", {"wanted": None})
+
+
+@pytest.mark.parametrize("keyboard", [True, False])
+def test_ctrl_c_ends_the_wait_for_an_answer(type_in: Any, keyboard: bool) -> None:
+    type_in("")
+    looks = iter([False, False, False, True])
+    operator = TerminalOperator(Heard(), lambda: next(looks, True), keyboard=keyboard)
+    with pytest.raises(Stopped):
+        operator.ask(CHOICES)
+
+
+def test_ctrl_c_at_the_question_halts_the_run_instead_of_ending_it_well(missions: Path, type_in: Any) -> None:
+    def interrupt(event: Event) -> None:
+        if event.kind == "asking":
+            os.kill(os.getpid(), signal.SIGINT)
+
+    type_in("")
+    loaded = load_mission(missions / "pick_on_request.yaml", discover())
+    events: list[Event] = []
+    run = Run(loaded, discover(), seed=1, kind=FakeCell, observers=[events.append, interrupt])
+    outcome = run.execute()
+    assert (outcome.status, outcome.message) == ("HALTED", "halted by the user")
+    ends = {event.data["status"] for event in events if event.kind == "status"}
+    assert ends == {"RUNNING", "INVALID"}, "nothing failed, and nobody quit"
+    entries = [entry_of(event) for event in events]
+    again = compare(loaded, discover(), Past.of(entries), 1)
+    assert again.difference == ""
+    assert again.decisions == sum(entry["kind"] == "status" for entry in entries) > 0
+
+
+@pytest.mark.parametrize(
+    ("said", "answer"),
+    [([None, "a unicorn", "1"], "sphere"), (["cube", "cube", None, "duck"], "duck")],
+    ids=["where nobody can type", "an answer to no question picks nothing"],
+)
+def test_what_is_asked_for_elsewhere_is_heard(said: list[str | None], answer: str) -> None:
+    heard, words = Heard(), iter(said)
+    operator = TerminalOperator(heard, lambda: False, lambda: next(words), keyboard=False)
+    assert operator.ask(CHOICES) == answer
+    assert heard == [("asking", {"choices": list(CHOICES)}), ("request", {"wanted": answer})]

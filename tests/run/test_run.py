@@ -1,0 +1,157 @@
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+from py_trees.common import Status
+
+from executive.cell.values import Detection
+from executive.cells.fake.cell import FakeCell
+from executive.errors import InputError
+from executive.events import Event
+from executive.mission.load import load_mission
+from executive.plugins import discover
+from executive.run.run import Run
+
+
+def make(
+    missions: Path, name: str = "sort_overhead", seed: int = 3, **options: Any
+) -> tuple[Run, list[Event]]:
+    events: list[Event] = []
+    loaded = load_mission(missions / f"{name}.yaml", discover())
+    observers = [events.append, *options.pop("observers", [])]
+    return Run(loaded, discover(), seed=seed, observers=observers, kind=FakeCell, **options), events
+
+
+def fake_of(run: Run) -> FakeCell:
+    assert isinstance(run.workcell, FakeCell)
+    return run.workcell
+
+
+def running(run: Run) -> list[str]:
+    return [node.name for node in run.root.iterate() if node.status is Status.RUNNING]
+
+
+def test_an_object_that_cannot_be_had_is_rejected_and_the_others_go_on(missions: Path) -> None:
+    run, _ = make(missions)
+    fake = fake_of(run)
+    stubborn = fake.world.objects[0]
+    fake.tool.seals = lambda: fake.world.under(fake.arm.tool_pose.position) is not stubborn
+    outcome, items, audit = run.execute(), run.items(), run.audit()
+    assert (outcome.status, outcome.reason) == ("INCOMPLETE", "rejected")
+    named = next(row["item"] for row in items["rows"] if row["state"] == "rejected")
+    why = "could not be picked (6 failed attempts)"
+    assert outcome.message == f"1 object(s) were not sorted: {named} ({why})"
+    assert (items["rejected"], audit["left"]) == (1, 1)
+    assert items["placed"] == audit["right"] == items["seen"] - 1
+    rejected = next(row for row in items["rows"] if row["state"] == "rejected")
+    assert rejected["why"] == "could not be picked (6 failed attempts)"
+
+
+def test_a_reason_nobody_catches_ends_the_mission(missions: Path) -> None:
+    run, _ = make(missions)
+    fake_of(run).detector.answers = lambda look, true: "the server is gone"
+    outcome = run.execute()
+    assert (outcome.status, outcome.reason) == ("FAILURE", "Detect.unavailable")
+    assert (outcome.message, outcome.node.rpartition("/")[2]) == (
+        "detector embedded: the server is gone", "Detect",
+    )  # fmt: skip
+
+
+def test_a_bug_in_a_part_is_a_fault_and_the_arm_is_at_rest(missions: Path) -> None:
+    run, events = make(missions)
+    fake = fake_of(run)
+
+    def broken() -> bool:
+        raise ZeroDivisionError("vacuum gauge")
+
+    fake.tool.seals = broken
+    outcome = run.execute()
+    assert (outcome.status, outcome.node.rpartition("/")[2]) == ("FAULT", "Grasp")
+    assert "vacuum gauge" in outcome.message and fake.arm.at_rest
+    assert (running(run), events[-1].kind) == ([], "end")
+
+
+def test_ctrl_c_halts_every_node_and_brakes_the_arm(missions: Path) -> None:
+    def interrupt(event: Event) -> None:
+        if event.kind == "intent" and not sent:
+            sent.append(1)
+            os.kill(os.getpid(), signal.SIGINT)
+
+    sent: list[int] = []
+    before = signal.getsignal(signal.SIGINT)
+    run, events = make(missions, observers=[interrupt])
+    outcome = run.execute()
+    assert (outcome.status, outcome.message) == ("HALTED", "halted by the user")
+    assert fake_of(run).arm.at_rest
+    assert (running(run), events[-1].kind) == ([], "end")
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_requests_are_served_in_order_and_the_rest_is_left(missions: Path) -> None:
+    run, events = make(missions, "pick_on_request", requests=["cube", "s", "0", "q"])
+    fake = fake_of(run)
+    fake.world.objects.clear()
+    for label, x, y in (("cube", 0.45, -0.1), ("cube", 0.55, 0.1), ("duck", 0.5, 0.0)):
+        fake.world.put(label, x, y)
+    outcome, items, audit = run.execute(), run.items(), run.audit()
+    assert outcome.status == "SUCCESS"
+    assert [e.data["wanted"] for e in events if e.kind == "request"] == ["cube", "rescan", "cube", None]
+    assert (items["placed"], items["skipped"]) == (2, 1) == (audit["right"], audit["left"])
+
+
+def test_an_unknown_kind_of_cell_names_the_installed_ones(missions: Path) -> None:
+    loaded = load_mission(missions / "sort_overhead.yaml", discover(), {"cell.kind": "hardware"})
+    with pytest.raises(
+        InputError, match='no installed package offers cells of kind "hardware"; installed: fake, sim'
+    ):
+        Run(loaded, discover(), seed=1)
+
+
+def test_a_box_that_stays_in_doubt_ends_in_an_empty_table_and_not_in_a_failure(missions: Path) -> None:
+    run, events = make(missions)
+    ghost = Detection("duck", 0.4, (300, 200, 320, 220))
+    fake_of(run).detector.answers = lambda look, true: [*true, ghost]
+    fake_of(run).world.objects.clear()
+    outcome = run.execute()
+    assert (outcome.status, outcome.message) == (
+        "INCOMPLETE", "1 object(s) were not sorted: duck-1 (no look is sure of it)",
+    )  # fmt: skip
+    assert sum(e.data.get("reason") == "unsure" and e.data["node"].endswith("Detect") for e in events) >= 6
+
+
+def test_an_object_that_slips_out_of_the_cup_every_time_is_given_up_in_the_end(missions: Path) -> None:
+    run, _ = make(missions)
+    fake = fake_of(run)
+    slippery = fake.world.objects[0]
+    advance = fake.advance
+
+    def slipping() -> None:
+        advance()
+        if fake.world.held is slippery and fake.arm.tool_pose.position[2] > 0.12:
+            fake.tool.open()
+        assert fake.world.steps < 60_000, "the mission tries for ever"
+
+    fake.advance = slipping  # type: ignore[method-assign]
+    outcome, items, audit = run.execute(), run.items(), run.audit()
+    assert outcome.status == "INCOMPLETE", outcome
+    assert (items["rejected"], audit["left"]) == (1, 1)
+    assert items["placed"] == audit["right"] == items["seen"] - 1
+    assert next(row for row in items["rows"] if row["state"] == "rejected")["attempts"] == 12
+
+
+def test_books_that_do_not_balance_are_a_fault(missions: Path) -> None:
+    run, events = make(missions)
+    fake_of(run).ledger.balance = lambda: {  # type: ignore[method-assign]
+        "seen": 3, "placed": 1, "rejected": 0, "skipped": 0, "lost": 1, "phantom": 0,
+    }  # fmt: skip
+    outcome = run.execute()
+    assert outcome.status == "FAULT"
+    assert outcome.message == (
+        "the books do not balance: 3 seen, 1 placed, 0 rejected, 0 skipped, 1 lost, 0 phantom; "
+        "seen must be what was placed, rejected, skipped and lost"
+    )
+    assert events[-1].kind == "end"

@@ -1,0 +1,97 @@
+"""Pausing, stepping and stopping a run from outside."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import pytest
+
+from executive.cells.fake.cell import FakeCell
+from executive.errors import Fault
+from executive.events import Event
+from executive.mission.load import load_mission
+from executive.plugins import discover
+from executive.run.run import Run
+from executive.run.run_control import RunControl
+
+
+def make(missions: Path, observer) -> Run:
+    loaded = load_mission(missions / "sort_overhead.yaml", discover())
+    return Run(loaded, discover(), seed=3, kind=FakeCell, observers=[observer])
+
+
+@pytest.mark.parametrize("steps", [0, 3])
+def test_a_paused_run_stands_still_and_a_step_is_a_tick(missions: Path, steps: int) -> None:
+    ticks: list[int] = []
+
+    def pause_once(event: Event) -> None:
+        if event.tick >= 50 and not ticks:
+            ticks.append(event.tick)
+            run.control.step(steps) if steps else run.control.pause()
+            threading.Timer(0.2, lambda: (ticks.append(run.tick), run.control.resume())).start()
+
+    run = make(missions, pause_once)
+    assert run.execute().status == "SUCCESS"
+    # It ends the tick it is in before it stands still.
+    assert ticks[1] == ticks[0] + 1 + steps
+
+
+def test_a_paused_run_can_be_stopped(missions: Path) -> None:
+    run = make(missions, lambda event: None)
+    run.control.step(50)
+    threading.Timer(0.3, run.control.stop).start()
+    outcome = run.execute()
+    assert (outcome.status, outcome.message) == ("HALTED", "halted by the user")
+    assert run.workcell.cell.arm.at_rest
+    assert run.tick >= 50
+
+
+def test_what_the_tool_holds_at_the_end_is_told(missions: Path) -> None:
+    def stop(event: Event) -> None:
+        if event.kind == "item" and event.data["state"] == "held":
+            run.control.stop()
+
+    run = make(missions, stop)
+    held = run.execute().holds
+    assert held in {row["item"] for row in run.items()["rows"]}
+
+
+@pytest.mark.parametrize("kind", ["item", "end", "fault"])
+def test_a_record_that_breaks_at_the_very_end_is_a_fault_with_an_outcome(missions: Path, kind: str) -> None:
+    def refuse(event: Event) -> None:
+        if event.tick >= 100:
+            run.control.stop()
+        if run.control.stopped and event.kind == kind:
+            raise Fault("the disk is full")
+        if kind == "fault" and event.tick >= 100:
+            raise Fault("the disk is full")
+
+    run = make(missions, refuse)
+    outcome = run.execute()
+    assert (outcome.status, outcome.message) == ("FAULT", "the disk is full")
+    assert run.workcell.cell.arm.at_rest
+
+
+def test_something_is_done_between_ticks_and_while_the_run_stands_still() -> None:
+    control, done = RunControl(), []
+    control.between_ticks(lambda: done.append(control.paused))
+    control.wait()
+    assert done == [False]
+    control.pause()
+
+    def go_on_after_three() -> None:
+        if len(done) == 4:
+            control.resume()
+
+    control.between_ticks(go_on_after_three)
+    control.wait()
+    assert done == [False, True, True, True]
+
+
+def test_what_is_asked_for_is_told_once_in_order() -> None:
+    control = RunControl()
+    assert control.requested() is None
+    control.request("cube")
+    control.request("duck")
+    assert [control.requested() for _ in range(3)] == ["cube", "duck", None]

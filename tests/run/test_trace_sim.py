@@ -1,0 +1,30 @@
+"""The simulated world repeats itself: one mission and seed, one trace."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from executive.mission.load import load_mission
+from executive.plugins import discover
+from executive.record.trace import Trace
+from executive.run.run import Run
+from executive.testing.oracle import oracle_cell
+
+
+def trace_of(missions: Path, seed: int) -> str:
+    trace = Trace()
+    loaded = load_mission(missions / "sort_wrist.yaml", discover())
+    run = Run(loaded, discover(), seed=seed, observers=[trace], kind=oracle_cell())
+    try:
+        assert run.execute().status == "SUCCESS"
+    finally:
+        run.close()
+    return trace.hexdigest()
+
+
+@pytest.mark.slow
+def test_the_same_seed_gives_the_same_trace_and_another_one_does_not(missions: Path) -> None:
+    first, other, again = (trace_of(missions, seed) for seed in (7, 8, 7))
+    assert first == again != other

@@ -1,0 +1,127 @@
+"""What is registered: by installed packages, and by the project one works in."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from executive.errors import InputError
+from executive.perception.detectors.registry import installed
+from executive.plugins import cell_kind, discover, registered
+
+Write = Callable[..., Path]
+Install = Callable[[str, str], None]
+
+WAVE = 'from executive.skill import Skill\n\n\nclass Wave(Skill):\n    """Wave."""\n'
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Write]:
+    """Make the working directory a project with a package, which registers in these groups."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    before = set(sys.modules)
+
+    def make(package: str, text: str, *, name: str = "", **groups: str) -> Path:
+        (tmp_path / package).mkdir()
+        (tmp_path / package / "part.py").write_text(text)
+        tables = [f'[project.entry-points."executive.{group}"]\n{line}\n' for group, line in groups.items()]
+        file = tmp_path / "pyproject.toml"
+        file.write_text("".join([f'[project]\nname = "{name or package}"\n', *tables]))
+        return file
+
+    yield make
+    for module in set(sys.modules) - before:
+        del sys.modules[module]
+
+
+@pytest.fixture
+def packages(
+    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., None]:
+    """Install a package that registers skills, as far as its metadata go."""
+
+    def install(name: str, entries: str) -> None:
+        folder = tmp_path_factory.mktemp("site")
+        info = folder / f"{name.replace('-', '_')}-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+        (info / "entry_points.txt").write_text(f"[executive.skills]\n{entries}\n")
+        monkeypatch.syspath_prepend(str(folder))
+
+    return install
+
+
+def test_a_skill_of_the_project_is_found_beside_the_installed_ones(project: Write) -> None:
+    project("hall_one", WAVE, skills='Wave = "hall_one.part:Wave"')
+    found = discover()
+    assert found["Wave"].__doc__ == "Wave."
+    assert "Grasp" in found
+    assert list(found) == sorted(found)
+
+
+def test_its_folder_is_the_last_place_where_modules_are_looked_for(project: Write) -> None:
+    file = project("hall_two", WAVE, skills='Wave = "hall_two.part:Wave"')
+    registered("executive.cells", "kind of cell")
+    assert str(file.parent) not in sys.path, "it registers none of these"
+    for _ in range(2):
+        registered("executive.skills", "skill")
+    assert (sys.path[-1], sys.path.count(str(file.parent))) == (str(file.parent), 1)
+
+
+def test_kinds_of_cells_and_detectors_are_found_likewise(project: Write) -> None:
+    project(
+        "hall_four", "class Bench:\n    pass\n\n\nclass Eye:\n    pass\n",
+        cells='bench = "hall_four.part:Bench"', detectors='eye = "hall_four.part:Eye"',
+    )  # fmt: skip
+    assert cell_kind("bench").__name__ == "Bench"
+    assert installed()["eye"].load().__name__ == "Eye"
+
+
+@pytest.mark.parametrize(
+    ("group", "kind", "ask"),
+    [
+        ("skills", "skill", discover),
+        ("cells", "kind of cell", lambda: cell_kind("wave")),
+        ("detectors", "kind of detector", lambda: installed()["wave"].load()),
+    ],
+)
+def test_what_cannot_be_loaded_is_named_with_place_and_file(
+    project: Write, group: str, kind: str, ask: Callable[[], object]
+) -> None:
+    file = project("hall_five", "import nowhere\n", **{group: 'wave = "hall_five.part:Wave"'})
+    with pytest.raises(InputError) as caught:
+        ask()
+    assert str(caught.value) == (
+        f'the {kind} "wave" (hall_five.part:Wave) cannot be loaded: ModuleNotFoundError: '
+        f"No module named 'nowhere', in {file.parent}/hall_five/part.py:1; mend it, or take it out of {file}"
+    )
+
+
+def test_one_name_is_registered_once(project: Write, packages: Install) -> None:
+    project("hall_six", WAVE, skills='Wave = "hall_six.part:Wave"')
+    packages("other", "Wave = other:Wave")
+    with pytest.raises(InputError) as caught:
+        discover()
+    assert str(caught.value) == (
+        'the skill "Wave" is registered twice, by hall_six.part:Wave and other:Wave; '
+        "uninstall or rename one of them"
+    )
+
+
+def test_of_a_project_that_is_installed_its_file_counts(project: Write, packages: Install) -> None:
+    project("hall_seven", WAVE, name="Hall.Seven", skills='Wave = "hall_seven.part:Wave"')
+    packages("hall-seven", "Wave = hall_seven.old:Wave\nGone = hall_seven.gone:Gone")
+    found = registered("executive.skills", "skill")
+    assert found["Wave"].value == "hall_seven.part:Wave"
+    assert "Gone" not in found
+
+
+def test_this_repository_registers_nothing_twice(missions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(missions)
+    here = discover()
+    monkeypatch.chdir("/")
+    assert here == discover()

@@ -1,0 +1,96 @@
+"""Processes that work for another one: what reaches them, and how they end."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from executive.processes import Workers
+
+PARENT = """\
+import multiprocessing, signal
+from executive.processes import Workers
+
+if __name__ == "__main__":
+    pool = Workers(1)
+    pool.submit(signal.getsignal, signal.SIGINT).result()
+    (worker,) = multiprocessing.active_children()
+    print(worker.pid, flush=True)
+    {then}
+"""
+
+
+def wait_until(true) -> None:
+    """Return as soon as something is true; it has to be within a time that no machine needs."""
+    deadline = time.monotonic() + 30.0
+    while not true():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def has_ended(process: int) -> bool:
+    """Tell whether a process that is nobody's child here works no more."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+    except FileNotFoundError:
+        return True
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks for the worker in /proc")
+@pytest.mark.parametrize(
+    "then", ["pool.submit(signal.pause).result()", "signal.pause()"], ids=["a busy one", "an idle one"]
+)
+def test_a_worker_ends_when_its_parent_is_killed(tmp_path: Path, then: str) -> None:
+    script = tmp_path / "parent.py"
+    script.write_text(PARENT.format(then=then))
+    parent = subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    assert parent.stdout is not None
+    with parent:
+        worker = int(parent.stdout.readline())
+        assert not has_ended(worker)
+        parent.kill()
+    wait_until(lambda: has_ended(worker))
+
+
+def interrupted() -> str:
+    """Press Ctrl-C on this process, and go on."""
+    os.kill(os.getpid(), signal.SIGINT)
+    return "unhurt"
+
+
+def test_ctrl_c_does_nothing_to_a_worker() -> None:
+    with Workers(1) as pool:
+        assert pool.submit(interrupted).result() == "unhurt"
+
+
+def test_ctrl_c_at_its_very_start_does_nothing_to_a_worker(capfd: pytest.CaptureFixture[str]) -> None:
+    with Workers(1) as pool:
+        future = pool.submit(os.getpid)
+        (worker,) = multiprocessing.active_children()
+        assert worker.pid is not None
+        os.kill(worker.pid, signal.SIGINT)
+        assert future.result() == worker.pid
+    assert capfd.readouterr().err == ""
+
+
+def test_starting_a_worker_keeps_no_ctrl_c_from_its_parent() -> None:
+    with Workers(1) as pool:
+        pool.submit(os.getpid).result()
+        assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+
+def test_who_leaves_the_pool_by_an_exception_does_not_wait_for_the_work() -> None:
+    began = time.monotonic()
+    with pytest.raises(KeyboardInterrupt), Workers(2) as pool:
+        for _ in range(4):
+            pool.submit(time.sleep, 600.0)
+        raise KeyboardInterrupt
+    assert time.monotonic() - began < 60.0
+    assert multiprocessing.active_children() == []

@@ -1,0 +1,111 @@
+"""What is done to a simulated cell is done by its physics, and ledger and audit agree in the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from executive.cells.sim.cell import SimCell
+from executive.events import Event
+from executive.geometry import Array
+from executive.testing import faults as effects
+from executive.testing.faults import Disturbance, after, during
+from executive.testing.faults.hand import hand_of
+from executive.testing.oracle import oracle_cell
+from executive.testing.run_mission import MissionResult, run_mission
+
+
+class Watched:
+    """A mission in the simulator, looked at while it runs: its world is gone when it is over."""
+
+    def __init__(self) -> None:
+        self.seen: dict[str, object] = {}
+        self._cell: SimCell | None = None
+
+    def run(self, disturbance: Disturbance, look: Callable[[SimCell, Event], object]) -> MissionResult:
+        """Run sort_overhead; keep what the first `look` at each kind of event, or reason, returns."""
+
+        def watch(event: Event) -> None:
+            assert self._cell is not None
+            for name in (event.kind, event.data.get("reason")):
+                if name and name not in self.seen:
+                    self.seen[name] = look(self._cell, event)
+
+        def keep(cell: SimCell) -> None:
+            self._cell = cell
+
+        return run_mission(
+            "sort_overhead", oracle_cell(), disturbances=[disturbance], arrange=keep, observers=[watch]
+        )
+
+
+@pytest.fixture
+def watched() -> Watched:
+    return Watched()
+
+
+def places(cell: SimCell, event: Event) -> dict[int, Array]:
+    """Return where every object is, by body `(3,)` [m]."""
+    return {thing.body: thing.position for thing in hand_of(cell).things}
+
+
+def holding(cell: SimCell, event: Event) -> bool:
+    return cell.cell.tool.holding
+
+
+@pytest.mark.slow
+def test_when_a_seal_breaks_in_mid_carry_the_object_falls_and_is_picked_up_again(watched: Watched) -> None:
+    result = watched.run(during("*/Transit", effects.seal_breaks(), nth=3), places)
+    (told,) = result.disturbances()
+    hung = watched.seen["disturbance"]
+    fallen = watched.seen["SelectTarget.unseen"]
+    assert isinstance(hung, dict) and isinstance(fallen, dict)
+    (body,) = (body for body, place in hung.items() if np.allclose(place, told["position"], atol=1e-3))
+    assert hung[body][2] > 0.1
+    assert fallen[body][2] < 0.05
+    assert (result.status, result.reasons("*/Transit")) == ("SUCCESS", ["dropped"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["seal_breaks", "arm_runs_into", "no_way"])
+def test_what_falls_or_is_put_down_is_not_taken_for_something_else(name: str) -> None:
+    script = [during("*/Transit", getattr(effects, name)(), nth=2)]
+    assert run_mission("sort_overhead", oracle_cell(), disturbances=script).agrees
+
+
+def test_what_is_taken_out_of_the_tool_is_parted_from_it_first(watched: Watched) -> None:
+    result = watched.run(during("*/Transit", effects.object_removed(), nth=2), holding)
+    assert (watched.seen["disturbance"], watched.seen["dropped"]) == (True, False)
+    assert (result.reason, result.items["lost"], result.agrees) == ("lost", 1, True)
+
+
+@pytest.mark.slow
+def test_what_is_moved_is_found_where_it_is_now(watched: Watched) -> None:
+    result = watched.run(during("*/Approach", effects.object_moved((0.0, 0.06)), nth=2), places)
+    (told,) = result.disturbances()
+    before, felt = watched.seen["disturbance"], watched.seen["no_contact"]
+    assert isinstance(before, dict) and isinstance(felt, dict)
+    (body,) = (body for body, place in before.items() if np.allclose(place, told["position"], atol=1e-3))
+    assert np.allclose(felt[body][:2] - before[body][:2], [0.0, 0.06], atol=0.005)
+    assert (result.status, result.items["lost"], result.agrees) == ("SUCCESS", 0, True)
+
+
+@pytest.mark.slow
+def test_an_arm_that_runs_into_something_brakes(watched: Watched) -> None:
+    hand = during("*/Approach", effects.arm_runs_into("a hand"), nth=2)
+    result = watched.run(hand, lambda cell, event: cell.cell.arm.at_rest)
+    assert (watched.seen["disturbance"], watched.seen["blocked"]) == (False, True)
+    failed = next(event for event in result.events if event.data.get("reason") == "blocked")
+    assert failed.data["message"] == "the arm ran into a hand"
+    told = next(event for event in result.events if event.kind == "disturbance")
+    assert 10 < failed.tick - told.tick < 120, "it brakes along its path"
+    assert (result.status, result.items["rejected"], result.agrees) == ("SUCCESS", 0, True)
+
+
+@pytest.mark.slow
+def test_the_world_goes_on_without_what_was_removed_before_anybody_looked(watched: Watched) -> None:
+    result = watched.run(after(0.0, effects.object_removed(1)), places)
+    assert (result.status, result.agrees) == ("SUCCESS", True)
+    assert result.items["seen"] == len(watched.seen["end"])  # type: ignore[arg-type]

@@ -1,0 +1,163 @@
+"""The cell of a fault script: when things happen, to which kind of cell, and what is refused."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from collections.abc import Sequence
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from executive.cell.workcell import CellOptions
+from executive.cells.fake.cell import FakeCell, SilentOperator, bare_table
+from executive.errors import InputError
+from executive.events import ignore
+from executive.testing import faults as effects
+from executive.testing.cell_wrapper import CellWrapper
+from executive.testing.faults import (
+    Disturbance,
+    DisturbedCell,
+    after,
+    between,
+    disturbed,
+    during,
+    with_probability,
+)
+from executive.testing.faults.hand import hand_of
+from executive.testing.faults.script import DuringNode
+from executive.testing.run_mission import MissionResult, run_mission
+
+SLIPS = effects.seal_fails()
+SHARE = "a share of a motion is more than 0 and less than 1"
+
+
+def sorted_with(*script: Disturbance) -> MissionResult:
+    return run_mission("sort_overhead", disturbances=script)
+
+
+def slipped(result: MissionResult) -> list[int]:
+    """Return which grasps missed, counted from 1."""
+    grasps = [
+        event.data["status"]
+        for event in result.events
+        if event.kind == "status" and event.data["node"].endswith("/Grasp")
+    ]
+    ends = [status for status in grasps if status != "RUNNING"]
+    return [number for number, status in enumerate(ends, start=1) if status == "FAILURE"]
+
+
+@pytest.mark.parametrize(("nth", "missed"), [((1, 3), [1, 3]), ((), [1, 2, 3])])
+def test_it_happens_in_the_activations_it_is_meant_for(nth: int | Sequence[int], missed: list[int]) -> None:
+    result = sorted_with(during("*/Grasp", SLIPS, nth=nth))
+    assert slipped(result)[: len(missed)] == missed
+    assert len(slipped(result)) == len(missed) or nth == ()
+    assert len(result.disturbances()) == len(slipped(result))
+    assert result.agrees
+
+
+def test_it_lasts_from_one_time_until_before_another() -> None:
+    result = sorted_with(between(2.0, 6.0, effects.detector_dead()))
+    times = [e.clock for e in result.events if e.kind == "disturbance"]
+    assert times
+    assert 2.0 <= min(times) <= max(times) < 6.0
+    assert max(event.clock for event in result.events) > 6.0
+
+
+def test_after_a_time_it_lasts_until_the_end() -> None:
+    result = sorted_with(after(3.0, effects.seal_fails()))
+    assert result.status == "INCOMPLETE"
+    closed = [e.clock for e in result.events if e.kind == "intent" and e.data["action"] == "close"]
+    told = [e.clock for e in result.events if e.kind == "disturbance"]
+    assert told == [clock for clock in closed if clock >= 3.0]
+    assert result.items["rejected"] == result.audit["left"] > 0  # type: ignore[index]
+
+
+@pytest.mark.parametrize("probability", [0.0, 0.1, 0.5, 1.0])
+@pytest.mark.parametrize("seed", range(5))
+def test_a_chance_is_met_as_often_as_it_says(probability: float, seed: int) -> None:
+    when = with_probability(probability, "*", SLIPS, seed=seed).when
+    assert isinstance(when, DuringNode)
+    share = sum(when.chosen(number) for number in range(1, 401)) / 400
+    # Four standard deviations.
+    assert abs(share - probability) <= 4 * math.sqrt(probability * (1 - probability) / 400)
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda: during("*", SLIPS, nth=0), "activations are counted from 1, and nth is 0"),
+        (lambda: between(5, 5, SLIPS), "from some time until a later one, not from 5 s to 5 s"),
+        (lambda: after(-1, SLIPS), "not from -1 s to inf s"),
+        (lambda: with_probability(1.5, "*", SLIPS, seed=0), "a probability is 0 to 1, not 1.5"),
+        (lambda: effects.seal_breaks(1.0), f"{SHARE}, not 1"),
+        (lambda: effects.arm_runs_into(share=0.0), f"{SHARE}, not 0"),
+        (lambda: effects.object_removed(share=1.0), f"{SHARE}, not 1"),
+        (lambda: effects.object_removed(0), "objects are counted from 1, and which is 0"),
+        (lambda: effects.object_moved((0.1, 0.0), -1), "objects are counted from 1, and which is -1"),
+        (lambda: effects.detector_slow(-0.5), "a slow detector answers later, not by -0.5 s"),
+    ],
+)
+def test_a_script_that_makes_no_sense_is_refused(make, sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence):
+        make()
+
+
+def test_a_script_is_a_value_that_can_be_sent_to_another_process_and_used_again() -> None:
+    script = [
+        during("*/Grasp", SLIPS, nth=2),
+        between(4.0, 9.0, effects.detector_hangs()),
+        after(1.0, effects.object_moved((0.1, 0))),
+    ]
+    assert pickle.loads(pickle.dumps(script)) == script
+
+
+def test_what_happens_to_a_node_is_told_with_node_item_and_object() -> None:
+    result = sorted_with(during("*/Transit", effects.seal_breaks(), nth=1), between(500.0, 600.0, SLIPS))
+    (told,) = result.disturbances()
+    assert (told["what"], told["node"].rpartition("/")[2]) == ("seal_breaks", "Transit")
+    assert told["item"].startswith(f"{told['object']}-") and len(told["position"]) == 3
+
+
+def test_a_mission_waits_for_a_detector_and_a_test_for_a_mission_for_so_long_only() -> None:
+    result = sorted_with(between(4.0, 9.0, effects.detector_hangs()))
+    assert not [e for e in result.events if e.kind == "look" and 4.1 < e.clock < 9.0]
+    assert (result.status, result.agrees) == ("SUCCESS", True)
+    script = [during("tree/look/*/Detect", effects.detector_hangs())]
+    result = run_mission("sort_overhead", disturbances=script, longest=5.0)
+    assert result.message == "the mission is not done after 5 s on its clock"
+
+
+def test_everything_else_is_the_cell_that_it_wraps() -> None:
+    fake = FakeCell()
+    cell = DisturbedCell(fake, [])
+    for _ in range(3):
+        cell.advance()
+    assert (cell.steps, cell.cell.clock.now) == (3, fake.cell.clock.now)
+    assert cell.accounts is cell.cell.ledger is fake.ledger
+    assert cell.cell.bins is fake.cell.bins
+    assert (cell.audit(), cell.inner) == (fake.audit(), fake)
+    assert cell.cell.arm.tool_pose is fake.arm.tool_pose
+
+
+def test_a_kind_of_cell_is_disturbed_in_one_run_after_the_other() -> None:
+    kind = disturbed(FakeCell, [after(0.0, effects.table_bumped())])
+    options = CellOptions(SilentOperator(), base=Path())
+    for _ in range(2):
+        cell = kind(bare_table(), seed=0, routes={}, emit=ignore, options=options)
+        cell.advance()
+        assert cell.cell.ledger.epoch == 1
+
+
+def test_a_hand_reaches_through_wrapped_cells_and_into_no_unknown_one() -> None:
+    fake = FakeCell()
+    fake.world.put("cube", 0.5, 0.0)
+    assert [thing.label for thing in hand_of(CellWrapper(CellWrapper(fake))).things] == ["cube"]
+    gone = [after(0.0, effects.object_removed(1))]
+    strange: Any = SimpleNamespace(cell=FakeCell().cell, advance=lambda: None)
+    with pytest.raises(InputError, match="nobody knows how to reach into a SimpleNamespace; give `disturb"):
+        DisturbedCell(strange, gone).advance()
+    disturbed(lambda **_: strange, gone, hand=lambda _: hand_of(fake))().advance()
+    assert fake.world.objects == []

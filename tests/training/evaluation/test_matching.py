@@ -1,0 +1,94 @@
+"""Which detection is which object, and which mistakes that makes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from executive.cell.values import Detection
+from executive.errors import InputError
+from executive.training.evaluation.matching import is_ignored, match
+from executive.training.evaluation.misses import WorstMisses, misses
+from executive.training.evaluation.sheet import FOUND, TRUE, draw_sheet, write_sheet
+
+
+def matches(sample, *found):
+    return match([Detection(*one) for one in found], sample)
+
+
+def told(sample, *found):
+    return list(misses(matches(sample, *found), sample))
+
+
+def right_by(box, pixels, down=0):
+    left, top, right, bottom = box
+    return left + pixels, top + down, right + pixels, bottom + down
+
+
+def test_an_object_goes_to_its_own_class_then_to_the_most_confident(sample):
+    cube, duck = sample.boxes
+    for found, expected in (
+        ([("cube", 0.7, cube), ("cube", 0.9, cube)], [(0.9, 0, True), (0.7, None, False)]),
+        ([("duck", 0.9, cube), ("cube", 0.6, cube)], [(0.9, None, False), (0.6, 0, True)]),
+        ([("cube", 0.9, duck)], [(0.9, 1, False)]),
+        ([("cube", 0.9, right_by(cube, 11))], [(0.9, None, False)]),
+        ([("cube", 0.9, right_by(cube, 9))], [(0.9, 0, True)]),
+    ):
+        assert [(m.detection.confidence, m.number, m.right) for m in matches(sample, *found)] == expected
+
+
+def test_an_ignored_object_is_one_that_a_box_fits_better_than_any_other(sample):
+    (half_hidden,), on_cube = sample.ignored, Detection("cube", 0.9, sample.boxes[0])
+    assert is_ignored(Detection("cube", 0.9, half_hidden), sample)
+    assert not is_ignored(on_cube, sample)
+    assert not is_ignored(on_cube, replace(sample, ignored=(right_by(sample.boxes[0], 3),)))
+
+
+def test_every_kind_of_mistake_is_told_in_words_and_weighed(sample, knowing):
+    cube, duck = sample.boxes
+    phantom = ("duck", 0.7, (150.0, 200.0, 180.0, 230.0))
+    found = told(knowing(visible_fraction=[0.62, 1.0]), ("cube", 0.91, duck), phantom)
+    # A box off its place is as bad as its share of the object; what is cut off weighs half.
+    found += told(sample, ("duck", 0.9, duck), ("cube", 0.8, right_by(cube, 3, down=4)))[1:]
+    found += told(replace(sample, labels=("cube",), boxes=((0.0, 10.0, 30.0, 40.0),)))
+    assert [(miss.text, pytest.approx(miss.severity)) for miss in found] == [
+        ("cube overlooked, 62% visible", 0.62),
+        ("duck taken for cube 0.91", 0.91),
+        ("no such thing: duck 0.70", 0.7),
+        ("cube off by 5.0 px", 5 / 30),
+        ("cube overlooked, cut off", 0.5),
+    ]
+
+
+def test_the_worst_come_first_and_the_others_are_forgotten(knowing):
+    worst = WorstMisses(3)
+    for share in (0.55, 0.95, 0.75, 0.65):
+        worst.add([], knowing(visible_fraction=[share, 0.5]))
+    assert [miss.severity for miss in worst.kept] == [0.95, 0.75, 0.65]
+
+
+def test_the_sheet_shows_the_true_and_the_found_box(sample):
+    shown = told(sample, ("cube", 0.9, right_by(sample.boxes[0], 6)))
+    assert [miss.text for miss in shown] == ["duck overlooked", "cube off by 6.0 px"]
+    picture = draw_sheet(shown, "overhead")
+    tiles = picture[34:274, 10:250], picture[34:274, 260:500]
+    colours = [np.array(list(bytes.fromhex(colour[1:]))) for colour in (TRUE, FOUND)]
+    shows = [[bool((tile == colour).all(axis=-1).any()) for colour in colours] for tile in tiles]
+    assert shows == [[True, False], [True, True]]
+
+
+def test_a_sheet_without_mistakes_is_narrow_and_more_than_a_row_of_them_make_two(sample):
+    assert draw_sheet([], "overhead").shape == (34 + 290, 10 + 3 * 250, 3)
+    assert draw_sheet(told(sample) * 4, "overhead").shape == (34 + 2 * 290, 10 + 6 * 250, 3)
+
+
+def test_a_sheet_is_written_where_it_is_asked_for_or_that_is_explained(sample, tmp_path):
+    path = tmp_path / "new" / "sheet.png"
+    write_sheet(path, told(sample), "overhead")
+    assert np.array_equal(cv2.imread(str(path))[..., ::-1], draw_sheet(told(sample), "overhead"))
+    (tmp_path / "sheet.png").mkdir()
+    with pytest.raises(InputError, match=r"sheet\.png could not be written; is the disk full"):
+        write_sheet(tmp_path / "sheet.png", told(sample), "overhead")

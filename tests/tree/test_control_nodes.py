@@ -1,0 +1,95 @@
+"""Sequence, fallback, try, timeout, invert and succeed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import py_trees
+import pytest
+from py_trees.common import Status
+
+from executive.errors import Fault
+from executive.tree.halting import halt
+from executive.tree.sequence import Sequence
+from executive.tree.timeout import Timeout
+from executive.tree.try_catch import Try
+
+
+def test_finally_runs_neither_after_a_halt_nor_after_a_fault(leaf: Any, site: Any, log: Any) -> None:
+    node = Try(site(), leaf("A", "R S", "!"), [([("A", "lost")], leaf("rescue"))], leaf("finish"))
+    node.tick_once()
+    assert halt(node) == []
+    with pytest.raises(RuntimeError, match="broken"):
+        node.tick_once()
+    halt(node)
+    assert log == ["A starts", "A halted", "A starts"]
+
+
+def test_a_timeout_halts_its_body_and_says_timeout(leaf: Any, site: Any, clock: Any, log: Any) -> None:
+    node = Timeout(site("here"), leaf("A", "R R R R"), 0.3, clock)
+    for clock.now in (0.0, 0.1, 0.2, 0.1 + 0.2):
+        node.tick_once()
+    assert node.status is Status.FAILURE
+    assert (str(node.failure), node.failure.message) == ("timeout.timeout", "not done after 0.3 s")
+    assert log == ["A starts", "A halted"]
+
+
+@pytest.mark.parametrize(
+    ("script", "times", "status"),
+    [("R S", (0.0, 5.0), Status.SUCCESS), ("R R S", (1.0, 1.2), Status.RUNNING)],
+    ids=["done in the last moment", "the time counts from the start"],
+)
+def test_a_body_has_its_time(
+    leaf: Any, site: Any, clock: Any, script: str, times: tuple[float, ...], status: Status
+) -> None:
+    node = Timeout(site(), leaf("A", script), 0.3, clock)
+    for clock.now in times:
+        node.tick_once()
+    assert node.status is status
+
+
+def test_a_body_that_cannot_be_halted_is_a_fault(leaf: Any, site: Any, clock: Any) -> None:
+    body = leaf("A", "R R")
+    body.breaks = True
+    node = Timeout(site("here"), body, 0.1, clock)
+    node.tick_once()
+    clock.now = 1.0
+    with pytest.raises(Fault, match="A: cannot stop") as caught:
+        node.tick_once()
+    assert caught.value.node == "here"
+
+
+def test_labels_gather_on_the_way_up(leaf: Any, site: Any, ticks: Any) -> None:
+    inner = Sequence(site("tree/inner", "inner"), [leaf("A", "lost")])
+    node = Sequence(site("tree", "outer"), [inner])
+    ticks(node)
+    for source in ("A", "inner", "outer"):
+        assert node.failure.matches([(source, "lost")])
+    assert not node.failure.matches([("B", "lost"), ("A", "stuck")])
+
+
+def test_every_change_of_status_is_told_once(leaf: Any, site: Any, ticks: Any, events: Any) -> None:
+    ticks(Sequence(site("tree"), [leaf("A", "R R lost")]))
+    assert events == [
+        {"kind": "status", "node": "tree", "status": "RUNNING"},
+        {
+            "kind": "status", "node": "tree", "status": "FAILURE",
+            "reason": "A.lost", "message": "lost happened", "origin": "A",
+        },
+    ]  # fmt: skip
+
+
+def test_a_stock_behaviour_may_stand_in_a_tree(site: Any, ticks: Any) -> None:
+    node = Sequence(site("tree"), [py_trees.behaviours.Success("yes"), py_trees.behaviours.Failure("no")])
+    assert (ticks(node), str(node.failure)) == ("F", "no.failed")
+
+
+def test_a_tree_may_stand_in_a_stock_tree(leaf: Any, site: Any, log: Any) -> None:
+    inner = Sequence(site("tree"), [leaf("A", "R S")])
+    root = py_trees.composites.Sequence("root", True, [inner])
+    root.tick_once()
+    root.stop(Status.INVALID)
+    assert log == ["A starts", "A halted"]
+    root.tick_once()
+    root.tick_once()
+    assert root.status is Status.SUCCESS

@@ -1,0 +1,142 @@
+"""Once for each element of a list."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from py_trees.common import Status
+
+from executive.cell.values import Target
+from executive.errors import Fault
+from executive.skill import In, Skill
+from executive.tree.blackboard import Scope
+from executive.tree.for_each import ForEach
+from executive.tree.halting import halt
+from executive.tree.skill_leaf import SkillNode, Wiring
+
+
+class Use(Skill):
+    """Notes what it is given; `break` is a bug."""
+
+    given: In[Any]
+
+    def run(self, cell: Any) -> Iterator[None]:
+        cell.append(self.given)
+        yield
+        if self.given == "break":
+            raise ValueError("a bug")
+
+
+@pytest.fixture
+def used() -> list[Any]:
+    return []
+
+
+@pytest.fixture
+def scope() -> Scope:
+    return Scope()
+
+
+@pytest.fixture
+def make(site: Any, scope: Scope, used: list[Any]) -> Any:
+    """Make a loop over a source whose body notes every element."""
+
+    def make(source: Any) -> ForEach:
+        body = SkillNode(site("use"), "Use", Use, Wiring(inputs={"given": "it"}), used, scope)  # type: ignore[arg-type]
+        return ForEach(site("loop"), body, scope, "it", source)
+
+    return make
+
+
+def told(events: Any) -> list[str]:
+    return [event["choice"] for event in events if event["kind"] == "choice"]
+
+
+def test_a_text_names_the_variable_that_holds_the_list(
+    make: Any, scope: Scope, ticks: Any, used: Any
+) -> None:
+    scope.write({"todo": ("a", 2)})
+    assert (ticks(make("todo")), used) == ("RRS", ["a", 2])
+
+
+def test_the_list_is_the_one_of_the_start(make: Any, scope: Scope, ticks: Any, used: Any) -> None:
+    todo = ["a", "b"]
+    scope.write({"todo": todo})
+    node = make("todo")
+    node.tick_once()
+    todo.append("late")
+    scope.write({"todo": ["other"]})
+    assert (ticks(node), used) == ("RS", ["a", "b"])
+    assert (ticks(node), used) == ("RS", ["a", "b", "other"])
+
+
+def test_the_element_at_hand_is_told(make: Any, ticks: Any, events: Any) -> None:
+    target = Target("cube-2", "cube", np.zeros(3), 0.9, 1, 0, 0.0)
+    ticks(make(["cube", None, target, {"a": 1}]))
+    assert told(events) == [
+        "element 1 of 4: cube", "element 2 of 4: None", "element 3 of 4: cube-2", "element 4 of 4: dict",
+    ]  # fmt: skip
+    (first, *_) = [event for event in events if event["kind"] == "choice"]
+    assert (first["node"], first["reason"], first["message"]) == ("loop", "", "")
+
+
+@pytest.mark.parametrize("end", ["success", "halt", "fault"])
+def test_the_variable_is_gone_however_it_ends(end: str, make: Any, scope: Scope, ticks: Any) -> None:
+    scope.write({"other": 1})
+    node = make(["a", "break" if end == "fault" else "b"])
+    node.tick_once()
+    assert scope["it"] == "a"
+    if end == "fault":
+        with pytest.raises(Fault, match="ValueError: a bug"):
+            ticks(node)
+    elif end == "success":
+        assert ticks(node)[-1] == "S"
+    halt(node)
+    assert dict(scope) == {"other": 1}
+
+
+def test_the_variable_is_gone_when_the_body_cannot_be_halted(leaf: Any, site: Any, scope: Scope) -> None:
+    body = leaf("A", "R")
+    body.breaks = True
+    node = ForEach(site(), body, scope, "it", [1])
+    node.tick_once()
+    with pytest.raises(Fault, match="A: cannot stop"):
+        node.stop()
+    assert (node.status, dict(scope)) == (Status.INVALID, {})
+
+
+def test_a_loop_that_ended_does_not_touch_the_variable_again(make: Any, scope: Scope, ticks: Any) -> None:
+    node = make(["a"])
+    ticks(node)
+    scope.write({"it": "somebody else's"})
+    node.stop()
+    assert scope["it"] == "somebody else's"
+
+
+def test_a_list_that_nothing_wrote_is_a_fault(make: Any, scope: Scope) -> None:
+    scope.write({"targets": []})
+    with pytest.raises(Fault) as caught:
+        make("todo").tick_once()
+    assert (str(caught.value), caught.value.node) == (
+        "for_each: it reads $todo, which nothing has written yet; written so far: targets", "loop",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("value", "kind"), [("abc", "str"), ({"a": 1}, "dict"), (None, "NoneType")])
+def test_what_is_no_list_is_a_fault(make: Any, scope: Scope, value: Any, kind: str) -> None:
+    scope.write({"todo": value})
+    node = make("todo")
+    with pytest.raises(Fault) as caught:
+        node.tick_once()
+    assert str(caught.value) == (
+        f"for_each: $todo holds a {kind}, not a list; "
+        "go through a variable that holds one, or write the elements in the mission"
+    )
+    assert halt(node) == []
+
+
+def test_details_say_what_the_mission_says(make: Any) -> None:
+    assert (make("todo").detail, make(["cube", 2]).detail) == ("$it in $todo", "$it in [cube, 2]")

@@ -1,0 +1,103 @@
+"""What py_trees' own nodes do and ours must not, one test each."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import pytest
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from scripted_leaf import Leaf
+
+from executive.errors import Fault
+from executive.tree.backoff import Backoff
+from executive.tree.fallback import Fallback
+from executive.tree.halting import halt
+from executive.tree.invert import Invert
+from executive.tree.parallel import Parallel
+from executive.tree.retry import Retry
+from executive.tree.sequence import Sequence
+from executive.tree.timeout import Timeout
+
+
+class Terminated(Leaf):
+    """A leaf that notes every `terminate`, whatever for."""
+
+    def terminate(self, new_status: Status) -> None:
+        self._log.append(f"{self.name}: {self.status.value} to {new_status.value}")
+
+
+class Returning(Behaviour):
+    """Returns from `update` whatever it is told to."""
+
+    def __init__(self, value: Any) -> None:
+        super().__init__("odd")
+        self.value = value
+
+    def update(self) -> Any:
+        return self.value
+
+
+@pytest.mark.parametrize("kind", [Sequence, Fallback, Parallel])
+def test_children_that_finished_are_not_terminated_by_a_new_round_nor_by_a_halt(kind: Any, site: Any) -> None:
+    log: list[str] = []
+    end = "lost" if kind is Fallback else "S"
+    node = kind(site(), [Terminated("A", (end,), log), Terminated("B", ("S", "R R"), log)])
+    node.tick_once()
+    node.tick_once()
+    halt(node)
+    status = Status.FAILURE if kind is Fallback else Status.SUCCESS
+    told = [line for line in log if line.startswith("A: ")]
+    # Its own end, once a round, and nothing else.
+    assert told == [f"A: INVALID to {status.value}", f"A: {status.value} to {status.value}"]
+
+
+def test_halting_does_not_reach_a_child_that_never_ran(leaf: Any, site: Any) -> None:
+    log: list[str] = []
+    never = Terminated("never", ("S",), log)
+    node = Sequence(site(), [leaf("A", "R"), Invert(site("invert"), never)])
+    node.tick_once()
+    halt(node)
+    node.stop(Status.INVALID)
+    assert log == []
+
+
+def test_the_old_status_of_a_child_that_was_not_ticked_decides_nothing_and_is_told_to_nobody(
+    leaf: Any, site: Any, ticks: Any, events: Any
+) -> None:
+    tried = Sequence(site("tried"), [leaf("A", "lost", "S", "lost")])
+    ghost = Sequence(site("ghost"), [leaf("B", "S", "lost")])
+    node = Fallback(site("root"), [tried, ghost])
+    assert ticks(node) == "S"
+    assert ghost.status is Status.SUCCESS
+    events.clear()
+    assert ticks(node) == "S"
+    assert "ghost" not in {event["node"] for event in events}
+    # Nor is it taken for a success later on, when the node does get there.
+    assert ticks(node) == "F"
+
+
+def test_nothing_depends_on_the_clock_on_the_wall(
+    leaf: Any, site: Any, clock: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def forbidden() -> float:
+        raise AssertionError("looked at the clock on the wall")
+
+    for name in ("time", "monotonic", "perf_counter"):
+        monkeypatch.setattr(time, name, forbidden)
+    late = Timeout(site(), leaf("A", "R R R"), 0.25, clock)
+    waits = Retry(site(), leaf("B", "lost", "S"), 2, [], None, Backoff(0.25), clock)
+    for clock.now in (0.0, 0.125, 0.25):
+        late.tick_once()
+        waits.tick_once()
+    assert (late.status, waits.status) == (Status.FAILURE, Status.SUCCESS)
+
+
+@pytest.mark.parametrize("value", [None, Status.INVALID, "SUCCESS"])
+def test_a_node_without_a_status_is_a_fault_and_not_an_interruption(value: Any, leaf: Any, site: Any) -> None:
+    sequence = Sequence(site("here"), [Returning(value), leaf("after")])
+    root = Fallback(site("root"), [sequence, leaf("instead")])
+    with pytest.raises(Fault, match="odd was ticked and has no status") as caught:
+        root.tick_once()
+    assert (caught.value.node, halt(root)) == ("here", [])

@@ -1,0 +1,225 @@
+"""A skill as a leaf: fresh instances, committed outputs, faults, halting."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from py_trees.common import Status
+
+from executive.cell.values import Target
+from executive.errors import Fault
+from executive.skill import In, Out, Skill, param, port
+from executive.tree.blackboard import Scope
+from executive.tree.halting import halt
+from executive.tree.skill_leaf import SkillNode, Wiring
+
+
+class Worker(Skill):
+    """Does what `way` says."""
+
+    cleaned: ClassVar[list[str]] = []
+    """Values of `way` of the workers of one test that were cleaned up."""
+
+    given: In[str]
+    extra: In[str | None] = port(default=None)
+    made: Out[str]
+    way: str = param("ok")
+    reasons: ClassVar = ("bad",)
+
+    def run(self, cell: Any) -> Iterator[None]:
+        assert not hasattr(self, "made"), "a used instance"
+        # The garbage collector may end a worker during a later test.
+        cleaned = self.cleaned
+        try:
+            self.made = f"{self.given} {self.extra}"
+            yield
+            if self.way == "fail":
+                raise self.failed("bad", "3 mm off")
+            if self.way == "undeclared":
+                raise self.failed("worse", "")
+            if self.way == "break":
+                raise ValueError("a bug")
+            if self.way == "forget":
+                del self.made
+            if self.way == "yield":
+                yield iter(())  # type: ignore[misc]
+            self.given = "changed inside"
+        finally:
+            cleaned.append(self.way)
+            if self.way == "linger":
+                yield
+            if self.way == "break late":
+                raise ValueError("a late bug")
+
+
+@pytest.fixture
+def scope() -> Scope:
+    scope = Scope()
+    scope.write({"input": "stone"})
+    return scope
+
+
+@pytest.fixture
+def make(site: Any, scope: Scope, monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.setattr(Worker, "cleaned", [])
+
+    def make(way: str = "ok", skill: type[Skill] = Worker) -> SkillNode:
+        inputs, outputs = {"given": "input", "extra": "extra"}, {"made": "result"}
+        wiring = Wiring({"way": way}, inputs, outputs) if skill is Worker else Wiring({}, {}, {})
+        return SkillNode(site("tree/Worker"), skill.__name__, skill, wiring, None, scope)  # type: ignore[arg-type]
+
+    return make
+
+
+def test_inputs_are_those_of_the_start_and_outputs_are_committed_on_success_only(
+    make: Any, scope: Scope
+) -> None:
+    node = make()
+    node.tick_once()
+    assert node.status is Status.RUNNING and "result" not in scope
+    scope.write({"input": "brick"})
+    node.tick_once()
+    assert node.status is Status.SUCCESS
+    assert dict(scope) == {"input": "brick", "result": "stone None"}
+
+
+def test_a_failure_writes_nothing_and_says_why(make: Any, scope: Scope, ticks: Any) -> None:
+    node = make("fail")
+    assert ticks(node) == "RF"
+    failure = node.failure
+    assert (str(failure), failure.message, failure.path) == ("Worker.bad", "3 mm off", "tree/Worker")
+    assert "result" not in scope
+
+
+def test_every_start_gets_a_fresh_instance_and_fresh_inputs(make: Any, scope: Scope, ticks: Any) -> None:
+    node = make()
+    ticks(node)
+    scope.write({"input": "brick", "extra": "new"})
+    assert (ticks(node), scope["result"]) == ("RS", "brick new")
+
+
+@pytest.mark.parametrize(
+    ("way", "sentence"),
+    [
+        ("break", "Worker: ValueError: a bug"),
+        ("undeclared", 'Worker: Worker raised the undeclared reason "worse"; it declares: bad'),
+        ("forget", "Worker: it succeeded without setting its output made"),
+        (
+            "yield",
+            'Worker: it yielded a tuple_iterator; to run the steps of another generator, write "yield from"',
+        ),
+    ],
+)
+def test_a_bug_in_a_skill_is_a_fault(make: Any, way: str, sentence: str, events: Any) -> None:
+    node = make(way)
+    node.tick_once()
+    with pytest.raises(Fault) as caught:
+        node.tick_once()
+    assert (str(caught.value), caught.value.node) == (sentence, "tree/Worker")
+    assert (node.status, isinstance(caught.value.__cause__, ValueError)) == (Status.INVALID, way == "break")
+    assert (events[-1]["status"], events[-1]["reason"]) == ("INVALID", "fault")
+
+
+def test_a_missing_input_is_a_fault_that_names_it(make: Any, scope: Scope) -> None:
+    scope.forget("input")
+    with pytest.raises(Fault) as caught:
+        make().tick_once()
+    assert str(caught.value) == (
+        'Worker: the input "given" reads $input, which nothing has written yet; written so far: nothing'
+    )
+
+
+def test_halting_runs_the_finally_of_the_skill_unless_it_ended(make: Any, ticks: Any, events: Any) -> None:
+    node = make()
+    node.tick_once()
+    assert halt(node) == []
+    assert (Worker.cleaned, node.status, events[-1]["status"]) == (["ok"], Status.INVALID, "INVALID")
+    assert ticks(node) == "RS"
+    before = len(events)
+    node.stop(Status.INVALID)
+    assert (Worker.cleaned, len(events)) == (["ok", "ok"], before)
+
+
+@pytest.mark.parametrize(
+    ("way", "problem"),
+    [
+        ("linger", 'tree/Worker: Worker: it yielded while it was halted; nothing may wait in "finally"'),
+        ("break late", "tree/Worker: Worker: ValueError while it was halted: a late bug"),
+    ],
+)
+def test_a_skill_that_does_not_stop_cleanly_is_reported(make: Any, way: str, problem: str) -> None:
+    node = make(way)
+    node.tick_once()
+    assert halt(node) == [problem]
+    assert node.status is Status.INVALID
+
+
+def test_a_skill_without_a_yield_is_done_at_once(make: Any, ticks: Any) -> None:
+    class AtOnce(Skill):
+        """Nothing to wait for."""
+
+        def run(self, cell: Any) -> Iterator[None]:
+            Worker.cleaned.append("done")
+            return None  # type: ignore[return-value]
+
+    assert (ticks(make(skill=AtOnce)), Worker.cleaned) == ("S", ["done"])
+
+
+def test_events_say_what_happened_to_which_item(site: Any, events: Any) -> None:
+    class Take(Skill):
+        """Take the target."""
+
+        target: In[Target]
+        held: Out[str]
+
+        def run(self, cell: Any) -> Iterator[None]:
+            yield
+            self.held = self.target.item
+
+    scope = Scope()
+    scope.write({"target": Target("cube-2", "cube", np.zeros(3), 0.9, 1, 0, 0.0)})
+    wiring = Wiring({}, {"target": "target"}, {"held": "held"})
+    node = SkillNode(site("tree/Take"), "Take", Take, wiring, None, scope)  # type: ignore[arg-type]
+    node.tick_once()
+    node.tick_once()
+    common = {"kind": "status", "node": "tree/Take", "reason": "", "message": "", "item": "cube-2"}
+    assert events == [
+        {**common, "status": "RUNNING"},
+        {**common, "status": "SUCCESS", "outputs": {"held": "cube-2"}},
+    ]
+
+
+class Sort(Skill):
+    """Finds what goes into a box."""
+
+    colour: In[str]
+    box: In[str] = port(refers="item")
+    unlike: In[str | None] = port(default=None, refers="item")
+    found: Out[str] = port(refers="item")
+
+    def run(self, cell: Any) -> Iterator[None]:
+        yield
+        self.found = "cube-9" if self.colour == "red" else ""
+
+
+@pytest.mark.parametrize(("colour", "items"), [("red", ["box-1", "cube-9"]), ("blue", ["box-1", "box-1"])])
+def test_the_item_is_what_a_port_names_that_the_skill_always_has(
+    colour: str, items: list[str], site: Any, ticks: Any, events: Any
+) -> None:
+    scope = Scope()
+    scope.write({"box": "box-1", "unlike": "cube-2", "colour": colour})
+    inputs = {name: name for name in ("unlike", "colour", "box")}
+    wiring = Wiring({}, inputs, {"found": "found"})
+    assert ticks(SkillNode(site(), "Sort", Sort, wiring, None, scope)) == "RS"  # type: ignore[arg-type]
+    assert [event["item"] for event in events] == items
+
+
+def test_a_forgotten_variable_is_gone_and_need_not_have_been_there() -> None:
+    scope, other = Scope(), Scope()
+    scope.write({"a": 1, "b": 2})
+    for _ in range(2):
+        scope.forget("a")
+    assert (dict(scope), dict(other)) == ({"b": 2}, {})
