@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 from executive.cell.arm import Goal, Task
+from executive.cell.objects import ObjectClass, Target
 from executive.cell.protocols import Cell, LeastTimes, Steps, Tool
-from executive.cell.values import ObjectClass, Target
 from executive.manipulation.motions import follow, planned
 from executive.manipulation.tool_goals import OVERTRAVEL, PROBE_CLEARANCE, SPACING, approach, lowest_contact
 from executive.perception.evidence import describe_wrong_height, may_miss_top

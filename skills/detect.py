@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
+from executive.cell.detection import Detection, Detections
+from executive.cell.frame import Frame
 from executive.cell.protocols import Cell, LeastTimes, Steps
-from executive.cell.values import Detection, Detections, Frame
 from executive.errors import NoDepth, Unavailable
 from executive.manipulation.obstacles import is_in_bin
 from executive.skill import Out, Skill, param, port

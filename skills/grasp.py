@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell, Steps
-from executive.cell.values import Item, Target
 from executive.skill import EMPTY, HOLDING, In, Out, Seconds, Skill, param, port
 
 

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import ClassVar
 
+from executive.cell.detection import Detection, Detections, Glimpse
+from executive.cell.objects import Target
 from executive.cell.protocols import Cell
-from executive.cell.values import Detection, Detections, Glimpse, Target
 from executive.errors import NoDepth
 from executive.geometry import Array
 from executive.manipulation.obstacles import is_in_bin

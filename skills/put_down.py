@@ -6,8 +6,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from executive.cell.objects import Item
 from executive.cell.protocols import Cell, Steps
-from executive.cell.values import Item
 from executive.manipulation.motions import carry, let_go
 from executive.manipulation.tool_goals import aside
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, SkillFailed, param, port

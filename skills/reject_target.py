@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from executive.cell.objects import Item
 from executive.cell.protocols import Cell
-from executive.cell.values import Item
 from executive.skill import In, Skill, param, port
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from executive.cell.objects import Item
 from executive.cell.protocols import Cell, Steps
-from executive.cell.values import Item
 from executive.manipulation.motions import let_go
 from executive.skill import ANY, EMPTY, HOLDING, In, Out, Seconds, Skill, param, port
 

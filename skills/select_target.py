@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell
-from executive.cell.values import Item, Target
 from executive.manipulation.obstacles import slots_taken
 from executive.manipulation.tool_goals import nearest_first
 from executive.perception.evidence import describe_unknown

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
+from executive.cell.objects import Item
 from executive.cell.protocols import Cell, LeastTimes, Steps
-from executive.cell.values import Item
 from executive.manipulation.motions import carry
 from executive.manipulation.tool_goals import DROP, into
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Skill, param, port

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from executive.cell.values import Target
+from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach

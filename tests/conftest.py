@@ -8,7 +8,7 @@ import pytest
 from at_hand import look
 from hypothesis import settings
 
-from executive.cell.values import Target
+from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 
 # Every run of the tests draws the same examples, so that a red test is red again when it is repeated.

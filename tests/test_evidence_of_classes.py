@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from executive.cell.values import Box, Detection, Frame, ObjectClass
+from executive.cell.detection import Detection
+from executive.cell.frame import Box, Frame
+from executive.cell.objects import ObjectClass
 from executive.geometry import Array
 from executive.perception.evidence import (
     describe_unknown,

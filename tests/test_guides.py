@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner
 from guide_blocks import AUTHORS, GUIDES, ROOT, blocks, files, in_code, read, rows, shown, transcripts
 
-from executive.cell.values import Target
+from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.cells.sim.scene_file import (
     LightConfig,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import GeneratorType
 from typing import Protocol
 
-from executive.cell.values import Load, Obstacle
+from executive.cell.objects import Load, Obstacle
 from executive.errors import Fault
 from executive.geometry import Array, Pose
 

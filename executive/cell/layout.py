@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.config import BinConfig, CellConfig, ObjectConfig
-from executive.cell.protocols import Cell, Ledger, Routes
-from executive.cell.values import BIN_THICKNESS, Bin, ObjectClass, Target
+from executive.cell.ledger import Ledger
+from executive.cell.objects import ObjectClass, Target
+from executive.cell.protocols import Cell, Routes
 from executive.cell.workcell import KeyPath
 from executive.errors import Unreachable
 from executive.events import Emit

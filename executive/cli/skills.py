@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import re
 import textwrap
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -123,7 +124,7 @@ def _default(of: Param | Port) -> Any:
 def _type(declared: Any) -> str:
     plain = isinstance(declared, type) and not get_args(declared)
     name = declared.__name__ if plain else str(declared)
-    return name.replace("typing.", "").replace("executive.cell.values.", "")
+    return re.sub(r"\b(typing|executive\.cell\.\w+)\.", "", name)
 
 
 def _briefly(facts: Facts) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 
-from executive.cell.values import Detections
+from executive.cell.detection import Detections
 from executive.ledger.item import NOTHING, ON_TABLE, UNSURE, Record, State
 
 MIN_EMPTY_PROBES = 3

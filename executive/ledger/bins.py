@@ -9,9 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.config import LedgerConfig
+from executive.cell.detection import Detections
+from executive.cell.objects import Item
 from executive.cell.protocols import Routes
-from executive.cell.values import BIN_THICKNESS, Bin, Detections, Item
 from executive.geometry import Array
 from executive.ledger.item import Record, State
 from executive.ledger.update import SURE, spread_of
@@ -105,4 +107,4 @@ class Bins:
         """Tell whether a look shows the whole floor of a bin."""
         bin = self.bins[name]
         reach = np.append(bin.size[:2] / 2 - WALL, 0.0)
-        return bool(look.searched(bin.position + reach * CORNERS).all())
+        return bool(look.is_searched(bin.position + reach * CORNERS).all())

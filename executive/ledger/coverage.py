@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.config import TableConfig
-from executive.cell.values import Detections
+from executive.cell.detection import Detections
 from executive.geometry import Array
 from executive.ledger.independence import repeat_probability, viewpoint_of
 
@@ -69,7 +69,7 @@ class Coverage:
 
         Points near the positions `doubtful` `(3,)` [m] of doubtful detections do not count as searched.
         """
-        searched = detections.searched(self._points)
+        searched = detections.is_searched(self._points)
         for place in doubtful:
             searched &= np.hypot(*(self._points - place)[:, :2].T) > PITCH
         current = self._change_epochs <= detections.frame.epoch
@@ -85,7 +85,7 @@ class Coverage:
         if detections.view == "full":
             self._full_looks += 1
             # Points at the border of the image may never be seen again; they do not count as shown.
-            self._last_shown[searched & detections.shows(self._points, BORDER_WIDTH)] = self._full_looks
+            self._last_shown[searched & detections.is_in_area(self._points, BORDER_WIDTH)] = self._full_looks
 
     def reset_near(self, centre: Array, radius: float, epoch: int) -> None:
         """Reset points within `radius` [m] of `centre`; change no. `epoch` may have put an object there."""

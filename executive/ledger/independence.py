@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from executive.cell.values import Detections
+from executive.cell.detection import Detections
 
 GRID = 0.02
 """Pitch of the grid to which camera positions are rounded [m]; equal rounded positions are one viewpoint."""

@@ -9,8 +9,10 @@ from enum import Enum
 
 import numpy as np
 
+from executive.cell.detection import Detection
 from executive.cell.error_rates import ErrorRates
-from executive.cell.values import Detection, Frame, Target
+from executive.cell.frame import Frame
+from executive.cell.objects import Target
 from executive.geometry import Array
 from executive.ledger.independence import repeat_probability
 

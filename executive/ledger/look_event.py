@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from executive.cell.values import Detection, Detections, Glimpse
+from executive.cell.detection import Detection, Detections, Glimpse
 from executive.geometry import Array
 
 

@@ -8,9 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from executive.cell.bins import Bin
 from executive.cell.config import LedgerConfig, TableConfig
+from executive.cell.detection import Detections, Glimpse
+from executive.cell.frame import Frame
+from executive.cell.objects import Item, Target
 from executive.cell.protocols import Routes
-from executive.cell.values import Bin, Detections, Frame, Glimpse, Item, Target
 from executive.errors import Fault
 from executive.events import Emit
 from executive.geometry import Array

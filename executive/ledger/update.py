@@ -9,7 +9,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from executive.cell.config import LedgerConfig
-from executive.cell.values import Detections, Frame, Glimpse, Item
+from executive.cell.detection import Detections, Glimpse
+from executive.cell.frame import Frame
+from executive.cell.objects import Item
 from executive.geometry import Array
 from executive.ledger.coverage import Coverage
 from executive.ledger.independence import viewpoint_of
@@ -159,7 +161,7 @@ class Looks:
         if not unseen:
             return []
         phantoms = []
-        searched = look.searched(np.array([record.position for record in unseen]))
+        searched = look.is_searched(np.array([record.position for record in unseen]))
         for record, there in zip(unseen, searched, strict=True):
             if there:
                 record.miss(look.error_rates)

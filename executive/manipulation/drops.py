@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from executive.cell.objects import Item
 from executive.cell.protocols import Cell
-from executive.cell.values import Item
 from executive.geometry import GRAVITY, Array
 
 CALM = 0.2

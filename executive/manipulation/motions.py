@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 
 from executive.cell.arm import Arm, Goal, Motion, Task
+from executive.cell.objects import Item, Load
 from executive.cell.protocols import Cell, Steps
-from executive.cell.values import Item, Load
 from executive.errors import Blocked, Unreachable
 from executive.manipulation.drops import slipped
 from executive.manipulation.obstacles import around

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from executive.cell.bins import BIN_THICKNESS, Bin
+from executive.cell.objects import Item, Obstacle, Target
 from executive.cell.protocols import Cell
-from executive.cell.values import BIN_THICKNESS, Bin, Item, Obstacle, Target
 from executive.geometry import Array
 
 ROLLED = 0.002

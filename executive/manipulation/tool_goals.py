@@ -9,8 +9,9 @@ from itertools import product
 import numpy as np
 
 from executive.cell.arm import Goal, Task
+from executive.cell.bins import BIN_THICKNESS, Bin
+from executive.cell.objects import Item, ObjectClass, Target
 from executive.cell.protocols import Cell
-from executive.cell.values import BIN_THICKNESS, Bin, Item, ObjectClass, Target
 from executive.geometry import Array
 from executive.manipulation.obstacles import around, level, obstacle_of, slots_taken, tallest
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from executive.cell.clock import STEP
-from executive.cell.values import Load
+from executive.cell.objects import Load
 from executive.geometry import GRAVITY, Array
 from executive.motion.kinematics import Kinematics
 from executive.motion.state import JOINTS

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from executive.cell.values import Bin, Frame
+from executive.cell.bins import Bin
+from executive.cell.frame import Frame
 from executive.geometry import Array
 from executive.perception.outline_fit import Fit, OutlineFitter
 

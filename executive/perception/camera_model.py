@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from executive.cell.config import CameraConfig
-from executive.cell.values import Box
+from executive.cell.frame import Box
 from executive.geometry import Array, Pose
 
 NEAR, FAR = 0.02, 5.0

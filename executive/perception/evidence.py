@@ -8,7 +8,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from executive.cell.config import CellConfig
-from executive.cell.values import Box, Detection, Frame, ObjectClass
+from executive.cell.detection import Detection
+from executive.cell.frame import Box, Frame
+from executive.cell.objects import ObjectClass
 from executive.errors import NoDepth
 from executive.geometry import Array
 from executive.perception.depth_image import measure_top

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from executive.cell.config import CameraConfig
-from executive.cell.values import Box
+from executive.cell.frame import Box
 from executive.geometry import Pose
 from executive.perception.camera_model import calibrated
 

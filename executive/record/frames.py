@@ -9,7 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from executive.cell.values import Detection, Frame
+from executive.cell.detection import Detection
+from executive.cell.frame import Frame
 from executive.events import Event
 from executive.record.pictures.drawer import Drawer
 from executive.record.pictures.scene import Scene

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from executive.cell.values import Frame
+from executive.cell.frame import Frame
 from executive.events import Exact
 from executive.geometry import Pose
 

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.arm import Motion
+from executive.cell.detection import Answer, Detection
 from executive.cell.error_rates import ErrorRates
-from executive.cell.values import Answer, Detection, Frame
+from executive.cell.frame import Frame
 from executive.geometry import Array, Pose
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from executive.cell.objects import Item
 from executive.cell.protocols import Cell
-from executive.cell.values import Item
 from executive.events import Event
 from executive.manipulation.motions import carrying
 from executive.manipulation.tool_goals import approach, into, nearest_first

@@ -6,9 +6,11 @@ from dataclasses import replace
 from typing import Any
 
 from executive.cell.arm import Goal
+from executive.cell.detection import Detections
+from executive.cell.frame import Frame
+from executive.cell.objects import Target
 from executive.cell.protocols import Cell
 from executive.cell.proxy import Access, intercept
-from executive.cell.values import Detections, Frame, Target
 from executive.replay.recorded_cell import COMMANDS
 
 _ROLES = ("arm", "tool", "camera", "detector", "ledger", "operator")

@@ -17,8 +17,9 @@ import cv2
 import numpy as np
 
 from executive.cell.config import CameraConfig, CellConfig, DetectorConfig
+from executive.cell.detection import Detection
+from executive.cell.frame import Frame
 from executive.cell.protocols import Clock
-from executive.cell.values import Detection, Frame
 from executive.cells.sim.arrangements import UNKNOWN
 from executive.cells.sim.camera import Image, SimCamera
 from executive.cells.sim.cell import SimCell

@@ -11,8 +11,8 @@ from typing import Annotated, TypeVar
 import yaml
 from pydantic import BaseModel, Field, FiniteFloat, ValidationError
 
+from executive.cell.frame import Box
 from executive.cell.paths import leaves_folder, links_out
-from executive.cell.values import Box
 from executive.errors import MAX_QUOTED, InputError
 
 COCO_FILE_NAME = "_annotations.coco.json"

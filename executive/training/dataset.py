@@ -18,7 +18,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from executive.cell.values import Box
+from executive.cell.frame import Box
 from executive.errors import InputError
 
 SPLITS = ("train", "valid", "test")

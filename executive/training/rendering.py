@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from executive.cell.config import CellConfig
-from executive.cell.values import Box
+from executive.cell.frame import Box
 from executive.cells.sim.models import missing_models
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig
 from executive.cells.sim.scenes import SIZE, Sample, SceneRenderer

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.values import Box
+from executive.cell.frame import Box
 from executive.errors import InputError
 from executive.geometry import Array
 from executive.training.annotations import COCO_FILE_NAME, is_split, read_annotations

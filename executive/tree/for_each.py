@@ -8,7 +8,7 @@ from typing import Any
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.cell.values import Target
+from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.tree.blackboard import Scope
 from executive.tree.loop import Rounds

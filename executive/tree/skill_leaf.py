@@ -9,8 +9,8 @@ from typing import Any
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from executive.cell.objects import Target
 from executive.cell.protocols import Cell
-from executive.cell.values import Target
 from executive.errors import Fault
 from executive.skill import Skill, SkillFailed
 from executive.tree.blackboard import Scope

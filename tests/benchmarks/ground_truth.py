@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import CellConfig
 from executive.cell.protocols import Routes
-from executive.cell.values import BIN_THICKNESS
 from executive.cell.workcell import CellOptions
 from executive.cells.sim.arrangements import UNKNOWN
 from executive.cells.sim.audit import audit

@@ -12,8 +12,9 @@ import click
 
 from executive.campaign.pool import do_all
 from executive.cell.config import CellConfig
+from executive.cell.detection import Answer
+from executive.cell.frame import Frame
 from executive.cell.protocols import Clock, Request
-from executive.cell.values import Answer, Frame
 from executive.cli.options import runs_option, workers_option
 from executive.cli.progress import bar, print_halting
 from executive.perception.detectors.setting import ClosableDetector

@@ -11,7 +11,7 @@ import numpy as np
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
 from executive.cell.layout import as_bin
-from executive.cell.values import Load, ObjectClass, Obstacle
+from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.cells.sim.collision import PathClearance
 from executive.cells.sim.models import load_mesh, weighed
 from executive.cells.sim.spawn import spawn

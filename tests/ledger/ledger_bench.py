@@ -6,9 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from executive.cell.bins import Bin
 from executive.cell.config import LedgerConfig, TableConfig
+from executive.cell.detection import Detection, Detections, Glimpse
 from executive.cell.error_rates import ErrorRates
-from executive.cell.values import Bin, Detection, Detections, Frame, Glimpse, Target
+from executive.cell.frame import Frame
+from executive.cell.objects import Target
 from executive.ledger.tracker import ItemLedger
 from tests.camera_poses import looking_down
 

@@ -7,7 +7,7 @@ import pytest
 from ledger_bench import Bench, Thing
 
 from executive.cell.error_rates import ErrorRates
-from executive.cell.values import Target
+from executive.cell.objects import Target
 from executive.errors import Fault
 
 CUBE: Thing = ("cube", 0.5, 0.0)

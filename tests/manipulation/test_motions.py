@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from executive.cell.arm import Goal, Task
-from executive.cell.values import Obstacle, Target
+from executive.cell.objects import Obstacle, Target
 from executive.cells.fake.cell import FakeCell
 from executive.manipulation.motions import planned
 from executive.testing.run_skill import run_skill

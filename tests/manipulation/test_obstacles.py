@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from at_hand import look, pick
 
-from executive.cell.values import BIN_THICKNESS, Target
+from executive.cell.bins import BIN_THICKNESS
+from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.manipulation.motions import carrying, heeding
 from executive.manipulation.obstacles import around, slots_taken

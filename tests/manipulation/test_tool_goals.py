@@ -9,7 +9,8 @@ import pytest
 from at_hand import look, pick
 
 from executive.cell.arm import Goal
-from executive.cell.values import BIN_THICKNESS, ObjectClass
+from executive.cell.bins import BIN_THICKNESS
+from executive.cell.objects import ObjectClass
 from executive.cells.fake.cell import FakeCell
 from executive.manipulation.tool_goals import DROP, SIDE_BY_SIDE, approach, aside, onto, over
 from executive.testing.run_skill import run_skill

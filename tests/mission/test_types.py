@@ -7,7 +7,8 @@ from typing import Any, Optional
 
 import pytest
 
-from executive.cell.values import Detection, Target
+from executive.cell.detection import Detection
+from executive.cell.objects import Target
 from executive.mission.model.port_types import called, element_of, fits
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from executive.cell.config import CellConfig
-from executive.cell.values import Detection
+from executive.cell.detection import Detection
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Unreachable
 

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CameraConfig, CellConfig, DetectorConfig
+from executive.cell.detection import Detection
+from executive.cell.frame import Frame
 from executive.cell.protocols import Clock
-from executive.cell.values import Detection, Frame
 from executive.cell.workcell import Workcell
 from executive.cells.fake.cell import FakeCell
 from executive.cells.sim.cell import SimCell

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from executive.cell.values import Answer, Detection
+from executive.cell.detection import Answer, Detection
 from executive.cells.fake.cell import FakeCell
 from executive.plugins import cell_kind
 from executive.testing.faults import Disturbance, after, during, object_bumped, with_probability

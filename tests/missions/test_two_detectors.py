@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from executive.cell.values import Detection
+from executive.cell.detection import Detection
 from executive.cells.fake.cell import FakeCell
 from executive.testing.run_mission import MissionResult, run_mission
 

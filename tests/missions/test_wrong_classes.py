@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from executive.cell.values import Detection
+from executive.cell.detection import Detection
 from executive.cells.fake.cell import FakeCell
 from executive.testing.run_mission import MissionResult, run_mission
 

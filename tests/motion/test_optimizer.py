@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import LIMITS, passed, peaks, positions
 
-from executive.cell.values import Load, ObjectClass, Obstacle
+from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.geometry import Array, tool_down
 from executive.motion.clearance_model import Surroundings, hanging
 from executive.motion.optimizer import Detour, Gap

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from executive.cell.values import Load, ObjectClass
+from executive.cell.objects import Load, ObjectClass
 from executive.geometry import GRAVITY
 from executive.motion.payload import METRES, SAFETY, STRIDE, Hold
 from executive.motion.state import State

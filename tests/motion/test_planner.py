@@ -10,7 +10,7 @@ from joint_states import SOONER, passed, peaks, tool_velocities
 
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
-from executive.cell.values import Load, ObjectClass, Obstacle
+from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
 from executive.motion.kinematics import fold

@@ -8,9 +8,10 @@ import cv2
 import numpy as np
 import pytest
 
+from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.config import BinConfig
+from executive.cell.frame import Frame
 from executive.cell.layout import as_bin
-from executive.cell.values import BIN_THICKNESS, Bin, Frame
 from executive.geometry import Array, Pose
 from executive.perception.camera_check import MAX_DISTANCE, describe_displacement, estimate_offset
 from executive.perception.camera_model import camera_matrix, project

@@ -12,7 +12,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from executive.cell.config import CameraConfig
-from executive.cell.values import Frame
+from executive.cell.frame import Frame
 from executive.perception.camera_model import (
     NEAR,
     calibrated,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from executive.cell.values import Detection
+from executive.cell.detection import Detection
 from executive.errors import InputError
 from executive.perception.detectors.embedded import LABELS, MODEL
 from executive.perception.detectors.onnx_model import OnnxModel, read_labels

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from executive.cell.config import DetectorConfig
-from executive.cell.values import Detection
+from executive.cell.detection import Detection
 from executive.errors import InputError
 from executive.perception.detectors.embedded import LABELS, MODEL, EmbeddedDetector
 from executive.perception.detectors.rfdetr import RfdetrDetector

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.cell.values import Detection
+from executive.cell.detection import Detection
 from executive.errors import InputError
 from executive.perception.detectors.views import Finding, merge, parts_of, search_parts, without_duplicates
 

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from executive.cell.values import Frame
+from executive.cell.frame import Frame
 from executive.events import Event
 from executive.geometry import Pose
 from executive.record import frames as module

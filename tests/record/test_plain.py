@@ -14,8 +14,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from executive.cell.detection import Detection
 from executive.cell.error_rates import ErrorRates
-from executive.cell.values import Detection, Frame
+from executive.cell.frame import Frame
 from executive.events import Exact
 from executive.geometry import Pose
 from executive.record.plain import LONGEST, plain

@@ -10,8 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from executive.cell.detection import Answer, Detection
 from executive.cell.error_rates import ErrorRates
-from executive.cell.values import Answer, Detection, Frame
+from executive.cell.frame import Frame
 from executive.geometry import Pose, about_z
 from executive.replay.codec import ANSWER, ARRAY, BOX, FRAME, MOTION, POSE, Codec, PlayedMotion
 

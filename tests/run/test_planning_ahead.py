@@ -10,7 +10,7 @@ import at_hand
 import pytest
 
 from executive.cell.arm import Goal
-from executive.cell.values import Target
+from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.events import Event
 from executive.manipulation.tool_goals import nearest_first

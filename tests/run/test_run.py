@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from py_trees.common import Status
 
-from executive.cell.values import Detection
+from executive.cell.detection import Detection
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.events import Event

@@ -7,7 +7,7 @@ from functools import partial
 import at_hand
 import pytest
 
-from executive.cell.values import Target
+from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 
 

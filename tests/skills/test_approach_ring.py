@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from executive.cell.values import Target
+from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.mission.parse.cell_file import load_cell
 from executive.testing.run_skill import run_skill

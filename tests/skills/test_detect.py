@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from executive.cell.values import Detection
+from executive.cell.detection import Detection
 from executive.cells.fake.cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.detect import Detect

@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from executive.cell.values import Detection, Detections, Frame, Glimpse, Target
+from executive.cell.detection import Detection, Detections, Glimpse
+from executive.cell.frame import Frame
+from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.errors import NoDepth
 from executive.geometry import Array

@@ -7,7 +7,7 @@ import at_hand
 import numpy as np
 import pytest
 
-from executive.cell.values import Target
+from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from at_hand import look
 
-from executive.cell.values import Target
+from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import pytest
 
 from executive.cell.arm import Goal
-from executive.cell.values import Target
+from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault, InputError
 from executive.skill import In, Out, Skill, param

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from executive.cell.values import Target
+from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault, InputError
 from executive.testing.run_skill import run_skill

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from py_trees.common import Status
 
-from executive.cell.values import Target
+from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.skill import In, Skill
 from executive.tree.blackboard import Scope

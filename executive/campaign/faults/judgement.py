@@ -9,7 +9,8 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.campaign.faults.fault import Fault, InjectedError
-from executive.cell.values import BIN_THICKNESS, Bin, Frame
+from executive.cell.bins import BIN_THICKNESS, Bin
+from executive.cell.frame import Frame
 from executive.events import Event
 from executive.ledger.accounts import is_balanced
 from executive.ledger.item import State
@@ -126,7 +127,7 @@ def check_losses(audit: Mapping[str, int] | None, events: Sequence[Event]) -> It
 def _is_shown(thing: Thing, frame: Frame) -> bool:
     height, width = frame.visible.shape
     place = thing.position[None]
-    return bool((frame.shows(place, (0, 0, width, height), EDGE) & frame.bares(place))[0])
+    return bool((frame.is_in_area(place, (0, 0, width, height), EDGE) & frame.is_unobstructed(place))[0])
 
 
 def count_of(events: Sequence[Event], what: str) -> int:

@@ -9,7 +9,7 @@ from executive.campaign.faults.causes import causes
 from executive.campaign.faults.fault import Breakage, Fault, When
 from executive.campaign.faults.rehearsal import Rehearsal
 from executive.campaign.subject import Subject
-from executive.cell.values import Target
+from executive.cell.objects import Target
 from executive.mission.model import nodes
 from executive.skill import HOLDING, Direction, Skill
 from executive.testing import faults as effects

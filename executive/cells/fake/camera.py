@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.config import CameraConfig, DetectorConfig, TableConfig
+from executive.cell.detection import Answer, Detection
 from executive.cell.error_rates import ErrorRates
+from executive.cell.frame import Box, Frame
 from executive.cell.protocols import Clock, Request
-from executive.cell.values import Answer, Box, Detection, Frame
 from executive.cells.fake.world import FakeWorld
 from executive.errors import Unavailable
 from executive.geometry import Pose

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from executive.cell.bins import BIN_THICKNESS
 from executive.cell.clock import StepClock
 from executive.cell.config import CellConfig
 from executive.cell.layout import bins_of, cell_without_hardware, object_classes
 from executive.cell.protocols import Cell, LeastTimes, Routes
-from executive.cell.values import BIN_THICKNESS
 from executive.cell.workcell import PLACES, CellOptions, KeyPath
 from executive.cells.fake.arm import FakeArm, FakeTool, out_of_reach
 from executive.cells.fake.camera import FakeCamera, FakeDetector

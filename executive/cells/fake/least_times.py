@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from executive.cell.bins import Bin
 from executive.cell.config import CellConfig
 from executive.cell.layout import as_bin, travel_height
-from executive.cell.values import Bin
 from executive.cells.fake.arm import SPEED
 from executive.cells.fake.world import TOUCH
 

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from executive.cell.config import DetectorConfig, Section
+from executive.cell.detection import Answer, Detection
+from executive.cell.frame import Frame
 from executive.cell.protocols import Detector
-from executive.cell.values import Answer, Detection, Frame
 from executive.perception.detectors.options import OptionFaults, read_options, wrong_options
 from executive.perception.detectors.requests import ChangedRequest
 from executive.perception.detectors.setting import Setting

@@ -8,7 +8,7 @@ import numpy as np
 
 from executive.cell.config import CellConfig
 from executive.cell.layout import bin_walls
-from executive.cell.values import ObjectClass
+from executive.cell.objects import ObjectClass
 from executive.geometry import Array
 from executive.motion.clearance_model import PRESSED
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.clock import STEP
-from executive.cell.values import BIN_THICKNESS, Bin, ObjectClass
+from executive.cell.objects import ObjectClass
 from executive.errors import InputError
 from executive.geometry import Array
 from executive.mission.findings import alternatives

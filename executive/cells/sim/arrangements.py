@@ -12,9 +12,9 @@ import pybullet
 from numpy.random import Generator
 from pybullet_utils.bullet_client import BulletClient
 
+from executive.cell.bins import BIN_THICKNESS
 from executive.cell.clock import STEP
 from executive.cell.config import BinConfig, CameraConfig, CellConfig, Colour, ObjectConfig
-from executive.cell.values import BIN_THICKNESS
 from executive.cells.sim.models import add_body, load_mesh, upright
 from executive.cells.sim.variations import random_object_colour
 from executive.cells.sim.world import World, add_bin

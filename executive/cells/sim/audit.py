@@ -6,8 +6,8 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
+from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.protocols import Routes
-from executive.cell.values import BIN_THICKNESS, Bin
 from executive.cell.workcell import PLACES
 from executive.cells.sim.arrangements import UNKNOWN
 from executive.cells.sim.world import World

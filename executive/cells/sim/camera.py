@@ -10,9 +10,10 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
+from executive.cell.bins import Bin
 from executive.cell.config import CameraConfig, DepthConfig, NoiseConfig
+from executive.cell.frame import Frame
 from executive.cell.protocols import Clock
-from executive.cell.values import Bin, Frame
 from executive.cells.sim.view import ArmShadow
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose

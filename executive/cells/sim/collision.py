@@ -13,8 +13,9 @@ from typing import NamedTuple
 import pybullet
 
 from executive.cell.arm import Task
+from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import CellConfig
-from executive.cell.values import BIN_THICKNESS, Load, ObjectClass, Obstacle
+from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.cells.sim.world import World, held_part
 from executive.errors import Blocked
 from executive.geometry import Array, Pose

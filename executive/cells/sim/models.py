@@ -14,7 +14,7 @@ from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.layout import object_class
-from executive.cell.values import ObjectClass
+from executive.cell.objects import ObjectClass
 from executive.cell.workcell import KeyPath
 from executive.cells.sim.model_files import find_mesh, find_model, read_numbers, read_obj, read_urdf
 from executive.errors import InputError

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.config import CellConfig, NoiseConfig
-from executive.cell.values import Box
+from executive.cell.frame import Box
 from executive.cells.sim.arrangements import (
     UNKNOWN,
     SceneObject,

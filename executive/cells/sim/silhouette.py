@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.values import Box
+from executive.cell.frame import Box
 from executive.cells.sim.models import Mesh
 from executive.geometry import Array
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from executive.cell.config import CellConfig
-from executive.cell.values import Box
+from executive.cell.frame import Box
 from executive.geometry import Array, Pose
 from executive.perception.camera_model import camera_matrix, looking_at
 

@@ -7,8 +7,8 @@ from itertools import combinations
 
 import numpy as np
 
+from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import BinConfig, CellConfig
-from executive.cell.values import BIN_THICKNESS
 from executive.geometry import Array
 from executive.mission.parse.validate import KeyPath
 

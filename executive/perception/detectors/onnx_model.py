@@ -14,7 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.values import Box, Detection
+from executive.cell.detection import Detection
+from executive.cell.frame import Box
 from executive.errors import InputError, Unavailable
 from executive.geometry import Array
 from executive.perception.detectors.views import without_duplicates

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from concurrent.futures import Future, TimeoutError
 from dataclasses import dataclass
 
+from executive.cell.detection import Answer, Detection
 from executive.cell.error_rates import ErrorRates
 from executive.cell.protocols import Clock, Request
-from executive.cell.values import Answer, Detection
 from executive.errors import DeadlinePassed
 
 SLICE = 0.05

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from executive.cell.config import DetectorConfig, Section
-from executive.cell.values import Detection, Frame
+from executive.cell.detection import Detection
+from executive.cell.frame import Frame
 from executive.errors import InputError
 from executive.perception.detectors.onnx_model import OnnxModel, no_model, read_labels
 from executive.perception.detectors.options import OptionFaults, read_options, wrong_class_map, wrong_options

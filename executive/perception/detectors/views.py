@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.values import Box, Detection
+from executive.cell.detection import Detection
+from executive.cell.frame import Box
 from executive.errors import InputError
 
 Part = tuple[int, int, int, int]

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from executive.cell.config import Section, TableConfig
-from executive.cell.values import Frame
+from executive.cell.frame import Frame
 from executive.perception.visibility import outline
 
 MIN_PIXELS = 400

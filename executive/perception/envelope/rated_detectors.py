@@ -8,8 +8,8 @@ from pathlib import Path
 
 from executive.cell.config import CellConfig
 from executive.cell.error_rates import ErrorRates, assume_rates
+from executive.cell.frame import Frame
 from executive.cell.protocols import Clock
-from executive.cell.values import Frame
 from executive.errors import InputError
 from executive.perception.detectors.registry import build_detectors, installed
 from executive.perception.detectors.requests import ChangedRequest

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal
 
+from executive.cell.objects import ObjectClass
 from executive.cell.protocols import Localizer
-from executive.cell.values import ObjectClass
 from executive.perception.localization.depth import DepthLocalizer
 from executive.perception.localization.plane import PlaneLocalizer
 from executive.perception.localization.ray import Cast, RayLocalizer

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from executive.cell.values import Detection, Frame
+from executive.cell.detection import Detection
+from executive.cell.frame import Frame
 from executive.errors import NoDepth
 from executive.geometry import Array
 from executive.perception.camera_model import intersect_plane

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from executive.cell.values import Detection, Frame, ObjectClass
+from executive.cell.detection import Detection
+from executive.cell.frame import Frame
+from executive.cell.objects import ObjectClass
 from executive.errors import NoDepth
 from executive.geometry import Array
 from executive.perception.camera_model import pixel_ray

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.values import Box
+from executive.cell.frame import Box
 from executive.record.pictures.boxes import draw_boxes
 from executive.record.pictures.palette import GROUND, bgr, class_colour
 from executive.record.pictures.scene import Scene

@@ -8,7 +8,7 @@ from dataclasses import KW_ONLY, dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.values import Detection
+from executive.cell.detection import Detection
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Union, get_args, get_origin
 
-from executive.cell.values import Detections, Target
+from executive.cell.detection import Detections
+from executive.cell.objects import Target
 from executive.mission.model.port_types import called
 from executive.skill import ANY, EMPTY, HOLDING, Direction, Param, Port, Skill
 from executive.testing.conformance.stage import Stage, set_up

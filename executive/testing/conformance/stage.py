@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from executive.cell.values import Detections, Item, Target
+from executive.cell.detection import Detections
+from executive.cell.objects import Item, Target
 from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import ROUTES, FakeCell, SilentOperator, bare_table
 from executive.geometry import tool_down

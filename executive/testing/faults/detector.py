@@ -9,8 +9,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from executive.cell.detection import Answer
 from executive.cell.protocols import Request
-from executive.cell.values import Answer
 from executive.errors import InputError, Unavailable
 from executive.testing.faults.effect import Effect, Occasion
 

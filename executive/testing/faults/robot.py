@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from executive.cell.arm import Motion, Planning
-from executive.cell.values import Frame
+from executive.cell.frame import Frame
 from executive.errors import Blocked, NoDepth, Unreachable
 from executive.geometry import Array
 from executive.testing.faults.effect import Effect, Occasion, checked_share

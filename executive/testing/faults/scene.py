@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 
 from executive.cell.arm import Motion
+from executive.cell.objects import Item
 from executive.cell.protocols import Cell
-from executive.cell.values import Item
 from executive.cell.workcell import Workcell
 from executive.events import Emit
 from executive.geometry import Array

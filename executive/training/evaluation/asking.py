@@ -9,7 +9,8 @@ from pathlib import Path
 
 from executive.cell.clock import STEP, StepClock
 from executive.cell.config import CameraConfig, DetectorConfig
-from executive.cell.values import Answer, Frame
+from executive.cell.detection import Answer
+from executive.cell.frame import Frame
 from executive.errors import Unavailable
 from executive.perception.detectors.registry import build_detectors
 

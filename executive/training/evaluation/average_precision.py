@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from executive.cell.values import Box, Detection
+from executive.cell.detection import Detection
+from executive.cell.frame import Box
 from executive.training.samples import LabelledImage
 
 

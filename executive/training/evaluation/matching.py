@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.values import Box, Detection
+from executive.cell.detection import Detection
+from executive.cell.frame import Box
 from executive.geometry import Array
 from executive.training.samples import LabelledImage
 

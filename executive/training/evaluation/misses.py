@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from executive.cell.values import Box, Detection
+from executive.cell.detection import Detection
+from executive.cell.frame import Box
 from executive.training.evaluation.matching import Match, offset_of
 from executive.training.evaluation.truth import is_whole, visible_fraction
 from executive.training.samples import LabelledImage

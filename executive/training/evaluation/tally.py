@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from executive.cell.frame import Frame
 from executive.cell.protocols import Localizer
-from executive.cell.values import Frame
 from executive.errors import NoDepth
 from executive.perception.camera_model import intersect_plane
 from executive.training.evaluation.error_rates import MeasuredErrorRates

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from executive.cell.values import Box, Frame
+from executive.cell.frame import Box, Frame
 from executive.geometry import Array, Pose
 from executive.training.samples import LabelledImage
 

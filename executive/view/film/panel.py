@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from PIL import Image, ImageDraw
 
-from executive.cell.values import Box
+from executive.cell.frame import Box
 from executive.mission.outline import OutlineNode
 from executive.view.film import ink
 from executive.view.film.course import Course

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from executive.cell.arm import Goal, Motion, Task
+from executive.cell.bins import BIN_THICKNESS
 from executive.cell.clock import STEP
-from executive.cell.values import BIN_THICKNESS, Load, Obstacle
+from executive.cell.objects import Load, Obstacle
 from executive.cells.fake.arm import SPEED
 from executive.cells.fake.cell import FakeCell, bare_table
 from executive.errors import Blocked, Fault, Unreachable

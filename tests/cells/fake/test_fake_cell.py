@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig
-from executive.cell.values import Detections
+from executive.cell.detection import Detections
 from executive.cell.workcell import PLACES, CellOptions
 from executive.cells.fake.cell import FakeCell, SilentOperator
 from executive.errors import InputError

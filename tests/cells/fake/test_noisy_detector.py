@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from executive.cell.config import DetectorConfig
-from executive.cell.values import Answer, Detection
+from executive.cell.detection import Answer, Detection
 from executive.cells.fake.noisy_detector import NoisyDetector
 from executive.perception.detectors.setting import Setting
 

@@ -9,7 +9,7 @@ import pytest
 from rig import Rig
 
 from executive.cell.arm import Goal, Motion, Task
-from executive.cell.values import Obstacle
+from executive.cell.objects import Obstacle
 from executive.errors import Fault, Unreachable
 
 OVER = Goal((0.5, 0.1, 0.15))

@@ -10,7 +10,7 @@ from rig import Rig
 
 from executive.cell.arm import Goal, Task
 from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, object_class
-from executive.cell.values import Load
+from executive.cell.objects import Load
 from executive.geometry import Array
 from executive.motion.trajectory import Trajectory
 from tests.benchmarks.halts import measure_distance

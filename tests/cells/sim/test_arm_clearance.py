@@ -8,7 +8,7 @@ import pytest
 
 from executive.cell.arm import Task
 from executive.cell.config import CellConfig
-from executive.cell.values import Load, ObjectClass, Obstacle
+from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.cells.sim.collision import PathClearance
 from executive.errors import Blocked
 from executive.motion.kinematics import Kinematics, fold

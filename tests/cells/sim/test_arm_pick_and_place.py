@@ -8,7 +8,7 @@ from rig import Rig
 
 from executive.cell.arm import Goal, Task
 from executive.cell.layout import as_bin, object_class
-from executive.cell.values import Load
+from executive.cell.objects import Load
 from executive.geometry import Pose
 
 AIM = {"cube": 0.0, "sphere": 0.0, "duck": 0.01}

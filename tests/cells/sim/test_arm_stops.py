@@ -12,7 +12,7 @@ from executive.cell.arm import Goal, Task
 from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
 from executive.cell.layout import object_class
-from executive.cell.values import Load
+from executive.cell.objects import Load
 from executive.motion.trajectory import Trajectory
 from tests.benchmarks.halts import measure_distance
 

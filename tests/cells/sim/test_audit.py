@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from executive.cell.values import Bin
+from executive.cell.bins import Bin
 from executive.cell.workcell import PLACES
 from executive.cells.sim.arrangements import UNKNOWN
 from executive.cells.sim.audit import audit

@@ -7,7 +7,7 @@ from rig import Rig
 
 from executive.cell.arm import Goal, Task
 from executive.cell.layout import object_class
-from executive.cell.values import Load
+from executive.cell.objects import Load
 
 CUBE = (0.5, 0.1)
 OVER = Goal((*CUBE, 0.15))

@@ -8,7 +8,7 @@ import pytest
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
 from executive.cell.layout import as_bin, object_class
-from executive.cell.values import Load
+from executive.cell.objects import Load
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.collision import PathClearance
 from executive.cells.sim.least_times import SimLeastTimes

@@ -15,7 +15,7 @@ import pytest
 import yaml
 
 from executive.cell.config import CellConfig, NoiseConfig
-from executive.cell.values import Frame
+from executive.cell.frame import Frame
 from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import ROUTES, SilentOperator
 from executive.cells.sim.arrangements import UNKNOWN

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from executive.cell.arm import Goal
-from executive.cell.values import Detections
+from executive.cell.detection import Detections
 from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import ROUTES, SilentOperator
 from executive.cells.sim.cell import SimCell

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from executive.cell.values import Frame
+from executive.cell.frame import Frame
 from tests.camera_poses import looking_down
 
 

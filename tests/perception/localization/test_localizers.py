@@ -9,7 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from executive.cell.values import Detection, Frame, ObjectClass
+from executive.cell.detection import Detection
+from executive.cell.frame import Frame
+from executive.cell.objects import ObjectClass
 from executive.errors import NoDepth
 from executive.perception.camera_model import camera_matrix, looking_at, project
 from executive.perception.localization.build import build_localizer

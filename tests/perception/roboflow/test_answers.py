@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.cell.values import Detection
+from executive.cell.detection import Detection
 from executive.perception.detectors.roboflow.answers import read_answer, read_output
 from executive.perception.detectors.roboflow.complaints import failed, late, plain, unbelievable
 from executive.perception.detectors.roboflow.options import RoboflowOptions

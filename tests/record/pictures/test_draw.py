@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from executive.cell.values import Detection
+from executive.cell.detection import Detection
 from executive.record.pictures.boxes import captions
 from executive.record.pictures.draw import WIDTH, draw
 from executive.record.pictures.palette import GROUND, PALETTE, bgr, class_colour

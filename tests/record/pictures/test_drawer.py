@@ -7,7 +7,7 @@ import threading
 import cv2
 import numpy as np
 
-from executive.cell.values import Detection
+from executive.cell.detection import Detection
 from executive.record.pictures import drawer as module
 from executive.record.pictures.drawer import MAX_WAITING, Drawer
 from executive.record.pictures.scene import Scene

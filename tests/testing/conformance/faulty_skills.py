@@ -7,8 +7,8 @@ import sys
 from typing import ClassVar
 
 from executive.cell.arm import Goal
+from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell, Steps
-from executive.cell.values import Item, Target
 from executive.manipulation.motions import carry, follow, heeding, planned
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Out, Seconds, Skill, SkillFailed, param, port
 

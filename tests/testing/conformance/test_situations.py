@@ -7,8 +7,9 @@ from typing import Any
 import faulty_skills as faulty
 import pytest
 
+from executive.cell.detection import Detections
+from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell, Steps
-from executive.cell.values import Detections, Item, Target
 from executive.plugins import discover
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, param, port
 from executive.testing.conformance import Stage

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from executive.cell.detection import Answer, Detection
 from executive.cell.error_rates import ErrorRates
-from executive.cell.values import Answer, Detection
 from executive.errors import Unavailable
 from executive.training.samples import LabelledImage
 

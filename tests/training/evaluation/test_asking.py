@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from executive.cell.config import DetectorConfig
-from executive.cell.values import Answer, Detection
+from executive.cell.detection import Answer, Detection
 from executive.errors import Unavailable
 from executive.perception.detectors.views import parts_of
 from executive.training.evaluation import asking

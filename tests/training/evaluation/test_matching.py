@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from executive.cell.values import Detection
+from executive.cell.detection import Detection
 from executive.errors import InputError
 from executive.training.evaluation.matching import is_ignored, match
 from executive.training.evaluation.misses import WorstMisses, misses

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from executive.cell.values import Detection
+from executive.cell.detection import Detection
 
 MOST = 300
 """Predictions in one answer; RF-DETR has 300 queries."""

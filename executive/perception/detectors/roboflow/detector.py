@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.config import DetectorConfig
-from executive.cell.values import Detection, Frame
+from executive.cell.detection import Detection
+from executive.cell.frame import Frame
 from executive.errors import DeadlinePassed, InputError, Unavailable
 from executive.perception.detectors.options import OptionFaults
 from executive.perception.detectors.requests import Pending

@@ -1,0 +1,99 @@
+"""Camera image with the pose, time and visibility that belong to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from executive.geometry import Array, Pose
+
+Box = tuple[float, float, float, float]
+"""Left, top, right and bottom side [pixel] of a box in an image; pixel i covers [i, i + 1)."""
+
+OBJECT_RADIUS = 0.03
+"""Typical distance from the centre of an object to its outline [m]."""
+OBJECT_POINTS = OBJECT_RADIUS * np.array([(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)], float)
+"""Points of an object, relative to its centre `(5, 3)` [m], that must all be visible for it to be found."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One camera image with the pose of the camera at capture.
+
+    Attributes:
+        id: Number of the frame in this run, unique over all cameras.
+        camera: Name of the camera.
+        image: `(H, W, 3)` uint8, RGB.
+        depth: `(H, W)` [m] along the optical axis, NaN for pixels without a measurement; None for a camera
+            without depth.
+        matrix: Camera matrix `(3, 3)` [pixel].
+        X_WC: Camera pose in the world at capture, OpenCV convention (z forward, y down).
+        stamp: Capture time on the run's clock [s].
+        visible: `(H, W)` bool, False for pixels in which the arm hides the scene, by its kinematics.
+        epoch: Number of changes of the table at capture (`Ledger.epoch`).
+    """
+
+    id: int
+    camera: str
+    image: NDArray[np.uint8]
+    depth: Array | None
+    matrix: Array
+    X_WC: Pose
+    stamp: float
+    visible: NDArray[np.bool_]
+    epoch: int
+
+    def visible_share(self, box: Box) -> float:
+        """Return the share of a box (0 to 1) in which the arm does not hide the scene."""
+        height, width = self.visible.shape
+        left, right = (min(max(round(x), 0), width) for x in box[::2])
+        top, bottom = (min(max(round(y), 0), height) for y in box[1::2])
+        part = self.visible[top:bottom, left:right]
+        return float(part.mean()) if part.size else 0.0
+
+    def is_in_area(self, points: Array, area: Box, margin: float = 0.0) -> NDArray[np.bool_]:
+        """Return a mask `(N,)` of the points `(N, 3)` [m] of the world that lie in an area of the image.
+
+        Args:
+            points: Points in the world `(N, 3)` [m].
+            area: Part of the image [pixel].
+            margin: Smallest distance of a point to the border of the area [pixel].
+        """
+        pixels, is_ahead = self._project(points)
+        left, top, right, bottom = area
+        inside = (pixels >= (left + margin, top + margin)) & (pixels < (right - margin, bottom - margin))
+        return np.asarray(is_ahead & inside.all(axis=1))
+
+    def is_unobstructed(self, points: Array) -> NDArray[np.bool_]:
+        """Return a mask `(N,)` of the points `(N, 3)` [m] at which the arm hides no part of an object."""
+        mask = np.ones(len(points), dtype=bool)
+        height, width = self.visible.shape
+        for offset in OBJECT_POINTS:
+            pixels, is_ahead = self._project(points + offset)
+            columns, rows = pixels.astype(int).clip(0, (width - 1, height - 1)).T
+            mask &= is_ahead & self.visible[rows, columns]
+        return mask
+
+    def depth_of(self, position: Array) -> float:
+        """Return the distance [m] of a point `(3,)` [m] from the camera, along the optical axis."""
+        return float(self.X_WC.inverse().apply(position)[2])
+
+    def opencv(self) -> tuple[Array, Array, Array]:
+        """Return the camera in OpenCV's form: matrix `(3, 3)`, rvec `(3,)` [rad] and tvec `(3,)` [m].
+
+        `cv2.projectPoints(points, rvec, tvec, matrix, None)` then returns world points in OpenCV's pixels.
+        The centres of OpenCV's pixels have integer coordinates: add 0.5 for the coordinates used here, in
+        which pixel i covers [i, i + 1).
+        """
+        matrix = self.matrix.copy()
+        matrix[:2, 2] -= 0.5
+        X_CW = self.X_WC.inverse()
+        return matrix, X_CW.rotation_vector, X_CW.position
+
+    def _project(self, points: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the image positions of points `(N, 2)` [pixel], and a mask of those ahead of the camera."""
+        in_camera = self.X_WC.inverse().apply(points) @ self.matrix.T
+        depth = in_camera[:, 2:]
+        return in_camera[:, :2] / np.where(depth > 0, depth, np.inf), depth[:, 0] > 0

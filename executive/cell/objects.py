@@ -1,0 +1,84 @@
+"""Objects of a cell: classes, items, targets, loads and obstacles."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from executive.geometry import Array
+
+Item = str
+"""Identity of one physical object in the ledger, for instance `cube-2`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """An observation bound to an item.
+
+    Attributes:
+        item: The item.
+        label: Class name.
+        position: Centre of the object `(3,)` [m] in the world, at half its known height.
+        confidence: Confidence of the last detection, 0 to 1.
+        frame: Id of the frame that showed it last.
+        epoch: Number of changes of the table when that frame was taken.
+        stamp: Time at which that frame was taken [s].
+    """
+
+    item: Item
+    label: str
+    position: Array
+    confidence: float
+    frame: int
+    epoch: int
+    stamp: float
+
+
+@dataclass(frozen=True)
+class ObjectClass:
+    """Known properties of a class of objects.
+
+    Attributes:
+        label: Class name that the detectors use.
+        height: Height of the object as it lies on the table [m].
+        radius: Radius of the circle around its outline seen from above [m].
+        ring: Distance from its centre at which to touch it [m]; more than 0 for parts with a hole.
+        mass: [kg]
+    """
+
+    label: str
+    height: float
+    radius: float
+    ring: float = 0.0
+    mass: float = 0.1
+
+
+@dataclass(frozen=True)
+class Load:
+    """Object in the tool.
+
+    Attributes:
+        kind: Its class.
+        bears: Largest force that its seal withstands [N].
+    """
+
+    kind: ObjectClass
+    bears: float = math.inf
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """An upright cylinder on the table that the arm must avoid.
+
+    Attributes:
+        x, y: Position of its axis [m].
+        radius: [m]
+        top: Height of its top [m].
+        name: Its name in error messages.
+    """
+
+    x: float
+    y: float
+    radius: float
+    top: float
+    name: str
