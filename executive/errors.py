@@ -64,6 +64,10 @@ class Unavailable(ExecutiveError):
     """A detector gave no usable answer; the text says why."""
 
 
+class Crowded(Unavailable):
+    """A detector found more boxes than there can be objects."""
+
+
 class DeadlinePassed(Unavailable):
     """A detector's time for an answer was over before it came."""
 

@@ -17,7 +17,7 @@ from executive.cells.sim.spawn import count_that_fits
 from executive.errors import InputError
 from executive.mission.findings import alternatives
 from executive.perception.detectors.registry import find_problems
-from executive.perception.localization.build import build_localizer
+from executive.perception.localization.localizer import build_localizer
 from executive.training.evaluation.asking import CellDetector
 from executive.training.evaluation.evaluate import evaluate
 from executive.training.evaluation.figures import Evaluation
@@ -201,7 +201,7 @@ def _localizer(config: CellConfig) -> Localizer | None:
     if config.localization == "ray":
         return None
     classes = {label: object_class(label, kind) for label, kind in config.objects.items()}
-    return build_localizer(config.localization, classes, lambda _origin, _direction: None)
+    return build_localizer(config.localization, classes)
 
 
 def _labels_beside(weights: Path) -> Path:

@@ -39,40 +39,47 @@ class Detection:
 class Answer:
     """Answer of a detector to a frame; it may be empty.
 
+    A detector reports all detections at or above its floor in `found`. The cell divides them before a skill
+    reads the answer (`executive.perception.detectors.screening`).
+
     Attributes:
         detector: Name of the detector in the cell file.
-        found: Everything at or above its floor, most confident first.
-        error_rates: Error rates of that detector.
-    """
-
-    detector: str
-    found: tuple[Detection, ...]
-    error_rates: ErrorRates
-
-
-@dataclass(frozen=True, eq=False)
-class Detections:
-    """Detections in one frame; they may be none.
-
-    Attributes:
-        frame: The searched image.
-        found: Detections at or above the threshold, most confident first.
-        detector: Name of the detector.
-        error_rates: Error rates of that detector.
-        view: Name of the searched part of the frame: `table` or `full`.
-        area: Searched part of the frame [pixel].
+        found: Detections that count, most confident first.
+        error_rates: Error rates of the detector.
         doubtful: Detections below the threshold or less than twice as likely as another class.
         unknown: Detections at or above the threshold with labels that the cell does not know.
     """
 
-    frame: Frame
-    found: tuple[Detection, ...]
     detector: str
+    found: tuple[Detection, ...]
     error_rates: ErrorRates
-    view: str
-    area: Box
     doubtful: tuple[Detection, ...] = ()
     unknown: tuple[Detection, ...] = ()
+
+    def describe_doubt(self, detection: Detection) -> str:
+        """Return a sentence about the best of the doubtful detections and the limit that it misses."""
+        threshold = self.error_rates.threshold
+        second = f"with another class at {detection.rival:.2f}"
+        limit = f"< {threshold:.2f}" if detection.confidence < threshold else second
+        return (
+            f"detector {self.detector} found nothing certain: at best a {detection.label} "
+            f"at {detection.confidence:.2f} {limit}"
+        )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Detections(Answer):
+    """Answer of a detector together with the frame that it searched.
+
+    Attributes:
+        frame: The searched image.
+        view: Name of the searched part of the frame: `table` or `full`.
+        area: Searched part of the frame [pixel].
+    """
+
+    frame: Frame
+    view: str
+    area: Box
 
     def is_in_area(self, points: Array, margin: float = 0.0) -> NDArray[np.bool_]:
         """Return a mask `(N,)` of the points `(N, 3)` [m] of the world that lie in the searched area.
@@ -87,12 +94,19 @@ class Detections:
 
 
 @dataclass(frozen=True, eq=False)
-class Glimpse:
-    """A detection that does not count as one.
+class Observation:
+    """A detection localized in the world.
 
-    It is below the threshold, or `contradiction` is evidence against its class. `position` is `(3,)` [m].
+    Attributes:
+        detection: The detection.
+        position: Centre of the object `(3,)` [m] in the world.
+        std: Standard deviation of the random error of the position along each axis [m].
+        confident: False for a low-confidence detection: a doubtful or a contradicted one.
+        contradiction: Evidence against its class as a sentence, "" if there is none.
     """
 
     detection: Detection
     position: Array
+    std: float
+    confident: bool = True
     contradiction: str = ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from executive.cell.detection import Detections, Glimpse
+from executive.cell.detection import Detections, Observation
 from executive.cell.frame import Frame
 from executive.cell.objects import Item, Target
 from executive.geometry import Array
@@ -21,13 +21,14 @@ class Ledger(Protocol):
     def is_current(self, frame: Frame) -> bool:
         """Tell whether nothing has put the whole table in doubt since the frame was taken."""
 
-    def observe(
-        self, detections: Detections, positions: Sequence[Array], glimpses: Sequence[Glimpse] = ()
-    ) -> Sequence[Target]:
-        """Record a look and return the `targets` that are known now.
+    def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:
+        """Update all items with one search of a frame, and return the `targets` that are known now.
 
-        `positions` `(3,)` [m] belong to `detections.found` one to one, `glimpses` to `detections.doubtful`.
-        What earlier looks have shown, and nothing has disturbed since, is known too.
+        Targets of earlier frames are included, unless something has disturbed them since.
+
+        Args:
+            detections: The frame, the searched area, and the detector's error rates.
+            observations: Its detections, localized.
         """
 
     def targets(self) -> Sequence[Target]:

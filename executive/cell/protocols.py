@@ -13,7 +13,7 @@ from typing import Protocol
 
 from executive.cell.arm import Arm
 from executive.cell.bins import Bin
-from executive.cell.detection import Answer, Detection
+from executive.cell.detection import Answer, Detection, Detections, Observation
 from executive.cell.frame import Box, Frame
 from executive.cell.ledger import Ledger
 from executive.cell.objects import ObjectClass, Target
@@ -98,9 +98,10 @@ class Request(Protocol):
         """True from the tick at which the answer is due on the run's clock."""
 
     def result(self) -> Answer:
-        """Return what the detector says.
+        """Return the answer of the detector.
 
         Raises:
+            Crowded: The detector found more boxes than there can be objects.
             Unavailable: The detector gave no usable answer.
         """
 
@@ -113,13 +114,23 @@ class Detector(Protocol):
 
 
 class Localizer(Protocol):
-    """Turns a detection into a point in the world."""
+    """Finds the positions of detected objects in the world."""
 
     def locate(self, detection: Detection, frame: Frame) -> Array:
-        """Return the centre of the detected object `(3,)` [m], from the pose stored with the frame.
+        """Return the centre of the detected object `(3,)` [m], from the camera pose of the frame.
 
         Raises:
             NoDepth: The frame has no usable depth where the detection lies.
+        """
+
+    def localize(self, detections: Detections) -> Sequence[Observation]:
+        """Return an observation of each found or doubtful detection.
+
+        An observation is not confident if its detection is doubtful, or if the size of its box or the height
+        of its top contradicts its class.
+
+        Raises:
+            NoDepth: The frame has no usable depth where a detection lies.
         """
 
 

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.config import LedgerConfig
-from executive.cell.detection import Detections
+from executive.cell.detection import Detections, Observation
 from executive.cell.objects import Item
 from executive.cell.protocols import Routes
 from executive.geometry import Array
 from executive.ledger.item import Record, State
-from executive.ledger.update import SURE, spread_of
+from executive.ledger.update import SURE
 
 WALL = 0.035
 """How far from a bin's wall the middle of something has to come down to be in it for sure [m]: its radius."""
@@ -46,15 +46,14 @@ class Bins:
         """Return how many objects were let go in `bin` so far, or must have fallen into it."""
         return sum(bin in (record.bin, self.believed(record)) for record in self.records.values())
 
-    def at(self, position: Array, look: Detections) -> str | None:
-        """Return the bin that something lies in that a look showed at `position` `(3,)` [m], if any.
+    def at(self, observation: Observation, bias: float) -> str | None:
+        """Return the bin in which an observed object lies, None if there is none.
 
-        What seems to lie just beside a bin is in it, if something was let go there.
+        An object just beside a bin counts as in it, if something was let go there.
         """
-        by = look.error_rates
-        error = math.hypot(spread_of(look.frame, position, by.jitter), by.bias)
+        error = math.hypot(observation.std, bias)
         for name, bin in self.bins.items():
-            if bin.contains(position, SURE * error if self.objects_in(name) else 0.0):
+            if bin.contains(observation.position, SURE * error if self.objects_in(name) else 0.0):
                 return name
         return None
 
@@ -72,7 +71,7 @@ class Bins:
         return next((bin for bin, odds in record.fallen.items() if odds >= FELL), None)
 
     def fallen(
-        self, look: Detections, positions: Sequence[Array], inside: Iterable[str | None]
+        self, look: Detections, inside: Iterable[tuple[Observation, str | None]]
     ) -> Iterator[tuple[Record, str]]:
         """Yield the dropped items that a look finds in a bin that is right for them, and that bin.
 
@@ -81,14 +80,13 @@ class Bins:
 
         Args:
             look: A look at everything the camera sees.
-            positions: Where what it found is `(3,)` [m], one to one.
-            inside: The bin that each detection is in, as `at` says it, or None.
+            inside: Each confident observation and the bin in which it lies, or None.
         """
         # What leans on a wall from inside may have its middle over it.
         shown = Counter(
-            (detection.label, bin)
-            for detection, bin, position in zip(look.found, inside, positions, strict=True)
-            if bin is not None and self.bins[bin].contains(position, BIN_THICKNESS)
+            (observation.detection.label, bin)
+            for observation, bin in inside
+            if bin is not None and self.bins[bin].contains(observation.position, BIN_THICKNESS)
         )
         for record in self.records.values():
             if record.state is not State.DROPPED:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from executive.cell.bins import Bin
 from executive.cell.config import LedgerConfig, TableConfig
-from executive.cell.detection import Detections, Glimpse
+from executive.cell.detection import Detections, Observation
 from executive.cell.frame import Frame
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Routes
@@ -78,9 +77,7 @@ class ItemLedger:
         """Tell whether nothing has put the whole table in doubt since the frame was taken."""
         return self._freshness.anywhere_holds(frame.epoch)
 
-    def observe(
-        self, detections: Detections, positions: Sequence[Array], glimpses: Sequence[Glimpse] = ()
-    ) -> Sequence[Target]:
+    def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:
         """Record a look and return the `targets` that are known now.
 
         What lies in a bin is no target. A detection where the robot has changed the table since the frame
@@ -91,8 +88,8 @@ class ItemLedger:
         self._remarks.add(detections)
         if frame.id != self._frame:
             self._frame = frame.id
-            self._take(detections, positions, glimpses)
-        self._emit("look", **describe_look(detections, positions, glimpses), frame_object=frame)
+            self._take(detections, observations)
+        self._emit("look", **describe_look(detections, observations), frame_object=frame)
         return self.targets()
 
     def targets(self) -> Sequence[Target]:
@@ -274,17 +271,16 @@ class ItemLedger:
         """Return a plain row per item, in the order of first sight."""
         return [record.row for record in self._records.values()]
 
-    def _take(self, detections: Detections, positions: Sequence[Array], glimpses: Sequence[Glimpse]) -> None:
-        inside = [self._in_bins.at(position, detections) for position in positions]
-        outside = [number for number, bin in enumerate(inside) if bin is None]
-        look = replace(detections, found=tuple(detections.found[number] for number in outside))
-        places = [positions[number] for number in outside]
-        unsure = [glimpse for glimpse in glimpses if self._in_bins.at(glimpse.position, detections) is None]
-        for record in self._looks.take(self._records, look, places, unsure):
+    def _take(self, detections: Detections, observations: Sequence[Observation]) -> None:
+        bias = detections.error_rates.bias
+        inside = [(one, self._in_bins.at(one, bias)) for one in observations]
+        on_table = [one for one, bin in inside if bin is None]
+        for record in self._looks.take(self._records, detections, on_table):
             self._certainty.reject_if_uncertain(record, settled=self._looks.settled(record))
             self._emit("item", **record.row)
         if detections.view == "full":
-            for record, bin in self._in_bins.fallen(detections, positions, inside):
+            confident = [(one, bin) for one, bin in inside if one.confident]
+            for record, bin in self._in_bins.fallen(detections, confident):
                 record.why = ""
                 self.placed(record.item, bin)
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from executive.cell.config import LedgerConfig
-from executive.cell.detection import Detections, Glimpse
+from executive.cell.detection import Detections, Observation
 from executive.cell.frame import Frame
 from executive.cell.objects import Item
 from executive.geometry import Array
@@ -53,31 +53,28 @@ class Looks:
         return self._freshness.holds(record.position, record.epoch)
 
     def take(
-        self, records: Items, detections: Detections, positions: Sequence[Array], glimpses: Sequence[Glimpse]
+        self, records: Items, detections: Detections, observations: Sequence[Observation]
     ) -> list[Record]:
         """Take a look into the books and return the items that changed by it.
 
         Args:
             records: All items by name; new ones are entered.
             detections: The look.
-            positions: Where `detections.found` are `(3,)` [m], one to one.
-            glimpses: What the detector is not sure of.
+            observations: Its detections on the table.
         """
         frame, by, viewpoint = detections.frame, detections.error_rates, viewpoint_of(detections)
-        current = [i for i, p in enumerate(positions) if self._freshness.holds(p, frame.epoch)]
-        found = [detections.found[i] for i in current]
-        places = [positions[i] for i in current]
-        spreads = [spread_of(frame, place, by.jitter) for place in places]
+        current = [one for one in observations if self._freshness.holds(one.position, frame.epoch)]
+        found = [one for one in current if one.confident]
         known = [record for record in records.values() if record.state in LYING]
         # What may have been an invention all along, and pushed since, is not what lies there now.
         trusted = [record for record in known if self.settled(record) or record.probability >= 0.5]
         bound = _bind(
-            trusted, [detection.label for detection in found], places, spreads,
-            gate=self._config.gate, settled=self.settled,
+            trusted, found, gate=self._config.gate, settled=self.settled,
         )  # fmt: skip
         absent = [record for record in trusted if record not in bound.values()]
         seen: list[Record] = []
-        for index, (detection, place) in enumerate(zip(found, places, strict=True)):
+        for index, one in enumerate(found):
+            detection, place = one.detection, one.position
             record = bound.get(index)
             if record is None:
                 # The less likely an object was overlooked there, the likelier it is invented.
@@ -87,12 +84,13 @@ class Looks:
                 record.state, record.why = State.SEEN, ""
             if not self.settled(record):
                 record.forget_answers()
-            alone = not self._may_be_of(absent, place, spreads[index])
+            alone = not self._may_be_of(absent, one)
             record.vote(detection.label, by, viewpoint, alone=alone)
-            record.locate(place, spreads[index], settled=self.settled(record))
+            record.locate(place, one.std, settled=self.settled(record))
             record.shown(frame, detection)
             seen.append(record)
-        glimpsed = self._glimpsed(records, seen, detections, glimpses)
+        unsure = [one for one in current if not one.confident]
+        glimpsed = self._glimpsed(records, seen, frame, unsure)
         missed = self._missed(known, [*seen, *glimpsed], detections)
         # Once it is given up, what lies there is known as well as it will ever be.
         self._coverage.update(detections, [r.position for r in glimpsed if r.state is State.SEEN])
@@ -100,11 +98,11 @@ class Looks:
         changed = [*seen, *glimpsed, *missed, *recognized, *self._one_of_two(records, seen)]
         return list({id(record): record for record in changed}.values())
 
-    def _may_be_of(self, records: Sequence[Record], place: Array, spread: float) -> bool:
+    def _may_be_of(self, records: Sequence[Record], one: Observation) -> bool:
         """Tell whether what seems to be at a place may be one of these items, seen a little off."""
         return any(
-            float(np.linalg.norm(record.position - place))
-            <= FAR_OFF * reach(record, spread, self._config.gate)
+            float(np.linalg.norm(record.position - one.position))
+            <= FAR_OFF * reach(record, one.std, self._config.gate)
             for record in records
         )
 
@@ -117,32 +115,31 @@ class Looks:
         return record
 
     def _glimpsed(
-        self, records: Items, seen: Sequence[Record], look: Detections, glimpses: Sequence[Glimpse]
+        self, records: Items, seen: Sequence[Record], frame: Frame, unsure: Sequence[Observation]
     ) -> list[Record]:
         """Count what the detector is not sure of, and return the items that it may be.
 
         It may be any item at that place, which the look did not miss then, or a new one, if something may
         have been overlooked there. A second, weaker box on what was seen for sure is nothing.
         """
-        frame, jitter = look.frame, look.error_rates.jitter
         counted: list[Record] = []
-        for glimpse in glimpses:
-            place, spread = glimpse.position, spread_of(look.frame, glimpse.position, jitter)
-            if not self._freshness.holds(place, frame.epoch) or self._may_be_of(seen, place, spread):
+        for glimpse in unsure:
+            place = glimpse.position
+            if self._may_be_of(seen, glimpse):
                 continue
             lying = [
                 record
                 for record in records.values()
                 if record.state in LYING and record.overlooked > self._config.overlooked
             ]
-            there = [record for record in lying if self._may_be_of([record], place, spread)]
+            there = [record for record in lying if self._may_be_of([record], glimpse)]
             record = min(there, key=lambda r: float(np.linalg.norm(r.position - place)), default=None)
             if record is None:
                 odds = EXPECTED * NEARBY * self._coverage.find_miss_probability(place)
                 if odds <= self._config.overlooked:
                     continue
                 record = self._enter(records, glimpse.detection.label, place, odds)
-                record.locate(place, spread, settled=True)
+                record.locate(place, glimpse.std, settled=True)
                 record.shown(frame, glimpse.detection)
             if record not in counted:
                 # Evidence against another class says nothing against this one.
@@ -229,12 +226,6 @@ class Looks:
         return missing and (moved or nudged)
 
 
-def spread_of(frame: Frame, position: Array, jitter: float) -> float:
-    """Return how far [m] an object at `position` is off for `jitter` [pixel] in the image."""
-    depth = float(frame.X_WC.inverse().apply(position)[2])
-    return jitter * depth / float(frame.matrix[0, 0])
-
-
 def reach(record: Record, spread: float, gate: float) -> float:
     """Return how far from an item [m] a detection of it may be localized.
 
@@ -250,9 +241,7 @@ def reach(record: Record, spread: float, gate: float) -> float:
 
 def _bind(
     records: Sequence[Record],
-    labels: Sequence[str],
-    positions: Sequence[Array],
-    spreads: Sequence[float],
+    found: Sequence[Observation],
     *,
     gate: float,
     settled: Callable[[Record], bool],
@@ -268,16 +257,16 @@ def _bind(
     def assign(candidates: Sequence[Record], same_class: bool) -> None:
         taken = {id(record) for record in bound.values()}
         pairs = sorted(
-            (float(np.linalg.norm(record.position - positions[index])), index, order)
+            (float(np.linalg.norm(record.position - found[index].position)), index, order)
             for order, record in enumerate(candidates)
-            for index in range(len(positions))
+            for index in range(len(found))
             if index not in bound
             and id(record) not in taken
-            and (not same_class or record.label == labels[index])
+            and (not same_class or record.label == found[index].detection.label)
         )
         for distance, index, order in pairs:
             record = candidates[order]
-            allowed = reach(record, spreads[index], gate)
+            allowed = reach(record, found[index].std, gate)
             if distance <= allowed and index not in bound and id(record) not in taken:
                 bound[index] = record
                 taken.add(id(record))

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from executive.cell.bins import BIN_THICKNESS, Bin
+from executive.cell.detection import Detection
+from executive.cell.frame import Frame
 from executive.cell.objects import Item, Obstacle, Target
 from executive.cell.protocols import Cell
-from executive.geometry import Array
+from executive.errors import NoDepth
 
 ROLLED = 0.002
 """How far an object in a bin may lie from where it was let go [m]."""
@@ -24,8 +26,12 @@ def around(cell: Cell, but: Item | None = None) -> tuple[Obstacle, ...]:
     )
 
 
-def is_in_bin(cell: Cell, position: Array) -> bool:
-    """Return True if a position `(3,)` [m] is inside a bin or its walls."""
+def shows_bin_content(cell: Cell, detection: Detection, frame: Frame) -> bool:
+    """Return True if a detection is at a position inside a bin or its walls."""
+    try:
+        position = cell.localizer.locate(detection, frame)
+    except NoDepth:
+        return False
     return any(bin.contains(position, BIN_THICKNESS) for bin in cell.bins.values())
 
 

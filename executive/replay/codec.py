@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.arm import Motion
-from executive.cell.detection import Answer, Detection
+from executive.cell.detection import Answer, Detection, Observation
 from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
 from executive.geometry import Array, Pose
@@ -83,24 +83,51 @@ def read_frame(value: Any) -> Frame:
     )
 
 
+def write_detection(detection: Detection) -> list[Any]:
+    """Return label, confidence, box and confidence of the second class."""
+    box = [float(edge) for edge in detection.box]
+    return [detection.label, float(detection.confidence), box, float(detection.rival)]
+
+
+def read_detection(value: Any) -> Detection:
+    """Return what `write_detection` was given."""
+    label, confidence, box, rival = value
+    return Detection(label, confidence, tuple(box), rival)
+
+
 def write_answer(answer: Answer) -> dict[str, Any]:
     """Return a detector's answer."""
-    sure = answer.error_rates
     return {
         "detector": answer.detector,
-        "found": [
-            [one.label, float(one.confidence), [float(x) for x in one.box], float(one.rival)]
-            for one in answer.found
-        ],
-        "reliability": list(astuple(sure)),
+        "found": [write_detection(one) for one in answer.found],
+        "reliability": list(astuple(answer.error_rates)),
+        "doubtful": [write_detection(one) for one in answer.doubtful],
+        "unknown": [write_detection(one) for one in answer.unknown],
     }
 
 
 def read_answer(value: Any) -> Answer:
     """Return what `write_answer` was given."""
-    # Journals of version 0.1.0 do not contain the confidence of the second class.
-    found = tuple(Detection(label, sure, tuple(box), *rival) for label, sure, box, *rival in value["found"])
-    return Answer(value["detector"], found, ErrorRates(*value["reliability"]))
+    found, doubtful, unknown = (
+        tuple(read_detection(one) for one in value[key]) for key in ("found", "doubtful", "unknown")
+    )
+    return Answer(value["detector"], found, ErrorRates(*value["reliability"]), doubtful, unknown)
+
+
+def write_observations(observations: Sequence[Observation]) -> list[Any]:
+    """Return the observations of one frame."""
+    return [
+        [write_detection(one.detection), one.position.tolist(), one.std, one.confident, one.contradiction]
+        for one in observations
+    ]
+
+
+def read_observations(value: Any) -> list[Observation]:
+    """Return what `write_observations` was given."""
+    return [
+        Observation(read_detection(detection), read_array(position), *others)
+        for detection, position, *others in value
+    ]
 
 
 def _packed(mask: NDArray[np.bool_]) -> str:
@@ -137,4 +164,5 @@ ARRAY = Codec(np.ndarray.tolist, read_array)
 POSE = Codec(write_pose, read_pose)
 FRAME = Codec(write_frame, read_frame)
 ANSWER = Codec(write_answer, read_answer)
+OBSERVATIONS = Codec(write_observations, read_observations)
 MOTION = Codec(_duration, PlayedMotion)

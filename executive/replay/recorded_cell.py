@@ -10,7 +10,7 @@ from executive.cell.clock import StepClock
 from executive.cell.protocols import Cell
 from executive.cell.proxy import Access, intercept
 from executive.events import Emit
-from executive.replay.codec import ANSWER, ARRAY, BOX, FRAME, MOTION, PLAIN, POSE, TEXTS, Codec
+from executive.replay.codec import ANSWER, ARRAY, BOX, FRAME, MOTION, OBSERVATIONS, PLAIN, POSE, TEXTS, Codec
 from executive.replay.input_recorder import Tape
 
 
@@ -50,6 +50,7 @@ INPUT_FORMATS: Mapping[str, InputFormat] = {
     "request.result": InputFormat("detector.{detector}", ANSWER),
     "operator.ask": InputFormat("operator"),
     "localizer.locate": InputFormat("localizer", ARRAY),
+    "localizer.localize": InputFormat("observations", OBSERVATIONS),
 }
 """Name and codec of the recorded input of each access that is not a command, by `Access.name`."""
 

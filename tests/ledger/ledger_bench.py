@@ -8,7 +8,7 @@ import numpy as np
 
 from executive.cell.bins import Bin
 from executive.cell.config import LedgerConfig, TableConfig
-from executive.cell.detection import Detection, Detections, Glimpse
+from executive.cell.detection import Detection, Detections, Observation
 from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
 from executive.cell.objects import Target
@@ -80,13 +80,21 @@ class Bench:
         found = tuple(Detection(label, 0.9, (0, 0, 1, 1)) for label, _, _ in things)
         strange = tuple(Detection(label, 0.9, (0, 0, 1, 1)) for label in unknown)
         return self.ledger.observe(
-            Detections(frame, found, detector, by, view, area_of(view), unknown=strange),
-            [np.array([x, y, 0.025]) for _, x, y in things],
+            Detections(detector, found, by, unknown=strange, frame=frame, view=view, area=area_of(view)),
             [
-                Glimpse(Detection(label, 0.4, (0, 0, 1, 1)), np.array([x, y, 0.025]), contradiction)
-                for label, x, y in unsure
+                *(self._observe(frame, by, thing, 0.4, contradiction) for thing in unsure),
+                *(self._observe(frame, by, thing, 0.9) for thing in things),
             ],
         )
+
+    def _observe(
+        self, frame: Frame, by: ErrorRates, thing: Thing, confidence: float, contradiction: str = ""
+    ) -> Observation:
+        label, x, y = thing
+        position = np.array([x, y, 0.025])
+        std = by.jitter * frame.depth_of(position) / float(frame.matrix[0, 0])
+        detection = Detection(label, confidence, (0, 0, 1, 1))
+        return Observation(detection, position, std, confidence >= by.threshold, contradiction)
 
     def overlooked(self, x: float, y: float) -> float:
         """The chance that an object at a place has been overlooked."""

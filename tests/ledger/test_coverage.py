@@ -26,7 +26,7 @@ EYE = ErrorRates(threshold=0.5, misses=0.2, confused=0.1, invented=0.5, jitter=1
 
 def look(*, view: str = "full", epoch: int = 0, hidden: slice = slice(0, 0)) -> Detections:
     """An empty look from above; the columns `hidden` of the image are behind the arm."""
-    return Detections(take_frame(1, epoch, hidden), (), "eye", EYE, view, area_of(view))
+    return Detections("eye", (), EYE, frame=take_frame(1, epoch, hidden), view=view, area=area_of(view))
 
 
 @pytest.fixture

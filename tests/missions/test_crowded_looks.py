@@ -21,6 +21,7 @@ from executive.cells.fake.cell import FakeCell
 from executive.cells.sim.cell import SimCell
 from executive.mission.load import load_mission
 from executive.perception.detectors.requests import Pending
+from executive.perception.detectors.screening import screen_detectors
 from executive.plugins import cell_kind, discover
 from executive.record.recorded_run import recorded_run
 
@@ -85,7 +86,7 @@ def _fake(config: Any, *, crowd: Mapping[str, Any], **given: Any) -> FakeCell:
         name: CrowdedDetector(name, detector, camera, fake.cell.clock, **crowd)
         for name, detector in config.detectors.items()
     }
-    fake.detectors.update(parts)
+    fake.cell.detectors.update(screen_detectors(parts, fake.cell.classes))  # type: ignore[attr-defined]
     return fake
 
 

@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from executive.cell.detection import Answer, Detection
+from executive.cell.detection import Answer, Detection, Observation
 from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
 from executive.geometry import Pose, about_z
-from executive.replay.codec import ANSWER, ARRAY, BOX, FRAME, MOTION, POSE, Codec, PlayedMotion
+from executive.replay.codec import ANSWER, ARRAY, BOX, FRAME, MOTION, OBSERVATIONS, POSE, Codec, PlayedMotion
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 few = settings(max_examples=25)
@@ -51,20 +51,25 @@ def test_a_frame_comes_back_without_its_image(visible: np.ndarray, epoch: int) -
     assert (read.image.shape, read.image.any(), read.depth) == ((*size, 3), False, None)
 
 
-@few
-@given(
-    st.lists(st.tuples(st.text(max_size=5), finite, st.tuples(finite, finite, finite, finite), finite)),
-    finite,
+detections = st.builds(
+    Detection, st.text(max_size=5), finite, st.tuples(finite, finite, finite, finite), finite
 )
-def test_an_answer_comes_back(found: list[tuple], misses: float) -> None:
-    answer = Answer("eye", tuple(Detection(*one) for one in found), ErrorRates(0.5, misses, 0.1, 0.2, 0.7))
+some = st.lists(detections, max_size=4).map(tuple)
+
+
+@few
+@given(some, some, some, finite)
+def test_an_answer_comes_back(found: tuple, doubtful: tuple, unknown: tuple, misses: float) -> None:
+    answer = Answer("eye", found, ErrorRates(0.5, misses, 0.1, 0.2, 0.7), doubtful, unknown)
     assert back(ANSWER, answer) == answer
 
 
-def test_an_answer_of_a_journal_without_second_classes_is_read() -> None:
-    old = {
-        "detector": "eye",
-        "found": [["duck", 0.9, [1, 2, 3, 4]]],
-        "reliability": [0.5, 0.1, 0.1, 0.2, 0.7],
-    }
-    assert ANSWER.read(old).found == (Detection("duck", 0.9, (1, 2, 3, 4)),)
+@few
+@given(detections, arrays(np.float64, 3, elements=finite), finite, st.booleans(), st.text(max_size=5))
+def test_observations_come_back(
+    detection: Detection, position: np.ndarray, std: float, confident: bool, contradiction: str
+) -> None:
+    (read,) = back(OBSERVATIONS, [Observation(detection, position, std, confident, contradiction)])
+    assert np.array_equal(read.position, position)
+    others = (read.detection, read.std, read.confident, read.contradiction)
+    assert others == (detection, std, confident, contradiction)

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from executive.cell.detection import Detection, Detections, Glimpse
+from executive.cell.detection import Detection, Detections, Observation
 from executive.cell.frame import Frame
 from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.errors import NoDepth
-from executive.geometry import Array
 from executive.testing.run_skill import run_skill
 from skills.detect import Detect
 from skills.localize import Localize
@@ -72,15 +71,15 @@ def test_a_cube_on_a_duck_in_the_depth_image_is_a_cube(fake: FakeCell) -> None:
 def test_an_object_in_a_bin_may_lie_at_any_height(fake: FakeCell, monkeypatch: pytest.MonkeyPatch) -> None:
     x, y, _ = fake.cell.bins["red_bin"].position
     fake.world.put("cube", x, y)
-    observed: list[tuple[int, int]] = []
+    observed: list[bool] = []
 
-    def observe(look: Detections, places: list[Array], glimpses: list[Glimpse]) -> list[Target]:
-        observed.append((len(look.found), len(glimpses)))
+    def observe(look: Detections, observations: list[Observation]) -> list[Target]:
+        observed.extend(one.confident for one in observations)
         return []
 
     monkeypatch.setattr(fake.ledger, "observe", observe)
     look_in_depth(fake, 0.08)
-    assert observed == [(1, 0)]
+    assert observed == [True]
 
 
 def unsure(fake: FakeCell):

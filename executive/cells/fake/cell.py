@@ -28,8 +28,9 @@ from executive.ledger.item import State
 from executive.ledger.tracker import ItemLedger
 from executive.mission.parse.cell_file import load_cell
 from executive.mission.text.files import shipped_folder
+from executive.perception.detectors.screening import screen_detectors
 from executive.perception.evidence import classes_distinct_by_touch
-from executive.perception.localization.plane import PlaneLocalizer
+from executive.perception.localization.localizer import build_localizer
 
 ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
 """Where the classes of the shipped cells go."""
@@ -122,9 +123,9 @@ class FakeCell:
             arm=self.arm,
             tool=self.tool,
             camera=self.camera,
-            detectors=self.detectors,
+            detectors=screen_detectors(self.detectors, classes),
             operator=options.operator,
-            localizer=PlaneLocalizer(classes),
+            localizer=build_localizer("plane", classes, bins.values()),
         )
 
     @staticmethod

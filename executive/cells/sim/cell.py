@@ -33,10 +33,11 @@ from executive.ledger.tracker import ItemLedger
 from executive.mission.text.files import shipped_folder
 from executive.motion.planner import Planner
 from executive.perception.detectors.registry import find_problems, known_labels
+from executive.perception.detectors.screening import screen_detectors
 from executive.perception.detectors.setting import ClosableDetector
 from executive.perception.envelope.rated_detectors import build_rated_detectors
 from executive.perception.evidence import classes_distinct_by_touch
-from executive.perception.localization.build import build_localizer
+from executive.perception.localization.localizer import build_localizer
 
 
 class SimCell:
@@ -101,7 +102,7 @@ class SimCell:
             self._camera.skip(options.past.frames, options.past.turns)
         classes = {label: weighed(label, kind) for label, kind in config.objects.items()}
 
-        localizer = build_localizer(config.localization, classes, self._world.cast_ray)
+        localizer = build_localizer(config.localization, classes, self._bins.values(), self._world.cast_ray)
         # Last of all: some of them start processes, which nobody would end if something after them failed.
         folders = (options.base, shipped_folder() / "cells")
         self._detectors = detectors(
@@ -113,7 +114,7 @@ class SimCell:
             arm=self._arm,
             tool=self._tool,
             camera=self._camera,
-            detectors=self._detectors,
+            detectors=screen_detectors(self._detectors, classes),
             operator=options.operator,
             classes=classes,
             localizer=localizer,

@@ -67,13 +67,11 @@ def look(fake: FakeCell) -> tuple[Detections, list[Target]]:
     """Return what the first detector sees on the table, and where the ledger takes everything to be."""
     camera, view = fake.camera, "table"
     frame = camera.capture()
-    request = fake.detector.request(frame, view)
+    request = next(iter(fake.cell.detectors.values())).request(frame, view)
     while not request.ready:
         fake.advance()
-    answer = request.result()
-    detections = Detections(frame, answer.found, answer.detector, answer.error_rates, view, camera.area(view))
-    positions = [fake.cell.localizer.locate(detection, frame) for detection in answer.found]
-    return detections, list(fake.ledger.observe(detections, positions))
+    detections = Detections(**vars(request.result()), frame=frame, view=view, area=camera.area(view))
+    return detections, list(fake.ledger.observe(detections, fake.cell.localizer.localize(detections)))
 
 
 def _works_on_target(skill: type[Skill]) -> bool:

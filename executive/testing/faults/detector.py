@@ -27,20 +27,20 @@ def unchanged(answer: Answer) -> Answer:
 
 def refuse(answer: Answer) -> Answer:
     """Raise Unavailable."""
-    del answer
-    raise Unavailable("the detector is dead, as the test wants it")
+    raise Unavailable(f"detector {answer.detector}: the detector is dead, as the test wants it")
 
 
 def doubt(answer: Answer) -> Answer:
     """Return an answer whose confidences are below the threshold."""
     most = DOUBT * answer.error_rates.threshold
-    found = tuple(replace(one, confidence=min(one.confidence, most)) for one in answer.found)
-    return replace(answer, found=found)
+    seen = sorted((*answer.found, *answer.doubtful), key=lambda one: -one.confidence)
+    doubtful = tuple(replace(one, confidence=min(one.confidence, most)) for one in seen)
+    return replace(answer, found=(), doubtful=doubtful, unknown=())
 
 
 def overlook(answer: Answer) -> Answer:
     """Return an answer in which nothing was found."""
-    return replace(answer, found=())
+    return replace(answer, found=(), doubtful=(), unknown=())
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from executive.testing.faults.script import Disturbance, DuringNode
 _DISTURBED = frozenset(
     {
         "arm.plan", "tool.close", "tool.open", "camera.sees_table", "camera.capture", "detector.request",
-        "localizer.locate", "operator.ask",
+        "localizer.localize", "operator.ask",
     }
 )  # fmt: skip
 """Accesses that go through the schedule; the method of an effect has the name of the member."""

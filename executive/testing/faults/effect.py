@@ -15,8 +15,8 @@ class Effect:
 
     An effect is a value without state: the state of one occurrence is in its `Occasion`. A subclass acts by
     itself (`act`), or between the skills and the cell: it then defines `close`, `open` (tool), `plan` (arm),
-    `sees_table`, `capture` (camera), `request` (detector), `locate` (localizer) or `ask` (operator). Each of
-    these methods gets a function that asks the cell, and the occasion, and returns the answer.
+    `sees_table`, `capture` (camera), `request` (detector), `localize` (localizer) or `ask` (operator). Each
+    of these methods gets a function that asks the cell, and the occasion, and returns the answer.
 
     Attributes:
         name: Name of the effect in the record.

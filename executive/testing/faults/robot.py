@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from executive.cell.arm import Motion, Planning
+from executive.cell.detection import Observation
 from executive.cell.frame import Frame
 from executive.errors import Blocked, NoDepth, Unreachable
-from executive.geometry import Array
 from executive.testing.faults.effect import Effect, Occasion, checked_share
 
 
@@ -151,7 +151,7 @@ class DepthMissing(Effect):
 
     name = "no_depth"
 
-    def locate(self, ask: Callable[[], Array], now: Occasion) -> Array:
+    def localize(self, ask: Callable[[], Sequence[Observation]], now: Occasion) -> Sequence[Observation]:
         """Raise NoDepth."""
         del ask
         now.tell()

@@ -50,13 +50,8 @@ def look(made: SimCell) -> None:
     request = cell.detectors["embedded"].request(frame, "full")
     while not request.ready:
         made.advance()
-    answer = request.result()
-    found = answer.found
-    positions = [cell.localizer.locate(detection, frame) for detection in found]
-    detections = Detections(
-        frame, found, answer.detector, answer.error_rates, "full", cell.camera.area("full")
-    )
-    cell.ledger.observe(detections, positions)
+    detections = Detections(**vars(request.result()), frame=frame, view="full", area=cell.camera.area("full"))
+    cell.ledger.observe(detections, cell.localizer.localize(detections))
 
 
 def put(made: SimCell, body: int, place: tuple[float, float, float]) -> None:

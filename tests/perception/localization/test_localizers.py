@@ -14,14 +14,11 @@ from executive.cell.frame import Frame
 from executive.cell.objects import ObjectClass
 from executive.errors import NoDepth
 from executive.perception.camera_model import camera_matrix, looking_at, project
-from executive.perception.localization.build import build_localizer
-from executive.perception.localization.depth import DepthLocalizer
-from executive.perception.localization.plane import PlaneLocalizer
-from executive.perception.localization.ray import RayLocalizer
+from executive.perception.localization.localizer import build_localizer
 
 SIDE = 0.05
 CLASSES = {"cube": ObjectClass("cube", SIDE, 0.0354)}
-PLANE, DEPTH = PlaneLocalizer(CLASSES), DepthLocalizer(CLASSES)
+PLANE, DEPTH = build_localizer("plane", CLASSES), build_localizer("depth", CLASSES)
 K = camera_matrix(640, 480, 55)
 ABOVE = looking_at([0.5, 0.0, 1.2], [0.5, 0.0, 0.0], [1, 0, 0])
 ASKEW = looking_at([0.3, 0.3, 1.0], [0.5, 0.0, 0.0], [1, 0, 0])
@@ -85,7 +82,7 @@ def test_a_ray_is_cast_from_the_lens_through_the_middle_of_the_box():
         assert origin == pytest.approx(ABOVE.position)
         return origin + (centre[2] + SIDE / 2 - origin[2]) / direction[2] * direction
 
-    found = RayLocalizer(CLASSES, onto_the_top).locate(*showing_cube(centre))
+    found = build_localizer("ray", CLASSES, cast=onto_the_top).locate(*showing_cube(centre))
     assert found == pytest.approx(centre, abs=0.002)
 
 
@@ -112,7 +109,7 @@ def with_one_pixel(detection, frame):
             "frame 7 has no depth image; set `localization: plane`, or `depth` of the camera eye",
         ),
         (
-            RayLocalizer(CLASSES, lambda origin, direction: None),
+            build_localizer("ray", CLASSES, cast=lambda origin, direction: None),
             lambda one, frame: (one, frame),
             "the ray through pixel (320, 240) of frame 7 hits nothing",
         ),
@@ -127,8 +124,3 @@ def test_what_keeps_an_object_from_being_localized_is_told(localizer, spoil, tex
     with pytest.raises(NoDepth) as caught:
         localizer.locate(*spoil(*showing_cube(IN_THE_MIDDLE)))
     assert str(caught.value).startswith(text)
-
-
-def test_the_cell_file_s_word_decides():
-    for way, kind in {"plane": PlaneLocalizer, "depth": DepthLocalizer, "ray": RayLocalizer}.items():
-        assert type(build_localizer(way, CLASSES, lambda origin, direction: None)) is kind

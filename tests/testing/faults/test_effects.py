@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from executive.cell.detection import Observation
 from executive.cell.protocols import Request
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Blocked, NoDepth, Unavailable, Unreachable
@@ -152,9 +153,9 @@ def test_an_unsure_detector_sees_everything_and_believes_nothing() -> None:
     request = ask(cell)
     answered(cell, request)
     answer = request.result()
-    assert [one.label for one in answer.found] == list(PLACES)
+    assert (answer.found, [one.label for one in answer.doubtful]) == ((), list(PLACES))
     threshold = answer.error_rates.threshold
-    assert [one.confidence for one in answer.found] == pytest.approx([0.9 * threshold] * 3)
+    assert [one.confidence for one in answer.doubtful] == pytest.approx([0.9 * threshold] * 3)
 
 
 @pytest.mark.parametrize("share", [0.2, 0.8])
@@ -249,7 +250,7 @@ def test_nothing_that_the_arm_hides_is_believed_and_it_is_told_once_a_control_st
 def test_no_detection_can_be_localized() -> None:
     cell: Any = cell_with(effects.no_depth())
     with pytest.raises(NoDepth, match="the frame has no depth there, as the test wants it"):
-        cell.cell.localizer.locate(None, None)
+        cell.cell.localizer.localize(None)
 
 
 @pytest.mark.parametrize(("which", "gone"), [(1, "cube"), (2, "sphere"), ("nearest", "duck"), (4, "")])
@@ -278,7 +279,7 @@ def test_the_object_of_a_node_is_what_the_ledger_takes_for_its_item() -> None:
         script = [during("*/Approach", effects.object_removed())]
         cell = DisturbedCell(cell.fake, script)
         look = run_skill(Detect, cell).outputs["detections"]
-        places = [np.array([*PLACES[one.label], 0.025]) for one in look.found]
+        places = [Observation(one, np.array([*PLACES[one.label], 0.025]), 0.003) for one in look.found]
         items = {one.label: one.item for one in cell.cell.ledger.observe(look, places)}
         item = items["sphere"]
         cell.inner.world.objects[1].position[0] += near

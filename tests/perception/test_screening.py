@@ -1,0 +1,66 @@
+"""Answers of detectors, screened before a skill reads them."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from executive.cell.detection import Answer, Detection
+from executive.cell.error_rates import ErrorRates
+from executive.cell.frame import Frame
+from executive.errors import Crowded, Unavailable
+from executive.geometry import Pose
+from executive.perception.detectors.screening import MAX_BOXES, screen, screen_detectors
+
+RATES = ErrorRates(threshold=0.5, misses=0.02, confused=0.0025, invented=0.02, jitter=0.7)
+VISIBLE = np.ones((20, 20), bool)
+VISIBLE[:, 10:] = False  # The arm hides the right half.
+FRAME = Frame(1, "eye", np.zeros((20, 20, 3), np.uint8), None, np.eye(3), Pose.identity(), 0.0, VISIBLE, 0)
+
+
+def detect(label: str = "cube", confidence: float = 0.9, right: float = 9.0, rival: float = 0.0) -> Detection:
+    return Detection(label, confidence, (right - 9.0, 0.0, right, 9.0), rival)
+
+
+def test_detections_are_divided_by_confidence_second_class_and_label() -> None:
+    cube, weak, torn = detect(), detect(confidence=0.4), detect(confidence=0.7, rival=0.4)
+    mug, weak_mug = detect("mug"), detect("mug", confidence=0.4)
+    answer = screen(Answer("eye", (cube, mug, torn, weak, weak_mug), RATES), FRAME, "table", ["cube"])
+    assert (answer.found, answer.doubtful, answer.unknown) == ((cube,), (torn, weak), (mug,))
+
+
+def test_a_box_that_the_arm_hides_is_left_out() -> None:
+    shown, hidden = detect(right=12.0), detect(right=16.0)
+    assert screen(Answer("eye", (shown, hidden), RATES), FRAME, "table", ["cube"]).found == (shown,)
+
+
+def raise_unavailable() -> Answer:
+    raise Unavailable("the line is busy")
+
+
+@pytest.mark.parametrize(
+    ("result", "error", "message"),
+    [
+        (raise_unavailable, Unavailable, "detector eye: the line is busy"),
+        (
+            lambda: Answer("eye", (detect(confidence=1.5),), RATES),
+            Unavailable,
+            "detector eye gave an invalid box: 'cube' 1.5 at (0.0, 0.0, 9.0, 9.0)",
+        ),
+        (
+            lambda: Answer("eye", (detect(),) * (MAX_BOXES + 1), RATES),
+            Crowded,
+            "detector eye found 61 boxes in the view full, which cannot all be objects; at most 60 are "
+            "allowed: raise `floor` of the detector in the cell file, or use another detector",
+        ),
+    ],
+)
+def test_an_unusable_answer_names_the_detector(result: Any, error: type[Exception], message: str) -> None:
+    eye: Any = SimpleNamespace(request=lambda frame, view: SimpleNamespace(ready=True, result=result))
+    request = screen_detectors({"eye": eye}, ["cube"])["eye"].request(FRAME, "full")
+    with pytest.raises(error) as raised:
+        request.result()
+    assert str(raised.value) == message
