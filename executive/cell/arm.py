@@ -73,7 +73,7 @@ class Arm(Protocol):
 
     @property
     def q(self) -> Array:
-        """Measured joint positions `(7,)` [rad]."""
+        """Measured joint positions `(n,)` [rad]."""
 
     @property
     def tool_pose(self) -> Pose:

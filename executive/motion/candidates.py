@@ -10,9 +10,9 @@ import numpy as np
 from executive.cell.arm import Goal
 from executive.geometry import Array
 from executive.motion.cartesian_line import SAMPLES, Line
-from executive.motion.kinematics import Kinematics
-from executive.motion.limits import JointLimits, rest_to_rest
-from executive.motion.postures import find_postures, line_chain
+from executive.motion.kinematics import Configuration, Kinematics
+from executive.motion.limits import JointLimits, min_time
+from executive.motion.postures import find_postures, solve_vertical_line
 from executive.motion.state import State
 
 UNLIKE = 0.2
@@ -27,13 +27,13 @@ class Way:
         estimate: Least time that it takes [s].
         entry: State in which the free part ends.
         arrival: What follows it, straight down, or None.
-        posture: Branch and swivel [rad] of the posture it ends in, or None for a named pose.
+        configuration: Configuration in which it ends, or None for a named pose.
     """
 
     estimate: float
     entry: State
     arrival: Line | None
-    posture: tuple[int, float] | None
+    configuration: Configuration | None
 
     @property
     def tail(self) -> float:
@@ -50,17 +50,17 @@ def ways_down(
         Unreachable: There is no posture.
     """
     postures = find_postures(kinematics, goal, length, start.q)
-    estimates = rest_to_rest(postures.high - start.q, limits)
+    estimates = min_time(postures.high - start.q, limits)
     taken: list[Array] = []
     for number in np.argsort(estimates, kind="stable"):
         low = postures.low[number]
         if any(np.max(np.abs(low - other)) <= UNLIKE for other in taken):
             continue
         taken.append(low)
-        posture = int(postures.branch[number]), float(postures.swivel[number])
+        configuration = postures.configurations[number]
         arrival, entry = None, State.rest(low)
         if length > 0:
-            chain = line_chain(kinematics, low, length, SAMPLES, *posture)[::-1]
+            chain = solve_vertical_line(kinematics, low, length, SAMPLES, configuration)[::-1]
             arrival = Line(chain, length, limits, goal.speed, enters=True)
             entry = arrival.at(0.0)
-        yield Way(float(estimates[number]), entry, arrival, posture)
+        yield Way(float(estimates[number]), entry, arrival, configuration)

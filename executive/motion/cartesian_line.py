@@ -35,7 +35,7 @@ class Line:
     An end at which it does not rest is passed at the largest speed that leaves room to rest at the other.
 
     Args:
-        chain: Joint positions `(N, 7)` [rad] at N places evenly spread along it, `N` > 3.
+        chain: Joint positions `(N, n)` [rad] at N places evenly spread along it, `N` > 3.
         length: Its length [m].
         limits: What the joints may do.
         speed: Largest speed of the tool [m/s].
@@ -80,7 +80,7 @@ class Line:
         return State(self._spline(place), first * speed, first * change + second * speed**2)
 
     def over(self, times: Array) -> State:
-        """Return the states at `times` `(N,)` [s], each array of shape `(N, 7)`."""
+        """Return the states at `times` `(N,)` [s], each array of shape `(N, n)`."""
         place, speed, change = np.array([self._profile.at_time(s) for s in times.tolist()])[:, :, 0].T
         first, second = (derivative(place) for derivative in self._derivatives)
         bent = second * speed[:, None] ** 2

@@ -1,29 +1,61 @@
-"""Limits of the arm's joints as arrays in SI units, and how long moves within them take at least."""
+"""Joint limits as arrays in SI units, and the minimum time of a motion within them."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from executive.cell.config import LimitsConfig
 from executive.geometry import Array
 
 
-@dataclass(frozen=True, eq=False)
-class JointLimits:
-    """Joint limits, each of shape `(7,)`.
+class JointRange(NamedTuple):
+    """Range of the joint positions.
 
     Attributes:
-        position: Largest angle to either side [rad].
+        lower: Smallest joint positions `(n,)` [rad].
+        upper: Largest joint positions `(n,)` [rad].
+    """
+
+    lower: Array
+    upper: Array
+
+    def shrink(self, margin: float) -> JointRange:
+        """Return the range without a margin [rad] at both ends of every joint."""
+        return JointRange(self.lower + margin, self.upper - margin)
+
+    def contains(self, qs: Array) -> NDArray[np.bool_]:
+        """Return `(...)` bool: True for joint positions `(..., n)` [rad] within the range."""
+        return np.asarray(np.all((self.lower <= qs) & (qs <= self.upper), axis=-1))
+
+    def excess(self, qs: Array) -> Array:
+        """Return how far each joint of `qs` `(..., n)` is outside the range [rad]; negative inside."""
+        return np.asarray(np.maximum(qs - self.upper, self.lower - qs))
+
+    def describe(self, joint: int) -> str:
+        """Return the range of a joint, by its index, in words."""
+        lower, upper = math.degrees(self.lower[joint]), math.degrees(self.upper[joint])
+        return f"±{upper:.0f}°" if lower == -upper else f"{lower:.0f}° to {upper:.0f}°"
+
+
+@dataclass(frozen=True, eq=False)
+class JointLimits:
+    """Limits of `n` joints, each an array `(n,)`.
+
+    Attributes:
+        position: Range of the joint positions.
         velocity: [rad/s].
         acceleration: [rad/s²].
         jerk: [rad/s³].
-        stop_acceleration: Largest acceleration while braking [rad/s²].
-        stop_jerk: Largest jerk while braking [rad/s³].
+        stop_acceleration: Maximum acceleration while braking [rad/s²].
+        stop_jerk: Maximum jerk while braking [rad/s³].
     """
 
-    position: Array
+    position: JointRange
     velocity: Array
     acceleration: Array
     jerk: Array
@@ -32,9 +64,10 @@ class JointLimits:
 
     @staticmethod
     def of(config: LimitsConfig) -> JointLimits:
-        """Return the limits of a cell file in radians."""
+        """Return the limits of a cell file."""
+        lower, upper = np.radians(config.position_ranges_deg).T
         return JointLimits(
-            position=np.radians(config.position_deg),
+            position=JointRange(lower, upper),
             velocity=np.radians(config.velocity_deg),
             acceleration=np.array(config.acceleration),
             jerk=np.array(config.jerk),
@@ -42,16 +75,21 @@ class JointLimits:
             stop_jerk=np.array(config.stop_jerk),
         )
 
+    @property
+    def joint_count(self) -> int:
+        """Number of joints, `n`."""
+        return len(self.velocity)
 
-def rest_to_rest(change: Array, limits: JointLimits) -> Array:
-    """Return the shortest time `(...)` [s] of a move from rest to rest by `change` `(..., 7)` [rad].
 
-    Every joint has a profile of its own, and the slowest one decides. A jerk-limited profile reaches the
-    largest velocity, or only the largest acceleration, or neither, depending on how far the move is.
+def min_time(change: Array, limits: JointLimits) -> Array:
+    """Return the minimum time `(...)` [s] of a motion from rest to rest by `change` `(..., n)` [rad].
+
+    Each joint has its own jerk-limited profile, and the slowest joint determines the time. Depending on the
+    distance, a profile reaches the maximum velocity, or only the maximum acceleration, or neither.
     """
     far = np.abs(change)
     v, a, j = limits.velocity, limits.acceleration, limits.jerk
-    rise = a / j  # [s] from rest to the largest acceleration
-    ramp = np.where(v >= a * rise, v / a + rise, 2 * np.sqrt(v / j))  # [s] to the largest velocity
+    rise = a / j  # [s] from rest to the maximum acceleration
+    ramp = np.where(v >= a * rise, v / a + rise, 2 * np.sqrt(v / j))  # [s] to the maximum velocity
     short = np.where(far >= 2 * a * rise**2, rise + np.sqrt(rise**2 + 4 * far / a), 4 * np.cbrt(far / 2 / j))
     return np.max(np.where(far >= v * ramp, far / v + ramp, short), axis=-1)

@@ -19,7 +19,7 @@ from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.payload import Hold
 from executive.motion.point_to_point import Connector, Free, NoProfile
-from executive.motion.state import JOINTS, State
+from executive.motion.state import State
 from executive.motion.transcription import SAMPLES, STEPS, WEIGHT, Course, Demand, Transcription
 
 NEAR = 0.03
@@ -55,26 +55,28 @@ class Gap:
     hold: Hold | None = None
 
     def slack(self, qs: Array) -> Array:
-        """Return by how much joint positions `(N, 7)` keep their distance [m] and limits [rad] `(N,)`."""
+        """Return by how much joint positions `(N, n)` keep their distance [m] and limits [rad] `(N,)`."""
         tips, axes = self.kinematics.tips(qs)
         return np.minimum(self.surroundings.slack(tips, axes, self.discs), self._inside(qs).min(axis=1))
 
     def slopes(self, qs: Array, slack: Array) -> Array:
-        """Return how the slack `(N,)` at joint positions `(N, 7)` depends on each joint `(N, 7)` [m/rad]."""
+        """Return how the slack `(N,)` at joint positions `(N, n)` depends on each joint `(N, n)` [m/rad]."""
         tips, axes = self.kinematics.tips(qs)
-        moved = self.kinematics.tips((qs[:, None] + _DIFFERENCE * np.eye(JOINTS)).reshape(-1, JOINTS))
-        shaped = moved[0].reshape(-1, JOINTS, 3), moved[1].reshape(-1, JOINTS, 3)
+        count = qs.shape[1]
+        moved = self.kinematics.tips((qs[:, None] + _DIFFERENCE * np.eye(count)).reshape(-1, count))
+        shaped = moved[0].reshape(-1, count, 3), moved[1].reshape(-1, count, 3)
         slopes = self.surroundings.slopes(tips, axes, self.discs, shaped) / _DIFFERENCE
         inside = self._inside(qs)
         joint = np.argmin(inside, axis=1)
         number = np.arange(len(qs))
         limited = inside[number, joint] <= slack
         slopes[limited] = 0.0
-        slopes[number[limited], joint[limited]] = -np.sign(qs[number[limited], joint[limited]])
+        middle = (self.kinematics.joint_range.lower + self.kinematics.joint_range.upper) / 2
+        slopes[number[limited], joint[limited]] = -np.sign((qs - middle)[number[limited], joint[limited]])
         return slopes
 
     def _inside(self, qs: Array) -> Array:
-        return np.asarray(self.kinematics.position_limit - INSIDE - np.abs(qs))
+        return -self.kinematics.joint_range.shrink(INSIDE).excess(qs)
 
 
 class Detour:
@@ -82,7 +84,7 @@ class Detour:
 
     Args:
         gap: The gap.
-        first: A way over it `(M, 7)` [rad] at the places that a course is looked at, however slow.
+        first: A way over it `(M, n)` [rad] at the places that a course is looked at, however slow.
         duration: Of that way [s].
 
     Attributes:

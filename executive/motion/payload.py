@@ -10,7 +10,6 @@ from executive.cell.clock import STEP
 from executive.cell.objects import Load
 from executive.geometry import GRAVITY, Array
 from executive.motion.kinematics import Kinematics
-from executive.motion.state import JOINTS
 from executive.motion.trajectory import Trajectory
 from executive.motion.transcription import SAMPLES, Demand
 
@@ -64,7 +63,7 @@ class Hold:
         return trajectory if share >= 1 else trajectory.slowed(math.sqrt(max(share, GENTLEST)))
 
     def demand(self, qs: Array, time: float, near: float) -> Demand:
-        """Return what it demands of positions of a course `(M, 7)` [rad], `time` [s] apart from each other.
+        """Return what it demands of positions of a course `(M, n)` [rad], `time` [s] apart from each other.
 
         Left out is what is farther than `near` from its bounds. A metre stands for 50 m/s².
         """
@@ -78,8 +77,8 @@ class Hold:
         slack = METRES * (self._most - pull)
         chosen = np.nonzero(slack < near)[0]
         rows, direction = rows[chosen], felt[chosen] / pull[chosen, None]
-        moved = qs[rows][:, :, None] + _DIFFERENCE * np.eye(JOINTS)
-        there = self._middles(moved.reshape(-1, JOINTS)).reshape(*moved.shape[:3], 3)
+        moved = qs[rows][:, :, None] + _DIFFERENCE * np.eye(qs.shape[1])
+        there = self._middles(moved.reshape(-1, qs.shape[1])).reshape(*moved.shape[:3], 3)
         jacobian = (there - middles[rows][:, :, None]) / _DIFFERENCE
         slopes = -METRES / time**2 * np.einsum("k,rkjx,rx->rkj", _WEIGHTS, jacobian, direction)
         # The same positions in more time: accelerations fall with its square.
@@ -87,7 +86,7 @@ class Hold:
         return Demand(slack[chosen], rows, slopes, growth)
 
     def _middles(self, qs: Array) -> Array:
-        """Return the middle of the load at joint positions `(N, 7)` as `(N, 3)` [m]."""
+        """Return the middle of the load at joint positions `(N, n)` as `(N, 3)` [m]."""
         tips, axes = self._kinematics.tips(qs)
         return np.asarray(tips + self._middle * axes)
 

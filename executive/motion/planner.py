@@ -22,8 +22,7 @@ from executive.cell.config import CellConfig
 from executive.cell.layout import travel_height
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
-from executive.motion.clearance_model import BETWEEN
-from executive.motion.kinematics import Kinematics, fold
+from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.payload import Hold
 from executive.motion.point_to_point import NoProfile
@@ -32,7 +31,7 @@ from executive.motion.search import Search
 from executive.motion.trajectory import Trajectory, thinned
 
 Check = Callable[[Array, Task], None]
-"""Takes joint positions along a path `(N, 7)` [rad] and what it has to heed; raises Blocked."""
+"""Takes joint positions along a path `(N, n)` [rad] and what it has to heed; raises Blocked."""
 
 SPACING = math.radians(1.0)
 """Largest joint move between the states whose clearance is checked [rad]."""
@@ -43,24 +42,23 @@ class Planner:
 
     Args:
         config: The cell file.
+        kinematics: Kinematics of its arm.
         check: The last word on clearance; by default none beyond the search's own.
 
     Attributes:
-        kinematics: The arm's; joint 6 bends only as far as the wrist may fold.
+        kinematics: Kinematics of the arm.
         limits: Its joints'.
     """
 
-    def __init__(self, config: CellConfig, check: Check | None = None) -> None:
+    def __init__(self, config: CellConfig, kinematics: Kinematics, check: Check | None = None) -> None:
         self.limits = JointLimits.of(config.arm.limits)
-        bent = self.limits.position.copy()
-        bent[5] = min(bent[5], fold(config.motion.margin + BETWEEN))
-        self.kinematics = Kinematics(config.tool.length, bent)
+        self.kinematics = kinematics
         self._config = config
         self._check = check
         self._height = travel_height(config)
 
     def plan(self, q_start: ArrayLike, goal: Goal | ArrayLike, task: Task = Task()) -> Trajectory:
-        """Return the fastest motion found from rest at `q_start` `(7,)` [rad] to a goal or joint positions.
+        """Return the fastest motion found from rest at `q_start` `(n,)` [rad] to a goal or joint positions.
 
         Raises:
             Unreachable: The goal has no joint solution inside the limits.
@@ -77,7 +75,8 @@ class Planner:
         Raises:
             Unreachable: They cannot; the text says how far off it is.
         """
-        find_postures(self.kinematics, goal, max(0.0, self._height - goal.position[2]), np.zeros(7))
+        rise = max(0.0, self._height - goal.position[2])
+        find_postures(self.kinematics, goal, rise, np.zeros(self.limits.joint_count))
 
     def _plan(self, start: Array, end: Goal | Array, task: Task) -> Trajectory:
         search = Search(self._config, self.kinematics, self.limits, start, end, _keeping_clear(task))

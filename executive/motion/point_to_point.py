@@ -15,7 +15,7 @@ from ruckig import Trajectory as Profile
 from executive.errors import Fault
 from executive.geometry import Array
 from executive.motion.limits import JointLimits
-from executive.motion.state import JOINTS, State
+from executive.motion.state import State
 
 _ROUNDING = 1e-9  # share of a limit
 
@@ -36,7 +36,7 @@ class Free:
         return State(*map(np.array, self._profile.at_time(s)))
 
     def over(self, times: Array) -> State:
-        """Return the states at `times` `(N,)` [s], each array of shape `(N, 7)`."""
+        """Return the states at `times` `(N,)` [s], each array of shape `(N, n)`."""
         states = np.array([self._profile.at_time(s) for s in times.tolist()])
         return State(states[:, 0], states[:, 1], states[:, 2])
 
@@ -46,8 +46,8 @@ class Connector:
 
     def __init__(self, limits: JointLimits) -> None:
         self.limits = limits
-        self._ruckig = Ruckig(JOINTS)
-        self._input = InputParameter(JOINTS)
+        self._ruckig = Ruckig(limits.joint_count)
+        self._input = InputParameter(limits.joint_count)
         self._input.max_velocity = limits.velocity.tolist()
         self._input.max_acceleration = limits.acceleration.tolist()
         self._input.max_jerk = limits.jerk.tolist()
@@ -59,11 +59,12 @@ class Connector:
 
         Raises:
             NoProfile: There is none, for instance because a velocity is outside the limits.
-            Fault: A state is not of seven finite numbers each: ruckig would read out of bounds or crash.
+            Fault: A state has not one finite number for each joint: ruckig would read out of bounds or crash.
         """
+        count = self.limits.joint_count
         for values in (*start, *end):
-            if values.shape != (JOINTS,) or not math.isfinite(float(values.sum())):
-                raise Fault(f"a motion needs states of {JOINTS} finite numbers, not {values}")
+            if values.shape != (count,) or not math.isfinite(float(values.sum())):
+                raise Fault(f"a motion needs states of {count} finite numbers, not {values}")
         inputs = self._input
         inputs.current_position, inputs.current_velocity, inputs.current_acceleration = (
             values.tolist() for values in start
@@ -72,7 +73,7 @@ class Connector:
             values.tolist() for values in end
         )
         inputs.minimum_duration = least
-        profile = Profile(JOINTS)
+        profile = Profile(count)
         try:
             result = self._ruckig.calculate(inputs, profile)
         except (RuckigError, ValueError) as error:
@@ -85,7 +86,7 @@ class Connector:
 
 
 def _fastest(profile: Profile) -> Array:
-    """Return the largest speed of every joint `(7,)` [rad/s].
+    """Return the largest speed of every joint `(n,)` [rad/s].
 
     Where an acceleration changes sign within a phase, ruckig does not always look.
     """

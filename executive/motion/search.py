@@ -17,12 +17,12 @@ from executive.geometry import Array, tool_down
 from executive.motion.candidates import Way, ways_down
 from executive.motion.cartesian_line import SAMPLES, Line
 from executive.motion.clearance_model import Surroundings, hanging
-from executive.motion.kinematics import Kinematics
+from executive.motion.kinematics import Configuration, Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.optimizer import Detour, Gap
 from executive.motion.payload import Hold
 from executive.motion.point_to_point import Connector, NoProfile
-from executive.motion.postures import line_chain, upright_line
+from executive.motion.postures import find_vertical_line, solve_vertical_line
 from executive.motion.state import Piece, State
 from executive.motion.trajectory import Trajectory, over
 from executive.motion.transcription import PLACES
@@ -46,8 +46,8 @@ class Search:
         config: The cell file.
         kinematics: The arm's.
         limits: Its joints'.
-        start: Where it rests `(7,)` [rad].
-        end: Where it goes: a goal, or joint positions `(7,)` [rad].
+        start: Where it rests `(n,)` [rad].
+        end: Where it goes: a goal, or joint positions `(n,)` [rad].
         task: What it has to heed; what is to be touched in the end is in `around`.
     """
 
@@ -87,7 +87,7 @@ class Search:
                     yield self._motion(way, *self._corners(way, lift, straight=True))
 
     def require_clear(self, qs: Array) -> None:
-        """Make sure that states `(N, 7)` [rad] keep away from things, and from where things may be.
+        """Make sure that states `(N, n)` [rad] keep away from things, and from where things may be.
 
         Raises:
             Blocked: One does not.
@@ -179,12 +179,12 @@ class Search:
             self._rises[high, straight] = self._rise(high, straight)
         up, here = self._rises[high, straight]
         (x, y, z), _ = self._tip(way.entry.q)
-        if way.posture is None or z >= high:
+        if way.configuration is None or z >= high:
             return [*up, connect(here, way.entry)]
         if straight and way.arrival is None:
-            chain = line_chain(self._kinematics, way.entry.q, high - z, SAMPLES, *way.posture)
+            chain = solve_vertical_line(self._kinematics, way.entry.q, high - z, SAMPLES, way.configuration)
             return [*up, connect(here, State.rest(chain[-1])), Line(chain[::-1], high - z, self._limits)]
-        above = self._above((x, y, high), *way.posture, way.entry.q)
+        above = self._above((x, y, high), way.configuration, way.entry.q)
         return [*up, connect(here, above), connect(above, way.entry)]
 
     def _rise(self, high: float, straight: bool) -> tuple[list[Piece], State]:
@@ -193,20 +193,20 @@ class Search:
         if not upright or z >= high:
             return [], self._start
         if straight and self._departure is None:
-            chain = upright_line(self._kinematics, q, high - z, SAMPLES)
+            chain = find_vertical_line(self._kinematics, q, high - z, SAMPLES)
             if chain is not None:
                 return [Line(chain, high - z, self._limits)], State.rest(chain[-1])
-        above = self._above((x, y, high), self._kinematics.branch(q), self._kinematics.swivel(q), q)
+        above = self._above((x, y, high), self._kinematics.configuration(q), q)
         return [self._connector.connect(self._start, above)], above
 
     def _tip(self, q: Array) -> tuple[Array, bool]:
         tips, axes = self._kinematics.tips(q[None])
         return tips[0], bool(-axes[0, 2] > POINTS_DOWN)
 
-    def _above(self, place: tuple[float, float, float], branch: int, swivel: float, near: Array) -> State:
-        """Return the state of rest at a place in a posture, joint 7 as at `near` `(7,)` [rad]."""
-        q = self._kinematics.grid(tool_down(place), np.array([swivel]))[branch, 0]
-        q[6] = near[6]
+    def _above(self, place: tuple[float, float, float], configuration: Configuration, near: Array) -> State:
+        """Return the state of rest at a place, with the last joint as at `near` `(n,)` [rad]."""
+        q = self._kinematics.solve(tool_down(place), configuration)
+        q[-1] = near[-1]
         return State.rest(q)
 
     def _depart(self, start: Array, height: float) -> Line | None:
@@ -218,7 +218,7 @@ class Search:
         length = self._straight or (LOOSE if self._hold else 0.0)
         if not length or height + length > self._height:
             return None
-        chain = upright_line(self._kinematics, start, length, SAMPLES)
+        chain = find_vertical_line(self._kinematics, start, length, SAMPLES)
         if chain is None:
             return None
         borne = self._hold.lift if self._hold else math.inf

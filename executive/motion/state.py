@@ -8,11 +8,9 @@ import numpy as np
 
 from executive.geometry import Array
 
-JOINTS = 7
-
 
 class State(NamedTuple):
-    """Position [rad], velocity [rad/s] and acceleration [rad/s²] of the joints, each `(7,)`."""
+    """Position [rad], velocity [rad/s] and acceleration [rad/s²] of the joints, each `(n,)`."""
 
     q: Array
     qd: Array
@@ -20,8 +18,8 @@ class State(NamedTuple):
 
     @staticmethod
     def rest(q: Array) -> State:
-        """Return the state of standing still at `q` `(7,)` [rad]."""
-        return State(q, np.zeros(JOINTS), np.zeros(JOINTS))
+        """Return the state of standing still at `q` `(n,)` [rad]."""
+        return State(q, np.zeros(len(q)), np.zeros(len(q)))
 
 
 class Piece(Protocol):
@@ -35,4 +33,4 @@ class Piece(Protocol):
         """Return the state at time `s`, 0 to `duration` [s]."""
 
     def over(self, times: Array) -> State:
-        """Return the states at `times` `(N,)` [s], each array of shape `(N, 7)`."""
+        """Return the states at `times` `(N,)` [s], each array of shape `(N, n)`."""

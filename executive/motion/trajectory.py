@@ -16,7 +16,7 @@ from executive.errors import Fault, Unreachable
 from executive.geometry import Array
 from executive.motion.limits import JointLimits
 from executive.motion.point_to_point import NoProfile
-from executive.motion.state import JOINTS, Piece, State
+from executive.motion.state import Piece, State
 
 _ROUNDING = 1e-6
 """Difference of joint states that is rounding [rad, rad/s, rad/s²]."""
@@ -27,8 +27,8 @@ class Trajectory:
 
     Attributes:
         duration: Time from start to rest [s].
-        start: Joint positions where it begins `(7,)` [rad].
-        end: Joint positions where it ends `(7,)` [rad].
+        start: Joint positions where it begins `(n,)` [rad].
+        end: Joint positions where it ends `(n,)` [rad].
         guarded: Time from which on the tool is meant to touch something [s]; infinite: never.
     """
 
@@ -68,7 +68,7 @@ class Trajectory:
 
     @cached_property
     def samples(self) -> State:
-        """Its states every 1/240 s, the last one included: each array of shape `(N, 7)`."""
+        """Its states every 1/240 s, the last one included: each array of shape `(N, n)`."""
         states = over(self._pieces, np.asarray(np.arange(0.0, self.duration, STEP), dtype=np.float64))
         return State(*(np.concatenate([a, b[None]]) for a, b in zip(states, self._last, strict=True)))
 
@@ -81,7 +81,7 @@ class Trajectory:
         """
         states = self.samples
         # Ruckig's `position_extrema` are too small where a joint turns back (pantor/ruckig issue 215).
-        _require_inside(np.abs(states.q).max(axis=0), limits)
+        _require_inside(states.q, limits)
         for name, share in zip(("velocity", "acceleration", "jerk"), peaks(states, limits), strict=True):
             joint = int(np.argmax(share))
             if share[joint] > 1 + _ROUNDING:
@@ -92,7 +92,7 @@ class Trajectory:
 
 
 def peaks(states: State, limits: JointLimits) -> Array:
-    """Return each joint's largest velocity, acceleration and jerk over its limit `(3, 7)`.
+    """Return each joint's largest velocity, acceleration and jerk over its limit `(3, n)`.
 
     The states are a motion's samples, every `STEP`. The last one is not a whole step after the one before,
     so no jerk is taken from it.
@@ -124,7 +124,7 @@ class _Slowed:
 
 
 def thinned(qs: Array, spacing: float) -> Array:
-    """Return so few positions of a path `(N, 7)` [rad] that no joint moves farther than `spacing`."""
+    """Return so few positions of a path `(N, n)` [rad] that no joint moves farther than `spacing`."""
     kept = [0]
     for number in range(1, len(qs) - 1):
         if np.max(np.abs(qs[number + 1] - qs[kept[-1]])) > spacing:
@@ -134,7 +134,8 @@ def thinned(qs: Array, spacing: float) -> Array:
 
 def over(pieces: Sequence[Piece], times: Array) -> State:
     """Return the states that `pieces`, one after the other, pass at rising `times` `(N,)` [s]."""
-    parts, before = [State(*np.empty((3, 0, JOINTS)))], 0.0
+    count = len(pieces[0].at(0.0).q)
+    parts, before = [State(*np.empty((3, 0, count)))], 0.0
     for number, piece in enumerate(pieces, start=1):
         end = before + piece.duration if number < len(pieces) else np.inf
         here = times[(before <= times) & (times < end)]
@@ -151,11 +152,11 @@ def _require_same(one: State, other: State, what: str) -> None:
             raise Fault(f"{what} do not fit together: their {name} differ by {apart:.2g}")
 
 
-def _require_inside(extremes: Array, limits: JointLimits) -> None:
-    excess = extremes - limits.position
-    joint = int(np.argmax(excess))
-    if excess[joint] > _ROUNDING:
+def _require_inside(qs: Array, limits: JointLimits) -> None:
+    excess = limits.position.excess(qs)
+    number, joint = (int(index) for index in np.unravel_index(np.argmax(excess), excess.shape))
+    if excess[number, joint] > _ROUNDING:
         raise Unreachable(
-            f"the motion would take joint {joint + 1} to {math.degrees(extremes[joint]):.1f}°; "
-            f"its limit is ±{math.degrees(limits.position[joint]):.0f}°"
+            f"the motion would take joint {joint + 1} to {math.degrees(qs[number, joint]):.1f}°; "
+            f"its limit is {limits.position.describe(joint)}"
         )

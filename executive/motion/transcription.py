@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from executive.geometry import Array
 from executive.motion.limits import JointLimits
-from executive.motion.state import JOINTS, State
+from executive.motion.state import State
 
 STEPS = 8
 """Steps of time of a motion."""
@@ -43,7 +43,6 @@ SMOOTHNESS = 1e-4
 """Weight of the squares of accelerations as shares of their limits: it settles what time leaves open [s]."""
 SHORTEST, LONGEST = 0.8, 1.6
 """Change of the duration in one solution, at most."""
-_INNER = JOINTS * (STEPS - 1)
 _METRE = 0.01  # [m] what distances are shares of
 _UNBOUNDED = 1e30
 _SOLVED, _EQUALITY = 1, 5  # what daqp calls them
@@ -54,8 +53,8 @@ class Course(NamedTuple):
 
     Attributes:
         step: Length of one [s].
-        accelerations: At the ends of the steps `(7, STEPS + 1)` [rad/s²].
-        qs: Joint positions at the places looked at `(M, 7)` [rad], neither its start nor its end among them.
+        accelerations: At the ends of the steps `(n, STEPS + 1)` [rad/s²].
+        qs: Joint positions at the places looked at `(M, n)` [rad], neither its start nor its end among them.
     """
 
     step: float
@@ -74,7 +73,7 @@ class Demand(NamedTuple):
     Attributes:
         slack: What they are now `(R,)` [m].
         rows: Positions that each depends on `(R, K)`.
-        slopes: How it depends on them `(R, K, 7)` [m/rad].
+        slopes: How it depends on them `(R, K, n)` [m/rad].
         growth: How it depends on the length of a step, all positions being the same `(R,)` [m/s].
     """
 
@@ -97,14 +96,15 @@ class Transcription:
 
     def __init__(self, start: State, end: State, limits: JointLimits) -> None:
         self._start, self._end = start, end
-        self._grid = _grid()
+        self._grid = _grid(limits.joint_count)
+        self._inner = limits.joint_count * (STEPS - 1)
         velocity, acceleration, jerk = (
             share * limit
             for share, limit in zip(LESS, (limits.velocity, limits.acceleration, limits.jerk), strict=True)
         )
         self._acceleration = acceleration
         grid, halves = self._grid, len(self._grid.half)
-        ends = np.zeros((JOINTS, STEPS))
+        ends = np.zeros((limits.joint_count, STEPS))
         ends[:, 0] -= start.qdd
         ends[:, -1] += end.qdd
         given = np.outer(start.qdd, grid.half[:, 0]) + np.outer(end.qdd, grid.half[:, -1])
@@ -123,20 +123,22 @@ class Transcription:
         y = course.accelerations * h**2
         qd = start.qd + (grid.half @ y.T) / h
         middle = (y[:, :-1] + y[:, 1:]) / 2
-        qdd = np.empty((2 * STEPS - 1, JOINTS))
+        qdd = np.empty((2 * STEPS - 1, len(y)))
         qdd[::2], qdd[1::2] = middle.T / h**2, course.accelerations[:, 1:-1].T
         inner = slice(SAMPLES // 2 - 1, None, SAMPLES // 2)
         return [start, *map(State, course.qs[inner], qd, qdd), self._end]
 
     def fit(self, step: float, first: Array) -> Course | None:
-        """Return the course with steps of `step` [s] that is nearest to positions `(M, 7)` [rad], or None."""
+        """Return the course with steps of `step` [s] that is nearest to positions `(M, n)` [rad], or None."""
         program = self._program(step)
         inner = self._grid.place[:, 1:-1]
         off = first - self._start.q - self._given(step)
-        scale = program.scale[:_INNER]
-        program.square[:_INNER, :_INNER] += scale[:, None] * np.kron(np.eye(JOINTS), inner.T @ inner) * scale
-        program.cost[:_INNER] = -(inner.T @ off).T.ravel() * scale
-        program.low[_INNER] = program.high[_INNER] = 1.0
+        scale = program.scale[: self._inner]
+        program.square[: self._inner, : self._inner] += (
+            scale[:, None] * np.kron(np.eye(len(self._acceleration)), inner.T @ inner) * scale
+        )
+        program.cost[: self._inner] = -(inner.T @ off).T.ravel() * scale
+        program.low[self._inner] = program.high[self._inner] = 1.0
         return self._course(step, program)
 
     def shorten(self, last: Course, demands: Sequence[Demand], trust: float) -> Course | None:
@@ -146,19 +148,21 @@ class Transcription:
         """
         step, start = last.step, self._start
         program = self._program(step)
-        program.cost[_INNER:] = STEPS * step, WEIGHT * _METRE
+        program.cost[self._inner :] = STEPS * step, WEIGHT * _METRE
         before = (last.accelerations[:, 1:-1] / self._acceleration[:, None]).ravel()
-        program.low[:_INNER], program.high[:_INNER] = before - trust, before + trust
+        program.low[: self._inner], program.high[: self._inner] = before - trust, before + trust
         rows, most = [], []
         for demand in demands:
             place, slopes = self._grid.place[demand.rows], demand.slopes
             ends = np.stack([start.qdd, self._end.qdd])
             bent = np.einsum("rke,rkj,ej->r", place[:, :, [0, -1]], slopes, ends)
-            part = np.empty((len(slopes), _INNER + 2))
-            part[:, :_INNER] = -np.einsum("rkj,rki->rji", slopes, place[:, :, 1:-1]).reshape(-1, _INNER)
+            part = np.empty((len(slopes), self._inner + 2))
+            part[:, : self._inner] = -np.einsum("rkj,rki->rji", slopes, place[:, :, 1:-1]).reshape(
+                -1, self._inner
+            )
             steady = np.einsum("rkj,j,rk->r", slopes, start.qd, self._grid.times[demand.rows])
-            part[:, _INNER] = -steady - 2 * step * bent - demand.growth
-            part[:, _INNER + 1] = -1.0
+            part[:, self._inner] = -steady - 2 * step * bent - demand.growth
+            part[:, self._inner + 1] = -1.0
             off = np.einsum("rkj,rkj->r", slopes, start.q - last.qs[demand.rows])
             rows.append(part)
             most.append(demand.slack - SPARE + off - step**2 * bent - step * demand.growth)
@@ -171,28 +175,26 @@ class Transcription:
         rising, rest = np.array([1.0, 2 * step, 3 * step**2]), np.array([0.0, -(step**2), -2 * step**3])
         column, turning = rising @ self._reach, rest @ self._reach
         shift, turn = self._steady + 2 * step * self._bent, step**2 * self._bent
-        count = len(column)
-        rows = grid.rows.copy()
-        rows[:count, _INNER], rows[count : 2 * count, _INNER] = shift - column, -shift - column
-        speeds = np.outer(grid.velocity[-1, [0, -1]], np.ones(JOINTS)) * (start.qdd, end.qdd)
-        ways = np.outer(grid.position[-1, [0, -1]], np.ones(JOINTS)) * (start.qdd, end.qdd)
+        rows, limits, joints, step_column = grid.rows.copy(), len(column), len(start.q), self._inner
+        rows[:limits, step_column], rows[limits : 2 * limits, step_column] = shift - column, -shift - column
+        speeds = np.outer(grid.velocity[-1, [0, -1]], np.ones(joints)) * (start.qdd, end.qdd)
+        ways = np.outer(grid.position[-1, [0, -1]], np.ones(joints)) * (start.qdd, end.qdd)
         faster, farther = speeds.sum(axis=0), ways.sum(axis=0)
-        rows[2 * count : 2 * count + JOINTS, _INNER] = start.qd - end.qd + 2 * step * faster
-        rows[2 * count + JOINTS :, _INNER] = STEPS * start.qd + 2 * step * farther
+        rows[2 * limits : -joints, step_column] = start.qd - end.qd + 2 * step * faster
+        rows[-joints:, step_column] = STEPS * start.qd + 2 * step * farther
         least = np.full(len(rows), -_UNBOUNDED)
         most = np.concatenate(
             [turning + turn, turning - turn, step**2 * faster, end.q - start.q + step**2 * farther]
         )
-        least[2 * count :] = most[2 * count :]
-        low, high = np.full(_INNER + 2, -_UNBOUNDED), np.full(_INNER + 2, _UNBOUNDED)
-        low[_INNER:], high[_INNER] = (SHORTEST, 0.0), LONGEST
+        least[2 * limits :] = most[2 * limits :]
+        low, high = np.full(step_column + 2, -_UNBOUNDED), np.full(step_column + 2, _UNBOUNDED)
+        low[step_column:], high[step_column] = (SHORTEST, 0.0), LONGEST
         scale = np.concatenate([np.repeat(self._acceleration * step**2, STEPS - 1), [step, _METRE]])
-        return _Program(
-            scale, SMOOTHNESS * np.eye(_INNER + 2), np.zeros(_INNER + 2), rows, low, high, least, most
-        )
+        square, cost = SMOOTHNESS * np.eye(step_column + 2), np.zeros(step_column + 2)
+        return _Program(scale, square, cost, rows, low, high, least, most, 2 * joints)
 
     def _given(self, step: float) -> Array:
-        """Return the part of all positions `(M, 7)` [rad] that start and end decide."""
+        """Return the part of all positions `(M, n)` [rad] that start and end decide."""
         grid, start, end = self._grid, self._start, self._end
         bent = np.outer(grid.place[:, 0], start.qdd) + np.outer(grid.place[:, -1], end.qdd)
         return np.outer(grid.times, start.qd * step) + step**2 * bent
@@ -204,8 +206,8 @@ class Transcription:
         answer = program.solve(clear, most)
         if answer is None:
             return None
-        h = step * float(answer[_INNER])
-        inner = (answer * program.scale)[:_INNER].reshape(JOINTS, STEPS - 1)
+        h = step * float(answer[self._inner])
+        inner = (answer * program.scale)[: self._inner].reshape(-1, STEPS - 1)
         y = np.column_stack([self._start.qdd * h**2, inner, self._end.qdd * h**2])
         qs = self._start.q + np.outer(self._grid.times, self._start.qd * h) + self._grid.place @ y.T
         return Course(h, y / h**2, qs)
@@ -216,6 +218,7 @@ class _Program(NamedTuple):
 
     Attributes:
         scale: What the variables `x` are shares of; `rows` are given for the values themselves.
+        equalities: Number of the last rows that are equations.
     """
 
     scale: Array
@@ -226,6 +229,7 @@ class _Program(NamedTuple):
     high: Array
     least: Array
     most: Array
+    equalities: int
 
     def solve(self, clear: Array | None, most: Array | None) -> Array | None:
         """Return the solution, or None where there is none."""
@@ -235,7 +239,7 @@ class _Program(NamedTuple):
             least = np.concatenate([np.full(len(most), -_UNBOUNDED), least])
             upper = np.concatenate([most, upper])
         kinds = np.zeros(len(self.low) + len(rows), dtype=np.int32)
-        kinds[-2 * JOINTS :] = _EQUALITY
+        kinds[-self.equalities :] = _EQUALITY
         answer, _, flag, _ = daqp.solve(
             self.square, self.cost, np.ascontiguousarray(rows * self.scale),
             np.concatenate([self.high, upper]), np.concatenate([self.low, least]), kinds,
@@ -266,8 +270,8 @@ class _Grid(NamedTuple):
     rows: Array
 
 
-@lru_cache(maxsize=1)
-def _grid() -> _Grid:
+@lru_cache(maxsize=4)
+def _grid(joint_count: int) -> _Grid:
     velocity, position = np.zeros((2, STEPS + 1, STEPS + 1))
     for k in range(STEPS):
         velocity[k + 1], position[k + 1] = velocity[k], position[k] + velocity[k]
@@ -285,7 +289,7 @@ def _grid() -> _Grid:
     half[::2] = velocity[:-1]
     for k in range(STEPS):
         half[2 * k, k : k + 2] += 3 / 8, 1 / 8
-    joints = np.eye(JOINTS)
+    joints = np.eye(joint_count)
     accelerations = np.asarray(np.kron(joints, np.eye(STEPS - 1)), dtype=np.float64)
     jerks = np.asarray(np.kron(joints, np.diff(np.eye(STEPS + 1), axis=0)[:, 1:-1]), dtype=np.float64)
     limits = np.concatenate([accelerations, np.kron(joints, half[:, 1:-1]), jerks])

@@ -19,9 +19,9 @@ from executive.cell.arm import Goal
 from executive.cell.clock import STEP
 from executive.geometry import Array
 from executive.motion.kinematics import Kinematics
-from executive.motion.limits import JointLimits, rest_to_rest
+from executive.motion.limits import JointLimits, min_time
 from executive.motion.point_to_point import Connector
-from executive.motion.postures import find_postures, upright_line
+from executive.motion.postures import find_postures, find_vertical_line
 from executive.motion.state import State
 from executive.motion.trajectory import Trajectory
 from tests.motion.joint_states import reach
@@ -52,13 +52,13 @@ def find_waypoints(
         Unreachable: A waypoint is out of reach.
     """
     x, y, z = kinematics.forward(start).position.tolist()
-    line = upright_line(kinematics, start, max(0.0, height - z), 2)
+    line = find_vertical_line(kinematics, start, max(0.0, height - z), 2)
     up = reach(kinematics, (x, y, height), start) if line is None else line[-1]
     fetch = find_postures(kinematics, touch, height - touch.position[2], start)
     carry = find_postures(kinematics, drop, height - drop.position[2], start)
-    fetching = rest_to_rest(fetch.high - up, limits) + 2 * rest_to_rest(fetch.high - fetch.low, limits)
-    carrying = rest_to_rest(carry.high - fetch.high[:, None], limits)
-    carrying += rest_to_rest(carry.low - carry.high, limits)
+    fetching = min_time(fetch.high - up, limits) + 2 * min_time(fetch.high - fetch.low, limits)
+    carrying = min_time(carry.high - fetch.high[:, None], limits)
+    carrying += min_time(carry.low - carry.high, limits)
     i, j = np.unravel_index(np.argmin(fetching[:, None] + carrying), carrying.shape)
     return (
         np.array([start, up, fetch.high[i], fetch.low[i]]),
@@ -103,8 +103,8 @@ def find_lower_bound(
     and swivel are those with the least total time.
     """
     touching, dropping = (find_postures(kinematics, goal, 0.0, start).low for goal in (touch, drop))
-    there = rest_to_rest(touching - start, limits)
-    back = rest_to_rest(touching[:, None] - dropping, limits)
+    there = min_time(touching - start, limits)
+    back = min_time(touching[:, None] - dropping, limits)
     i, j = np.unravel_index(np.argmin(there[:, None] + back), back.shape)
     motions = [
         plan_with_stops(np.array(ends), limits) for ends in pairwise((start, touching[i], dropping[j]))

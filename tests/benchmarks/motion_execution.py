@@ -12,7 +12,6 @@ from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
 from executive.cells.sim.arm import SimArm
 from executive.cells.sim.clock import SimClock
-from executive.cells.sim.collision import FIRST_MOVING, SELF_PAIRS, WRIST
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import World, held_part
 from executive.errors import Blocked, Unreachable
@@ -88,15 +87,15 @@ class ClearanceMonitor:
         load = "" if held is None else held_part(world.bodies[held])
         for body in things:
             for point in near(world.arm, body, MAX_MEASURED_DISTANCE):
-                if point[3] >= FIRST_MOVING:
+                if point[3] >= world.robot.first_moving_link:
                     yield point[8], f"{world.part_of(point[3])} - {world.name_of(body)}"
             for point in near(held, body, MAX_MEASURED_DISTANCE) if load else ():
                 yield point[8], f"{load} - {world.name_of(body)}"
-        for one, other in SELF_PAIRS:
+        for one, other in world.robot.self_pairs:
             for point in near(world.arm, world.arm, MAX_MEASURED_DISTANCE, linkIndexA=one, linkIndexB=other):
                 yield point[8], f"{world.part_of(one)} - {world.part_of(other)}"
         for point in near(held, world.arm, MAX_MEASURED_DISTANCE) if load else ():
-            if FIRST_MOVING <= point[4] < WRIST:
+            if world.robot.first_moving_link <= point[4] < world.robot.wrist_link:
                 yield point[8], f"{load} - {world.part_of(point[4])}"
 
 

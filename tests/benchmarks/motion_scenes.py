@@ -21,6 +21,7 @@ from executive.cells.sim.world import World
 from executive.errors import InputError, Unreachable
 from executive.geometry import tool_down
 from executive.manipulation.tool_goals import onto, over
+from executive.motion.arms import build_planner
 from executive.motion.planner import Planner
 
 MAX_TRIES = 50
@@ -32,7 +33,7 @@ def open_world(cell: CellConfig) -> Iterator[tuple[World, Planner]]:
     """Yield a world without objects, and a planner that makes all checks of the planner of a run."""
     world, clearance = World(cell, visuals=False), PathClearance(cell)
     try:
-        yield world, Planner(cell, clearance.check)
+        yield world, build_planner(cell, clearance.check)
     finally:
         clearance.close()
         world.close()

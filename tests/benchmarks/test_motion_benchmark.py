@@ -11,9 +11,8 @@ from executive.cell.layout import travel_height
 from executive.cells.sim.world import World
 from executive.cli.cells import load_cells
 from executive.geometry import Pose
+from executive.motion.arms import build_kinematics, build_planner
 from executive.motion.kinematics import Kinematics
-from executive.motion.limits import JointLimits
-from executive.motion.planner import Planner
 from executive.motion.postures import find_postures
 from executive.motion.trajectory import peaks
 from tests.benchmarks import motion
@@ -31,7 +30,7 @@ def cell() -> CellConfig:
 
 @pytest.fixture(scope="module")
 def kinematics(cell: CellConfig) -> Kinematics:
-    return Kinematics(cell.tool.length, JointLimits.of(cell.arm.limits).position)
+    return build_kinematics(cell)
 
 
 def test_only_what_must_not_be_touched_counts(cell: CellConfig, kinematics: Kinematics) -> None:
@@ -55,7 +54,7 @@ def test_only_what_must_not_be_touched_counts(cell: CellConfig, kinematics: Kine
 
 
 def test_the_methods_are_in_order_and_pass_the_waypoints(cell: CellConfig) -> None:
-    planner = Planner(cell)
+    planner = build_planner(cell)
     arm, limits = planner.kinematics, planner.limits
     touch, drop = Goal((0.5, 0.1, 0.051)), Goal((0.24, -0.48, 0.065))
     start = find_postures(arm, Goal((0.24, 0.48, 0.065)), 0.1, np.zeros(7)).low[0]

@@ -67,8 +67,8 @@ def test_a_finding_shows_line_and_caret(small_cell: str) -> None:
         'c.yaml:4:5: error[unknown-key]: arm.limits has no key "sorce"\n'
         "   4 |     sorce: a test\n"
         "     |     ^^^^^\n"
-        '  Did you mean "source"? arm.limits takes: source, position_deg, velocity_deg, acceleration, jerk, '
-        "stop_acceleration, stop_jerk."
+        '  Did you mean "source"? arm.limits takes: source, min_position_deg, position_deg, velocity_deg, '
+        "acceleration, jerk, stop_acceleration, stop_jerk."
     )
 
 
@@ -243,12 +243,12 @@ def test_models_are_looked_for_beside_the_file_that_names_them(small_cell: str) 
     for folder in (Path(), Path("parts")):
         (folder / "models").mkdir(parents=True)
         (folder / "models/cup.urdf").write_text("<robot/>")
-    Path("parts/base.yaml").write_text(small_cell.replace("  limits", "  urdf: models/cup.urdf\n  limits", 1))
-    Path("c.yaml").write_text(
-        "base: parts/base.yaml\nobjects: {cup: {urdf: models/cup.urdf, height: 0.05, radius: 0.03}}\n"
-    )
+    cup = "{urdf: models/cup.urdf, height: 0.05, radius: 0.03}"
+    Path("parts/base.yaml").write_text(small_cell.replace("objects:", f"objects:\n  cup: {cup}", 1))
+    Path("c.yaml").write_text("base: parts/base.yaml\n")
+    assert load_cell(Path("c.yaml")).objects["cup"].urdf == str(Path("parts/models/cup.urdf").resolve())
+    Path("c.yaml").write_text(f"base: parts/base.yaml\nobjects: {{cup: {cup}}}\n")
     cell = load_cell(Path("c.yaml"))
-    assert cell.arm.urdf == str(Path("parts/models/cup.urdf").resolve())
     assert cell.objects["cup"].urdf == str(Path("models/cup.urdf").resolve())
 
 

@@ -10,6 +10,7 @@ import yaml
 
 from executive.cell.config import CellConfig
 from executive.geometry import Array
+from executive.motion.arms import build_kinematics, build_planner
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
@@ -28,7 +29,7 @@ def limits(config: CellConfig) -> JointLimits:
 
 @pytest.fixture(scope="session")
 def kinematics(config: CellConfig, limits: JointLimits) -> Kinematics:
-    return Kinematics(config.tool.length, limits.position)
+    return build_kinematics(config)
 
 
 @pytest.fixture(scope="session")
@@ -38,7 +39,7 @@ def connector(limits: JointLimits) -> Connector:
 
 @pytest.fixture(scope="session")
 def planner(config: CellConfig) -> Planner:
-    return Planner(config)
+    return build_planner(config)
 
 
 @pytest.fixture(scope="session")

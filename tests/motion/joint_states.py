@@ -9,12 +9,14 @@ from numpy.typing import ArrayLike
 from executive.cell.arm import Goal
 from executive.geometry import Array
 from executive.motion.kinematics import Kinematics
-from executive.motion.limits import JointLimits
+from executive.motion.limits import JointLimits, JointRange
 from executive.motion.postures import find_postures
 from executive.motion.state import Piece, State
 
+POSITION_LIMIT = np.radians([170, 120, 170, 120, 170, 120, 175])
+"""Of an iiwa 14 [rad]."""
 LIMITS = JointLimits(
-    position=np.radians([170, 120, 170, 120, 170, 120, 175]),
+    position=JointRange(-POSITION_LIMIT, POSITION_LIMIT),
     velocity=np.radians([85, 85, 100, 75, 130, 135, 135]),
     acceleration=np.array([8.57, 8.57, 8.74, 11.36, 12.23, 15.72, 15.72]),
     jerk=np.array([85.7, 85.7, 87.4, 113.6, 122.3, 157.2, 157.2]),
@@ -29,7 +31,7 @@ SOONER = 1e-3
 shares = st.lists(st.floats(-1, 1), min_size=7, max_size=7).map(np.array)
 """A number between -1 and 1 for every joint."""
 
-positions = shares.map(lambda share: share * LIMITS.position)
+positions = shares.map(lambda share: share * LIMITS.position.upper)
 """Joint positions inside the limits."""
 
 

@@ -12,10 +12,10 @@ from joint_states import LIMITS, SOONER, passed, peaks, tool_velocities
 from executive.cell.arm import Goal
 from executive.geometry import Array
 from executive.motion.cartesian_line import SAMPLES, Line
-from executive.motion.kinematics import Kinematics
-from executive.motion.postures import find_postures, line_chain
+from executive.motion.iiwa14 import Iiwa14
+from executive.motion.postures import find_postures, solve_vertical_line
 
-ARM = Kinematics(0.12, LIMITS.position)
+ARM = Iiwa14(0.12, LIMITS.position)
 
 
 class Descent(NamedTuple):
@@ -33,8 +33,8 @@ def descents(draw: st.DrawFn) -> Descent:
     length = draw(st.floats(0.005, 0.2))
     postures = find_postures(ARM, Goal(place), length, np.zeros(7))
     number = draw(st.integers(0, len(postures) - 1))
-    posture = int(postures.branch[number]), float(postures.swivel[number])
-    chain = line_chain(ARM, postures.low[number], length, SAMPLES, *posture)[::-1]
+    configuration = postures.configurations[number]
+    chain = solve_vertical_line(ARM, postures.low[number], length, SAMPLES, configuration)[::-1]
     return Descent(chain, length, draw(st.sampled_from([0.03, 0.2, math.inf])))
 
 

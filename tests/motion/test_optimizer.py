@@ -29,10 +29,10 @@ def over_the_post(config, kinematics, connector):
     """The gap between two places with a post between them, and the way that stops at every corner."""
 
     def given(load: Load | None = None) -> tuple[Gap, list]:
-        branch = kinematics.branch(np.radians(config.arm.poses_deg["home"]))
+        branch, _ = kinematics.configuration(np.radians(config.arm.poses_deg["home"]))
 
         def state(x: float, y: float, z: float) -> State:
-            return State.rest(kinematics.grid(tool_down((x, y, z)), np.zeros(1))[branch, 0])
+            return State.rest(kinematics.solve(tool_down((x, y, z)), (branch, 0.0)))
 
         corners = [state(*LEFT), state(*LEFT[:2], HIGH), state(*RIGHT[:2], HIGH), state(*RIGHT)]
         surroundings = Surroundings(config, (POST,), np.array([LEFT[:2], RIGHT[:2]]))
@@ -93,7 +93,7 @@ def test_slopes_are_the_derivatives_of_slack_by_the_joints(over_the_post, q: Arr
 def test_near_a_joints_limit_that_is_what_slack_and_slopes_tell(over_the_post) -> None:
     gap, _ = over_the_post()
     qs = gap.start.q[None].copy()
-    qs[0, 6] = -LIMITS.position[6] + 0.003
+    qs[0, 6] = -LIMITS.position.upper[6] + 0.003
     slack = gap.slack(qs)
     assert slack[0] == pytest.approx(0.003 - 0.01)
     assert np.array_equal(gap.slopes(qs, slack)[0], np.eye(7)[6])

@@ -11,13 +11,19 @@ from joint_states import LIMITS
 
 from executive.cell.arm import Goal
 from executive.errors import Unreachable
-from executive.motion.kinematics import Kinematics
-from executive.motion.postures import find_postures, upright_line
+from executive.geometry import Array
+from executive.motion.iiwa14 import Iiwa14
+from executive.motion.limits import JointRange
+from executive.motion.postures import find_postures, find_vertical_line
 
-ARM = Kinematics(0.12, LIMITS.position)
+ARM = Iiwa14(0.12, LIMITS.position)
 START = np.radians([38, 33, 0, -88, 0, 59, 20])
 places = st.tuples(st.floats(0.42, 0.64), st.floats(-0.22, 0.22), st.floats(0.02, 0.1))
 yaws = st.none() | st.floats(-math.pi, math.pi)
+
+
+def arm_within(limit: Array) -> Iiwa14:
+    return Iiwa14(0.12, JointRange(-limit, limit))
 
 
 @given(places, yaws, st.floats(0.0, 0.15))
@@ -28,27 +34,27 @@ def test_every_posture_points_down_over_the_goal_inside_the_limits(place, yaw, l
         tips, axes = ARM.tips(qs)
         assert np.allclose(tips, np.add(place, (0, 0, height)), atol=1e-7)
         assert np.allclose(axes, [0, 0, -1], atol=1e-7)
-        assert np.all(np.abs(qs) <= LIMITS.position + 1e-9)
+        assert np.all(LIMITS.position.shrink(-1e-9).contains(qs))
         for q in qs[::17] if yaw is not None else ():
             assert np.allclose(ARM.forward(q).rotation[:, 1], [-math.sin(yaw), math.cos(yaw), 0], atol=1e-7)
 
 
 def test_a_free_yaw_turns_joint_7_no_more_than_the_way_down_asks_for() -> None:
     start = START.copy()
-    start[6] = LIMITS.position[6]
+    start[6] = LIMITS.position.upper[6]
     found = find_postures(ARM, Goal((0.5, 0.1, 0.05)), 0.1, start)
     drift = found.high[:, 6] - found.low[:, 6]
-    last = LIMITS.position[6] - math.radians(1)
+    last = LIMITS.position.upper[6] - math.radians(1)
     assert np.allclose(np.maximum(found.low[:, 6], found.high[:, 6]), last, atol=1e-9)
     assert np.ptp(drift) > 0.01
 
 
 def test_there_is_no_line_up_where_the_tool_does_not_point_down_or_a_joint_leaves_its_range() -> None:
     tilted = START + np.eye(7)[5] * 0.1
-    assert upright_line(ARM, START, 0.1, 5) is not None
-    assert upright_line(ARM, tilted, 0.1, 5) is None
-    narrow = Kinematics(0.12, np.minimum(LIMITS.position, np.abs(START) + 0.01))
-    assert upright_line(narrow, START, 0.2, 5) is None
+    assert find_vertical_line(ARM, START, 0.1, 5) is not None
+    assert find_vertical_line(ARM, tilted, 0.1, 5) is None
+    narrow = arm_within(np.minimum(LIMITS.position.upper, np.abs(START) + 0.01))
+    assert find_vertical_line(narrow, START, 0.2, 5) is None
 
 
 @pytest.mark.parametrize(
@@ -69,14 +75,14 @@ def test_there_is_no_line_up_where_the_tool_does_not_point_down_or_a_joint_leave
     ],
 )
 def test_what_cannot_be_reached_says_at_which_height_and_why(place, length: float, text: str) -> None:
-    narrow = Kinematics(0.12, np.radians([170, 120, 170, 120, 170, 20 if place[2] == 0.1 else 120, 175]))
+    narrow = arm_within(np.radians([170, 120, 170, 120, 170, 20 if place[2] == 0.1 else 120, 175]))
     point, reason = text.split(" m: ")
     with pytest.raises(Unreachable, match=f"{re.escape(point)} m: {reason}"):
         find_postures(narrow, Goal(place), length, np.zeros(7))
 
 
 def test_heights_that_only_different_postures_reach_are_unreachable_together() -> None:
-    narrow = Kinematics(0.12, np.radians([15, 120, 18, 120, 170, 120, 175]))
+    narrow = arm_within(np.radians([15, 120, 18, 120, 170, 120, 175]))
     x, y, low, high = 0.42, 0.18, 0.05, 0.25
     for height in (low, high):
         assert len(find_postures(narrow, Goal((x, y, height), 0.0), 0.0, START))

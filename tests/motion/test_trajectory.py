@@ -90,13 +90,13 @@ def test_a_motion_to_where_the_arm_is_takes_no_time() -> None:
 def test_leaving_a_joints_range_between_two_states_inside_it_is_seen(joint: int, share: float) -> None:
     """Where a joint turns back, ruckig's own extremes are too small."""
     edge = State.rest(np.zeros(7))
-    edge.q[joint] = -LIMITS.position[joint] + 0.01
+    edge.q[joint] = -LIMITS.position.upper[joint] + 0.01
     leaving = State.rest(edge.q.copy())
     leaving.qd[joint] = share * LIMITS.velocity[joint]
     back = CONNECTOR.connect(leaving, State.rest(np.zeros(7)))
     trajectory = Trajectory([CONNECTOR.connect(edge, leaving), back])
-    limit = round(np.degrees(LIMITS.position[joint]))
-    with pytest.raises(Unreachable, match=rf"take joint {joint + 1} to \d+\.\d°; its limit is ±{limit}°"):
+    limit = round(np.degrees(LIMITS.position.upper[joint]))
+    with pytest.raises(Unreachable, match=rf"take joint {joint + 1} to -\d+\.\d°; its limit is ±{limit}°"):
         trajectory.check(LIMITS)
 
 

@@ -6,59 +6,88 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from executive.cell.config.section import MIN_LENGTH, Distance, Force, Joints, Length, Name, Section
+from executive.cell.config.section import MIN_LENGTH, Angle, Distance, Force, Length, Name, Section
 
-MaxJointAngle = Annotated[float, Field(ge=1, le=360)]
-"""Largest joint angle to either side [degree]: under 1 degree a joint is fixed."""
+MIN_JOINT_RANGE = 2.0
+"""Minimum range of a joint position [degree]; a joint with a smaller range is fixed."""
 Speed = Annotated[float, Field(ge=1, le=1000)]
 """[degree/s]; the fastest arms turn a joint by 1000 degrees per second."""
 Acceleration = Annotated[float, Field(ge=0.1, le=1000)]
 """[rad/s²]; below 0.1 a motion takes minutes, and 1000 is ten times the acceleration of the fastest arms."""
 Jerk = Annotated[float, Field(ge=1, le=1e5)]
 """[rad/s³]; the lower bound reaches 0.1 rad/s² in 0.1 s, the upper bound 1000 rad/s² in 0.01 s."""
-MaxJointAngles = tuple[
-    MaxJointAngle, MaxJointAngle, MaxJointAngle, MaxJointAngle, MaxJointAngle, MaxJointAngle, MaxJointAngle
-]
-Speeds = tuple[Speed, Speed, Speed, Speed, Speed, Speed, Speed]
-Accelerations = tuple[
-    Acceleration, Acceleration, Acceleration, Acceleration, Acceleration, Acceleration, Acceleration
-]
-Jerks = tuple[Jerk, Jerk, Jerk, Jerk, Jerk, Jerk, Jerk]
 
 
 class LimitsConfig(Section):
-    """Joint limits of the arm, shape (7,) each, and their source."""
+    """Joint limits of the arm, one value for each joint, and their source."""
 
     source: str
     """Source of the limits."""
-    position_deg: MaxJointAngles
-    """Largest joint angle to either side [degree]."""
-    velocity_deg: Speeds
+    min_position_deg: tuple[Angle, ...] = ()
+    """Smallest joint angles [degree]; if empty, the negative of `position_deg`."""
+    position_deg: tuple[Angle, ...] = Field(min_length=1)
+    """Largest joint angles [degree]."""
+    velocity_deg: tuple[Speed, ...]
     """[degree/s]"""
-    acceleration: Accelerations
+    acceleration: tuple[Acceleration, ...]
     """[rad/s²]"""
-    jerk: Jerks
+    jerk: tuple[Jerk, ...]
     """[rad/s³]"""
-    stop_acceleration: Accelerations
+    stop_acceleration: tuple[Acceleration, ...]
     """Largest acceleration while braking [rad/s²]."""
-    stop_jerk: Jerks
+    stop_jerk: tuple[Jerk, ...]
     """Largest jerk while braking [rad/s³]."""
+
+    @property
+    def position_ranges_deg(self) -> tuple[tuple[float, float], ...]:
+        """Smallest and largest angle of each joint [degree]."""
+        lower = self.min_position_deg or tuple(-upper for upper in self.position_deg)
+        return tuple(zip(lower, self.position_deg, strict=True))
+
+    @model_validator(mode="after")
+    def _check_joints(self) -> LimitsConfig:
+        count = len(self.position_deg)
+        for name, values in self:
+            is_default = name == "min_position_deg" and not values
+            if isinstance(values, tuple) and len(values) != count and not is_default:
+                raise ValueError(
+                    f"has {len(values)} values in {name} and {count} in position_deg; both need one value "
+                    "for each joint"
+                )
+        for joint, (lower, upper) in enumerate(self.position_ranges_deg, start=1):
+            if upper - lower < MIN_JOINT_RANGE:
+                raise ValueError(
+                    f"allows joint {joint} the positions {lower:g} to {upper:g} degrees; the range of a "
+                    f"joint must be at least {MIN_JOINT_RANGE:g} degrees"
+                )
+        return self
 
 
 class ArmConfig(Section):
     """The arm, its limits and its named poses."""
 
     urdf: str = "kuka_iiwa/model.urdf"
-    """Model of the arm, in pybullet_data."""
+    """Model of the arm, in pybullet_data; one of the supported arms in `executive/motion/arms.py`."""
     limits: LimitsConfig
     """Joint limits of the arm."""
-    poses_deg: dict[Name, Joints] = Field(min_length=1)
-    """Named joint poses; `home` is where a run begins."""
+    poses_deg: dict[Name, tuple[Angle, ...]] = Field(min_length=1)
+    """Named joint poses, one angle for each joint [degree]; `home` is where a run begins."""
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints."""
+        return len(self.limits.position_deg)
 
     @model_validator(mode="after")
     def _has_home(self) -> ArmConfig:
         if "home" not in self.poses_deg:
             raise ValueError(f'needs a pose named "home"; there are: {", ".join(self.poses_deg)}')
+        for name, pose in self.poses_deg.items():
+            if len(pose) != self.joint_count:
+                raise ValueError(
+                    f'has {len(pose)} angles in the pose "{name}" and limits of {self.joint_count} joints; '
+                    "each needs one value for each joint"
+                )
         return self
 
 

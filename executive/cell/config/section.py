@@ -50,7 +50,6 @@ Vector = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(description=
 Angle = Annotated[float, Field(ge=-360, le=360)]
 """An angle [degree]; a whole turn to either side covers all orientations."""
 Angles = Annotated[tuple[Angle, Angle, Angle], Field(description="roll, pitch, yaw [degree]")]
-Joints = tuple[Angle, Angle, Angle, Angle, Angle, Angle, Angle]
 Force = Annotated[float, Field(ge=1e-3, le=1e4)]
 """A force [N]: from the weight of a tenth of a gram to that of a ton."""
 Channel = Annotated[float, Field(ge=0, le=1)]

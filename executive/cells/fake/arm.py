@@ -20,7 +20,7 @@ from executive.cells.fake.world import FakeWorld
 from executive.errors import Blocked, Fault, Unreachable
 from executive.events import Emit, ignore
 from executive.geometry import Array, Pose, tool_down
-from executive.motion.kinematics import Kinematics
+from executive.motion.arms import build_kinematics
 from executive.motion.plans import Plan, Plans
 
 REACH = 0.85
@@ -262,7 +262,7 @@ class FakeTool:
 
 def named_poses(config: CellConfig) -> dict[str, Pose]:
     """Return where each named pose of a cell file brings the tool."""
-    kinematics = Kinematics(config.tool.length, np.radians(config.arm.limits.position_deg))
+    kinematics = build_kinematics(config)
     return {name: kinematics.forward(np.radians(pose)) for name, pose in config.arm.poses_deg.items()}
 
 

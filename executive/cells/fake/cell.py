@@ -28,6 +28,7 @@ from executive.ledger.item import State
 from executive.ledger.tracker import ItemLedger
 from executive.mission.parse.cell_file import load_cell
 from executive.mission.text.files import shipped_folder
+from executive.motion.arms import find_unsupported_arm
 from executive.perception.detectors.screening import screen_detectors
 from executive.perception.evidence import classes_distinct_by_touch
 from executive.perception.localization.localizer import build_localizer
@@ -130,8 +131,10 @@ class FakeCell:
 
     @staticmethod
     def check(config: CellConfig, base: Path) -> Iterable[tuple[KeyPath, str]]:
-        """Return findings for places that the fake arm cannot reach, and for more objects than fit."""
+        """Return findings for an unsupported arm, places out of reach, and more objects than fit."""
         del base
+        if unsupported := tuple(find_unsupported_arm(config)):
+            return unsupported
         problem = _find_lack_of_room(config, config.table.objects[1])
         return (*out_of_reach(config), *([(("table", "objects"), problem)] if problem else []))
 

@@ -21,7 +21,6 @@ from executive.geometry import Array, Pose
 from executive.motion.braking import brake
 from executive.motion.planner import Planner
 from executive.motion.plans import Plan, Plans
-from executive.motion.state import JOINTS
 from executive.motion.trajectory import Trajectory
 
 MOMENT = 1e-4
@@ -83,8 +82,8 @@ class SimArm:
 
     @property
     def q(self) -> Array:
-        """Measured joint positions `(7,)` [rad]."""
-        states = self._world.client.getJointStates(self._world.arm, range(JOINTS))
+        """Measured joint positions `(n,)` [rad]."""
+        states = self._world.client.getJointStates(self._world.arm, range(self._world.robot.joint_count))
         return np.array([state[0] for state in states])
 
     @property
@@ -95,7 +94,7 @@ class SimArm:
     @property
     def tool_velocity(self) -> Array:
         """Velocity of the tool centre point in the world `(3,)` [m/s], from the measured joint velocities."""
-        states = self._world.client.getJointStates(self._world.arm, range(JOINTS))
+        states = self._world.client.getJointStates(self._world.arm, range(self._world.robot.joint_count))
         q, turned = np.array([(state[0], state[1] * MOMENT) for state in states]).T
         forward = self.planner.kinematics.forward
         return (forward(q + turned).position - forward(q).position) / MOMENT
@@ -197,7 +196,7 @@ class SimArm:
 
     @property
     def _goal(self) -> Array:
-        """Joint positions `(7,)` [rad] at which the running motion ends, or that are commanded."""
+        """Joint positions `(n,)` [rad] at which the running motion ends, or that are commanded."""
         return self._command if self._motion is None else self._motion.end
 
     def _solve(self, start: Array, goal: Goal | str, task: Task) -> Trajectory:

@@ -19,7 +19,6 @@ from executive.cells.sim.models import add_body, load_mesh, upright
 from executive.cells.sim.variations import random_object_colour
 from executive.cells.sim.world import World, add_bin
 from executive.geometry import Array, Pose, about_z, rotation_from_quaternion, tool_down
-from executive.motion.kinematics import FLANGE_OFFSET
 
 MAX_OBJECTS_SPARSE, MAX_OBJECTS_DENSE = 7, 20
 """Largest number of objects in a sparse scene and in a dense scene."""
@@ -201,13 +200,13 @@ def _pose_of(client: BulletClient, body: int, item: SceneObject) -> Pose:
 
 def _move_tool(world: World, X_WT: Pose) -> None:
     """Move the tool near `X_WT`; the residual error is harmless: the camera pose is read later."""
-    X_WE = X_WT @ Pose.of([0, 0, -(FLANGE_OFFSET + world.config.tool.length)])
+    X_WE = X_WT @ Pose.of([0, 0, -(world.robot.flange_offset + world.config.tool.length)])
     for _ in range(3):
         q = world.client.calculateInverseKinematics(
             world.arm, world.flange, X_WE.position, X_WE.quaternion,
             maxNumIterations=60, residualThreshold=1e-4,
         )  # fmt: skip
-        world.set_arm(q[:7])
+        world.set_arm(q[: world.robot.joint_count])
 
 
 def _random_rotation(rng: Generator) -> Array:

@@ -31,7 +31,7 @@ from executive.errors import InputError
 from executive.events import Emit
 from executive.ledger.tracker import ItemLedger
 from executive.mission.text.files import shipped_folder
-from executive.motion.planner import Planner
+from executive.motion.arms import build_planner, find_unsupported_arm
 from executive.perception.detectors.registry import find_problems, known_labels
 from executive.perception.detectors.screening import screen_detectors
 from executive.perception.detectors.setting import ClosableDetector
@@ -78,7 +78,7 @@ class SimCell:
         self._bins = bins_of(config)
         self._clock = clock = SimClock(self._world, STEP)
         self._clearance = PathClearance(config)
-        planner = Planner(config, self._clearance.check)
+        planner = build_planner(config, self._clearance.check)
         self._tool = SuctionTool(self._world, config.tool)
         under_way = None if options.past is None else self._rebuilt(options.past.log)
         self._arm = SimArm(self._world, planner, config, clock, lambda: self._tool.held_body, emit, under_way)
@@ -124,9 +124,11 @@ class SimCell:
     def check(config: CellConfig, base: Path) -> Iterable[tuple[KeyPath, str]]:
         """Return what this kind of cell cannot do of a cell file, with the key it is about.
 
-        Missing models and detectors, places out of reach, more objects than fit, poses in collision, and
-        cameras that do not see the whole workspace.
+        An unsupported arm, missing models and detectors, places out of reach, more objects than fit, poses in
+        collision, and cameras that do not see the whole workspace.
         """
+        if unsupported := tuple(find_unsupported_arm(config)):
+            return unsupported
         missing = tuple(missing_models(config))
         return (
             *missing,
@@ -165,7 +167,7 @@ class SimCell:
 
     def log_to(self, path: Path) -> None:
         """Keep in a file, from now on, what is done to the world."""
-        self._world.log = CommandLog(path)
+        self._world.log = CommandLog(path, self._world.robot.joint_count)
         self._arm.hold()
 
     def advance(self) -> None:
@@ -202,7 +204,7 @@ class SimCell:
         """Rebuild the world as its log says, and go on with the log."""
         under_way = rebuild(self._world, self._tool, read_commands(log))
         self._clock.skip(under_way.idle)
-        self._world.log = CommandLog(log, again=True)
+        self._world.log = CommandLog(log, self._world.robot.joint_count, again=True)
         return under_way
 
 

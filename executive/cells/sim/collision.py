@@ -20,16 +20,6 @@ from executive.cells.sim.world import World, held_part
 from executive.errors import Blocked
 from executive.geometry import Array, Pose
 
-FIRST_MOVING = 1
-"""Lowest link that can come near anything: the base and link 1 only turn about the base's axis."""
-SELF_PAIRS = ((4, 6), (7, 0), (7, 1), (7, 2))
-"""Links 5 and 7, and the tool against the arm from its foot to the elbow.
-
-In 1500 random postures 121 of 131 self-collisions of arm and tool were of the first pair; longer tools meet
-the others, the first of them most often.
-"""
-WRIST = 5
-"""Lowest link that what is held may be near: it hangs there."""
 SLACK = 1e-5
 """Difference of distances that is rounding [m]."""
 FAR_AWAY = (0.0, 0.0, 50.0)
@@ -67,7 +57,7 @@ class PathClearance:
         self._around: dict[str, tuple[int, ...]] = {}
 
     def check(self, path: Array, task: Task = Task()) -> None:
-        """Make sure that joint positions along a path `(N, 7)` [rad] keep the cell file's margin.
+        """Make sure that joint positions along a path `(N, n)` [rad] keep the cell file's margin.
 
         Raises:
             Blocked: They do not; the text names the two bodies, the distance and the place.
@@ -96,7 +86,7 @@ class PathClearance:
         return found
 
     def too_near(self, q: Array) -> Approach | None:
-        """Return what an empty arm at `q` `(7,)` [rad] brings nearest, if nearer than the margin, or None."""
+        """Return what an empty arm at `q` `(n,)` [rad] brings nearest, if nearer than the margin, or None."""
         nearest = min(self._near(q, None), key=lambda near: near.distance, default=None)
         return nearest if nearest and nearest.distance < nearest.allowed - SLACK else None
 
@@ -115,14 +105,14 @@ class PathClearance:
         """Yield what is nearer than its margin at `q`."""
         client, arm = self.world.client, self.world.arm
         near = client.getClosestPoints  # looked up once: that costs as much as asking
-        client.resetJointStatesMultiDof(arm, range(7), [[angle] for angle in q])
+        client.resetJointStatesMultiDof(arm, range(len(q)), [[angle] for angle in q])
         bodies = {"the table": (self.world.table,), **self.world.bins, **self._around}
         for name, parts in bodies.items():
             for body in parts:
                 for point in near(arm, body, self._margin):
-                    if point[3] >= FIRST_MOVING:
+                    if point[3] >= self.world.robot.first_moving_link:
                         yield Approach(self.world.part_of(point[3]), name, point[8], self._margin)
-        for one, other in SELF_PAIRS:
+        for one, other in self.world.robot.self_pairs:
             for point in near(arm, arm, self._margin, linkIndexA=one, linkIndexB=other):
                 yield Approach(self.world.part_of(one), self.world.part_of(other), point[8], self._margin)
         if carrying is not None:
@@ -140,7 +130,7 @@ class PathClearance:
                     touchable = point[6][2] <= floor + 0.001 and name not in self._around
                     yield Approach(part, name, point[8], 0.0 if touchable else self._margin)
         for point in near(held, self.world.arm, self._margin):
-            if FIRST_MOVING <= point[4] < WRIST:
+            if self.world.robot.first_moving_link <= point[4] < self.world.robot.wrist_link:
                 yield Approach(part, self.world.part_of(point[4]), point[8], self._margin)
         self.world.client.resetBasePositionAndOrientation(held, FAR_AWAY, [0, 0, 0, 1])
 

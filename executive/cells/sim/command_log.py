@@ -16,24 +16,25 @@ import numpy as np
 
 from executive.errors import Fault, InputError, explained, reason_of
 from executive.geometry import Array
-from executive.motion.state import JOINTS, State
+from executive.motion.state import State
 from executive.motion.trajectory import Trajectory
 
-MAGIC = b"executive world 1\n"
-"""Begins every log; the number is that of the format."""
+VERSION = 2
+"""Version of the format."""
+MAGIC = b"executive world "
+"""Begins every log; version and number of joints follow in the first line: `executive world 2 joints 7`."""
 STEP, IDLE, CLOSE, OPEN, PART, JOINTS_TO, MOTION, DONE, PLACE, REMOVE = b"SICOPJMDXR"
 """Kinds of commands: a physics step of the run, and one between two parts of a run; vacuum on and off; a seal
 that gives way; joint targets; a motion that begins, and one that is over; an object that is put elsewhere,
 and one that is taken away."""
 _BODIES = {
-    STEP: "", IDLE: "", CLOSE: "", OPEN: "", PART: "", DONE: "", JOINTS_TO: f"{1 + JOINTS}d", MOTION: "2dI",
-    PLACE: "i7d", REMOVE: "i",
+    STEP: "", IDLE: "", CLOSE: "", OPEN: "", PART: "", DONE: "", MOTION: "2dI", PLACE: "i7d", REMOVE: "i",
 }  # fmt: skip
-_STATE = 3 * JOINTS
+"""Numbers of each command but JOINTS_TO, which has a time and one number for each joint."""
 
 
 class Command(NamedTuple):
-    """One command: its kind, its numbers, and the states `(N, 21)` of a motion."""
+    """One command: its kind, its numbers, and the states `(N, 3 n)` of a motion."""
 
     kind: int
     numbers: tuple[float, ...] = ()
@@ -45,28 +46,31 @@ class CommandLog:
 
     Args:
         path: The file; None: nothing is kept.
+        joint_count: Number of the arm's joints.
         again: Whether the file is there already, and goes on; a command that a kill tore is cut off.
 
     Raises:
         InputError: It cannot be written, or is no log.
     """
 
-    def __init__(self, path: Path | None = None, *, again: bool = False) -> None:
+    def __init__(self, path: Path | None = None, joint_count: int = 0, *, again: bool = False) -> None:
         self._path = path
         self._file: int | None = None
         if path is None:
             return
-        length = max((end for _, end in _commands(path)), default=len(MAGIC)) if again else 0
+        header = MAGIC + f"{VERSION} joints {joint_count}\n".encode()
+        length = max((end for _, end in _commands(path)), default=len(header)) if again else 0
         with explained(InputError, f'cannot write "{path}"'):
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
             os.ftruncate(self._file, length)
             if not again:
-                os.write(self._file, MAGIC)
+                os.write(self._file, header)
 
     def note(self, kind: int, *numbers: float) -> None:
         """Append a command."""
         if self._file is not None:
-            self._write(bytes([kind]) + struct.pack(f"<{_BODIES[kind]}", *numbers))
+            body = f"{len(numbers)}d" if kind == JOINTS_TO else _BODIES[kind]
+            self._write(bytes([kind]) + struct.pack(f"<{body}", *numbers))
 
     def motion(self, motion: Trajectory) -> None:
         """Append that the arm begins to follow a motion: whoever comes later can brake on its path."""
@@ -125,20 +129,28 @@ def _commands(path: Path) -> Iterator[tuple[Command, int]]:
     data = _content(path)
     if not data.startswith(MAGIC):
         raise InputError(f'"{path}" is no log of a world: it does not begin with {MAGIC.decode().strip()!r}')
-    place = len(MAGIC)
+    header, _, _ = data.partition(b"\n")
+    version, *rest = header.removeprefix(MAGIC).split()
+    if version != str(VERSION).encode() or rest[:1] != [b"joints"]:
+        raise InputError(
+            f'the log of the world "{path}" has version {version.decode(errors="replace")}; this program '
+            f"reads version {VERSION}; run the mission again"
+        )
+    place, joint_count = len(header) + 1, int(rest[1])
+    bodies, state = {**_BODIES, JOINTS_TO: f"{1 + joint_count}d"}, 3 * joint_count
     while place < len(data):
         kind = data[place]
-        body = struct.Struct(f"<{_BODIES[kind]}")
+        body = struct.Struct(f"<{bodies[kind]}")
         if place + 1 + body.size > len(data):
             return
         numbers = body.unpack_from(data, place + 1)
         place += 1 + body.size
         states = None
         if kind == MOTION:
-            size = 8 * _STATE * int(numbers[-1])
+            size = 8 * state * int(numbers[-1])
             if place + size > len(data):
                 return
-            states = np.frombuffer(data, "<f8", _STATE * int(numbers[-1]), place).reshape(-1, _STATE)
+            states = np.frombuffer(data, "<f8", state * int(numbers[-1]), place).reshape(-1, state)
             place += size
         yield Command(kind, numbers, states), place
 
@@ -150,6 +162,6 @@ def _content(path: Path) -> bytes:
 
 
 def states_of(command: Command) -> State:
-    """Return the states of a motion that begins, each array of shape `(N, 7)`."""
+    """Return the states of a motion that begins, each array of shape `(N, n)`."""
     assert command.states is not None
     return State(*np.hsplit(command.states, 3))

@@ -9,21 +9,21 @@ from executive.cell.layout import as_bin, pile_height
 from executive.cells.sim.tool import TOUCH
 from executive.errors import Unreachable
 from executive.geometry import Array, tool_down
-from executive.motion.kinematics import Kinematics
-from executive.motion.limits import JointLimits, rest_to_rest
+from executive.motion.arms import build_kinematics
+from executive.motion.limits import JointLimits, min_time
 
-SWIVELS = np.radians(np.arange(-180.0, 180.0, 20.0))
-"""Swivels of the elbow that are tried [rad]."""
+SPACING = np.radians(20.0)
+"""Distance between the redundancy angles that are tried [rad]."""
 SAFETY = 0.8
-"""Share of the time found for a carry that is surely needed: other swivels and heights may take less."""
+"""Share of the minimum time found for a carry; other configurations and heights may take less time."""
 
 
 class SimLeastTimes:
     """Bounds that hold however a motion is planned; implements `executive.cell.protocols.LeastTimes`.
 
     A carry begins at rest on an object and ends at rest over the bin: no joint makes its part of that sooner
-    than from rest to rest, whatever the way between. The least over all postures counts; joint 7 need not
-    turn, since any yaw will do.
+    than from rest to rest, whatever the way between. The least over all configurations counts; the last joint
+    need not turn, since any yaw will do.
 
     Args:
         config: The cell file.
@@ -32,7 +32,7 @@ class SimLeastTimes:
     def __init__(self, config: CellConfig) -> None:
         self._config = config
         self._limits = JointLimits.of(config.arm.limits)
-        self._kinematics = Kinematics(config.tool.length, self._limits.position)
+        self._kinematics = build_kinematics(config)
         self._highest = pile_height(config)
         self._carries: dict[str, float] = {}
 
@@ -72,18 +72,18 @@ class SimLeastTimes:
         """Return the time of the shortest of the ways from `places` `(N, 2)` to `slots` `(N, 2)` [m]."""
         nearest = np.argmin(np.linalg.norm(places - slots, axis=1))
         starts, ends = (self._postures(ways[nearest], self._highest) for ways in (places, slots))
-        return float(rest_to_rest(ends - starts[:, None], self._limits).min())
+        return float(min_time(ends - starts[:, None], self._limits).min())
 
     def _postures(self, place: Array, height: float) -> Array:
-        """Return joint positions `(N, 7)` [rad] with the tool at a place `(2,)` [m], joint 7 at 0.
+        """Return joint positions `(N, n)` [rad] with the tool at a place `(2,)` [m], the last joint at 0.
 
         Raises:
             Unreachable: There are none.
         """
         pose = tool_down(np.array([*place, height]))
-        found = self._kinematics.grid(pose, SWIVELS).reshape(-1, 7)
-        found[:, 6] = 0.0
-        inside = found[np.all(np.abs(found) <= self._limits.position, axis=1)]
+        found = self._kinematics.solve_all(pose, np.zeros(self._limits.joint_count), SPACING).qs
+        found[:, -1] = 0.0
+        inside = found[self._limits.position.contains(found)]
         if not len(inside):
-            raise self._kinematics.outside_limits(pose, found)
+            raise Unreachable("no configuration of the arm is inside its joint limits")
         return inside

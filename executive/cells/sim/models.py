@@ -125,10 +125,6 @@ def weighed(label: str, config: ObjectConfig) -> ObjectClass:
 
 def missing_models(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield the key of every model of a cell file that is missing or not as the file says, and a sentence."""
-    try:
-        find_model(config.arm.urdf)
-    except InputError as error:
-        yield ("arm", "urdf"), str(error)
     for label, kind in config.objects.items():
         key: KeyPath = ("objects", label)
         try:

@@ -6,7 +6,6 @@ import contextlib
 from collections.abc import Iterator
 
 import numpy as np
-import pybullet
 
 from executive.cell.arm import Goal
 from executive.cell.clock import STEP
@@ -20,7 +19,7 @@ from executive.cells.sim.collision import PathClearance
 from executive.cells.sim.view import ArmShadow
 from executive.cells.sim.world import World
 from executive.geometry import Array
-from executive.motion.planner import Planner
+from executive.motion.arms import build_planner
 from executive.perception.camera_model import calibrated
 
 POINTS_PER_SIDE = 9
@@ -33,20 +32,20 @@ def out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     Asked for are every drop slot of every bin and the safe place, from travel height down to where a load is
     let go in one posture, and every named pose within the joint limits.
     """
-    planner = Planner(config)
+    planner = build_planner(config)
     load = max(kind.height for kind in config.objects.values())
 
     def require(place: Array, floor: float) -> None:
         planner.require_reachable(Goal((float(place[0]), float(place[1]), floor + load)))
 
+    ranges = config.arm.limits.position_ranges_deg
     for name, pose in config.arm.poses_deg.items():
-        for joint, (angle, limit) in enumerate(
-            zip(pose, config.arm.limits.position_deg, strict=True), start=1
-        ):
-            if abs(angle) > limit:
+        for joint, (angle, (lower, upper)) in enumerate(zip(pose, ranges, strict=True), start=1):
+            if not lower <= angle <= upper:
+                limit = f"{upper:g}" if lower == -upper else f"{lower:g} to {upper:g}"
                 yield (
                     ("arm", "poses_deg", name),
-                    f'joint {joint} of the pose "{name}" is at {angle:g} degrees; its limit is {limit:g}',
+                    f'joint {joint} of the pose "{name}" is at {angle:g} degrees; its limit is {limit}',
                 )
     yield from places_out_of_reach(config, require)
 
@@ -57,12 +56,7 @@ def unfit_poses(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     No named pose may bring arm or tool nearer to table, bins or the arm itself than the margin, for there
     is no motion to it then; and from every scan pose the camera must see the whole workspace.
     """
-    try:
-        clearance = PathClearance(config)
-    except pybullet.error as error:
-        yield ("arm", "urdf"), f"the model {config.arm.urdf} cannot be loaded as an iiwa 14: {error}"
-        return
-    with contextlib.closing(clearance):
+    with contextlib.closing(PathClearance(config)) as clearance:
         for name, pose in config.arm.poses_deg.items():
             near = clearance.too_near(np.radians(pose))
             if near:
@@ -75,7 +69,7 @@ def unfit_poses(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
 
 def _blind_poses(config: CellConfig, world: World) -> Iterator[tuple[KeyPath, str]]:
     """Yield the scan poses and the bins that keep a camera from seeing the whole workspace."""
-    planner = Planner(config)
+    planner = build_planner(config)
     shadow = ArmShadow(SimArm(world, planner, config, SimClock(world, STEP)), planner.kinematics, config)
     for name, camera in config.cameras.items():
         matrix, _ = calibrated(camera)

@@ -25,7 +25,7 @@ class UnderWay:
     """What the arm was doing when nobody commanded it any more.
 
     Attributes:
-        command: Joint positions of the last command before the last physics step `(7,)` [rad].
+        command: Joint positions of the last command before the last physics step `(n,)` [rad].
         motion: The motion it followed, or None.
         time: How far on that path it was [s].
         idle: Physics steps that were none of the run.
@@ -107,7 +107,7 @@ class Sampled:
     """A piece between given states: polynomials of fifth degree that agree with them; implements `Piece`.
 
     Args:
-        states: Every `STEP`, and at the end; each array of shape `(N, 7)`.
+        states: Every `STEP`, and at the end; each array of shape `(N, n)`.
         duration: Time it takes [s].
     """
 

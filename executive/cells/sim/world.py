@@ -21,10 +21,9 @@ from executive.cells.sim import command_log
 from executive.cells.sim.command_log import CommandLog
 from executive.cells.sim.model_files import find_model
 from executive.cells.sim.models import add_body, upright
+from executive.cells.sim.robot_models import ROBOT_MODELS, RobotModel
 from executive.cells.sim.table_top import TableTop
 from executive.geometry import Array, Pose
-from executive.motion.kinematics import FLANGE_OFFSET
-from executive.motion.state import JOINTS
 
 TABLE_HEIGHT = 0.625
 """Height of the top of pybullet_data's table over its feet [m]."""
@@ -34,8 +33,6 @@ CYLINDER_MARGIN = 0.001
 """What Bullet adds all around a URDF's cylinder when it collides [m]."""
 TOOL_MASS = 0.1
 """Mass of the tool [kg]."""
-TORQUES = (320.0, 320.0, 176.0, 176.0, 110.0, 40.0, 40.0)
-"""Largest joint torques of the iiwa 14 [Nm], data sheet as in RobotLocomotion/models iiwa_description."""
 RAY_LENGTH, RAY_STEP = 5.0, 1e-4
 """Length of a ray, and the distance behind the arm's surface at which it goes on [m]."""
 
@@ -51,7 +48,8 @@ class World:
     Attributes:
         client: The connection to the physics server.
         arm: Body of the arm, fixed at the origin.
-        flange: Index of the arm's link 7; the flange is `FLANGE_OFFSET` along its z axis.
+        robot: Model of the arm.
+        flange: Index of the link with the flange.
         tool: Index of the tool's link, whose frame is the flange's.
         table, plane: Bodies of the table and of the floor under it.
         table_top: The surface of the table.
@@ -65,11 +63,10 @@ class World:
         removed: Class and last position `(3,)` [m] of each object that somebody took away, by body.
     """
 
-    flange = 6
-    tool = 7
-
     def __init__(self, config: CellConfig, *, gui: bool = False, visuals: bool = True) -> None:
         self.config = config
+        self.robot = ROBOT_MODELS[config.arm.urdf]
+        self.flange, self.tool = self.robot.joint_count - 1, self.robot.joint_count
         self.client = BulletClient(pybullet.GUI if gui else pybullet.DIRECT)
         self.client.setGravity(0, 0, -9.81)
         self.client.setTimeStep(STEP)
@@ -141,29 +138,29 @@ class World:
         self.client.resetBasePositionAndOrientation(body, X_WI.position, X_WI.quaternion)
 
     def set_arm(self, q: Sequence[float] | Array) -> None:
-        """Put the arm at joint positions `q` `(7,)` [rad], at rest, whatever is in the way."""
+        """Put the arm at joint positions `q` `(n,)` [rad], at rest, whatever is in the way."""
         for joint, angle in enumerate(q):
             self.client.resetJointState(self.arm, joint, angle)
 
     def command_arm(self, q: Array, time: float = 0.0) -> None:
-        """Have the arm's motors go to joint positions `q` `(7,)` [rad], `time` [s] on the path of its motion.
+        """Have the arm's motors go to joint positions `q` `(n,)` [rad], `time` [s] on the path of its motion.
 
         Full position gain and no velocity: sent before every step, it follows a path to 0.0005°.
         """
         self.log.note(command_log.JOINTS_TO, time, *q)
         self.client.setJointMotorControlArray(
             self.arm,
-            range(JOINTS),
+            range(self.robot.joint_count),
             pybullet.POSITION_CONTROL,
             targetPositions=q.tolist(),
-            forces=TORQUES,
-            positionGains=[1.0] * JOINTS,
+            forces=self.robot.torques,
+            positionGains=[1.0] * self.robot.joint_count,
         )
 
     def flange_pose(self) -> Pose:
         """Return `X_WF`, the pose of the flange."""
         state = self.client.getLinkState(self.arm, self.flange, computeForwardKinematics=True)
-        return Pose.of(*state[4:6]) @ Pose.of([0, 0, FLANGE_OFFSET])
+        return Pose.of(*state[4:6]) @ Pose.of([0, 0, self.robot.flange_offset])
 
     def tool_pose(self) -> Pose:
         """Return `X_WT`, the pose of the tool centre point: the middle of the cup's lip."""
@@ -197,7 +194,8 @@ class World:
         """
         path = find_model(self.config.arm.urdf)
         text = path.read_text().replace('filename="meshes/', f'filename="{path.parent}/meshes/')
-        text = text.replace("</robot>", _tool_link(self.config.tool.length, self.config.tool.cup_radius))
+        tool = self.config.tool
+        text = text.replace("</robot>", _tool_link(tool.length, tool.cup_radius, self.robot))
         with tempfile.TemporaryDirectory() as folder:
             generated = Path(folder) / "arm_with_tool.urdf"
             generated.write_text(text)
@@ -225,7 +223,7 @@ def add_bin(client: BulletClient, bin: BinConfig) -> int:
     )
 
 
-def _tool_link(length: float, cup_radius: float) -> str:
+def _tool_link(length: float, cup_radius: float, robot: RobotModel) -> str:
     """Return the URDF text of the tool, from the flange to the lip, and the closing tag."""
     body = length - NECK_LENGTH
     parts = [(body, TOOL_RADIUS, body / 2), (NECK_LENGTH, cup_radius, length - NECK_LENGTH / 2)]
@@ -244,7 +242,7 @@ def _tool_link(length: float, cup_radius: float) -> str:
     {shapes}
   </link>
   <joint name="tool_joint" type="fixed">
-    <parent link="lbr_iiwa_link_7"/><child link="tool"/><origin xyz="0 0 {FLANGE_OFFSET}"/>
+    <parent link="{robot.flange_link}"/><child link="tool"/><origin xyz="0 0 {robot.flange_offset}"/>
   </joint>
 </robot>
 """

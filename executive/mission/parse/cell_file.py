@@ -196,7 +196,6 @@ def _links(file: CellFile, config: CellConfig) -> Iterator[Finding]:
 
 def _models(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield the keys and the path, as written, of every model file that a cell names."""
-    yield ("arm", "urdf"), config.arm.urdf
     for label, kind in config.objects.items():
         if kind.urdf:
             yield ("objects", label, "urdf"), kind.urdf
@@ -217,8 +216,7 @@ def _models_found(file: CellFile, config: CellConfig, folders: Mapped[Source, Pa
         for label, kind in config.objects.items()
         for key in ("mesh" if kind.mesh else "urdf",)
     }
-    arm = config.arm.model_copy(update={"urdf": found["arm", "urdf"]})
-    return config.model_copy(update={"arm": arm, "objects": objects})
+    return config.model_copy(update={"objects": objects})
 
 
 def _models_outside(file: CellFile, config: CellConfig, folders: Mapped[Source, Path]) -> Iterator[Finding]:

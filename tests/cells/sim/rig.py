@@ -14,7 +14,7 @@ from executive.cells.sim.collision import PathClearance
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
-from executive.motion.planner import Planner
+from executive.motion.arms import build_planner
 from executive.motion.trajectory import Trajectory
 
 WHITE = (1.0, 1.0, 1.0)
@@ -32,7 +32,7 @@ class Rig:
         self.config = config
         self.world = World(config, visuals=False)
         self.clearance = PathClearance(config)
-        self.planner = Planner(config, self.clearance.check)
+        self.planner = build_planner(config, self.clearance.check)
         self.clock = SimClock(self.world, STEP)
         self.events: list[dict[str, Any]] = []
         self.tool = SuctionTool(self.world, config.tool)

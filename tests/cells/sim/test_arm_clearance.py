@@ -11,7 +11,8 @@ from executive.cell.config import CellConfig
 from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.cells.sim.collision import PathClearance
 from executive.errors import Blocked
-from executive.motion.kinematics import Kinematics, fold
+from executive.motion.arms import build_kinematics
+from executive.motion.iiwa14 import Iiwa14, max_wrist_angle
 from tests.motion.joint_states import reach
 
 DUCK = Task(Load(ObjectClass("duck", 0.05, 0.04)))
@@ -27,12 +28,12 @@ def clearance(overhead: CellConfig) -> Iterator[PathClearance]:
 
 
 @pytest.fixture(scope="module")
-def kinematics(overhead: CellConfig) -> Kinematics:
-    return Kinematics(overhead.tool.length, np.radians(overhead.arm.limits.position_deg))
+def kinematics(overhead: CellConfig) -> Iiwa14:
+    return build_kinematics(overhead)
 
 
 @pytest.fixture
-def at(overhead: CellConfig, kinematics: Kinematics):
+def at(overhead: CellConfig, kinematics: Iiwa14):
     """Joint positions with the tool centre point at a place."""
     home = np.radians(overhead.arm.poses_deg["home"])
     return lambda x, y, z: reach(kinematics, (x, y, z), home)
@@ -133,7 +134,7 @@ def test_the_wrist_may_fold_as_far_as_links_5_and_7_stay_apart(clearance, distan
     world, rng = clearance.world, np.random.default_rng(6)
     for side in (-1, 1):
         q = rng.uniform(-2, 2, 7)
-        q[5] = side * fold(distance)
+        q[5] = side * max_wrist_angle(distance)
         world.set_arm(q)
         points = world.client.getClosestPoints(world.arm, world.arm, 0.05, linkIndexA=4, linkIndexB=6)
         assert min(point[8] for point in points) == pytest.approx(distance, abs=5e-4)

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from executive.cell.config import CellConfig
+from executive.cell.config import ArmConfig, CellConfig
+from executive.cells.fake.cell import FakeCell
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.poses import out_of_reach, unfit_poses
 from executive.mission.parse.cell_file import load_cell
-from executive.motion.kinematics import Kinematics
+from executive.motion.arms import build_kinematics
 from tests.cells.sim.conftest import shipped_cell
 from tests.motion.joint_states import reach
 
@@ -34,7 +35,7 @@ def moved(config: CellConfig, bin: str, *position: float) -> CellConfig:
 
 def reaching(config: CellConfig, *place: float) -> Sequence[float]:
     """Return the pose [degree] with the tool straight down at a place [m]."""
-    kinematics = Kinematics(config.tool.length, np.radians(config.arm.limits.position_deg))
+    kinematics = build_kinematics(config)
     home = np.radians(config.arm.poses_deg["home"])
     return tuple(np.degrees(reach(kinematics, place, home)))
 
@@ -124,10 +125,27 @@ def test_a_scan_pose_without_a_view_of_it_all_is_found(overhead: CellConfig, wri
     ]
 
 
-def test_a_model_that_is_no_iiwa_is_a_finding_and_no_traceback(overhead: CellConfig) -> None:
+@pytest.mark.parametrize("kind", [SimCell, FakeCell])
+def test_an_arm_without_kinematics_is_a_finding_with_the_supported_arms(overhead: CellConfig, kind) -> None:
     config = overhead.model_copy(update={"arm": overhead.arm.model_copy(update={"urdf": "r2d2.urdf"})})
-    assert list(unfit_poses(config)) == [
-        (("arm", "urdf"), "the model r2d2.urdf cannot be loaded as an iiwa 14: Cannot load URDF file.")
+    assert list(kind.check(config, Path())) == [
+        (
+            ("arm", "urdf"),
+            'the arm model "r2d2.urdf" has no kinematics; supported: kuka_iiwa/model.urdf',
+        )
+    ]
+
+
+def test_limits_of_another_number_of_joints_are_a_finding(overhead: CellConfig) -> None:
+    limits = {name: value[:6] if isinstance(value, tuple) else value for name, value in overhead.arm.limits}
+    arm = ArmConfig(limits=limits, poses_deg={"home": overhead.arm.poses_deg["home"][:6]})
+    config = overhead.model_copy(update={"arm": arm})
+    assert list(SimCell.check(config, Path())) == [
+        (
+            ("arm", "limits"),
+            "the arm kuka_iiwa/model.urdf has 7 joints, but the limits of 6 joints are given; write 7 values "
+            "for each limit and pose",
+        )
     ]
 
 

@@ -12,7 +12,7 @@ from executive.cell.config import CellConfig
 from executive.cells.sim import command_log as log
 from executive.cells.sim.command_log import CommandLog, read_commands, states_of
 from executive.errors import InputError
-from executive.motion.planner import Planner
+from executive.motion.arms import build_planner
 
 
 @pytest.fixture
@@ -21,14 +21,14 @@ def path(tmp_path: Path) -> Path:
 
 
 def test_it_reads_what_was_written_bit_by_bit(path: Path) -> None:
-    written = CommandLog(path)
+    written = CommandLog(path, 7)
     joints = (1 / 3, *np.random.default_rng(1).normal(size=7))
     written.note(log.CLOSE)
     written.note(log.JOINTS_TO, *joints)
     written.note(log.STEP)
     written.note(log.PLACE, 7, *joints[:7])
     written.close()
-    again = CommandLog(path, again=True)
+    again = CommandLog(path, 7, again=True)
     again.note(log.IDLE)
     again.close()
     read = list(read_commands(path))
@@ -40,8 +40,8 @@ def test_it_reads_what_was_written_bit_by_bit(path: Path) -> None:
 
 
 def test_a_command_that_was_torn_is_left_out_wherever_it_was(path: Path, overhead: CellConfig) -> None:
-    planner = Planner(overhead)
-    written = CommandLog(path)
+    planner = build_planner(overhead)
+    written = CommandLog(path, 7)
     written.note(log.STEP)
     whole = path.stat().st_size
     written.note(log.JOINTS_TO, *range(8))
@@ -60,13 +60,13 @@ def test_a_command_that_was_torn_is_left_out_wherever_it_was(path: Path, overhea
 
 
 def test_what_goes_on_begins_after_the_last_whole_command(path: Path) -> None:
-    written = CommandLog(path)
+    written = CommandLog(path, 7)
     written.note(log.STEP)
     written.note(log.JOINTS_TO, *range(8))
     written.close()
     written.close()
     path.write_bytes(path.read_bytes()[:-5])
-    again = CommandLog(path, again=True)
+    again = CommandLog(path, 7, again=True)
     again.note(log.OPEN)
     again.close()
     CommandLog().note(log.STEP)  # nothing is kept without a path
@@ -77,10 +77,30 @@ def test_a_file_that_is_no_log_says_so(path: Path) -> None:
     with pytest.raises(InputError, match=r"cannot read the log of the world .*without it a simulated run"):
         list(read_commands(path))
     path.write_bytes(b"something else")
-    with pytest.raises(InputError, match=r"is no log of a world: it does not begin with 'executive world 1'"):
+    with pytest.raises(InputError, match=r"is no log of a world: it does not begin with 'executive world'"):
         list(read_commands(path))
     with pytest.raises(InputError, match=r"cannot write .*: not a directory"):
-        CommandLog(path / "below")
+        CommandLog(path / "below", 7)
     assert not log.is_log(path)
-    CommandLog(path).close()
+    CommandLog(path, 7).close()
     assert log.is_log(path)
+
+
+def test_the_header_states_the_number_of_joints(path: Path) -> None:
+    written = CommandLog(path, 6)
+    written.note(log.JOINTS_TO, *range(7))
+    written.close()
+    assert path.read_bytes().startswith(b"executive world 2 joints 6\n")
+    assert [one.numbers for one in read_commands(path)] == [tuple(range(7))]
+
+
+@pytest.mark.parametrize("header", [b"executive world 1\n", b"executive world 3 arms 2\n"])
+def test_a_log_of_another_version_is_refused_in_one_message(path: Path, header: bytes) -> None:
+    path.write_bytes(header + b"SSS")
+    version = header.split()[2].decode()
+    with pytest.raises(
+        InputError, match=rf"has version {version}; this program reads version 2; run the mission"
+    ):
+        list(read_commands(path))
+    with pytest.raises(InputError, match="reads version 2"):
+        CommandLog(path, 7, again=True)

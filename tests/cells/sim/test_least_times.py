@@ -13,7 +13,7 @@ from executive.cells.sim.cell import SimCell
 from executive.cells.sim.collision import PathClearance
 from executive.cells.sim.least_times import SimLeastTimes
 from executive.geometry import Array
-from executive.motion.planner import Planner
+from executive.motion.arms import build_planner
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def nearest(config: CellConfig, slots: Array) -> Array:
 def test_no_planned_carry_is_faster_than_the_least(overhead: CellConfig, least: SimLeastTimes) -> None:
     """Half of them are the shortest there are: from the place nearest to a slot, and higher than it must."""
     clearance = PathClearance(overhead)
-    planner = Planner(overhead, clearance.check)
+    planner = build_planner(overhead, clearance.check)
     rng, home = np.random.default_rng(3), np.radians(overhead.arm.poses_deg["home"])
     shares = []
     for number in range(24):

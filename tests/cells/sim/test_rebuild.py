@@ -137,7 +137,7 @@ def test_a_command_that_no_physics_step_has_followed_is_not_skipped(
     log = tmp_path / "log"
     log.write_bytes(one.log.read_bytes())
     time = one.time + STEP
-    CommandLog(log, again=True).note(JOINTS_TO, time, *one.motion.at(time).q)
+    CommandLog(log, 7, again=True).note(JOINTS_TO, time, *one.motion.at(time).q)
     cell = rebuilt(mission, log)
     cell.advance()
     assert cell._arm._time == pytest.approx(time, abs=STEP / 10)

@@ -25,7 +25,7 @@ STEPS = 36
 def swing(config: CellConfig, path: Path, idle: int) -> Shoot:
     """A log in which the arm swings for some steps; in the middle some steps of nobody's run."""
     home = np.radians(config.arm.poses_deg["home"])
-    commands = CommandLog(path)
+    commands = CommandLog(path, 7)
     for step in range(STEPS):
         commands.note(log.JOINTS_TO, step / 240, *(home - 0.02 * step * np.eye(7)[0]))
         commands.note(log.STEP)

@@ -9,7 +9,7 @@ import pytest
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
-from executive.motion.kinematics import Kinematics
+from executive.motion.arms import build_kinematics
 from tests.cells.sim.conftest import shipped_cell
 from tests.motion.joint_states import reach
 
@@ -27,9 +27,7 @@ class Bench:
         self.world = World(config)
         self.config = config.tool
         self.tool = SuctionTool(self.world, config.tool)
-        self.kinematics = Kinematics(
-            tool_length=config.tool.length, position_limit=np.radians(config.arm.limits.position_deg)
-        )
+        self.kinematics = build_kinematics(config)
         self.q: Array = np.radians(config.arm.poses_deg["home"])
         self.body = self.world.add_object(label, Pose.of([X - GOOD_PLACE[label], Y, CUBE / 2]), (1, 1, 1))
         self.steps(120)

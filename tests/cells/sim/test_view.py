@@ -13,14 +13,14 @@ from executive.cells.sim.camera import camera_pose
 from executive.cells.sim.clock import SimClock
 from executive.cells.sim.view import ArmShadow
 from executive.cells.sim.world import World
-from executive.motion.planner import Planner
+from executive.motion.arms import build_planner
 from executive.perception.camera_model import calibrated, project
 
 Build = Callable[[CellConfig], World]
 
 
 def test_what_the_tool_holds_hides_what_lies_under_it(build: Build, overhead: CellConfig) -> None:
-    world, planner, holds = build(overhead), Planner(overhead), False
+    world, planner, holds = build(overhead), build_planner(overhead), False
     arm = SimArm(world, planner, overhead, SimClock(world, STEP))
     shadow = ArmShadow(arm, planner.kinematics, overhead, lambda: holds)
     camera = overhead.cameras["overhead"]

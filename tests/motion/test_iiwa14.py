@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 from pybullet_utils.bullet_client import BulletClient
 
 from executive.geometry import Pose
-from executive.motion.kinematics import Kinematics
+from executive.motion.iiwa14 import Iiwa14
+from executive.motion.limits import JointRange
 
 LIMIT = np.radians([170, 120, 170, 120, 170, 120, 175])
-ARM = Kinematics(0.12, LIMIT)
+ARM = Iiwa14(0.12, JointRange(-LIMIT, LIMIT))
 postures = st.tuples(*(st.floats(-limit, limit) for limit in LIMIT)).map(np.array)
 
 
@@ -26,17 +27,16 @@ def assert_same(one: Pose, other: Pose, tolerance: float = 1e-7) -> None:
 @settings(max_examples=40)
 def test_every_solution_of_a_reachable_pose_reaches_it(q) -> None:
     goal = ARM.forward(q)
-    found = ARM.grid(goal, np.array([ARM.swivel(q), 0.7])).reshape(-1, 7)
-    for solution in found:
+    for solution in ARM.solve_all(goal, q, math.pi).qs:
         assert_same(ARM.forward(solution), goal, 1e-6)
 
 
 @given(postures)
 @settings(max_examples=40)
-def test_branch_and_swivel_of_a_posture_lead_back_to_it(q) -> None:
+def test_the_configuration_of_a_posture_leads_back_to_it(q) -> None:
     if min(abs(math.sin(q[i])) for i in (1, 3, 5)) < 1e-3:
         return  # straight joints: the posture is not one of a few
-    found = ARM.grid(ARM.forward(q), np.array([ARM.swivel(q)]))[ARM.branch(q), 0]
+    found = ARM.solve(ARM.forward(q), ARM.configuration(q))
     assert np.abs(found - q).max() < 1e-5
 
 

@@ -1,0 +1,125 @@
+"""The planner with an arm of six joints, whose limits are asymmetric."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+import pytest
+from joint_states import passed, peaks
+from six_joint_arm import SixJointArm
+
+from executive.cell.arm import Goal, Task
+from executive.cell.config import ArmConfig, CellConfig, LimitsConfig
+from executive.cell.objects import Load, ObjectClass, Obstacle
+from executive.errors import Blocked, Unreachable
+from executive.motion.kinematics import Kinematics
+from executive.motion.limits import JointLimits
+from executive.motion.planner import Planner
+from executive.motion.postures import find_postures
+
+LIMITS = LimitsConfig(
+    source="Invented; like those of a Panda, some do not include 0.",
+    min_position_deg=(-150, -60, 20, -170, -20, -90),
+    position_deg=(170, 110, 150, 170, 120, 175),
+    velocity_deg=(120, 120, 120, 180, 180, 200),
+    acceleration=(8, 8, 10, 15, 15, 20),
+    jerk=(80, 80, 100, 150, 150, 200),
+    stop_acceleration=(12, 12, 15, 20, 20, 25),
+    stop_jerk=(160, 160, 200, 300, 300, 400),
+)
+CUBE = ObjectClass("cube", 0.05, 0.0354)
+HOME = np.radians([20.0, -10.0, 110.0, 0.0, 80.0, 0.0])
+"""The tool points down."""
+
+
+@pytest.fixture(scope="module")
+def six(config: CellConfig) -> CellConfig:
+    arm = ArmConfig(urdf="six", limits=LIMITS, poses_deg={"home": tuple(np.degrees(HOME).tolist())})
+    return config.model_copy(update={"arm": arm})
+
+
+@pytest.fixture(scope="module")
+def arm(six: CellConfig) -> Kinematics:
+    return SixJointArm(six.tool.length, JointLimits.of(LIMITS).position)
+
+
+def test_the_kinematics_of_the_test_arm_are_consistent(arm: Kinematics) -> None:
+    rng, limits = np.random.default_rng(1), JointLimits.of(LIMITS).position
+    qs = rng.uniform(limits.lower, limits.upper, (100, 6))
+    tips, axes = arm.tips(qs)
+    for q, tip, axis in zip(qs, tips, axes, strict=True):
+        X_WT = arm.forward(q)
+        assert np.allclose(tip, X_WT.position)
+        assert np.allclose(axis, X_WT.rotation[:, 2])
+        assert np.allclose(arm.solve(X_WT, arm.configuration(q)), q, atol=1e-6)
+        for solution in arm.solve_all(X_WT, q, 0.1).qs:
+            assert np.allclose(arm.forward(solution).position, X_WT.position, atol=1e-9)
+            assert np.allclose(arm.forward(solution).rotation, X_WT.rotation, atol=1e-9)
+
+
+def test_motions_of_six_joints_reach_their_goals_within_asymmetric_limits(
+    six: CellConfig, arm: Kinematics
+) -> None:
+    checked = []
+    planner, limits = Planner(six, arm, lambda path, task: checked.append(path)), JointLimits.of(LIMITS)
+    rng, q = np.random.default_rng(3), HOME
+    for number in range(12):
+        x, y = rng.uniform((0.42, -0.22), (0.64, 0.22)).tolist()
+        wall = Obstacle(0.4, float(rng.choice([-0.25, 0.25])), 0.05, 0.15, "the wall")
+        goal, task = Goal((x, y, 0.053), guarded=0.015, speed=0.04), Task(around=(wall,))
+        if number % 2:
+            bin = list(six.bins.values())[number % len(six.bins)].position
+            goal, task = Goal((bin[0], bin[1], 0.08)), Task(Load(CUBE, 4.0), (wall,))
+        motion = planner.plan(q, goal, task)
+        states = passed(motion)
+        assert states.q.shape[1] == 6
+        assert limits.position.contains(states.q).all()
+        assert max(peaks(states, limits)) <= 1 + 1e-6
+        assert arm.forward(motion.end).position == pytest.approx(goal.position, abs=1e-6)
+        assert arm.forward(motion.end).rotation[2, 2] == pytest.approx(-1)
+        q = motion.end
+    assert all(path.shape[1] == 6 for path in checked)
+
+
+def test_the_yaw_of_a_goal_is_that_of_the_tool(six: CellConfig, arm: Kinematics) -> None:
+    motion = Planner(six, arm).plan(HOME, Goal((0.5, 0.1, 0.1), yaw=0.4))
+    assert arm.forward(motion.end).rotation[:, 1] == pytest.approx(
+        [-math.sin(0.4), math.cos(0.4), 0], abs=1e-6
+    )
+
+
+def test_only_configurations_within_asymmetric_limits_are_found(arm: Kinematics) -> None:
+    found = find_postures(arm, Goal((0.5, 0.1, 0.05)), 0.1, HOME)
+    assert len(found)
+    assert (found.low[:, 2] >= math.radians(20)).all()
+
+
+def test_errors_state_both_limits_of_a_joint(six: CellConfig, arm: Kinematics) -> None:
+    with pytest.raises(Unreachable, match=r"leaves joint \d \d+\.\d° outside -?\d+° to \d+°$"):
+        find_postures(arm, Goal((-0.3, -0.02, 0.05)), 0.0, HOME)
+    narrow = HOME.copy()
+    narrow[4] = math.radians(-25)
+    text = "would take joint 5 to -25.0°; its limit is -20° to 120°"
+    with pytest.raises(Blocked, match=re.escape(text)):
+        Planner(six, arm).plan(HOME, narrow)
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"velocity_deg": LIMITS.velocity_deg[:5]}, "has 5 values in velocity_deg and 6 in position_deg"),
+        ({"jerk": ()}, "has 0 values in jerk and 6 in position_deg"),
+        ({"min_position_deg": (-150.0,)}, "has 1 values in min_position_deg and 6 in position_deg"),
+        ({"position_deg": (170, 110, 21, 170, 120, 175)}, "allows joint 3 the positions 20 to 21 degrees"),
+    ],
+)
+def test_limits_that_do_not_fit_together_are_refused(changes, text: str) -> None:
+    with pytest.raises(ValueError, match=text):
+        LimitsConfig(**{**LIMITS.model_dump(), **changes})
+
+
+def test_a_pose_of_another_number_of_joints_is_refused() -> None:
+    with pytest.raises(ValueError, match='has 7 angles in the pose "home" and limits of 6 joints'):
+        ArmConfig(limits=LIMITS, poses_deg={"home": (0.0,) * 7})
