@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
-from executive.cell.workcell import CellOptions, CellPast, Workcell
+from executive.cell.workcell import CellOptions, ResumePoint, Workcell
 from executive.cells.fake.cell import SilentOperator
 from executive.events import ignore
 from executive.mission.load import LoadedMission
@@ -25,7 +25,7 @@ def meanwhile(
         act: Changes the world; the arm is at rest before, and what was moved comes to rest after.
         kind: Makes the work cell, a fake or a simulated one.
     """
-    options = CellOptions(SilentOperator(), base=loaded.cell_path.parent, past=CellPast(log))
+    options = CellOptions(SilentOperator(), base=loaded.cell_path.parent, resume=ResumePoint(log))
     cell = kind(loaded.cell_config, seed=seed, routes=loaded.routes, emit=ignore, options=options)
     with closing(cell):
         hand = hand_of(cell)

@@ -37,7 +37,7 @@ from executive.mission.text.files import shipped_missions
 from executive.mission.text.yaml_text import parse_yaml, plain
 from executive.plugins import cell_kind, discover
 from executive.record.result import EXIT_CODES
-from executive.run.run import Run
+from executive.run.assembly import RunOptions, assemble
 from executive.testing.run_skill import run_skill
 
 LONGEST = 300.0
@@ -70,7 +70,8 @@ def in_time(event: Event) -> None:
 def assert_does_its_work(loaded: LoadedMission) -> None:
     # A detector behind a server cannot be measured here.
     assert [one for one in loaded.warnings if one.code != "not-measured"] == []
-    run = Run(loaded, discover(), seed=0, kind=FakeCell, requests=[*loaded.routes], observers=[in_time])
+    options = RunOptions(0, [*loaded.routes], kind=FakeCell)
+    run = assemble(loaded, discover(), options, [in_time])
     try:
         outcome = run.execute()
         assert (outcome.status, outcome.message) == ("SUCCESS", "")

@@ -68,12 +68,14 @@ def run_job(job: Job) -> Result:
     """Do one run, leave its record and its report, and return its result object."""
     from executive.mission.load import load_mission
     from executive.plugins import discover
-    from executive.record.recorded_run import recorded_run
+    from executive.record.recorded_run import RecordOptions, record_run
+    from executive.run.assembly import RunOptions
     from executive.view.report.page import leave_report
 
     skills = discover()
     loaded = load_mission(job.mission, skills, job.overrides)
-    result = recorded_run(loaded, skills, seed=job.seed, runs=job.runs, frames=job.frames, scene=job.scene)
+    options = RunOptions(job.seed, scene=job.scene)
+    result = record_run(loaded, skills, options, job.runs, RecordOptions(frames=job.frames))
     # A run without a report counts as well as any other.
     leave_report(result)
     return result

@@ -1,6 +1,6 @@
 """Proxy between a skill and its cell: every attribute read and every call goes through one interceptor.
 
-The tape records and replays through it, the test kit watches through it, and fault scripts change answers
+The recorder and the replay use it, the test kit observes through it, and fault scripts change answers
 through it. Proxies can be nested: the cell that `intercept` returns can be intercepted again.
 """
 

@@ -1,4 +1,4 @@
-"""What the runtime drives: a cell together with the world it acts in, and how one is made."""
+"""Protocols of a work cell: the cell that skills use, the world around it, and the kinds of cells."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PLACES = ("right", "wrong_bin", "left", "elsewhere", "fell_in_wrong_bin", "unsee
 
 
 class Accounts(Protocol):
-    """What the runtime asks of a ledger when a run is over."""
+    """The part of a ledger that a run uses at its end and when it is resumed."""
 
     def close(self, *, completed: bool) -> None:
         """Decide the final state of each item; `completed` is True if the tree succeeded."""
@@ -43,24 +43,24 @@ class Accounts(Protocol):
 
 
 class Workcell(Protocol):
-    """What the runtime drives: a cell together with the world it acts in."""
+    """A cell together with its world, as a run drives it."""
 
     @property
     def cell(self) -> Cell:
-        """What skills see."""
+        """The cell that skills see."""
 
     @property
     def accounts(self) -> Accounts:
-        """The books of the cell's ledger."""
+        """The ledger; at its end, the run closes the ledger and reads its counts and rows."""
 
     @property
     def steps(self) -> int:
-        """Control steps that its world has made since the run began, those before a resumption included."""
+        """Number of control steps since the run began, those before a resumption included."""
 
     def log_to(self, path: Path) -> None:
-        """Keep in a file, from now on, what a simulated world can be rebuilt from at any moment.
+        """Start a log file from which the simulated world can be rebuilt as it is at any moment.
 
-        Called before the first control step; a cell of hardware has nothing to keep.
+        Called before the first control step; a cell of hardware keeps no log.
 
         Raises:
             InputError: The file cannot be written.
@@ -70,51 +70,49 @@ class Workcell(Protocol):
         """Let one control step pass."""
 
     def scenery(self) -> Scenery | None:
-        """Return what there is to be seen, for people only; None where nothing tells."""
+        """Return the scene for viewers, or None if the cell has none."""
 
     def audit(self) -> Mapping[str, int] | None:
-        """Return what really became of the objects, or None where nobody can know (real hardware)."""
+        """Return the true final counts of the objects, or None if they are unknown, as on hardware."""
 
     def close(self) -> None:
-        """Give everything back; the cell cannot be used afterwards."""
+        """Release all resources; the cell cannot be used afterwards."""
 
 
 @dataclass(frozen=True)
-class CellPast:
-    """What a run that is taken up again has had of its cell.
+class ResumePoint:
+    """State of a cell in which an interrupted run left it.
 
-    A simulated world is rebuilt from the log that the run left, its arm braking, and the log goes on.
+    A simulated world is rebuilt from its log, with the arm braking; the log is continued.
 
     Attributes:
-        log: What `log_to` was given.
-        steps: Control steps made, as far as the journal knows.
-        frames: Images taken.
-        turns: Times that the camera was asked for its next pose.
+        log: File that `log_to` started.
+        frames: Number of images taken.
+        turns: Number of calls of the camera's `next_pose`.
     """
 
     log: Path
-    steps: int = 0
     frames: int = 0
     turns: int = 0
 
 
 @dataclass(frozen=True)
 class CellOptions:
-    """How a run wants its cell.
+    """Options of a run for its cell.
 
     Attributes:
-        operator: Who is asked for requests.
-        base: Folder that paths in the cell file start from.
+        operator: The operator beside the cell.
+        base: Folder that paths in the cell file are relative to.
         gui: Show the world in a window.
-        past: What a run that is taken up again has had of the cell; None: a run begins.
-        scene: File that changes the world of a simulated cell, which alone reads it; None: the world is as
-            the cell file declares it.
+        resume: State in which the interrupted run left the cell; None for a new run.
+        scene: File that changes the world of a simulated cell, and that only this cell reads; None: the world
+            is as the cell file declares it.
     """
 
     operator: Operator
     base: Path
     gui: bool = False
-    past: CellPast | None = None
+    resume: ResumePoint | None = None
     scene: Path | None = None
 
 
@@ -131,16 +129,16 @@ class CellKind(Protocol):
         """Return a cell made from a cell file (`executive.cell.config.CellConfig`)."""
 
     def check(self, config: Any, base: Path) -> Iterable[tuple[KeyPath, str]]:
-        """Return what is wrong with a cell file beyond its form: the key it is about, and a sentence.
+        """Return findings about a cell file of the right form: the key of each, and a sentence.
 
-        `base` is the folder that paths in it start from.
+        `base` is the folder that paths in the file are relative to.
         """
 
     def labels(self, config: Any, base: Path) -> Mapping[str, tuple[str, ...] | None]:
         """Return the classes that each detector of a cell file knows, by the cell's names for them.
 
-        None where nobody can know without asking it. Never raises: what is wrong is found by `check`.
+        None for a detector whose classes are unknown until it is asked. Never raises: `check` reports errors.
         """
 
     def least_times(self, config: Any) -> LeastTimes:
-        """Return what things take at the very least in a cell that `check` finds nothing wrong with."""
+        """Return the minimum times of actions in a cell for which `check` returns no finding."""

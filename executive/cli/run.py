@@ -16,6 +16,8 @@ from executive.cli.output import print_json, stdout_kept_clean
 from executive.cli.streams import unescaped_stderr
 
 if TYPE_CHECKING:
+    from executive.record.recorded_run import RecordOptions
+    from executive.run.assembly import RunOptions
     from executive.skill import Skill
     from executive.view.live.page import LivePage
     from executive.view.terminal.lines import Lines
@@ -69,8 +71,10 @@ def command(
     with stdout_kept_clean():
         from executive.plugins import discover
         from executive.record.guarded_view import GuardedView
+        from executive.record.recorded_run import RecordOptions
         from executive.record.result import disagreement, exit_code
         from executive.record.run_directory import RunDirectory
+        from executive.run.assembly import RunOptions
         from executive.view.report.page import leave_report
         from executive.view.terminal.summary import repeat_command, story_lines, summary, verdict
 
@@ -78,20 +82,16 @@ def command(
         shown = None if quiet else _view()
         with _page(live) as page:
             views = [GuardedView(view) for view in (shown, page) if view is not None]
-            options: dict[str, Any] = {
-                "views": views,
-                "paused": paused,
-                "gui": gui,
-                "realtime": realtime,
-                "keyboard": page is None or typing,
-            }
+            record = RecordOptions(views, paused)
+            options = RunOptions(
+                seed, requests or None, keyboard=page is None or typing, gui=gui, realtime=realtime,
+                scene=scene,
+            )  # fmt: skip
             if mission is None:
                 assert resume is not None
-                result, start = _resumed(resume, runs, skills, options)
+                result, start = _resume(resume, runs, skills, options, record)
             else:
-                asked = requests or None
-                options |= {"seed": seed, "runs": runs, "requests": asked, "scene": scene}
-                result = _fresh(mission, skills, overrides, options)
+                result = _start(mission, skills, overrides, options, runs, record)
                 start = {"seed": seed, "overrides": overrides}
             # What was asked for by a person is asked for again.
             asked_for, used_scene = requests or result["requests"], RunDirectory(Path(result["run"])).scene
@@ -101,7 +101,7 @@ def command(
                 page.finish(result, report and str(Path(report).resolve()))
                 problem = "; ".join(filter(None, (problem, page.problem)))
         problem = "; ".join(filter(None, (problem, *(view.problem for view in views))))
-        if problem and (options["views"] or result["story"] is not None):
+        if problem and (views or result["story"] is not None):
             click.echo(f"note: {problem}", err=True)
         if shown is not None:
             click.echo(summary(result, shown.items, repeat, report), err=True, nl=False)
@@ -127,36 +127,41 @@ def _require_sense(ctx: click.Context, mission: str | None, resume: str | None) 
         )
 
 
-def _fresh(
-    mission: str, skills: Mapping[str, type[Skill]], overrides: dict[str, str], options: dict[str, Any]
+def _start(
+    mission: str,
+    skills: Mapping[str, type[Skill]],
+    overrides: dict[str, str],
+    options: RunOptions,
+    runs: Path,
+    record: RecordOptions,
 ) -> dict[str, Any]:
     """Run a mission from its start and return the result."""
     from executive.mission.load import load_mission
     from executive.plugins import cell_kind
-    from executive.record.recorded_run import recorded_run
+    from executive.record.recorded_run import record_run
 
     loaded = load_mission(mission, skills, overrides, cell_kind)
-    if options["views"]:
+    if record.views:
         for warning in loaded.warnings:
             click.echo(str(warning), err=True)
-    if options["scene"] is not None:
+    if options.scene is not None:
         from executive.cells.sim.scene_file import load_scene
 
         # A cell that is not simulated would not read it.
-        load_scene(options["scene"], loaded.cell_config)
-    return recorded_run(loaded, skills, **options)
+        load_scene(options.scene, loaded.cell_config)
+    return record_run(loaded, skills, options, runs, record)
 
 
-def _resumed(
-    name: str, runs: Path, skills: Mapping[str, type[Skill]], options: dict[str, Any]
+def _resume(
+    name: str, runs: Path, skills: Mapping[str, type[Skill]], options: RunOptions, record: RecordOptions
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Take up a run again and return the result, and how the run began."""
+    """Resume a run; return its result, and the entry of its start."""
     from executive.record.find_run import find_run
     from executive.record.journal import read_journal
-    from executive.record.resumed_run import resumed_run
+    from executive.record.resumed_run import resume_run
 
     path = find_run(name, runs)
-    result = resumed_run(path, skills, **options)
+    result = resume_run(path, skills, options, record)
     start, *_ = read_journal(path / "journal.jsonl")
     return result, start
 

@@ -1,10 +1,10 @@
-"""A run with its record: what `executive run` does once and a sweep does for every seed."""
+"""Execution of a run with its record, as `executive run` and sweeps do it."""
 
 from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from datetime import datetime
@@ -22,121 +22,115 @@ from executive.record.result import ENDED, result_of, write_result
 from executive.record.run_directory import RunDirectory
 
 if TYPE_CHECKING:
-    from executive.cell.workcell import Workcell
     from executive.mission.load import LoadedMission
+    from executive.run.assembly import RunOptions
     from executive.run.outcome import Outcome
     from executive.run.run import Run
     from executive.skill import Skill
 
 
 class View(Protocol):
-    """Something a person watches: an observer that is told of the run first and of its end last."""
+    """Display of a run for a person: an observer that is opened before the run and closed after it."""
 
     def open(self, run: Run) -> None:
-        """Begin to show a run; its `control` stops, pauses and steps it."""
+        """Begin to show a run, whose `control` stops, pauses and steps it."""
 
     def __call__(self, event: Event) -> None:
         """Take an event and return at once."""
 
     def close(self) -> None:
-        """Stop showing; called at every end of the run."""
+        """Stop showing the run; called however the run ends."""
 
     def note(self, sentence: str) -> None:
-        """Say something about the record that the person should know."""
+        """Show a sentence about the record."""
 
 
-def recorded_run(
+@dataclass(frozen=True)
+class RecordOptions:
+    """Options of the record of a run, and its displays.
+
+    Attributes:
+        views: Displays of the run.
+        paused: Pause the run before its first step.
+        frames: Keep the images behind the decisions, and the log of the world after the end of the run.
+    """
+
+    views: Sequence[View] = ()
+    paused: bool = False
+    frames: bool = True
+
+
+def record_run(
     loaded: LoadedMission,
     skills: Mapping[str, type[Skill]],
-    *,
-    seed: int,
+    options: RunOptions,
     runs: Path,
-    views: Sequence[View] = (),
-    paused: bool = False,
-    gui: bool = False,
-    realtime: bool = False,
-    requests: Sequence[str] | None = None,
-    keyboard: bool = True,
-    frames: bool = True,
-    kind: Callable[..., Workcell] | None = None,
-    scene: Path | None = None,
+    record: RecordOptions = RecordOptions(),
 ) -> dict[str, Any]:
-    """Run `loaded` once, leave its run directory below `runs` and return the result object.
+    """Run a mission once, leave its run directory below `runs`, and return the result object.
 
     Args:
         loaded: The mission and its cell.
         skills: Installed skills by name.
-        seed: Decides everything random.
+        options: Options of the run; the run directory gets a copy of the scene file.
         runs: Folder of the run directories.
-        views: Show it.
-        paused: Let it stand still before its first step.
-        gui: Show the simulated world in a window.
-        realtime: Pace the run by the wall clock.
-        requests: What the operator asks for, or None to ask at the terminal.
-        keyboard: Whether somebody can type there.
-        frames: Keep the pictures behind the decisions, and of a run that is over the log of its world.
-        kind: Makes the work cell; by default the installed kind that the cell file names.
-        scene: File that changes the world of a simulated cell; the run directory gets a copy.
+        record: Options of the record.
 
     Raises:
         InputError: The run directory cannot be made, or the cell cannot be built.
         ExecutiveError: The result cannot be written.
     """
-    from executive.run.run import Run
+    from executive.run.assembly import assemble
 
     began = time.perf_counter()
-    run = Run(
-        loaded, skills, seed=seed, gui=gui, realtime=realtime, requests=requests, keyboard=keyboard,
-        kind=kind, scene=scene,
-    )  # fmt: skip
+    run = assemble(loaded, skills, options)
     with closing(run):
-        if paused:
+        if record.paused:
             run.control.pause()
-        directory = new_directory(run, loaded, seed, runs, scene)
-        recorder = Recorder(directory, frames=frames)
-        result = Recording(run, loaded, skills, directory, recorder, views).execute(seed, began)
-    if not frames and result["status"] in ENDED:
-        # Of a run that is over nothing can be taken up again, and who wants no pictures wants no film.
+        directory = new_directory(run, loaded, options, runs)
+        recorder = Recorder(directory, frames=record.frames)
+        recording = Recording(run, loaded, skills, directory, recorder, record.views)
+        result = recording.execute(options.seed, began)
+    if not record.frames and result["status"] in ENDED:
+        # The log of the world is needed to resume a run and to make a film with its images: neither applies.
         directory.world.unlink(missing_ok=True)
     return result
 
 
-def new_directory(
-    run: Run, loaded: LoadedMission, seed: int, runs: Path, scene: Path | None = None
-) -> RunDirectory:
-    """Make a run's directory below `runs`, with all that it begins from in it, and return it.
-
-    `scene` is the scene file of the run, or None.
+def new_directory(run: Run, loaded: LoadedMission, options: RunOptions, runs: Path) -> RunDirectory:
+    """Make the directory of a run below `runs`, write the inputs of the run into it, and return it.
 
     Raises:
-        InputError: It cannot be made or written to.
+        InputError: The directory cannot be made, or a file cannot be written.
     """
-    scene_text = "" if scene is None else read_source(scene).text
-    directory = RunDirectory.create(runs, mission=loaded.mission.name, seed=seed, started=datetime.now())
+    scene = "" if options.scene is None else read_source(options.scene).text
+    directory = RunDirectory.create(
+        runs, mission=loaded.mission.name, seed=options.seed, started=datetime.now()
+    )
     directory.save_inputs(
         mission=loaded.text,
         params=loaded.params,
         cell=loaded.cell_config.model_dump(mode="json", exclude_unset=True),
         tree=tree_text(outline(run.root)),
         libraries=loaded.libraries,
-        scene=scene_text,
+        scene=scene,
     )
-    run.log_to(directory.world)
+    run.workcell.log_to(directory.world)
     return directory
 
 
 @dataclass
 class Recording:
-    """A run, and all who follow it.
+    """A run with its recorder and its displays.
 
     Attributes:
         run: The run.
         loaded: Its mission.
         skills: Installed skills by name.
         directory: Directory of its record.
-        recorder: Keeps the record.
-        views: Show the run.
-        past: Events before it begins.
+        recorder: Recorder of the run.
+        views: Displays of the run.
+        past: Events that the observers get before the run.
     """
 
     run: Run
@@ -152,14 +146,14 @@ class Recording:
         self._story = Story(self.loaded, self.skills)
 
     def execute(self, seed: int, began: float) -> dict[str, Any]:
-        """Execute the run and return its result object, which is in the run directory then.
+        """Execute the run, write its result into the run directory, and return it.
 
-        `began` is when the work on it did [s], by `time.perf_counter`.
+        `began` is the time at which the work on the run began, by `time.perf_counter` [s].
 
         Raises:
             ExecutiveError: The result cannot be written.
         """
-        outcome, items, audit = self._watched()
+        outcome, items, audit = self._execute_observed()
         run, path = self.run, self.directory.path
         result = result_of(
             mission=self.loaded.mission.name, seed=seed, outcome=outcome, items=items, audit=audit,
@@ -172,7 +166,7 @@ class Recording:
         except ExecutiveError as error:
             problems.append(str(error))
             if result["status"] != "FAULT":
-                # What `--json` prints is then all that there is of it.
+                # Then only `--json` prints the result.
                 result |= {"status": "FAULT", "reason": "fault", "message": str(error), "node": ""}
         if any(problems):
             for view in self.views:
@@ -180,12 +174,12 @@ class Recording:
         return result
 
     def _note(self, event: Event) -> None:
-        """Keep the plans and requests, which the result counts."""
+        """Keep plans and requests for the result."""
         if event.kind in ("plan", "request"):
             self._noted.append({"kind": event.kind, **event.data})
 
-    def _watched(self) -> tuple[Outcome, dict[str, Any], Mapping[str, int] | None]:
-        """Execute the run with all observers attached, and close them at every end."""
+    def _execute_observed(self) -> tuple[Outcome, dict[str, Any], Mapping[str, int] | None]:
+        """Execute the run with all observers attached, and close them afterwards."""
         run, completed = self.run, False
         watchers: list[Observer] = [self._note, self._story, *self.views]
         try:
@@ -201,7 +195,7 @@ class Recording:
             completed = True
         finally:
             with contextlib.ExitStack() as closing:
-                # A user who ends a run by force does not want to wait for its pictures.
+                # After an exception, do not wait for the images.
                 closing.callback(self.recorder.close, wait=completed)
                 for view in self.views:
                     closing.callback(view.close)

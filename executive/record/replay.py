@@ -1,4 +1,4 @@
-"""Deciding a recorded run once more, from what the cell answered then, without the cell."""
+"""Replay of a recorded run from its recorded inputs, and comparison of the decisions."""
 
 from __future__ import annotations
 
@@ -13,36 +13,35 @@ from executive.mission.load import LoadedMission
 from executive.record.entry import entry_of
 from executive.record.progress import is_skill, skill_name
 from executive.record.recorded_mission import recorded_mission
-from executive.replay.input_log import Entry, Past
-from executive.replay.input_recorder import Unrecorded
-from executive.replay.replayed_cell import PlayedCell
-from executive.run.run import Run
+from executive.replay.input_log import Entry, InputLog
+from executive.run.assembly import assemble_replay
+from executive.run.resume import ResumedRun
 from executive.skill import Skill
 
 Decision = Mapping[str, Any]
-"""What was decided in a control step, as plain values: its `tick`, `clock` and `kind`, and what it says."""
+"""A decision in a control step as plain values: `tick`, `clock`, `kind`, and the keys of `_DECIDING`."""
 
-_SAID = {
+_DECIDING = {
     "status": ("node", "status", "reason", "item", "outputs"),
     "choice": ("node", "choice", "reason"),
     "decision": ("item", "label", "bin"),
     "item": ("item", "state", "label", "bin"),
     "intent": ("action",),
 }
-"""What a decision is made of, by kind of event. Sentences are none of it: they may be worded anew."""
+"""Compared keys by kind of event. Sentences are not compared: their wording may change."""
 
 
 @dataclass(frozen=True)
 class Replay:
-    """What came of deciding a run once more.
+    """Result of a replay.
 
     Attributes:
-        decisions: How many were the same.
-        ticks: Control steps of the replay.
-        recorded: The first decision of the record that was not made again, or None.
-        replayed: What was decided instead, or None for nothing.
-        edited: Whether the mission is another one than that of the record.
-        unanswered: What was asked that the record has no answer to, which ended the replay; or "".
+        decisions: Number of equal decisions.
+        ticks: Number of control steps of the replay.
+        recorded: The first recorded decision that the replay did not repeat, or None.
+        replayed: The decision of the replay instead, or None if there was none.
+        edited: True if the mission is not the recorded one.
+        unanswered: Message of the question without a recorded answer that ended the replay, or "".
     """
 
     decisions: int
@@ -54,125 +53,132 @@ class Replay:
 
     @property
     def same(self) -> bool:
-        """Tell whether everything was decided as before."""
+        """True if all decisions are equal."""
         return self.recorded is None and self.replayed is None
 
     @property
     def difference(self) -> str:
-        """What differs first, in words; "" where nothing does."""
+        """The first difference in words, or ""."""
         if self.same:
             return ""
-        said = f"the record says {_told(self.recorded)}, and now it is {_told(self.replayed)}"
+        both = f"the record says {_describe(self.recorded)}, and now it is {_describe(self.replayed)}"
         if not self.unanswered:
-            return said
-        return f"{said}: {self.unanswered}; what would come of it only a run can tell"
+            return both
+        return f"{both}: {self.unanswered}; what would come of it only a run can tell"
 
 
 def replay(
     path: Path, entries: Iterable[Entry], skills: Mapping[str, type[Skill]], mission: Path | None = None
 ) -> Replay:
-    """Decide a run once more and return the first decision that differs.
+    """Replay a recorded run and return the first decision that differs.
 
-    The skills, the tree and the ledger are the real ones; the arm, the tool, the camera, the detectors and
-    the person are played from the journal. After the first difference the record has no answers any more,
-    so nothing is said of what would have come then.
+    Skills, tree and ledger are the present ones; the answers of arm, tool, camera, detectors and operator
+    come from the journal. After the first difference the journal has no answers any more.
 
     Args:
         path: The run directory.
-        entries: Its journal.
+        entries: Entries of its journal.
         skills: Installed skills by name.
-        mission: Another mission file to decide by; None: the one that was run. For another one only what
-            skills do and what is known of items is compared, and no control nodes.
+        mission: Another mission file to replay, or None for the recorded mission. For another mission only
+            the decisions of skills and the states of items are compared.
 
     Raises:
-        InputError: The directory holds no run that could be replayed.
+        InputError: The directory holds no run that can be replayed.
     """
-    past = Past.of(entries)
-    run = past.start
-    if run is None or not past.senses:
+    log = InputLog.of(entries)
+    run = log.start
+    if run is None or not log.inputs:
         raise InputError(
             f'"{path}" holds no run that can be replayed: its journal tells of no answers of a cell'
         )
     loaded = recorded_mission(path, run, skills, mission)
     edited = mission is not None and loaded.text != (path / "mission.yaml").read_text(encoding="utf-8")
-    return compare(loaded, skills, past, int(run["seed"]), edited=edited)
+    return compare(loaded, skills, log, int(run["seed"]), edited=edited)
 
 
 def compare(
-    loaded: LoadedMission, skills: Mapping[str, type[Skill]], past: Past, seed: int, *, edited: bool = False
+    loaded: LoadedMission,
+    skills: Mapping[str, type[Skill]],
+    log: InputLog,
+    seed: int,
+    *,
+    edited: bool = False,
 ) -> Replay:
-    """Decide by `loaded` what a past tells of, and return the first decision that differs."""
-    comparison = _Comparison(past, edited)
-    run = Run(loaded, skills, seed=seed, requests=(), kind=PlayedCell, past=past, observers=[comparison])
-    comparison.stop = run.control.stop
+    """Replay a log with a mission and return the first decision that differs."""
+    comparison = _Comparison(log, edited)
+    run = assemble_replay(loaded, skills, log, seed, observers=[comparison])
+    comparison.run = run
     run.execute()
+    comparison.end()
     recorded, replayed = comparison.difference
     return Replay(comparison.same, run.tick, recorded, replayed, edited, comparison.unanswered)
 
 
 class _Comparison:
-    """Compares decisions with those of a past, as they are made; an observer."""
+    """Observer that compares decisions with the recorded ones.
 
-    def __init__(self, past: Past, edited: bool) -> None:
-        self._past = past
+    Attributes:
+        same: Number of equal decisions.
+        difference: The first recorded decision that differs, and the new one; None if there is none.
+        unanswered: Message of a question without a recorded answer before the first difference, or "".
+        run: The replay; it is stopped at the first difference.
+    """
+
+    run: ResumedRun
+
+    def __init__(self, log: InputLog, edited: bool) -> None:
+        self._log = log
         self._edited = edited
-        self._to_come = [d for entry in past.entries if (d := _decision(entry, edited))]
-        # A run that was cut off told of everything but the last control step for sure.
-        self._whole = any(entry["kind"] == "end" for entry in past.entries)
-        self._over = False
+        self._recorded = [d for entry in log.entries if (d := _decision(entry, edited))]
+        # Of an interrupted run, the last control step may be incomplete.
+        self._is_complete = any(entry["kind"] == "end" for entry in log.entries)
+        self._is_over = False
         self.same = 0
         self.difference: tuple[Decision | None, Decision | None] = (None, None)
         self.unanswered = ""
-        self.stop = lambda: None
 
     def __call__(self, event: Event) -> None:
-        if event.kind == "fault":
-            _, asked, said = event.data["traceback"].partition(f".{Unrecorded.__name__}: ")
-            self.unanswered = said.partition("\n")[0] if asked else ""
-        if self._over:
-            return
-        if event.kind == "end":
-            self._end()
+        if self._is_over:
             return
         decision = _decision(entry_of(event), self._edited)
         if decision is None:
             return
-        recorded = self._to_come[self.same] if self.same < len(self._to_come) else None
+        recorded = self._recorded[self.same] if self.same < len(self._recorded) else None
         if recorded == decision:
             self.same += 1
             return
-        self._over = True
-        if self._whole or self._counts(decision) or (recorded is not None and self._counts(recorded)):
+        self._is_over, self.unanswered = True, self.run.replayed.unanswered
+        if self._is_complete or self._counts(decision) or (recorded is not None and self._counts(recorded)):
             self.difference = (recorded, decision)
-        self.stop()
+        self.run.control.stop()
 
-    def _end(self) -> None:
-        """The replay is at its end: is the record, too?"""
-        if self.same < len(self._to_come) and self._counts(self._to_come[self.same]):
-            self._over = True
-            self.difference = (self._to_come[self.same], None)
+    def end(self) -> None:
+        """Compare the end of the replay with the end of the record."""
+        if not self._is_over and self.same < len(self._recorded) and self._counts(self._recorded[self.same]):
+            self.difference = (self._recorded[self.same], None)
+            self.unanswered = self.run.replayed.unanswered
 
     def _counts(self, decision: Decision) -> bool:
-        """Tell whether the step of a decision was ended; what was still under way is no decision yet."""
-        return bool(decision["tick"] < self._past.last_tick)
+        """Return True if the control step of a decision is complete in the record."""
+        return bool(decision["tick"] < self._log.last_tick)
 
 
 def _decision(entry: Entry, edited: bool) -> Decision | None:
-    """Return what was decided, or None where nothing was."""
+    """Return the decision of an entry, or None if it is none."""
     kind = entry["kind"]
-    if kind not in _SAID or (edited and (kind == "choice" or (kind == "status" and not is_skill(entry)))):
+    if kind not in _DECIDING or (edited and (kind == "choice" or (kind == "status" and not is_skill(entry)))):
         return None
     decision = {"tick": entry["tick"], "clock": entry["clock"], "kind": kind}
-    decision |= {key: entry[key] for key in _SAID[kind] if entry.get(key)}
+    decision |= {key: entry[key] for key in _DECIDING[kind] if entry.get(key)}
     if edited and "node" in decision:
         decision["node"] = skill_name(decision["node"])
     return decision
 
 
-def _told(decision: Decision | None) -> str:
+def _describe(decision: Decision | None) -> str:
     """Return a decision in words."""
     if decision is None:
         return "nothing more"
-    said = {key: value for key, value in decision.items() if key not in ("tick", "clock", "kind", "outputs")}
-    what = ", ".join(f"{key} {value}" for key, value in said.items())
+    shown = {key: value for key, value in decision.items() if key not in ("tick", "clock", "kind", "outputs")}
+    what = ", ".join(f"{key} {value}" for key, value in shown.items())
     return f"at {decision['clock']:.3f} s (step {decision['tick']}) {decision['kind']}: {what}"

@@ -1,10 +1,11 @@
-"""A run that was cut off, taken up again where it was, in its own directory."""
+"""Resumption of an interrupted run in its own run directory."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,98 +13,85 @@ from executive.errors import InputError
 from executive.events import Event
 from executive.record.journal import ending_of, read_journal, start_of
 from executive.record.recorded_mission import recorded_mission
-from executive.record.recorded_run import Recording, View
+from executive.record.recorded_run import Recording, RecordOptions
 from executive.record.recorder import Recorder
 from executive.record.replay import compare
 from executive.record.result import ENDED
 from executive.record.run_directory import RunDirectory
-from executive.replay.input_log import Entry, Past
+from executive.replay.input_log import Entry, InputLog
 
 if TYPE_CHECKING:
-    from executive.cell.workcell import Workcell
+    from executive.run.assembly import RunOptions
     from executive.skill import Skill
 
-UNPLAYED = ("run", "plan", "request")
-"""Events that do not come about again when a past is played."""
+NOT_REPEATED = ("run", "plan", "request")
+"""Kinds of events that a replay does not repeat."""
 
 
-def resumed_run(
+def resume_run(
     path: Path,
     skills: Mapping[str, type[Skill]],
-    *,
-    views: Sequence[View] = (),
-    paused: bool = False,
-    gui: bool = False,
-    realtime: bool = False,
-    keyboard: bool = True,
-    frames: bool = True,
-    kind: Callable[..., Workcell] | None = None,
+    options: RunOptions,
+    record: RecordOptions,
 ) -> dict[str, Any]:
-    """Take up again the run in a directory, and return the result object.
+    """Resume the run in a directory, and return the result object.
 
-    Its journal is played to where it was cut off: then tree, variables and ledger are what they were. The
-    world of a simulated cell is rebuilt as it was, too, the arm braking. Since nobody watched the cell
-    meanwhile, the tool's sensor decides what is held, everything on the table is in doubt until it was seen
-    again, and each skill that was under way begins anew.
+    First, the journal is replayed up to the interruption, which restores the tree, the variables and the
+    ledger; a simulated world is rebuilt from its log, with the arm braking. Nothing observed the cell since
+    the interruption: the tool's sensor decides whether it holds its item, every position on the table is
+    doubted until the next look, and each skill that was running starts again.
 
-    A run that ended as INCOMPLETE is resumed as well: the tree begins again, and rejected and skipped items
-    are sought anew, wherever somebody has put them. Placed items stay placed and counted.
+    A run that ended as INCOMPLETE is resumed as well: the tree starts again, and rejected and skipped items
+    are searched anywhere. Placed items stay placed and counted.
 
     Args:
         path: The run directory.
         skills: Installed skills by name.
-        views: Show it.
-        paused: Let it stand still before its first new step.
-        gui: Show the simulated world in a window.
-        realtime: Pace the run by the wall clock.
-        keyboard: Whether somebody can type at the terminal.
-        frames: Keep the pictures behind the decisions.
-        kind: Makes the work cell; by default the installed kind that the cell file names.
+        options: Options of the resumed run; seed, requests and scene are those of the interrupted run.
+        record: Options of the record.
 
     Raises:
-        InputError: There is nothing to take up: the run goes on, has succeeded or failed, left too little of
-            a record, or would be decided otherwise by what is installed now.
+        InputError: The run cannot be resumed: it is still being executed, has succeeded or failed, left too
+            short a record, or the present skills would decide differently.
         ExecutiveError: The result cannot be written.
     """
-    from executive.run.run import Run
+    from executive.run.assembly import assemble_resumed
 
     began = time.perf_counter()
     directory = RunDirectory(path)
-    # First of all: from here on no other process writes to the directory.
-    recorder = Recorder(directory, frames=frames, again=True)
+    # Before anything else: from here on no other process writes to the directory.
+    recorder = Recorder(directory, frames=record.frames, again=True)
     try:
-        past, start = _past(directory)
+        log, start = _read_log(directory)
         seed = int(start["seed"])
         loaded = recorded_mission(path, start, skills)
-        # Not the step in which it was halted or in which a skill broke: a mended skill may go on there.
-        taken_up = past if past.halt is None else past.before(int(past.halt["tick"]))
-        replay = compare(loaded, skills, taken_up, seed)
+        # Without the step of a halt or of a bug in a skill: a corrected skill may continue there.
+        certain = log if log.halt is None else log.before(int(log.halt["tick"]))
+        replay = compare(loaded, skills, certain, seed)
         if not replay.same:
             raise InputError(
                 f'the run in "{path}" cannot be taken up again: {replay.difference}. The executive or a '
                 "skill has been changed since; go back to what it was run with, or run the mission anew"
             )
-        run = Run(
-            loaded, skills, seed=seed, gui=gui, realtime=realtime, requests=start["requests"],
-            keyboard=keyboard, kind=kind, past=past, takes_up=directory.world, scene=directory.scene,
-        )  # fmt: skip
+        options = replace(options, seed=seed, requests=start["requests"], scene=directory.scene)
+        run = assemble_resumed(loaded, skills, options, log, directory.world)
     except BaseException:
         recorder.close(wait=False)
         raise
     with closing(run):
-        if paused:
+        if record.paused:
             run.control.pause()
-        assert run.played is not None, "a run that is taken up again plays its past"
-        recorder.remember(run.played.entries)
-        told = _events(run.played)
-        return Recording(run, loaded, skills, directory, recorder, views, told).execute(seed, began)
+        replayed = run.replayed.log
+        recorder.remember(replayed.entries)
+        past = _events_not_repeated(replayed)
+        return Recording(run, loaded, skills, directory, recorder, record.views, past).execute(seed, began)
 
 
-def _past(directory: RunDirectory) -> tuple[Past, Entry]:
-    """Return what a run to take up again has had, and how it began.
+def _read_log(directory: RunDirectory) -> tuple[InputLog, Entry]:
+    """Return the inputs of a run that can be resumed, and the entry of its start.
 
     Raises:
-        InputError: There is nothing to take up.
+        InputError: The run cannot be resumed.
     """
     entries = read_journal(directory.journal)
     ending = ending_of(entries)
@@ -117,12 +105,12 @@ def _past(directory: RunDirectory) -> tuple[Past, Entry]:
             f'the run in "{directory.path}" came to its end: {ending["status"]}; '
             "there is nothing to take up again"
         )
-    return Past.of(entries), start_of(entries, directory.path, "run the mission anew")
+    return InputLog.of(entries), start_of(entries, directory.path, "run the mission anew")
 
 
-def _events(past: Past) -> Iterator[Event]:
-    """Yield what those who follow a run have to know, and are not told when its past is played."""
-    for entry in past.entries:
-        if entry["kind"] in UNPLAYED:
+def _events_not_repeated(log: InputLog) -> Iterator[Event]:
+    """Yield the recorded events that observers need, and that the replay does not repeat."""
+    for entry in log.entries:
+        if entry["kind"] in NOT_REPEATED:
             data = {key: value for key, value in entry.items() if key not in ("tick", "clock", "kind")}
             yield Event(entry["kind"], entry["tick"], entry["clock"], data)

@@ -1,1 +1,1 @@
-"""What a cell answered in a run: written down as it happens, and played back without the cell."""
+"""Recording of the inputs of a run, and their replay without the cell."""

@@ -31,8 +31,8 @@ class Codec(NamedTuple):
 
 
 @dataclass(frozen=True)
-class PlayedMotion:
-    """All that is known of a motion that was planned in a recorded run; implements `cell.arm.Motion`."""
+class RecordedMotion:
+    """Duration of a planned motion [s], the recorded part of the motion; implements `cell.arm.Motion`."""
 
     duration: float
 
@@ -165,4 +165,4 @@ POSE = Codec(write_pose, read_pose)
 FRAME = Codec(write_frame, read_frame)
 ANSWER = Codec(write_answer, read_answer)
 OBSERVATIONS = Codec(write_observations, read_observations)
-MOTION = Codec(_duration, PlayedMotion)
+MOTION = Codec(_duration, RecordedMotion)

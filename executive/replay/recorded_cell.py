@@ -1,4 +1,4 @@
-"""Cell that the tree of a run uses: the answers of the real cell are recorded, or replayed from a record."""
+"""Cell whose answers are recorded, and the names and codecs of the recorded inputs."""
 
 from __future__ import annotations
 
@@ -10,8 +10,20 @@ from executive.cell.clock import StepClock
 from executive.cell.protocols import Cell
 from executive.cell.proxy import Access, intercept
 from executive.events import Emit
-from executive.replay.codec import ANSWER, ARRAY, BOX, FRAME, MOTION, OBSERVATIONS, PLAIN, POSE, TEXTS, Codec
-from executive.replay.input_recorder import Tape
+from executive.replay.codec import (
+    ANSWER,
+    ARRAY,
+    BOX,
+    FRAME,
+    MOTION,
+    NOTHING,
+    OBSERVATIONS,
+    PLAIN,
+    POSE,
+    TEXTS,
+    Codec,
+)
+from executive.replay.input_recorder import InputRecorder
 
 
 class InputFormat(NamedTuple):
@@ -25,6 +37,16 @@ class InputFormat(NamedTuple):
 
     name: str
     codec: Codec = PLAIN
+
+    @staticmethod
+    def of(access: Access) -> InputFormat:
+        """Return the format of the answer to an access; all commands have the same one."""
+        if access.name in COMMANDS:
+            return _COMMAND
+        name, codec = INPUT_FORMATS[access.name]
+        if "{" in name:
+            name = name.format(*access.all_arguments, detector=access.detector)
+        return InputFormat(name, codec)
 
 
 INPUT_FORMATS: Mapping[str, InputFormat] = {
@@ -62,21 +84,20 @@ COMMANDS = frozenset(
 RECORDED_ROLES = ("arm", "tool", "camera", "detector", "operator", "localizer")
 """Roles whose answers are recorded. A replay builds its own ledger, and reads the cell file for the rest."""
 
+_COMMAND = InputFormat("command", NOTHING)
+"""Format of the answer to a command: None, unless the cell raises an exception."""
 
-def cell_on_tape(cell: Cell, tape: Tape, emit: Emit) -> Cell:
-    """Return a copy of the cell that uses the tape's clock, and whose answers the tape records or replays.
+
+def recorded_cell(cell: Cell, recorder: InputRecorder, clock: StepClock, emit: Emit) -> Cell:
+    """Return a copy of the cell that uses `clock`, and whose answers are recorded.
 
     Each action of the tool is emitted as an `intent` before the action.
     """
 
     def answer(access: Access) -> Any:
-        if access.name in COMMANDS:
-            if access.role == "tool":
-                emit("intent", action=access.member)
-            return tape.command(access.proceed)
-        name, codec = INPUT_FORMATS[access.name]
-        if "{" in name:
-            name = name.format(*access.all_arguments, detector=access.detector)
-        return tape.sense(name, access.proceed, codec)
+        if access.role == "tool" and access.name in COMMANDS:
+            emit("intent", action=access.member)
+        name, codec = InputFormat.of(access)
+        return recorder.read(name, access.proceed, codec)
 
-    return replace(intercept(cell, answer, RECORDED_ROLES), clock=StepClock(tape.clock, tape.step))
+    return replace(intercept(cell, answer, RECORDED_ROLES), clock=clock)

@@ -1,52 +1,168 @@
-"""Cell of a replay: bins, classes and a ledger, while a tape answers for every other part."""
+"""Work cell that replays recorded inputs, and may continue on the real cell."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from executive.cell.cell_wrapper import CellWrapper
+from executive.cell.clock import StepClock
 from executive.cell.config import CellConfig
 from executive.cell.layout import bins_of, cell_without_hardware
 from executive.cell.protocols import Cell, Routes
+from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import CellOptions, Workcell
+from executive.errors import Stopped
 from executive.events import Emit
 from executive.ledger.tracker import ItemLedger
 from executive.perception.evidence import classes_distinct_by_touch
+from executive.replay.input_log import InputLog, Interruption
+from executive.replay.input_replayer import InputReplayer
+from executive.replay.recorded_cell import RECORDED_ROLES, InputFormat
 
 
-class PlayedCell(Workcell):
-    """What decisions rest on beside a cell's answers: nothing to log, to be seen, to audit or to close.
+class ReplayedCell(CellWrapper):
+    """Answers as the recorded run was answered; the cell inside is used only for its ledger.
+
+    With a `last` interruption, the cell inside takes over after it: then all questions and commands go to the
+    cell inside.
+
+    Args:
+        inner: The cell inside.
+        log: The recorded inputs.
+        last: Interruption at the end of the log, or None to replay only.
+
+    Attributes:
+        log: The recorded inputs that are replayed: those before the last interruption.
+        interruption: Interruption before this control step after which the run was not resumed yet, or None.
+        is_live: True from the moment at which the cell inside has taken over.
+    """
+
+    def __init__(self, inner: Workcell, log: InputLog, last: Interruption | None = None) -> None:
+        super().__init__(inner)
+        self.log = log if last is None else log.before(last.complete)
+        self._last = last
+        self._replayer = InputReplayer(self.log)
+        self._is_halted = False
+        self.is_live = False
+        clock = StepClock(self._now, self.log.step)
+        self._cell = replace(intercept(inner.cell, self._answer, RECORDED_ROLES), clock=clock)
+        self._begin_step(0)
+        self.interruption = self._interruption_at(0)
+
+    @property
+    def cell(self) -> Cell:
+        """The cell that skills see."""
+        return self._cell
+
+    @property
+    def steps(self) -> int:
+        """Number of control steps since the run began."""
+        return self.inner.steps if self.is_live else self._steps
+
+    @property
+    def unanswered(self) -> str:
+        """Message of the first question without a recorded answer, or ""."""
+        return self._replayer.unanswered
+
+    @property
+    def is_over(self) -> bool:
+        """True if the recorded run ended before its tree was ticked in this control step."""
+        return self._last is None and self.log.is_over(self._steps)
+
+    @property
+    def is_reopened(self) -> bool:
+        """True if the recorded run ended in this control step as INCOMPLETE and was resumed."""
+        following = None if self.is_live else self._interruption_at(self._steps + 1)
+        return following is not None and following.reopens
+
+    def resume(self) -> None:
+        """Continue after the interruption; after the last one, the cell inside takes over.
+
+        The cell inside first makes the control steps that it lacks.
+        """
+        interruption, self.interruption = self.interruption, None
+        assert interruption is not None, "only an interrupted run can be resumed"
+        if interruption is not self._last:
+            self._begin_step(interruption.resumed)
+            return
+        while self.inner.steps < interruption.complete:
+            self.inner.advance()
+        self.is_live = True
+
+    def advance(self) -> None:
+        """Let one control step pass.
+
+        Raises:
+            Stopped: The recorded run was halted in this step; raised once.
+        """
+        if self.is_live:
+            self.inner.advance()
+            return
+        if self._last is None and not self._is_halted and self.log.is_halted_after_tick(self._steps):
+            self._is_halted = True
+            raise Stopped("the recorded run was halted here")
+        self._begin_step(self._steps + 1)
+        self.interruption = self._interruption_at(self._steps)
+
+    def _begin_step(self, steps: int) -> None:
+        self._steps = steps
+        self._replayer.begin_step(steps)
+
+    def _interruption_at(self, steps: int) -> Interruption | None:
+        if self._last is not None and steps == self._last.complete:
+            return self._last
+        return self.log.interruptions.get(steps)
+
+    def _now(self) -> float:
+        if self.is_live:
+            return self.inner.cell.clock.now
+        ahead: float = self._replayer.read("clock")
+        return self._steps * self.log.step + ahead
+
+    def _answer(self, access: Access) -> Any:
+        if self.is_live:
+            return access.proceed()
+        name, codec = InputFormat.of(access)
+        return self._replayer.read(name, codec)
+
+
+class CellWithoutHardware:
+    """Bins, classes and a ledger of a cell file, for a replay; implements `Workcell`.
 
     Args:
         config: The cell file.
-        seed: Decides nothing.
+        seed: Not used.
         routes: Class label to the bins that are right for it.
-        emit: Tells the run what happens.
-        options: What the run wants; the operator's answers are on the tape.
+        emit: Takes the events of the ledger.
+        options: Not used.
     """
 
     def __init__(
         self, config: CellConfig, *, seed: int, routes: Routes, emit: Emit, options: CellOptions
     ) -> None:
         del seed, options
-        self._steps = 0
-        self._ledger = ItemLedger(
+        self.accounts = ItemLedger(
             config.ledger, config.table, bins_of(config), routes, emit, classes_distinct_by_touch(config)
         )
-        self._cell = cell_without_hardware(config, routes, self._ledger, emit)
+        self.cell = cell_without_hardware(config, routes, self.accounts, emit)
+        self.steps = 0
 
-    @property
-    def cell(self) -> Cell:
-        """What skills see."""
-        return self._cell
-
-    @property
-    def accounts(self) -> ItemLedger:
-        """The books of the cell's ledger."""
-        return self._ledger
-
-    @property
-    def steps(self) -> int:
-        """Control steps made so far."""
-        return self._steps
+    def log_to(self, path: Path) -> None:
+        """Keep no log."""
 
     def advance(self) -> None:
         """Let one control step pass."""
-        self._steps += 1
+        self.steps += 1
+
+    def scenery(self) -> None:
+        """Return None: there is nothing to show."""
+
+    def audit(self) -> Mapping[str, int] | None:
+        """Return None: the true counts are unknown."""
+        return None
+
+    def close(self) -> None:
+        """Release nothing."""

@@ -1,29 +1,29 @@
-"""The person beside the cell: a script's list of requests, or somebody at the terminal."""
+"""Operators beside the cell: a list of requests, or a person at the terminal."""
 
 from __future__ import annotations
 
 import select
 import sys
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 from executive.errors import InputError, Stopped
 from executive.events import Emit
+from executive.run.run_control import RunControl
 
 RESCAN = "rescan"
-SLICE = 0.1
-"""How long a wait for the keyboard lasts before it looks for an interrupt [s]."""
+MAX_WAIT_SLICE = 0.1
+"""Time for which a wait for the keyboard lasts at once, so that a stop is noticed [s]."""
 
 
 class ScriptedOperator:
-    """Asks for what a list says, then quits; every request is recorded.
+    """Gives the answers of a list, then quits; every answer is emitted as an event.
 
     Args:
         requests: The list.
-        choices: What can be asked for.
+        choices: Classes that can be requested.
         emit: Takes the `request` events.
-        served: How many of the list were asked for before, in a run that is taken up again.
+        served: Number of requests of the list that an interrupted run has already served.
 
     Raises:
         InputError: A request names none of the `choices`.
@@ -31,70 +31,66 @@ class ScriptedOperator:
 
     def __init__(self, requests: Sequence[str], choices: Sequence[str], emit: Emit, served: int = 0) -> None:
         for word in requests:
-            if understood(word, choices) == "":
+            if interpret(word, choices) == "":
                 raise InputError(f'cannot pick "{word}"; ask for one of: {", ".join(choices)}')
         self._requests = list(requests)[served:]
         self._emit = emit
 
     def ask(self, choices: Sequence[str]) -> str | None:
         """Return the next request, or None at the end of the list."""
-        answer = understood(self._requests.pop(0), choices) if self._requests else None
+        answer = interpret(self._requests.pop(0), choices) if self._requests else None
         self._emit("request", wanted=answer)
         return answer
 
 
-@dataclass(eq=False)
 class TerminalOperator:
-    """Asks at the terminal; the run's clock stands still meanwhile, Ctrl-C works.
+    """Asks at the terminal; the run's clock stands still meanwhile, and Ctrl-C works.
 
-    Attributes:
+    Args:
         emit: Takes the `asking` and `request` events.
-        interrupted: Tells whether the run is to end.
-        requested: Returns a word that was asked for elsewhere than at the terminal, once, or None.
-        keyboard: Whether somebody can type; otherwise only what is asked for elsewhere is heard.
+        control: Tells whether the run has to halt, and gives answers from elsewhere, for instance a browser.
+        keyboard: True if a person can type at the terminal; otherwise only `control` gives answers.
     """
 
-    emit: Emit
-    interrupted: Callable[[], bool]
-    requested: Callable[[], str | None] = lambda: None
-    keyboard: bool = True
+    def __init__(self, emit: Emit, control: RunControl, *, keyboard: bool = True) -> None:
+        self._emit, self._control, self._keyboard = emit, control, keyboard
 
     def ask(self, choices: Sequence[str]) -> str | None:
         """Return the class typed, `rescan`, or None for `q` or the end of the input.
 
         Raises:
-            Stopped: The run is to end.
+            Stopped: The run has to halt.
         """
-        # An answer to no question, such as a second click, must not pick something later.
-        while self.requested() is not None:
+        # An answer without a question, such as a second click, must not pick anything.
+        while self._control.take_request() is not None:
             pass
-        self.emit("asking", choices=list(choices))
+        self._emit("asking", choices=list(choices))
         numbered = "  ".join(f"{number} {label}" for number, label in enumerate(choices))
         while True:
-            if self.keyboard:
+            if self._keyboard:
                 sys.stderr.write(f"pick what?  {numbered}  s rescan  q quit > ")
                 sys.stderr.flush()
-            line = self._line()
-            answer = understood(line.strip(), choices) if line else None
+            line = self._read_line()
+            answer = interpret(line.strip(), choices) if line else None
             if answer != "":
-                self.emit("request", wanted=answer)
+                self._emit("request", wanted=answer)
                 return answer
             sys.stderr.write(f'cannot pick "{line.strip()}"\n')
 
-    def _line(self) -> str:
-        while not self.interrupted():
-            if (word := self.requested()) is not None:
-                sys.stderr.write("\n" if self.keyboard else "")
+    def _read_line(self) -> str:
+        while not self._control.stopped:
+            if (word := self._control.take_request()) is not None:
+                sys.stderr.write("\n" if self._keyboard else "")
                 return word or "?"
-            if not self.keyboard:
-                time.sleep(SLICE)
-            elif select.select([sys.stdin], [], [], SLICE)[0]:
+            if not self._keyboard:
+                time.sleep(MAX_WAIT_SLICE)
+            elif select.select([sys.stdin], [], [], MAX_WAIT_SLICE)[0]:
                 return sys.stdin.readline()
-        raise Stopped("the run is to end, and nothing was asked for")
+        raise Stopped("the run has to halt, and nothing was requested")
 
 
-def understood(word: str, choices: Sequence[str]) -> str | None:
-    """Return what a typed word means: a class, `rescan`, None for `q`; "" if it means nothing."""
+def interpret(word: str, choices: Sequence[str]) -> str | None:
+    """Return the meaning of a typed word: a class, `rescan`, None for `q`, or "" if it has no meaning."""
     word = word.lower()
     if word in ("q", "quit"):
         return None

@@ -1,54 +1,149 @@
-"""Taking a run up again that was cut off: what was under way begins anew, in a cell that nobody watched."""
+"""Run that was interrupted: it replays its recorded inputs and resumes where it was interrupted."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
-from pathlib import Path
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.cell.protocols import Cell
-from executive.cell.workcell import CellPast
-from executive.replay.input_log import Past
+from executive.errors import Fault
+from executive.events import Observer
+from executive.mission.build import TreeNode
+from executive.replay.input_log import Interruption
+from executive.replay.replayed_cell import ReplayedCell
+from executive.run.outcome import Outcome
+from executive.run.planning_ahead import PlanningAhead
+from executive.run.run import Run
+from executive.run.run_context import RunContext, come_to_rest
+from executive.run.run_control import RunControl
+from executive.run.versions import versions
 from executive.tree.skill_leaf import SkillNode
 
 
-def reconcile(cell: Cell, last_intent: str) -> None:
-    """Make the ledger agree with the tool's sensor, and put everything on the table in doubt.
+class ResumedRun(Run):
+    """Run on a cell that replays an interrupted run, and may continue on the real cell.
 
-    Nobody watched the cell since the run was cut off: whatever lies there may have been moved, and what hung
-    on the tool may have fallen.
+    At each recorded interruption it does the same as the run that was resumed there. Observers get all
+    events, recorders only the events from the moment at which the real cell takes over.
 
     Args:
-        cell: The cell, its arm at rest.
-        last_intent: What the tool was told last, `open` or `close`; "" where it was told nothing.
+        context: Cell and events of the run.
+        replayed: The work cell of `context`.
+        root: The tree.
+        control: Stops, pauses and steps the run.
+        mission: Name of the mission.
+        realtime: Pace the run by the wall clock once the real cell has taken over.
+
+    Attributes:
+        replayed: The work cell.
     """
-    believed, holding = cell.ledger.in_tool(), cell.tool.holding
-    if believed is None and holding:
-        # It was sealed and never lifted: the run had not yet known that it holds.
-        cell.tool.open()
-    elif believed is not None and not holding and last_intent == "close":
-        cell.tool.open()
-        cell.ledger.dropped(believed)
-    # What the run itself had let go hangs nowhere: the skill that did begins anew and says where it is.
-    cell.ledger.bumped()
+
+    def __init__(
+        self,
+        context: RunContext,
+        replayed: ReplayedCell,
+        root: TreeNode,
+        control: RunControl,
+        mission: str,
+        *,
+        realtime: bool = False,
+    ) -> None:
+        super().__init__(context, root, control, mission)
+        self.replayed = replayed
+        self._paces_live_part = realtime
+        self._recorders: list[Observer] = []
+        self._planner = PlanningAhead(replayed.inner.cell)
+        context.observe(self._planner.observe)
+        control.between_ticks(self._follow_record)
+
+    def record(self, recorder: Observer) -> None:
+        """Call `recorder` with every event from the moment at which the real cell takes over."""
+        self._recorders.append(recorder)
+
+    def _execute_tree(self) -> Outcome:
+        """Execute the run as often as it ended as INCOMPLETE and was resumed, and return the last outcome."""
+        outcome = super()._execute_tree()
+        while outcome.status == "INCOMPLETE" and self.replayed.is_reopened:
+            self._context.advance()
+            outcome = super()._execute_tree()
+        return outcome
+
+    def _follow_record(self) -> None:
+        """Stop or resume where the recorded run was stopped or resumed; called between two ticks."""
+        if self.replayed.is_live:
+            return
+        if self.replayed.is_over:
+            self.control.stop()
+        elif (interruption := self.replayed.interruption) is not None:
+            self._resume(interruption)
+
+    def _resume(self, interruption: Interruption) -> None:
+        """Continue after an interruption, in which nothing observed the cell.
+
+        Raises:
+            Fault: The arm did not come to rest.
+        """
+        context, replayed = self._context, self.replayed
+        replayed.resume()
+        if replayed.is_live:
+            # Not recorded: if the braking is interrupted, the run is resumed at the same control step.
+            require_rest(lambda: come_to_rest(replayed.inner.cell, replayed.inner.advance))
+            for recorder in self._recorders:
+                context.observe(recorder, first=True)
+            context.planner, self._realtime = self._planner, self._paces_live_part
+        context.begin_step(replayed.steps)
+        if replayed.is_live:
+            self._wall_start = time.monotonic() - context.now
+            ticked, intent = interruption.complete, interruption.last_action
+            context.emit("resume", ticked=ticked, intent=intent, versions=versions())
+        restart_skills(self.root)
+        require_rest(context.come_to_rest)
+        if interruption.reopens:
+            replayed.accounts.reopen()
+        reconcile(context.cell, interruption.last_action)
 
 
-def cell_past(past: Past, log: Path) -> CellPast:
-    """Return the state of a cell at the end of a recorded run, from the record and the log of its world."""
-    frames, turns = (past.number_of_answers(f"camera.{name}") for name in ("frame", "next_pose"))
-    return CellPast(log, past.last_tick, frames, turns)
+def require_rest(brake: Callable[[], str]) -> None:
+    """Let an arm come to rest.
+
+    Raises:
+        Fault: `brake` returns a problem.
+    """
+    if problem := brake():
+        raise Fault(problem)
 
 
-def begin_anew(root: Behaviour, rest: Callable[[], None]) -> None:
-    """End every skill under way, let the arm come to rest, and have each begin anew at the coming tick.
+def restart_skills(root: Behaviour) -> None:
+    """Halt every running skill, so that it starts again at the next tick.
 
-    Control nodes stay where they are: attempts count on, variables keep their values.
+    Control nodes keep their state: attempts are counted on, and variables keep their values.
     """
     running = [
         node for node in root.iterate() if isinstance(node, SkillNode) and node.status is Status.RUNNING
     ]
     for node in running:
         node.stop(Status.INVALID)
-    rest()
+
+
+def reconcile(cell: Cell, last_action: str) -> None:
+    """Correct the ledger by the sensor of the tool, and doubt every position on the table.
+
+    Nothing observed the cell during the interruption: objects may have been moved, and the tool may have lost
+    its item.
+
+    Args:
+        cell: The cell, with its arm at rest.
+        last_action: Last action of the tool, `open` or `close`; "" if there was none.
+    """
+    believed, holding = cell.ledger.in_tool(), cell.tool.holding
+    if believed is None and holding:
+        # The interruption came after the seal and before the lift: the ledger does not know of the grasp.
+        cell.tool.open()
+    elif believed is not None and not holding and last_action == "close":
+        cell.tool.open()
+        cell.ledger.dropped(believed)
+    # After `open`, the restarted skill records where it released the item.
+    cell.ledger.bumped()

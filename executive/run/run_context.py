@@ -1,112 +1,111 @@
-"""What a run acts on: its work cell behind a tape, one control step at a time, and whoever is told."""
+"""State of one run: its work cell, its recorder of inputs, the count of control steps, and its observers."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
+from executive.cell.clock import StepClock
 from executive.cell.protocols import Cell
 from executive.cell.workcell import Workcell
 from executive.events import Event, Observer
-from executive.replay.input_log import Past
-from executive.replay.input_recorder import Tape
-from executive.replay.recorded_cell import cell_on_tape
+from executive.replay.input_recorder import InputRecorder
+from executive.replay.recorded_cell import recorded_cell
 from executive.run.planning_ahead import PlanningAhead
 
-LONGEST_BRAKING = 2.0
+MAX_BRAKING_TIME = 2.0
 """Time after which an arm that was told to brake must be at rest [s]."""
+MAX_BRAKING_ATTEMPTS = 4
+"""Number of times that an arm is told to brake; each part of the record may fail to record it once."""
 
-ATTEMPTS = 4
-"""Times that an arm is told to brake: each part of the record says once that it cannot be written."""
 
+class RunContext:
+    """The cell of a run as its tree sees it, and the events of the run.
 
-class Plant:
-    """A work cell, its tape and the count of control steps.
+    The context exists before its work cell, because the work cell emits events.
 
     Attributes:
-        tick: Control steps taken so far.
-        workcell: The cell as it is.
-        cell: The cell as the tree sees it.
-        tape: What stands between the two.
+        tick: Number of control steps so far.
+        workcell: The work cell.
+        cell: The cell as the tree sees it: all answers are recorded, and the clock shows the time at which
+            the control step began.
+        planner: Plans motions ahead, or None.
     """
 
     workcell: Workcell
     cell: Cell
-    tape: Tape
 
-    def __init__(self, observers: Sequence[Observer]) -> None:
+    def __init__(self, observers: Sequence[Observer] = ()) -> None:
         self.tick = 0
+        self.planner: PlanningAhead | None = None
         self._observers = list(observers)
-        self._recorders: list[Observer] = []
-        self._connected = False
+        self._recorder = InputRecorder(self.emit)
+        self._step = 0.0
+        self._ahead = 0.0
+        """Time of the cell's clock minus the time of all control steps [s]; 0 in simulation."""
 
-    def connect(self, workcell: Workcell, past: Past | None = None) -> None:
-        """Act on this cell from now on; first its tape plays a past, if there is one."""
-        clock = workcell.cell.clock
-        self.workcell = workcell
-        step = clock.step if past is None else past.step
-        self.tape = Tape(self.emit, step, lambda: clock.now, past)
-        self.cell = cell_on_tape(workcell.cell, self.tape, self.emit)
-        self._planning_ahead = PlanningAhead(workcell.cell)
-        self.observe(self._planning_ahead.observe)
-        self._connected = True
+    @property
+    def now(self) -> float:
+        """Time on the run's clock at which this control step began [s]."""
+        return self.tick * self._step + self._ahead
 
-    def observe(self, observer: Observer) -> None:
-        """Tell `observer` of every event from now on, those of the past among them."""
-        self._observers.append(observer)
+    def connect(self, workcell: Workcell, planner: PlanningAhead | None = None) -> None:
+        """Use this work cell from now on."""
+        self.workcell, self.planner = workcell, planner
+        if planner is not None:
+            self.observe(planner.observe)
+        self._step = workcell.cell.clock.step
+        clock = StepClock(lambda: self.now, self._step)
+        self.cell = recorded_cell(workcell.cell, self._recorder, clock, self.emit)
 
-    def record(self, recorder: Observer) -> None:
-        """Tell `recorder` of every event that is not of the past."""
-        self._recorders.append(recorder)
+    def observe(self, observer: Observer, *, first: bool = False) -> None:
+        """Call `observer` with every event from now on, `first` before all others."""
+        self._observers.insert(0 if first else len(self._observers), observer)
 
     def emit(self, kind: str, **data: Any) -> None:
-        """Stamp an event and tell everybody."""
-        now = self.tape.now if self._connected else 0.0
-        event = Event(kind, self.tick, round(now, 6), data)
-        if not (self._connected and self.tape.playing):
-            for recorder in self._recorders:
-                recorder(event)
+        """Stamp an event with control step and time, and pass it to all observers."""
+        event = Event(kind, self.tick, round(self.now, 6), data)
         for observer in self._observers:
             observer(event)
 
-    def begin_tick(self) -> None:
-        """Begin the control step that `tick` counts."""
-        self.tape.begin_tick(self.tick)
-
-    def go_live(self) -> None:
-        """Leave the past: what is asked and done from now on, the cell itself is asked and does.
-
-        The count of control steps becomes that of the cell's world.
-        """
-        self.tick = self.workcell.steps
-        self.tape.go_live()
-        self.begin_tick()
+    def begin_step(self, tick: int) -> None:
+        """Begin the control step number `tick`: read the clock."""
+        self.tick = tick
+        self._recorder.begin_step()
+        clock, begin = self.workcell.cell.clock, tick * self._step
+        self._ahead = self._recorder.read("clock", lambda: clock.now - begin)
 
     def advance(self) -> None:
-        """Let one control step pass; in the past it has passed already."""
-        if not self.tape.playing:
-            self.workcell.advance()
-        self.tick += 1
+        """Let one control step pass, and begin the next one."""
+        self.workcell.advance()
+        self.begin_step(self.tick + 1)
 
     def plan_ahead(self) -> None:
-        """Have the arm plan what it will probably be asked next; in the past nobody plans."""
-        if not self.tape.playing:
-            self._planning_ahead.step()
+        """Let the arm plan the motion that probably comes next."""
+        if self.planner is not None:
+            self.planner.step()
 
     def come_to_rest(self) -> str:
-        """Let the arm brake until it is at rest; return what went wrong, or ""."""
-        arm, deadline = self.cell.arm, self.tape.now + LONGEST_BRAKING
-        problems: list[str] = []
-        while len(problems) < ATTEMPTS:
-            try:
-                arm.stop()
-                while not arm.at_rest:
-                    if self.tape.now > deadline:
-                        return f"the arm is not at rest {LONGEST_BRAKING:.0f} s after it was told to brake"
-                    self.advance()
-                    self.begin_tick()
-            except Exception as error:
-                problems.append(str(error))
-            else:
-                return problems[0] if problems else ""
-        return f"the arm could not be braked: {problems[-1]}"
+        """Let the arm brake until it is at rest; return a problem, or ""."""
+        return come_to_rest(self.cell, self.advance)
+
+
+def come_to_rest(cell: Cell, advance: Callable[[], None]) -> str:
+    """Let the arm of a cell brake until it is at rest; return a problem, or "".
+
+    `advance` lets one control step pass.
+    """
+    deadline = cell.clock.now + MAX_BRAKING_TIME
+    problems: list[str] = []
+    while len(problems) < MAX_BRAKING_ATTEMPTS:
+        try:
+            cell.arm.stop()
+            while not cell.arm.at_rest:
+                if cell.clock.now > deadline:
+                    return f"the arm is not at rest {MAX_BRAKING_TIME:.0f} s after it was told to brake"
+                advance()
+        except Exception as error:
+            problems.append(str(error))
+        else:
+            return problems[0] if problems else ""
+    return f"the arm could not be braked: {problems[-1]}"

@@ -1,4 +1,4 @@
-"""What a person does to a run from outside: stop it, pause it, let it go on or step, ask for things."""
+"""Control of a run from outside: pause, step, resume, stop, and requests of the operator."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import threading
 from collections import deque
 from collections.abc import Callable
 
-SLICE = 0.05
-"""Longest time a pause holds the tick thread at once [s]: a signal is handled in between."""
+MAX_PAUSE_SLICE = 0.05
+"""Time for which a pause blocks the tick thread at once, so that signals are handled [s]."""
 
 
 class RunControl:
-    """Wishes for a run, made from any thread or a signal handler and heeded between two ticks.
+    """Commands to a run, from any thread or a signal handler; the run obeys between two ticks.
 
-    A pause lets the run's clock stand still: in simulation the world stands still, too, in mid-motion.
+    The run's clock stands still during a pause; in simulation, the world stands still, too.
     """
 
     def __init__(self) -> None:
@@ -22,62 +22,62 @@ class RunControl:
         self._steps = 0
         self._change = threading.Event()
         self._requests: deque[str] = deque()
-        self._between: list[Callable[[], None]] = []
+        self._callbacks: list[Callable[[], None]] = []
 
     @property
     def stopped(self) -> bool:
-        """True from the moment somebody wanted the run to end."""
+        """True from the first call of `stop`."""
         return self._stopped
 
     @property
     def paused(self) -> bool:
-        """True while the run is to stand still."""
+        """True while the run is paused or takes single steps."""
         return self._paused and not self._stopped
 
     def stop(self) -> None:
-        """Let the run halt: its tree is ended and the arm braked."""
+        """Halt the run: its tree is halted and its arm brakes."""
         self._stopped = True
         self._change.set()
 
     def pause(self) -> None:
-        """Let the run stand still before its next tick."""
+        """Pause the run before its next tick."""
         self._paused = True
 
     def resume(self) -> None:
-        """Let the run go on."""
+        """End the pause."""
         self._paused, self._steps = False, 0
         self._change.set()
 
     def step(self, ticks: int = 1) -> None:
-        """Let the run take so many ticks more and stand still again; it pauses if it did not."""
+        """Let the run tick `ticks` times and pause again; a run that is not paused is paused after them."""
         self._steps = self._steps + ticks if self._paused else ticks
         self._paused = True
         self._change.set()
 
     def request(self, word: str) -> None:
-        """Answer the question what is to be picked; what is said before it is asked counts for nothing."""
+        """Answer the operator's next question; answers given before the question are ignored."""
         self._requests.append(word)
 
-    def requested(self) -> str | None:
-        """Return the next word that was asked for, once; None where there is none."""
+    def take_request(self) -> str | None:
+        """Remove and return the oldest answer; None if there is none."""
         return self._requests.popleft() if self._requests else None
 
-    def between_ticks(self, do: Callable[[], None]) -> None:
-        """Have something done between any two ticks, and now and then while the run stands still.
+    def between_ticks(self, callback: Callable[[], None]) -> None:
+        """Call `callback` between any two ticks, and repeatedly during a pause.
 
-        It is done on the tick thread, where the cell may be looked at, and must return at once.
+        It runs on the tick thread, may read the cell, and must return at once.
         """
-        self._between.append(do)
+        self._callbacks.append(callback)
 
     def wait(self) -> None:
-        """Return when the next tick may begin, or the run is to halt."""
-        for do in self._between:
-            do()
+        """Return when the next tick may begin, or when the run has to halt."""
+        for callback in self._callbacks:
+            callback()
         while self._paused and not self._stopped:
             if self._steps > 0:
                 self._steps -= 1
                 return
-            self._change.wait(SLICE)
+            self._change.wait(MAX_PAUSE_SLICE)
             self._change.clear()
-            for do in self._between:
-                do()
+            for callback in self._callbacks:
+                callback()

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.workcell import Workcell
 from executive.errors import Fault
-from executive.testing.cell_wrapper import CellWrapper
 
 
 class BoundedCell(CellWrapper):

@@ -144,7 +144,7 @@ class Oracle:
 
 
 def oracle_cell(*, jitter: float = 0.7, rendered: bool = False) -> Callable[..., SimCell]:
-    """Return a kind of cell, for `Run(kind=...)`: the simulated one with oracles for detectors.
+    """Return a kind of cell, for `RunOptions.kind`: the simulated one with oracles for detectors.
 
     Args:
         jitter: Standard deviation of each side of a box [pixel].

@@ -8,6 +8,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
+from executive.cell.cell_wrapper import innermost
 from executive.cell.workcell import Workcell
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
@@ -15,11 +16,11 @@ from executive.events import Event, Observer
 from executive.mission.load import load_mission
 from executive.plugins import discover
 from executive.record.result import agrees
+from executive.run.assembly import RunOptions, assemble
 from executive.run.outcome import Outcome
 from executive.run.run import Run
 from executive.skill import Skill
 from executive.testing.bounded_cell import BoundedCell
-from executive.testing.cell_wrapper import innermost
 from executive.testing.faults.disturbed_cell import DisturbedCell, disturbed
 from executive.testing.faults.script import Disturbance
 from executive.tree.skill_leaf import SkillNode
@@ -115,15 +116,10 @@ def run_mission(
             raise
         return BoundedCell(workcell, longest)
 
-    run = Run(
-        loaded,
-        skills,
-        seed=seed,
-        observers=[events.append, *observers],
-        requests=requests,
-        kind=disturbed(arranged, disturbances),
-        substitutes=substitutes,
+    options = RunOptions(
+        seed, requests, kind=disturbed(arranged, disturbances), substitutes=substitutes or {}
     )
+    run = assemble(loaded, skills, options, [events.append, *observers])
     workcell = run.workcell
     assert isinstance(workcell, DisturbedCell)
     try:

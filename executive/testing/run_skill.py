@@ -8,7 +8,7 @@ from typing import Any
 
 from executive.cell.workcell import Workcell
 from executive.errors import InputError
-from executive.run.run_context import LONGEST_BRAKING
+from executive.run.run_context import MAX_BRAKING_TIME
 from executive.skill import Skill, SkillFailed
 from executive.testing.commands import written_down
 from executive.tree.skill_run import SkillRun
@@ -26,7 +26,7 @@ class SkillResult:
         ticks: Control steps it took.
         commanded: What it commanded of the cell, in order and in words (`written_down`).
         braking: Control steps from a halt until the arm was at rest; None if it still moved after
-            `LONGEST_BRAKING`.
+            `MAX_BRAKING_TIME`.
     """
 
     status: str
@@ -91,7 +91,7 @@ def _instance(skill: Skill | type[Skill], inputs: Mapping[str, Any] | None) -> S
 def _braking(workcell: Workcell) -> int | None:
     """Let the arm come to rest and return after how many control steps it was."""
     arm, clock = workcell.cell.arm, workcell.cell.clock
-    steps, deadline = 0, clock.now + LONGEST_BRAKING
+    steps, deadline = 0, clock.now + MAX_BRAKING_TIME
     while not arm.at_rest:
         if clock.now >= deadline:
             return None

@@ -23,8 +23,9 @@ from executive.perception.detectors.setting import ClosableDetector
 from executive.perception.envelope.rated_detectors import build_rated_detectors
 from executive.plugins import cell_kind, discover
 from executive.record.journal import read_journal
-from executive.record.recorded_run import recorded_run
+from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.result import exit_code
+from executive.run.assembly import RunOptions
 from tests.benchmarks.forks import ForkRunner
 from tests.benchmarks.report import WALL_TIME_LIMIT
 
@@ -273,7 +274,8 @@ def _run_in_this_process(
     skills = discover()
     loaded = load_mission(mission, skills, {}, cell_kind)
     maker = AuditedCellMaker(detectors)
-    result = recorded_run(loaded, skills, seed=seed, runs=runs, frames=False, kind=maker, scene=scene)
+    options = RunOptions(seed, kind=maker, scene=scene)
+    result = record_run(loaded, skills, options, runs, RecordOptions(frames=False))
     reports = read_reports(Path(result["run"]) / "journal.jsonl")
     objects = tuple(
         replace(one, reports=tuple(reports[item] for item in one.items if item in reports))

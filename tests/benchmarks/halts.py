@@ -22,6 +22,7 @@ from py_trees.common import Status
 
 from executive.campaign.halt_checks import check_journal, check_rest, check_tool
 from executive.campaign.subject import Subject
+from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.clock import STEP
 from executive.cell.workcell import Workcell
 from executive.cells.sim.arm import SimArm
@@ -32,11 +33,10 @@ from executive.motion.trajectory import Trajectory
 from executive.plugins import cell_kind
 from executive.record.journal import Journal, read_journal
 from executive.record.trace import Trace
+from executive.run.assembly import RunOptions, assemble
 from executive.run.outcome import Outcome
-from executive.run.run import Run
-from executive.testing.cell_wrapper import CellWrapper
 from tests.benchmarks.forks import ForkRunner
-from tests.benchmarks.report import Figures, describe, record_run, run_mission_command
+from tests.benchmarks.report import Figures, describe, record_subject, run_mission_command
 
 LIMITS = {"rest_s": 0.5, "deviation_rad": 1e-6, "acceleration_ratio": 1.0, "jerk_ratio": 1.02}
 """Limits of a halt: time to rest, distance of a joint's command from the planned trajectory, and acceleration
@@ -51,7 +51,7 @@ def measure(subject: Subject, period_steps: int | None = None) -> Figures:
     """Halt MISSION at moments all over one run, each time as Ctrl-C would."""
     period_steps = period_steps or (10 if subject.loaded.cell_config.kind == "sim" else 1)
     with tempfile.TemporaryDirectory() as folder:
-        undisturbed, problem = record_run(subject, subject.seed, Path(folder))
+        undisturbed, problem = record_subject(subject, subject.seed, Path(folder))
         if problem:
             raise ExecutiveError(f"{subject.name} with {problem}; choose a seed with which it succeeds")
         halts = _RunWithHalts(subject, period_steps, Path(folder)).run(undisturbed)
@@ -181,10 +181,12 @@ class _RunWithHalts:
                 kind(*args, **options), before=self._fork_and_halt_if_due, after=self._keep_command
             )
 
-        self._run = Run(
-            subject.loaded, subject.skills, seed=subject.seed, requests=subject.requests, kind=make_cell,
-            observers=[lambda event: self._journal(event), self._trace],
-        )  # fmt: skip
+        self._run = assemble(
+            subject.loaded,
+            subject.skills,
+            RunOptions(subject.seed, subject.requests, kind=make_cell),
+            [lambda event: self._journal(event), self._trace],
+        )
         self._arm = self._run.workcell.cell.arm
 
     def run(self, undisturbed: Figures) -> list[Figures]:

@@ -12,7 +12,7 @@ from executive.cli.options import runs_option
 from executive.events import Event
 from executive.record.recorder import Recorder
 from executive.record.run_directory import RunDirectory
-from executive.run.run import Run
+from executive.run.assembly import RunOptions, assemble
 from tests.benchmarks.report import Figures, describe, run_mission_command
 
 MAX_PERCENT = 3.0
@@ -24,7 +24,8 @@ def measure(subject: Subject, runs: Path) -> Figures:
     runs.mkdir(parents=True, exist_ok=True)
     times: list[float] = []
     began = time.perf_counter()
-    run = Run(subject.loaded, subject.skills, seed=subject.seed, requests=subject.requests, kind=subject.kind)
+    options = RunOptions(subject.seed, subject.requests, kind=subject.kind)
+    run = assemble(subject.loaded, subject.skills, options)
     with closing(run), tempfile.TemporaryDirectory(prefix=".journal-", dir=runs) as folder:
         with closing(Recorder(RunDirectory(Path(folder)), frames=False)) as recorder:
 

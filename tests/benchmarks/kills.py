@@ -27,13 +27,15 @@ from executive.plugins import cell_kind
 from executive.record.find_run import LATEST, find_run
 from executive.record.journal import ending_of, read_journal
 from executive.record.recorded_mission import recorded_mission
+from executive.record.recorded_run import RecordOptions
 from executive.record.replay import compare
 from executive.record.result import disagreement
-from executive.record.resumed_run import resumed_run
-from executive.replay.input_log import Past
+from executive.record.resumed_run import resume_run
+from executive.replay.input_log import InputLog
+from executive.run.assembly import RunOptions
 from executive.testing.faults.hand import Hand, Thing
 from tests.benchmarks.forks import ForkRunner
-from tests.benchmarks.report import Figures, describe, record_run, run_mission_command, show_progress
+from tests.benchmarks.report import Figures, describe, record_subject, run_mission_command, show_progress
 from tests.meanwhile import meanwhile
 
 RESUME_TIMEOUT = 300.0
@@ -58,7 +60,7 @@ def measure(subject: Subject, runs: Path, kills: int = 20, changed: int | None =
         folder = runs / str(number)
         while not run_and_kill(subject, subject.seed + number, folder, float(random.uniform(0.0, duration))):
             pass
-        done.append(resume_run(subject, subject.seed + number, folder, change))
+        done.append(resume_killed_run(subject, subject.seed + number, folder, change))
         if not done[-1]["problems"]:
             shutil.rmtree(folder)
     return {
@@ -81,7 +83,7 @@ def begin_run(subject: Subject, seed: int, runs: Path) -> int:
     child = os.fork()
     if child == 0:
         try:
-            record_run(subject, seed, runs)
+            record_subject(subject, seed, runs)
         finally:
             os._exit(0)
     return child
@@ -99,13 +101,13 @@ def run_and_kill(subject: Subject, seed: int, runs: Path, delay: float) -> bool:
         entries = read_journal(find_run(LATEST, runs) / "journal.jsonl")
     except ExecutiveError:
         return False
-    return Past.of(entries).start is not None and ending_of(entries) is None
+    return InputLog.of(entries).start is not None and ending_of(entries) is None
 
 
-def resume_run(subject: Subject, seed: int, runs: Path, change: str) -> Figures:
+def resume_killed_run(subject: Subject, seed: int, runs: Path, change: str) -> Figures:
     """Change the world if asked to, resume a killed run, and return its figures and problems."""
     path = find_run(LATEST, runs)
-    past = Past.of(read_journal(path / "journal.jsonl"))
+    past = InputLog.of(read_journal(path / "journal.jsonl"))
     status = {e["node"]: e["status"] for e in past.entries if e["kind"] == "status" and "item" in e}
     kill: Figures = {
         "run": str(path),
@@ -117,8 +119,9 @@ def resume_run(subject: Subject, seed: int, runs: Path, change: str) -> Figures:
 
     def resume() -> Figures:
         done = change_world(subject, seed, path, past, change) if change else ""
-        result = resumed_run(path, subject.skills, frames=False, kind=subject.kind)
-        after = Past.of(read_journal(path / "journal.jsonl"))
+        options = RunOptions(seed, kind=subject.kind)
+        result = resume_run(path, subject.skills, options, RecordOptions(frames=False))
+        after = InputLog.of(read_journal(path / "journal.jsonl"))
         problems = [*check_result(result, change_made=done), *find_handled_twice(after.entries)]
         difference = compare(subject.loaded, subject.skills, after, seed).difference
         if difference:
@@ -130,7 +133,7 @@ def resume_run(subject: Subject, seed: int, runs: Path, change: str) -> Figures:
     return figures or {**kill, "problems": [problem]}
 
 
-def change_world(subject: Subject, seed: int, path: Path, past: Past, change: str) -> str:
+def change_world(subject: Subject, seed: int, path: Path, past: InputLog, change: str) -> str:
     """Change the world of a killed run; return what was changed, or "" if nothing could be."""
     random = np.random.default_rng(seed)
     config = subject.loaded.cell_config

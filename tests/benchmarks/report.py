@@ -25,8 +25,9 @@ from executive.cli.options import MISSION, json_option, overrides_option, seed_o
 from executive.cli.output import print_json, stdout_kept_clean
 from executive.cli.subject import load_subject, oracle_option
 from executive.errors import ExecutiveError, InputError
-from executive.record.recorded_run import recorded_run
+from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.result import disagreement
+from executive.run.assembly import RunOptions
 
 Figures = dict[str, Any]
 """Figures of a benchmark by name; a name ends with the unit."""
@@ -85,12 +86,10 @@ def run_mission_command(measure: Callable[..., Figures], *options: Option) -> No
     run_command(measure_mission, MISSION, *options, oracle_option, seed_option, overrides_option)
 
 
-def record_run(subject: Subject, seed: int, runs: Path) -> tuple[Figures, str]:
+def record_subject(subject: Subject, seed: int, runs: Path) -> tuple[Figures, str]:
     """Run a mission to its end, recorded below `runs`; return its result and, if it failed, a sentence."""
-    result = recorded_run(
-        subject.loaded, subject.skills, seed=seed, runs=runs, requests=subject.requests, frames=False,
-        kind=subject.kind,
-    )  # fmt: skip
+    options = RunOptions(seed, subject.requests, kind=subject.kind)
+    result = record_run(subject.loaded, subject.skills, options, runs, RecordOptions(frames=False))
     if result["status"] == "HALTED":
         raise KeyboardInterrupt
     if result["status"] == "SUCCESS" and not disagreement(result):

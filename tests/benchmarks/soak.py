@@ -14,7 +14,7 @@ import click
 
 from executive.campaign.subject import Subject
 from executive.errors import InputError
-from tests.benchmarks.report import Figures, describe, record_run, run_mission_command, show_progress
+from tests.benchmarks.report import Figures, describe, record_subject, run_mission_command, show_progress
 
 PROCESS = Path("/proc/self")
 """Folder in which Linux lists the resources of this process."""
@@ -34,7 +34,7 @@ def measure(subject: Subject, runs: int = 100) -> Figures:
     failed: list[str] = []
     with tempfile.TemporaryDirectory() as folder:
         for seed in show_progress(range(subject.seed, subject.seed + runs), "run"):
-            result, problem = record_run(subject, seed, Path(folder))
+            result, problem = record_subject(subject, seed, Path(folder))
             failed += [problem] if problem else []
             shutil.rmtree(result["run"])
             samples.append(take_sample())

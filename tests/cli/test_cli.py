@@ -18,6 +18,7 @@ from executive.cli.main import COMMANDS, main
 from executive.errors import Fault, InputError
 from executive.mission.findings import Finding, MissionError
 from executive.mission.flow.endings import Ending
+from executive.run.assembly import RunOptions
 
 RESULT = {
     "mission": "sort",
@@ -52,15 +53,15 @@ def project(monkeypatch):
         named = SimpleNamespace(name=mission)
         return SimpleNamespace(mission=named, warnings=asked.warnings, endings=asked.endings)
 
-    def recorded_run(loaded, skills, **options):
-        asked.run.append(options)
+    def record_run(loaded, skills, options, runs, record):
+        asked.run.append((options, runs, record))
         os.write(1, b"noise from a library\n")
         if asked.run_error is not None:
             raise asked.run_error
         return asked.result
 
     monkeypatch.setattr("executive.mission.load.load_mission", load_mission)
-    monkeypatch.setattr("executive.record.recorded_run.recorded_run", recorded_run)
+    monkeypatch.setattr("executive.record.recorded_run.record_run", record_run)
     monkeypatch.setattr("executive.plugins.discover", dict)
     monkeypatch.setattr("executive.view.report.page.leave_report", lambda result: ("runs/x/report.html", ""))
     return asked
@@ -241,23 +242,20 @@ def test_a_bug_is_one_sentence_that_says_where_the_details_are(project):
 def test_a_run_ends_with_the_exit_code_of_its_outcome(project, status, code):
     project.result["status"] = status
     shown = invoke("run", "sort", "--quiet")
-    assert (shown.exit_code, shown.output, project.run[0]["views"]) == (code, "", [])
+    assert (shown.exit_code, shown.output, project.run[0][2].views) == (code, "", [])
 
 
 def test_a_run_passes_on_everything_it_was_asked_for(project):
     words = "run sort --seed 7 --set a=1 --set b=x=y --runs out --realtime --request cube --request duck"
     shown = invoke(*words.split(), "--json")
     assert project.load == [("sort", {"a": "1", "b": "x=y"})]
-    (options,) = project.run
-    assert options.pop("views")
-    assert options == {
-        "seed": 7, "runs": Path("out"), "gui": False, "realtime": True, "paused": False, "keyboard": True,
-        "requests": ("cube", "duck"), "scene": None,
-    }  # fmt: skip
+    ((options, runs, record),) = project.run
+    assert options == RunOptions(7, ("cube", "duck"), realtime=True)
+    assert (runs, record.paused, len(record.views)) == (Path("out"), False, 1)
     assert json.loads(shown.stdout) == RESULT, "nothing else is on standard output"
     assert "repeat: executive run sort --seed 7" in shown.stderr
     invoke("run", "sort")
-    assert project.run[1]["requests"] is None, "the operator is asked"
+    assert project.run[1][0].requests is None, "the operator is asked"
 
 
 def test_check_tells_every_finding(project):

@@ -23,8 +23,8 @@ from executive.mission.findings import Finding, MissionError
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.model.grammar import CONTROL
 from executive.plugins import cell_kind, discover
-from executive.run import run as run_module
-from executive.run.run import Run
+from executive.run import assembly
+from executive.run.assembly import RunOptions, assemble
 from executive.skill import Skill
 from executive.tree.blackboard import Scope
 from tests.mission.mutations import places
@@ -121,8 +121,9 @@ def _run(loaded: LoadedMission, skills: Mapping[str, type[Skill]], seed: int) ->
     """Return what must not be in a run of a mission."""
     wishes = random.Random(seed).choices([*loaded.routes, "rescan"], k=5)
     witness = Witness(loaded, skills, scope := Scope())
-    with mock.patch.object(run_module, "Scope", lambda: scope):
-        run = Run(loaded, skills, seed=seed, observers=[witness], requests=wishes, kind=UnkindCell)
+    with mock.patch.object(assembly, "Scope", lambda: scope):
+        options = RunOptions(seed, wishes, kind=UnkindCell)
+        run = assemble(loaded, skills, options, [witness])
     assert isinstance(run.workcell, UnkindCell)
     witness.cell = run.workcell
     outcome = run.execute()

@@ -10,7 +10,8 @@ from executive.events import Event
 from executive.mission.flow.analysis import Analysis
 from executive.mission.load import LoadedMission
 from executive.mission.model.nodes import SkillNode
-from executive.run.run import Outcome, Run
+from executive.run.outcome import Outcome
+from executive.run.run import Run
 from executive.skill import EMPTY, HOLDING, Skill
 from executive.tree.blackboard import Scope
 from tests.mission.unkind_cell import UnkindCell

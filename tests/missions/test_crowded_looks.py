@@ -23,7 +23,8 @@ from executive.mission.load import load_mission
 from executive.perception.detectors.requests import Pending
 from executive.perception.detectors.screening import screen_detectors
 from executive.plugins import cell_kind, discover
-from executive.record.recorded_run import recorded_run
+from executive.record.recorded_run import RecordOptions, record_run
+from executive.run.assembly import RunOptions
 
 LABELS = ("cube", "sphere", "duck")
 MAX_WALL_TIME = 60.0
@@ -113,7 +114,8 @@ def run_crowded(
     """Run a shipped mission and return its result and its journal."""
     skills = discover()
     loaded = load_mission(mission, skills, kinds=cell_kind)
-    result = recorded_run(loaded, skills, seed=1, runs=runs, keyboard=False, frames=False, kind=kind)
+    options = RunOptions(1, keyboard=False, kind=kind)
+    result = record_run(loaded, skills, options, runs, RecordOptions(frames=False))
     return result, (Path(result["run"]) / "journal.jsonl").read_text()
 
 

@@ -14,7 +14,7 @@ from executive.mission.load import LoadedMission, load_mission
 from executive.perception.detectors.setting import Setting
 from executive.plugins import cell_kind, discover
 from executive.record.result import agrees
-from executive.run.run import Run
+from executive.run.assembly import RunOptions, assemble
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 LONGEST = 200.0
@@ -75,7 +75,7 @@ class Dropping(Spoilt):
 def test_everything_is_in_its_bin_and_the_books_are_right(
     tmp_path: Path, kind: type[FakeCell], seed: int
 ) -> None:
-    run = Run(loaded(tmp_path, "sort_overhead"), discover(), seed=seed, kind=kind)
+    run = assemble(loaded(tmp_path, "sort_overhead"), discover(), RunOptions(seed, kind=kind))
     try:
         outcome, items, audit = run.execute(), run.items(), dict(run.audit() or {})
     finally:

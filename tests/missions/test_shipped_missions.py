@@ -16,7 +16,8 @@ from executive.events import Event
 from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import cell_kind, discover
 from executive.record.result import agrees
-from executive.run.run import Outcome, Run
+from executive.run.assembly import RunOptions, assemble
+from executive.run.outcome import Outcome
 from executive.testing.oracle import oracle_cell
 
 MISSIONS = {path.stem: path for path in sorted((Path(__file__).parents[2] / "missions").glob("*.yaml"))}
@@ -55,7 +56,8 @@ def execute(mission: LoadedMission, seed: int, kind: Callable[..., Workcell] = F
 
     # Where an operator is asked, every class is asked for until there can be none of it left.
     requests = [*mission.routes] * 6
-    run = Run(mission, discover(), seed=seed, kind=kind, requests=requests, observers=[observe])
+    options = RunOptions(seed, requests, kind=kind)
+    run = assemble(mission, discover(), options, [observe])
     try:
         outcome = run.execute()
         return Done(outcome, run.items(), dict(run.audit() or {}), ahead)

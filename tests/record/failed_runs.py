@@ -10,7 +10,7 @@ from executive.cells.fake.cell import FakeCell
 from executive.mission.load import load_mission
 from executive.plugins import discover
 from executive.record.diagnosis.diagnosis import Story
-from executive.run.run import Run
+from executive.run.assembly import RunOptions, assemble
 
 HEAD = """\
 mission: trial
@@ -55,9 +55,8 @@ class FailedRun:
             file.write_text(HEAD + mission)
         self.loaded = load_mission(file, discover(), overrides or {})
         self.story = Story(self.loaded, discover())
-        self.run = Run(
-            self.loaded, discover(), seed=3, observers=[self.story], kind=FakeCell, requests=requests
-        )
+        options = RunOptions(3, requests, kind=FakeCell)
+        self.run = assemble(self.loaded, discover(), options, [self.story])
         assert isinstance(self.run.workcell, FakeCell)
         self.fake = self.run.workcell
         if objects:

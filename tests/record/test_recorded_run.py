@@ -12,7 +12,8 @@ from executive.errors import InputError
 from executive.mission.load import load_mission
 from executive.plugins import discover
 from executive.record.journal import Journal, read_journal
-from executive.record.recorded_run import recorded_run
+from executive.record.recorded_run import RecordOptions, record_run
+from executive.run.assembly import RunOptions
 from executive.run.run import Run
 
 
@@ -44,9 +45,8 @@ def run(bring_one, tmp_path, monkeypatch):
     def once(*views, **options):
         loaded = load_mission(bring_one, discover())
         try:
-            return recorded_run(
-                loaded, discover(), seed=3, runs=tmp_path / "runs", kind=FakeCell, views=views, **options
-            )
+            record = RecordOptions(views, **options)
+            return record_run(loaded, discover(), RunOptions(3, kind=FakeCell), tmp_path / "runs", record)
         finally:
             assert len(closed) == 1
 

@@ -14,9 +14,10 @@ from executive.plugins import discover
 from executive.record.entry import entry_of
 from executive.record.find_run import find_run
 from executive.record.journal import read_journal
-from executive.record.recorded_run import recorded_run
+from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.replay import Replay, compare, replay
-from executive.replay.input_log import Past
+from executive.replay.input_log import InputLog
+from executive.run.assembly import RunOptions
 from executive.testing.faults import during, seal_fails
 from executive.testing.oracle import oracle_cell
 from executive.testing.run_mission import run_mission
@@ -28,7 +29,8 @@ QUICK = "sort_overhead"
 def recorded(missions: Path, runs: Path, name: str, kind: Any = FakeCell) -> Path:
     loaded = load_mission(missions / f"{name}.yaml", discover())
     requests = [*loaded.routes] * 4
-    recorded_run(loaded, discover(), seed=3, runs=runs, requests=requests, frames=False, kind=kind)
+    options = RunOptions(3, requests, kind=kind)
+    record_run(loaded, discover(), options, runs, RecordOptions(frames=False))
     return find_run("latest", runs)
 
 
@@ -76,9 +78,11 @@ def test_the_first_decision_of_an_edited_mission_that_differs_is_told(missions: 
 def test_a_mission_that_gives_up_sooner_says_where(missions: Path) -> None:
     file, skills = missions / "sort_overhead.yaml", discover()
     four_times = [during("*/Grasp", seal_fails(), nth=(1, 2, 3, 4))]
-    past = Past.of([entry_of(event) for event in run_mission(file, seed=3, disturbances=four_times).events])
-    assert compare(load_mission(file, skills), skills, past, 3).same
-    done = compare(load_mission(file, skills, {"attempts": "2"}), skills, past, 3, edited=True)
+    log = InputLog.of(
+        [entry_of(event) for event in run_mission(file, seed=3, disturbances=four_times).events]
+    )
+    assert compare(load_mission(file, skills), skills, log, 3).same
+    done = compare(load_mission(file, skills, {"attempts": "2"}), skills, log, 3, edited=True)
     assert done.replayed["node"] == "RejectTarget"
 
 
@@ -107,6 +111,6 @@ def test_a_decision_too_many_is_a_difference_in_a_run_that_was_cut_off_too(missi
     decided = ("status", "choice", "decision", "item", "intent")
     without = [e for n, e in enumerate(cut) if n < missing or e["kind"] not in decided]
     loaded = load_mission(file, skills)
-    assert compare(loaded, skills, Past.of(cut), 3).same
-    done = compare(loaded, skills, Past.of(without), 3)
+    assert compare(loaded, skills, InputLog.of(cut), 3).same
+    done = compare(loaded, skills, InputLog.of(without), 3)
     assert (done.recorded, done.replayed and done.replayed["kind"]) == (None, "intent")

@@ -18,9 +18,10 @@ from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import discover
 from executive.record.find_run import find_run
 from executive.record.journal import read_journal
-from executive.record.recorded_run import recorded_run
+from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.replay import replay
-from executive.record.resumed_run import resumed_run
+from executive.record.resumed_run import resume_run
+from executive.run.assembly import RunOptions
 from executive.testing.faults.hand import Hand
 from executive.testing.oracle import oracle_cell
 from executive.testing.substitutes import raising
@@ -61,8 +62,9 @@ def load(missions: Path, name: str) -> LoadedMission:
 
 def run_of(loaded: LoadedMission, runs: Path, **options: Any) -> dict[str, Any]:
     """Run a mission on the fake cell, asking for every class four times."""
-    options = {"skills": discover(), "requests": [*loaded.routes] * 4, **options}
-    return recorded_run(loaded, seed=SEED, runs=runs, frames=False, **{"kind": FakeCell, **options})
+    skills, views = options.pop("skills", discover()), options.pop("views", ())
+    run = RunOptions(SEED, [*loaded.routes] * 4, **{"kind": FakeCell, **options})
+    return record_run(loaded, skills, run, runs, RecordOptions(views, frames=False))
 
 
 def cut_off(loaded: LoadedMission, runs: Path, tick: int, nth: int = 1) -> Path:
@@ -73,7 +75,9 @@ def cut_off(loaded: LoadedMission, runs: Path, tick: int, nth: int = 1) -> Path:
 
 
 def resumed(path: Path, **options: Any) -> dict[str, Any]:
-    return resumed_run(path, **{"skills": discover(), "kind": FakeCell, **options}, frames=False)
+    skills, views = options.pop("skills", discover()), options.pop("views", ())
+    run = RunOptions(SEED, **{"kind": FakeCell, **options})
+    return resume_run(path, skills, run, RecordOptions(views, frames=False))
 
 
 def redecided(path: Path) -> str:

@@ -14,7 +14,17 @@ from executive.cell.detection import Answer, Detection, Observation
 from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
 from executive.geometry import Pose, about_z
-from executive.replay.codec import ANSWER, ARRAY, BOX, FRAME, MOTION, OBSERVATIONS, POSE, Codec, PlayedMotion
+from executive.replay.codec import (
+    ANSWER,
+    ARRAY,
+    BOX,
+    FRAME,
+    MOTION,
+    OBSERVATIONS,
+    POSE,
+    Codec,
+    RecordedMotion,
+)
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 few = settings(max_examples=25)
@@ -32,7 +42,7 @@ def test_numbers_come_back_bit_by_bit(array: np.ndarray, angle: float) -> None:
     pose = Pose(about_z(angle), array[:, 0])
     assert np.array_equal(back(POSE, pose).rotation, pose.rotation)
     assert np.array_equal(back(POSE, pose).position, pose.position)
-    assert back(MOTION, PlayedMotion(angle)) == PlayedMotion(angle)
+    assert back(MOTION, RecordedMotion(angle)) == RecordedMotion(angle)
     assert back(BOX, (1, 2, 3.5, angle)) == (1, 2, 3.5, angle)
 
 

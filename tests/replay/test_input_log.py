@@ -1,4 +1,4 @@
-"""What a journal says of a run so far."""
+"""Inputs and interruptions of a run, from its journal."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from executive.replay.input_log import Past
+from executive.replay.input_log import InputLog, Interruption
 
 
 def entry(tick: int, kind: str, **data: Any) -> dict[str, Any]:
@@ -17,53 +17,76 @@ def sense(tick: int, value: object, name: str = "tool.holding", nth: int = 1) ->
     return entry(tick, "sense", name=name, nth=nth, value=value)
 
 
+def resume(tick: int, ticked: int, intent: str = "") -> dict[str, Any]:
+    return entry(tick, "resume", ticked=ticked, intent=intent)
+
+
 START = entry(0, "run", step=1 / 240, seed=3)
 
 
-def test_answers_are_in_order_by_what_was_asked() -> None:
-    past = Past.of([START, sense(0, False), sense(0, "arm", name="arm.met"), sense(7, True, nth=2)])
-    assert [(one.tick, one.nth, one.value) for one in past.senses["tool.holding"]] == [
+def values(log: InputLog) -> list[object]:
+    return [one.value for one in log.inputs["tool.holding"]]
+
+
+def test_answers_are_in_order_by_the_name_of_the_input() -> None:
+    log = InputLog.of([START, sense(0, False), sense(0, "arm", name="arm.met"), sense(7, True, nth=2)])
+    assert [(one.tick, one.nth, one.value) for one in log.inputs["tool.holding"]] == [
         (0, 1, False),
         (7, 2, True),
     ]
-    assert (past.number_of_answers("arm.met"), past.number_of_answers("arm.q")) == (1, 0)
+    assert (log.number_of_answers("arm.met"), log.number_of_answers("arm.q")) == (1, 0)
 
 
-def test_what_a_kill_left_of_a_control_step_is_void_once_the_run_was_taken_up() -> None:
+def test_an_incomplete_control_step_is_void_once_the_run_was_resumed() -> None:
     killed = [START, sense(4, True), sense(5, False), entry(5, "intent", action="open")]
-    assert Past.of(killed).last_intent == "open"
-    taken_up = Past.of([*killed, entry(5, "resume", ticked=5, intent="open"), sense(5, True, nth=3)])
-    assert [one.value for one in taken_up.senses["tool.holding"]] == [True, True]
-    assert (taken_up.last_intent, taken_up.resumes[5]["intent"]) == ("", "open")
+    assert InputLog.of(killed).last_action == "open"
+    resumed = InputLog.of([*killed, resume(5, 5, "open"), sense(5, True, nth=3)])
+    assert values(resumed) == [True, True]
+    assert (resumed.last_action, resumed.interruptions[5].last_action) == ("", "open")
 
 
-def test_a_second_time_voids_only_what_came_after_the_first() -> None:
+def test_a_second_resumption_voids_only_the_end_of_the_first() -> None:
     entries = [
-        START, sense(2, 1), sense(3, 2), entry(3, "resume", ticked=3, intent=""), sense(4, 3), sense(6, 4),
-        entry(9, "resume", ticked=6, intent=""), sense(9, 5),
+        START, sense(2, 1), sense(3, 2), resume(3, 3), sense(4, 3), sense(6, 4), resume(9, 6), sense(9, 5),
     ]  # fmt: skip
-    past = Past.of(entries)
-    assert [one.value for one in past.senses["tool.holding"]] == [1, 3, 5]
-    assert {ticked: entry["tick"] for ticked, entry in past.resumes.items()} == {3: 3, 6: 9}
+    log = InputLog.of(entries)
+    assert values(log) == [1, 3, 5]
+    assert {one.complete: one.resumed for one in log.interruptions.values()} == {3: 3, 6: 9}
 
 
-def test_what_came_after_a_halt_does_not_count() -> None:
+def test_the_steps_after_a_halt_do_not_count() -> None:
     halted = [START, sense(8, 1), entry(9, "halt", ticked=True), sense(30, 2), entry(30, "end")]
-    past = Past.of(halted)
-    assert (past.complete(30), [one.value for one in past.before(9).senses["tool.holding"]]) == (9, [1])
-    # Once it goes on, the halt is void.
-    assert Past.of([*halted, entry(30, "resume", ticked=9, intent="")]).halt is None
+    log = InputLog.of(halted)
+    assert (log.interruption_after(30).complete, values(log.before(9))) == (9, [1])
+    # Once the run was resumed, the halt is void.
+    assert InputLog.of([*halted, resume(30, 9)]).halt is None
 
 
 @pytest.mark.parametrize(("steps", "complete"), [(0, 0), (7, 7), (8, 8), (9, 9), (500, 9)])
-def test_a_control_step_counts_once_the_world_has_made_it_and_the_journal_knows_of_it(
+def test_a_control_step_counts_if_the_world_made_it_and_the_journal_reaches_it(
     steps: int, complete: int
 ) -> None:
-    # 8 is the last step that it tells of: whether all of it, the world's steps say.
-    assert Past.of([START, sense(8, 1)]).complete(steps) == complete
+    # Step 8 is the last one in the journal: whether it is complete is known from the steps of the world.
+    assert InputLog.of([START, sense(8, 1)]).interruption_after(steps).complete == complete
 
 
-def test_how_it_began() -> None:
-    assert Past.of([]).start is None
-    past = Past.of([START, entry(3, "request"), entry(4, "request")])
-    assert (past.step, past.number_of("request")) == (1 / 240, 2)
+@pytest.mark.parametrize(("steps", "complete"), [(9, 6), (10, 10)])
+def test_a_resumption_that_was_interrupted_at_once_is_repeated_from_its_beginning(
+    steps: int, complete: int
+) -> None:
+    log = InputLog.of([START, sense(5, 1), resume(9, 6, "close"), sense(9, 2)])
+    interruption = log.interruption_after(steps)
+    assert (interruption.complete, interruption.resumed) == (complete, steps)
+
+
+def test_a_run_that_ended_as_incomplete_is_reopened() -> None:
+    log = InputLog.of([START, sense(8, 1), entry(9, "end", status="INCOMPLETE")])
+    assert log.interruption_after(9) == Interruption(10, "", True, 10)
+    log = InputLog.of([*log.entries, resume(10, 10), sense(11, 2)])
+    assert log.interruptions[10].reopens
+
+
+def test_the_start() -> None:
+    assert InputLog.of([]).start is None
+    log = InputLog.of([START, entry(3, "request"), entry(4, "request")])
+    assert (log.step, log.number_of("request")) == (1 / 240, 2)

@@ -1,4 +1,4 @@
-"""Recording what is answered, and playing it back."""
+"""Recording of answers, and their replay."""
 
 from __future__ import annotations
 
@@ -10,19 +10,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from executive.errors import Fault, Unreachable
-from executive.replay.input_log import Past
-from executive.replay.input_recorder import Tape, Unrecorded
-
-STEP = 0.25
+from executive.replay.input_log import InputLog
+from executive.replay.input_recorder import InputRecorder
+from executive.replay.input_replayer import InputReplayer, Unrecorded
 
 
 class Recording:
-    """A tape that records, and what it told."""
+    """A recorder and its events."""
 
     def __init__(self) -> None:
-        self.entries: list[dict[str, Any]] = [{"tick": 0, "clock": 0.0, "kind": "run", "step": STEP}]
+        self.entries: list[dict[str, Any]] = []
         self.tick = 0
-        self.tape = Tape(self.emit, STEP, lambda: self.tick * STEP)
+        self.recorder = InputRecorder(self.emit)
 
     def emit(self, kind: str, **data: Any) -> None:
         value = data.pop("value")
@@ -32,14 +31,10 @@ class Recording:
 
     def begin(self, tick: int) -> None:
         self.tick = tick
-        self.tape.begin_tick(tick)
+        self.recorder.begin_step()
 
-    def played(self) -> Tape:
-        return Tape(never, STEP, lambda: 0.0, Past.of(self.entries))
-
-
-def never(*args: Any, **data: Any) -> Any:
-    raise AssertionError("nobody is asked or told anything while a tape plays")
+    def replayer(self) -> InputReplayer:
+        return InputReplayer(InputLog.of(self.entries))
 
 
 def raising(error: Exception) -> Callable[[], Any]:
@@ -55,67 +50,37 @@ def test_the_same_questions_get_the_same_answers(steps: list[list[tuple[str, int
     for tick, asked in enumerate(steps):
         recording.begin(tick)
         for name, value in asked:
-            recording.tape.sense(name, lambda value=value: value)
-    tape = recording.played()
+            recording.recorder.read(name, lambda value=value: value)
+    replayer = recording.replayer()
     for tick, asked in enumerate(steps):
-        tape.begin_tick(tick)
-        assert [tape.sense(name, never) for name, _ in asked] == [value for _, value in asked]
+        replayer.begin_step(tick)
+        assert [replayer.read(name) for name, _ in asked] == [value for _, value in asked]
 
 
-def test_what_the_cell_raised_is_raised_again() -> None:
+def test_an_exception_of_the_cell_is_raised_again() -> None:
     recording = Recording()
     for error in (Unreachable("1 mm too far"), Fault("off its path"), KeyError("x")):
         with pytest.raises(type(error)):
-            recording.tape.sense("plan", raising(error))
-    tape = recording.played()
-    tape.begin_tick(0)
+            recording.recorder.read("plan", raising(error))
+    replayer = recording.replayer()
     for name, message in (("Unreachable", "1 mm too far"), ("Fault", "off its path"), ("KeyError", "x")):
         with pytest.raises(Exception, match=message) as raised:
-            tape.sense("plan", never)
+            replayer.read("plan")
         assert type(raised.value).__name__ == name
 
 
-def test_a_command_is_not_given_while_it_plays_but_its_failure_is() -> None:
+def test_a_question_that_was_never_asked_has_no_answer() -> None:
+    replayer, message = (
+        Recording().replayer(),
+        "the record holds no answer to what is asked here first: arm.q",
+    )
+    with pytest.raises(Unrecorded, match=message):
+        replayer.read("arm.q")
+    assert replayer.unanswered == message
+
+
+def test_only_answers_unlike_the_one_before_are_recorded() -> None:
     recording = Recording()
-    done: list[int] = []
-    recording.tape.command(lambda: done.append(1))
-    with pytest.raises(Fault):
-        recording.tape.command(raising(Fault("the arm is moving")))
-    assert done == [1]
-    tape = recording.played()
-    tape.begin_tick(0)
-    tape.command(never)
-    with pytest.raises(Fault, match="the arm is moving"):
-        tape.command(never)
-
-
-def test_what_was_never_asked_has_no_answer() -> None:
-    tape = Recording().played()
-    with pytest.raises(Unrecorded, match=r"the record holds no answer to what is asked here first: arm\.q"):
-        tape.sense("arm.q", never)
-
-
-def test_the_clock_is_the_count_of_steps_and_what_the_cells_own_is_ahead() -> None:
-    recording = Recording()
-    recording.begin(2)
-    assert recording.tape.clock() == recording.tape.now == 0.5
-    tape = recording.played()
-    tape.begin_tick(2)
-    assert tape.clock() == tape.now == 0.5
-    drifting = Tape(recording.emit, STEP, lambda: 0.6, None)
-    drifting.begin_tick(2)
-    assert drifting.clock() == pytest.approx(0.6)
-
-
-def test_gone_live_it_asks_and_tells_only_what_is_unlike_the_answer_before() -> None:
-    recording = Recording()
-    recording.begin(0)
-    recording.tape.sense("x", lambda: 1)
-    told: list[Any] = []
-    past = Past.of(recording.entries)
-    tape = Tape(lambda kind, **data: told.append(data["value"].value), STEP, lambda: 0.0, past)
-    tape.begin_tick(0)
-    assert tape.sense("x", never) == 1
-    tape.go_live()
-    assert [tape.sense("x", lambda value=value: value) for value in (1, 5, 5, 1)] == [1, 5, 5, 1]
-    assert told == [5, 1]
+    answers = [recording.recorder.read("x", lambda value=value: value) for value in (1, 1, 5, 5, 1)]
+    assert answers == [1, 1, 5, 5, 1]
+    assert [(entry["value"], entry["nth"]) for entry in recording.entries] == [(1, 1), (5, 3), (1, 5)]

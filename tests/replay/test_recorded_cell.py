@@ -1,11 +1,18 @@
-"""The cell that a tree sees: every question and command goes through the tape."""
+"""The cell that a tree sees: every question and command is recorded."""
 
 from __future__ import annotations
 
+from executive.cell.clock import StepClock
+from executive.cell.protocols import Cell
 from executive.cell.proxy import IS_METHOD
 from executive.cells.fake.cell import FakeCell
-from executive.replay.input_recorder import Tape
-from executive.replay.recorded_cell import COMMANDS, INPUT_FORMATS, RECORDED_ROLES, cell_on_tape
+from executive.events import Emit, ignore
+from executive.replay.input_recorder import InputRecorder
+from executive.replay.recorded_cell import COMMANDS, INPUT_FORMATS, RECORDED_ROLES, recorded_cell
+
+
+def recorded(fake: FakeCell, emit: Emit = ignore) -> Cell:
+    return recorded_cell(fake.cell, InputRecorder(emit), StepClock(lambda: 0.0), emit)
 
 
 def test_every_member_of_a_part_is_a_question_or_a_command() -> None:
@@ -17,9 +24,8 @@ def test_every_member_of_a_part_is_a_question_or_a_command() -> None:
 
 def test_every_part_that_can_answer_is_recorded() -> None:
     fake = FakeCell()
-    tape = Tape(lambda kind, **data: None, 1 / 240, lambda: 0.0)
-    behind = cell_on_tape(fake.cell, tape, lambda kind, **data: None)
-    same = {name for name in vars(behind) if getattr(behind, name) is getattr(fake.cell, name)}
+    cell = recorded(fake)
+    same = {name for name in vars(cell) if getattr(cell, name) is getattr(fake.cell, name)}
     # The content of a file, and the knowledge of the run itself.
     assert same == {
         "ledger", "bins", "classes", "routes", "safe_place", "descent", "descent_speed", "decided",
@@ -34,7 +40,7 @@ def test_an_intent_is_emitted_before_the_tool_acts() -> None:
         if kind == "intent":
             intents.append((str(data["action"]), fake.tool.holding))
 
-    tool = cell_on_tape(fake.cell, Tape(emit, 1 / 240, lambda: 0.0), emit).tool
+    tool = recorded(fake, emit).tool
     tip = fake.arm.tool_pose.position
     fake.world.put("cube", *tip[:2]).position[2] = tip[2] - 0.025
     tool.close()

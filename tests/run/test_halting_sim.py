@@ -21,7 +21,8 @@ from executive.motion.limits import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.plugins import discover
 from executive.record.journal import Journal, read_journal
-from executive.run.run import Outcome, Run
+from executive.run.assembly import RunOptions, assemble
+from executive.run.outcome import Outcome
 from executive.testing.oracle import oracle_cell
 
 pytestmark = pytest.mark.slow
@@ -61,7 +62,7 @@ def halt(missions: Path, tmp_path_factory: pytest.TempPathFactory, request: pyte
     earliest, file = request.param, tmp_path_factory.mktemp("halt") / "journal.jsonl"
     loaded = load_mission(missions / "sort_overhead.yaml", discover())
     journal = Journal(file)
-    run = Run(loaded, discover(), seed=2, kind=oracle_cell(), observers=[journal])
+    run = assemble(loaded, discover(), RunOptions(2, kind=oracle_cell()), [journal])
     workcell = run.workcell
     assert isinstance(workcell, SimCell)
     client, arm, advance = workcell._world.client, workcell._arm, workcell.advance

@@ -20,8 +20,9 @@ from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import discover
 from executive.record.plain import plain
 from executive.record.trace import Trace
-from executive.run.run import Run
-from executive.run.run_context import Plant
+from executive.run.assembly import RunOptions, assemble
+from executive.run.planning_ahead import PlanningAhead
+from executive.run.run_context import RunContext
 from executive.skill import Skill
 from executive.tree.blackboard import Scope
 from executive.tree.skill_leaf import SkillNode
@@ -39,21 +40,21 @@ class Interleaved:
 
     def __init__(self, loaded: LoadedMission, seed: int) -> None:
         self._trace = Trace()
-        self._plant = Plant([self._trace])
-        emit = self._plant.emit
+        self._context = RunContext([self._trace])
+        emit = self._context.emit
         self._fake = FakeCell(loaded.cell_config, seed=seed, routes=loaded.routes, emit=emit)
-        self._plant.connect(self._fake)
-        self._root = build(loaded, skills(), self._plant.cell, Scope(), emit)
+        self._context.connect(self._fake, PlanningAhead(self._fake.cell))
+        self._context.begin_step(0)
+        self._root = build(loaded, skills(), self._context.cell, Scope(), emit)
 
     def tick(self) -> bool:
         """Go on by one tick; return whether there is more to do."""
-        self._plant.begin_tick()
         self._root.tick_once()
         if self._root.status is not Status.RUNNING:
             return False
-        self._plant.plan_ahead()
-        self._plant.advance()
-        assert self._plant.tick < 5000, "the mission goes on for ever"
+        self._context.plan_ahead()
+        self._context.advance()
+        assert self._context.tick < 5000, "the mission goes on for ever"
         return True
 
     def story(self) -> Story:
@@ -62,8 +63,8 @@ class Interleaved:
         told = {"unknown": accounts.unknown, "doubts": accounts.doubts, "rows": accounts.rows()}
         items = {**accounts.balance(), **told}
         return (
-            self._root.status.value, self._plant.tick, self._trace.hexdigest(), variables(self._root), items,
-            self._fake.audit(),
+            self._root.status.value, self._context.tick, self._trace.hexdigest(), variables(self._root),
+            items, self._fake.audit(),
         )  # fmt: skip
 
 
@@ -87,7 +88,7 @@ def variables(root: Behaviour) -> list[dict[str, Any]]:
 
 def story_of(name: str, seed: int) -> Story:
     trace = Trace()
-    run = Run(loaded(name), skills(), seed=seed, observers=[trace], requests=[], kind=FakeCell)
+    run = assemble(loaded(name), skills(), RunOptions(seed, [], kind=FakeCell), [trace])
     try:
         outcome = run.execute()
         return (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import signal
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +18,10 @@ from executive.mission.load import load_mission
 from executive.plugins import discover
 from executive.record.entry import entry_of
 from executive.record.replay import compare
-from executive.replay.input_log import Past
-from executive.run.operator import ScriptedOperator, TerminalOperator, understood
-from executive.run.run import Run
+from executive.replay.input_log import InputLog
+from executive.run.assembly import RunOptions, assemble
+from executive.run.operator import ScriptedOperator, TerminalOperator, interpret
+from executive.run.run_control import RunControl
 
 CHOICES = ("cube", "sphere", "duck")
 
@@ -33,7 +35,7 @@ CHOICES = ("cube", "sphere", "duck")
     ],
 )  # fmt: skip
 def test_what_a_word_means(word: str, meaning: str | None) -> None:
-    assert understood(word, CHOICES) == meaning
+    assert interpret(word, CHOICES) == meaning
 
 
 class Heard(list[tuple[str, dict[str, Any]]]):
@@ -91,7 +93,7 @@ def test_the_terminal_lists_the_classes_and_takes_numbers_and_names(
 ) -> None:
     type_in(typed)
     heard = Heard()
-    assert TerminalOperator(heard, interrupted=lambda: False).ask(CHOICES) == meant
+    assert TerminalOperator(heard, RunControl()).ask(CHOICES) == meant
     assert capsys.readouterr().err == "pick what?  0 cube  1 sphere  2 duck  s rescan  q quit > "
     assert heard == [("asking", {"choices": [*CHOICES]}), ("request", {"wanted": meant})]
 
@@ -99,9 +101,9 @@ def test_the_terminal_lists_the_classes_and_takes_numbers_and_names(
 def test_the_terminal_asks_again_after_an_unknown_word(
     type_in: Any, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    operator = TerminalOperator(Heard(), interrupted=lambda: False)
+    operator = TerminalOperator(Heard(), RunControl())
     lines = iter(["banana\n", "2\n"])
-    monkeypatch.setattr(operator, "_line", lambda: next(lines))
+    monkeypatch.setattr(operator, "_read_line", lambda: next(lines))
     assert operator.ask(CHOICES) == "duck"
     first, second = capsys.readouterr().err.splitlines()
     assert first.endswith('> cannot pick "banana"')
@@ -111,15 +113,16 @@ def test_the_terminal_asks_again_after_an_unknown_word(
 def test_the_end_of_the_input_means_quit(type_in: Any) -> None:
     type_in("", closed=True)
     heard = Heard()
-    assert TerminalOperator(heard, interrupted=lambda: False).ask(CHOICES) is None
+    assert TerminalOperator(heard, RunControl()).ask(CHOICES) is None
     assert heard[-1] == ("request", {"wanted": None})
 
 
 @pytest.mark.parametrize("keyboard", [True, False])
 def test_ctrl_c_ends_the_wait_for_an_answer(type_in: Any, keyboard: bool) -> None:
     type_in("")
-    looks = iter([False, False, False, True])
-    operator = TerminalOperator(Heard(), lambda: next(looks, True), keyboard=keyboard)
+    control = RunControl()
+    threading.Timer(0.3, control.stop).start()
+    operator = TerminalOperator(Heard(), control, keyboard=keyboard)
     with pytest.raises(Stopped):
         operator.ask(CHOICES)
 
@@ -132,24 +135,27 @@ def test_ctrl_c_at_the_question_halts_the_run_instead_of_ending_it_well(missions
     type_in("")
     loaded = load_mission(missions / "pick_on_request.yaml", discover())
     events: list[Event] = []
-    run = Run(loaded, discover(), seed=1, kind=FakeCell, observers=[events.append, interrupt])
+    run = assemble(loaded, discover(), RunOptions(1, kind=FakeCell), [events.append, interrupt])
     outcome = run.execute()
     assert (outcome.status, outcome.message) == ("HALTED", "halted by the user")
     ends = {event.data["status"] for event in events if event.kind == "status"}
     assert ends == {"RUNNING", "INVALID"}, "nothing failed, and nobody quit"
     entries = [entry_of(event) for event in events]
-    again = compare(loaded, discover(), Past.of(entries), 1)
+    again = compare(loaded, discover(), InputLog.of(entries), 1)
     assert again.difference == ""
     assert again.decisions == sum(entry["kind"] == "status" for entry in entries) > 0
 
 
 @pytest.mark.parametrize(
-    ("said", "answer"),
-    [([None, "a unicorn", "1"], "sphere"), (["cube", "cube", None, "duck"], "duck")],
-    ids=["where nobody can type", "an answer to no question picks nothing"],
+    ("before", "after", "answer"),
+    [([], ["a unicorn", "1"], "sphere"), (["cube", "cube"], ["duck"], "duck")],
+    ids=["without a keyboard", "an answer without a question picks nothing"],
 )
-def test_what_is_asked_for_elsewhere_is_heard(said: list[str | None], answer: str) -> None:
-    heard, words = Heard(), iter(said)
-    operator = TerminalOperator(heard, lambda: False, lambda: next(words), keyboard=False)
+def test_requests_from_elsewhere_are_answers(before: list[str], after: list[str], answer: str) -> None:
+    heard, control = Heard(), RunControl()
+    for word in before:
+        control.request(word)
+    threading.Timer(0.2, lambda: [control.request(word) for word in after]).start()
+    operator = TerminalOperator(heard, control, keyboard=False)
     assert operator.ask(CHOICES) == answer
     assert heard == [("asking", {"choices": list(CHOICES)}), ("request", {"wanted": answer})]

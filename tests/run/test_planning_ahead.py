@@ -14,7 +14,8 @@ from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.events import Event
 from executive.manipulation.tool_goals import nearest_first
-from executive.run.run_context import Plant
+from executive.run.planning_ahead import PlanningAhead
+from executive.run.run_context import RunContext
 from executive.skill import Skill, SkillFailed
 from skills.approach import Approach
 from skills.grasp import Grasp
@@ -38,9 +39,10 @@ class Bench:
     def __init__(self) -> None:
         self.plans: list[dict[str, Any]] = []
         self.decisions: list[str] = []
-        self.plant = Plant([self.note])
-        self.fake = FakeCell(emit=self.plant.emit)
-        self.plant.connect(self.fake)
+        self.context = RunContext([self.note])
+        self.fake = FakeCell(emit=self.context.emit)
+        self.context.connect(self.fake, PlanningAhead(self.fake.cell))
+        self.context.begin_step(0)
         self.look = partial(at_hand.look, self.fake)
         self.fake.world.put("cube", 0.5, 0.0)
 
@@ -52,12 +54,11 @@ class Bench:
 
     def run(self, skill: Skill, meanwhile: Callable[[], object] = lambda: None) -> Skill:
         """Run a skill to its end; call `meanwhile` once, 30 control steps after its beginning."""
-        for tick, _ in enumerate(skill.run(self.plant.cell) or ()):
+        for tick, _ in enumerate(skill.run(self.context.cell) or ()):
             if tick == 30:
                 meanwhile()
-            self.plant.plan_ahead()
-            self.plant.advance()
-            self.plant.begin_tick()
+            self.context.plan_ahead()
+            self.context.advance()
         return skill
 
     def grasp(self, targets: list[Target]) -> Any:
@@ -131,7 +132,7 @@ def test_an_approach_that_was_not_foreseen_is_waited_for(bench: Bench, change: s
     if change == "moved":
         duck.position[0] += 0.002
         targets = bench.look()
-    bench.run(Approach(target=nearest_first(bench.plant.cell, targets)[change == "another"]))
+    bench.run(Approach(target=nearest_first(bench.context.cell, targets)[change == "another"]))
     assert (bench.ahead[-1], bench.plans[-1]["waits"]) == (False, LATENCY)
 
 
@@ -196,13 +197,13 @@ def test_a_target_out_of_reach_fails_in_its_approach_only(
     assert (failure.value.reason, bench.ahead[-1]) == ("unreachable", True)
 
 
-def test_nothing_is_planned_while_a_recorded_run_is_played(bench: Bench) -> None:
+def test_nothing_is_planned_without_a_planner(bench: Bench) -> None:
     selected = bench.run(SelectTarget(targets=bench.look()))
     bench.run(Approach(target=selected.target))
-    bench.plant.cell.tool.close()
-    bench.plant.tape.playing = True
-    bench.plant.plan_ahead()
-    bench.plant.tape.playing = False
+    bench.context.cell.tool.close()
+    planner, bench.context.planner = bench.context.planner, None
+    bench.context.plan_ahead()
+    bench.context.planner = planner
     bench.fake.ledger.held("cube-1")
     bench.run(Transit(held="cube-1", bin="red_bin"))
     assert bench.ahead == [False, False]
@@ -214,7 +215,7 @@ def test_a_decision_for_something_unknown_plans_nothing_and_ends_nothing(
 ) -> None:
     targets = bench.look()
     bench.run(Approach(target=targets[0]))
-    bench.plant.emit("decision", item=item, label="cube", frame=1, bin=bin)
+    bench.context.emit("decision", item=item, label="cube", frame=1, bin=bin)
     bench.run(Grasp(target=targets[0]))
     bench.run(Transit(held="cube-1", bin="red_bin"))
     assert bench.ahead[-1] is False

@@ -14,6 +14,7 @@ from executive.errors import InputError
 from executive.events import Event
 from executive.mission.load import load_mission
 from executive.plugins import discover
+from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
 
 
@@ -23,7 +24,7 @@ def make(
     events: list[Event] = []
     loaded = load_mission(missions / f"{name}.yaml", discover())
     observers = [events.append, *options.pop("observers", [])]
-    return Run(loaded, discover(), seed=seed, observers=observers, kind=FakeCell, **options), events
+    return assemble(loaded, discover(), RunOptions(seed, kind=FakeCell, **options), observers), events
 
 
 def fake_of(run: Run) -> FakeCell:
@@ -108,7 +109,7 @@ def test_an_unknown_kind_of_cell_names_the_installed_ones(missions: Path) -> Non
     with pytest.raises(
         InputError, match='no installed package offers cells of kind "hardware"; installed: fake, sim'
     ):
-        Run(loaded, discover(), seed=1)
+        assemble(loaded, discover(), RunOptions(1))
 
 
 def test_a_box_that_stays_in_doubt_ends_in_an_empty_table_and_not_in_a_failure(missions: Path) -> None:

@@ -12,13 +12,14 @@ from executive.errors import Fault
 from executive.events import Event
 from executive.mission.load import load_mission
 from executive.plugins import discover
+from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
 from executive.run.run_control import RunControl
 
 
 def make(missions: Path, observer) -> Run:
     loaded = load_mission(missions / "sort_overhead.yaml", discover())
-    return Run(loaded, discover(), seed=3, kind=FakeCell, observers=[observer])
+    return assemble(loaded, discover(), RunOptions(3, kind=FakeCell), [observer])
 
 
 @pytest.mark.parametrize("steps", [0, 3])
@@ -91,7 +92,7 @@ def test_something_is_done_between_ticks_and_while_the_run_stands_still() -> Non
 
 def test_what_is_asked_for_is_told_once_in_order() -> None:
     control = RunControl()
-    assert control.requested() is None
+    assert control.take_request() is None
     control.request("cube")
     control.request("duck")
-    assert [control.requested() for _ in range(3)] == ["cube", "duck", None]
+    assert [control.take_request() for _ in range(3)] == ["cube", "duck", None]

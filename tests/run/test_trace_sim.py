@@ -9,14 +9,14 @@ import pytest
 from executive.mission.load import load_mission
 from executive.plugins import discover
 from executive.record.trace import Trace
-from executive.run.run import Run
+from executive.run.assembly import RunOptions, assemble
 from executive.testing.oracle import oracle_cell
 
 
 def trace_of(missions: Path, seed: int) -> str:
     trace = Trace()
     loaded = load_mission(missions / "sort_wrist.yaml", discover())
-    run = Run(loaded, discover(), seed=seed, observers=[trace], kind=oracle_cell())
+    run = assemble(loaded, discover(), RunOptions(seed, kind=oracle_cell()), [trace])
     try:
         assert run.execute().status == "SUCCESS"
     finally:

@@ -12,7 +12,7 @@ from executive.errors import Fault, InputError
 from executive.events import Event
 from executive.mission.load import load_mission
 from executive.plugins import discover
-from executive.run.run import Run
+from executive.run.assembly import RunOptions, assemble
 from executive.testing.bounded_cell import BoundedCell
 from executive.testing.faults import after, detector_dead, during, seal_fails
 from executive.testing.run_mission import run_mission
@@ -82,14 +82,8 @@ def test_without_disturbances_a_mission_goes_as_it_always_goes() -> None:
         return [(e.kind, e.tick, str({**e.data, "frame_object": 0})) for e in events]
 
     events: list[Event] = []
-    run = Run(
-        load_mission("sort_overhead", discover()),
-        discover(),
-        seed=7,
-        kind=FakeCell,
-        requests=(),
-        observers=[events.append],
-    )
+    loaded, options = load_mission("sort_overhead", discover()), RunOptions(7, (), kind=FakeCell)
+    run = assemble(loaded, discover(), options, [events.append])
     run.execute()
     assert story(list(run_mission("sort_overhead", seed=7).events)) == story(events)
 

@@ -12,7 +12,7 @@ from executive.campaign.subject import Subject
 from executive.errors import InputError
 from executive.events import Event
 from executive.record.result import agrees
-from executive.run.run import Run
+from executive.run.assembly import RunOptions, assemble
 
 
 @dataclass(frozen=True)
@@ -69,14 +69,8 @@ def rehearse(subject: Subject) -> Rehearsal:
         KeyboardInterrupt: The user ended it.
     """
     activations = Activations()
-    run = Run(
-        subject.loaded,
-        subject.skills,
-        seed=subject.seed,
-        observers=[activations],
-        kind=subject.kind,
-        requests=subject.requests,
-    )
+    options = RunOptions(subject.seed, subject.requests, kind=subject.kind)
+    run = assemble(subject.loaded, subject.skills, options, [activations])
     with closing(run):
         outcome = run.execute()
         if outcome.status == "HALTED":

@@ -16,15 +16,15 @@ from executive.campaign.faults.listing import skill_nodes
 from executive.campaign.faults.rehearsal import Activations, Rehearsal
 from executive.campaign.halt_checks import check_journal, check_rest, check_tool
 from executive.campaign.subject import Subject
+from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.workcell import Workcell
 from executive.events import Event
 from executive.plugins import cell_kind
 from executive.record.recorded_run import Recording, new_directory
 from executive.record.recorder import Recorder
+from executive.run.assembly import RunOptions, assemble
 from executive.run.outcome import Outcome
-from executive.run.run import Run
 from executive.testing.bounded_cell import BoundedCell
-from executive.testing.cell_wrapper import CellWrapper
 from executive.testing.faults import DisturbedCell, disturbed
 from executive.testing.faults.objects import ObjectRemoved
 from executive.view.figures.fault_trials import Trial
@@ -51,7 +51,7 @@ def record(subject: Subject, rehearsal: Rehearsal, faults: Numbered, runs: Path)
     began, loaded = time.perf_counter(), subject.loaded
     trying = _Trying(subject, rehearsal, faults)
     with closing(trying.run):
-        directory = new_directory(trying.run, loaded, subject.seed, runs)
+        directory = new_directory(trying.run, loaded, trying.options, runs)
         recording = Recording(trying.run, loaded, subject.skills, directory, Recorder(directory), ())
         result = recording.execute(subject.seed, began)
         leave_report(result)
@@ -80,15 +80,13 @@ class _Trying:
         self._stopped = False
         happenings = [happening for fault in faults.values() for happening in fault.happenings]
         own = {node.path: subject.skills[node.skill] for node in skill_nodes(subject)}
-        self.run = Run(
-            subject.loaded,
-            subject.skills,
-            seed=subject.seed,
-            observers=[self._see, self._activations],
-            requests=subject.requests,
+        self.options = RunOptions(
+            subject.seed,
+            subject.requests,
             kind=disturbed(self._kind, happenings),
             substitutes=broken_skills(self._breakages, own),
         )
+        self.run = assemble(subject.loaded, subject.skills, self.options, [self._see, self._activations])
         workcell = self.run.workcell
         assert isinstance(workcell, DisturbedCell)
         self.run.observe(workcell.hear)

@@ -114,10 +114,10 @@ class FakeCell:
         }
         self.detector = next(iter(self.detectors.values()))
         self._log: FakeLog | None = None
-        if options.past is not None:
-            restore(read_state(options.past.log), self.world, self.arm)
-            self.camera.skip(options.past.frames, options.past.turns)
-            self.log_to(options.past.log)
+        if options.resume is not None:
+            restore(read_state(options.resume.log), self.world, self.arm)
+            self.camera.skip(options.resume.frames, options.resume.turns)
+            self.log_to(options.resume.log)
         self._cell = replace(
             cell_without_hardware(config, self.routes, self.ledger, emit),
             clock=clock,

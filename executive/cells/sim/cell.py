@@ -80,7 +80,7 @@ class SimCell:
         self._clearance = PathClearance(config)
         planner = build_planner(config, self._clearance.check)
         self._tool = SuctionTool(self._world, config.tool)
-        under_way = None if options.past is None else self._rebuilt(options.past.log)
+        under_way = None if options.resume is None else self._rebuilt(options.resume.log)
         self._arm = SimArm(self._world, planner, config, clock, lambda: self._tool.held_body, emit, under_way)
         self._ledger = ItemLedger(
             config.ledger, config.table, self._bins, routes, emit, classes_distinct_by_touch(config)
@@ -98,8 +98,8 @@ class SimCell:
             true=self._world.config.cameras[name],
             bins=tuple(self._bins.values()),
         )
-        if options.past is not None:
-            self._camera.skip(options.past.frames, options.past.turns)
+        if options.resume is not None:
+            self._camera.skip(options.resume.frames, options.resume.turns)
         classes = {label: weighed(label, kind) for label, kind in config.objects.items()}
 
         localizer = build_localizer(config.localization, classes, self._bins.values(), self._world.cast_ray)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.protocols import Cell
 from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import Workcell
 from executive.errors import InputError
 from executive.events import Emit, Event, ignore
-from executive.testing.cell_wrapper import CellWrapper
 from executive.testing.faults.hand import Hand, hand_of
 from executive.testing.faults.scene import Scene
 from executive.testing.faults.schedule import Schedule
@@ -104,7 +104,7 @@ def disturbed(
     disturbances: Sequence[Disturbance],
     hand: Callable[[Workcell], Hand] = hand_of,
 ) -> Callable[..., DisturbedCell]:
-    """Return a kind of cell, for `Run(kind=...)`: another kind, with a fault script.
+    """Return a kind of cell, for `RunOptions.kind`: another kind, with a fault script.
 
     The run must be observed by its cell: `run.observe(run.workcell.hear)`, or `run.record(...)` where it
     plays an earlier one first.

@@ -8,12 +8,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from executive.cell.cell_wrapper import innermost
 from executive.cell.workcell import Workcell
 from executive.cells.fake.cell import FakeCell
 from executive.cells.fake.world import FakeObject
 from executive.errors import InputError
 from executive.geometry import Array
-from executive.testing.cell_wrapper import innermost
 
 
 @dataclass(frozen=True, eq=False)

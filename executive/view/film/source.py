@@ -8,7 +8,7 @@ from executive.record.journal import read_journal, start_of
 from executive.record.recorded_mission import read_tree, recorded_cell
 from executive.record.result import read_result
 from executive.record.run_directory import RunDirectory
-from executive.replay.input_log import Past
+from executive.replay.input_log import InputLog
 
 
 class Source:
@@ -36,7 +36,7 @@ class Source:
         entries = read_journal(directory.journal)
         self.directory = directory
         self.start = start_of(entries, directory.path, "there is nothing to film")
-        self.entries = Past.of(entries).entries
+        self.entries = InputLog.of(entries).entries
         self.nodes = read_tree(directory.tree)
         self.config = recorded_cell(directory.path)
         self.bins = {

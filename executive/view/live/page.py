@@ -93,7 +93,7 @@ class LivePage:
     def open(self, run: Run) -> None:
         """Begin to show a run."""
         nodes = outline(run.root)
-        mission = run.loaded.mission.name
+        mission = run.mission
         self._run = run
         with self._harmless():
             self._scenery = run.workcell.scenery()
@@ -151,7 +151,7 @@ class LivePage:
                 self._paused = not self._paused
                 self._tell(paused=self._paused)
             if self._watched and self._keeps_up and self._scenery is not None:
-                self._tell(**poses(self._run.workcell.cell.clock.now, self._scenery.poses()))
+                self._tell(**poses(self._run.now, self._scenery.poses()))
 
     @property
     def _keeps_up(self) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from executive.cell.clock import STEP
-from executive.cell.workcell import CellOptions, CellPast
+from executive.cell.workcell import CellOptions, ResumePoint
 from executive.cells.fake.cell import SilentOperator
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.command_log import JOINTS_TO, CommandLog
@@ -21,7 +21,7 @@ from executive.mission.load import load_mission
 from executive.motion.limits import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.plugins import discover
-from executive.run.run import Run
+from executive.run.assembly import RunOptions, assemble
 from executive.testing.faults.hand import hand_of
 from executive.testing.oracle import oracle_cell
 from tests.meanwhile import meanwhile
@@ -65,10 +65,10 @@ def mission(missions: Path):
 def left(mission, tmp_path_factory: pytest.TempPathFactory) -> list[Left]:
     """One run, and what it would have left at some of its control steps."""
     folder = tmp_path_factory.mktemp("logs")
-    run = Run(mission, discover(), seed=SEED, kind=oracle_cell())
+    run = assemble(mission, discover(), RunOptions(SEED, kind=oracle_cell()))
     cell = run.workcell
     assert isinstance(cell, SimCell)
-    run.log_to(folder / "log")
+    cell.log_to(folder / "log")
     snapshots: list[Left] = []
     advance = cell.advance
 
@@ -89,7 +89,7 @@ def left(mission, tmp_path_factory: pytest.TempPathFactory) -> list[Left]:
 
 
 def rebuilt(mission, log: Path) -> SimCell:
-    options = CellOptions(SilentOperator(), base=mission.cell_path.parent, past=CellPast(log))
+    options = CellOptions(SilentOperator(), base=mission.cell_path.parent, resume=ResumePoint(log))
     return oracle_cell()(mission.cell_config, seed=SEED, routes=mission.routes, emit=ignore, options=options)
 
 

@@ -15,7 +15,7 @@ from executive.mission.load import load_mission
 from executive.perception.detectors.embedded import LABELS, MODEL
 from executive.perception.detectors.onnx_model import OnnxModel, read_labels
 from executive.plugins import discover
-from executive.run.run import Run
+from executive.run.assembly import RunOptions, assemble
 
 SECRET = "SECRET1234567890"
 STATUSES = ("401", "403", "404", "429", "500", "502", "503")
@@ -88,7 +88,8 @@ def sort(arrange, stub):
 
         path, overrides = arrange(FALLBACK, objects, deadline=1.0)
         loaded = load_mission(path, discover(), overrides)
-        with contextlib.closing(Run(loaded, discover(), seed=1, observers=[restart_server])) as run:
+        run = assemble(loaded, discover(), RunOptions(1), [restart_server])
+        with contextlib.closing(run):
             outcome, truth = run.execute(), run.audit()
         assert SECRET not in repr(events)
         return outcome.status, truth["right"], truth["wrong_bin"] + truth["elsewhere"]

@@ -11,12 +11,12 @@ from typing import Any
 
 import pytest
 
+from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import FakeCell, SilentOperator, bare_table
 from executive.errors import InputError
 from executive.events import ignore
 from executive.testing import faults as effects
-from executive.testing.cell_wrapper import CellWrapper
 from executive.testing.faults import (
     Disturbance,
     DisturbedCell,

@@ -8,8 +8,9 @@ import pytest
 
 from executive.mission.load import load_mission
 from executive.plugins import discover
-from executive.record.recorded_run import recorded_run
+from executive.record.recorded_run import record_run
 from executive.record.run_directory import RunDirectory
+from executive.run.assembly import RunOptions
 from executive.testing.oracle import oracle_cell
 from tests.record.conftest import MISSION
 
@@ -21,5 +22,5 @@ def filmed_run(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
     (folder / "bring_one.yaml").write_text(MISSION)
     skills = discover()
     loaded = load_mission(folder / "bring_one.yaml", skills)
-    result = recorded_run(loaded, skills, seed=5, runs=folder / "runs", kind=oracle_cell())
+    result = record_run(loaded, skills, RunOptions(5, kind=oracle_cell()), folder / "runs")
     return RunDirectory(Path(result["run"]))

@@ -21,6 +21,7 @@ from executive.cells.fake.cell import FakeCell
 from executive.events import Event
 from executive.mission.load import load_mission
 from executive.plugins import discover
+from executive.run.assembly import RunOptions, assemble
 from executive.run.outcome import Outcome
 from executive.run.run import Run
 from executive.view.live.page import MAX_QUEUED_NEWS, LivePage
@@ -54,7 +55,8 @@ def watch(text: str, folder: Path, do: Callable[[Watched], Awaitable[None]]) -> 
     loaded = load_mission(file, discover())
     page = LivePage()
     # In real time, so that there is something to pause.
-    run = Run(loaded, discover(), seed=3, observers=[page], realtime=True, kind=FakeCell, keyboard=False)
+    options = RunOptions(3, keyboard=False, realtime=True, kind=FakeCell)
+    run = assemble(loaded, discover(), options, [page])
     run.control.pause()
     page.open(run)
     outcomes: list[Outcome] = []
@@ -146,7 +148,7 @@ def test_a_page_that_died_costs_the_run_nothing(tmp_path: Path) -> None:
     file = tmp_path / "mission.yaml"
     file.write_text(MISSION)
     page = LivePage()
-    run = Run(load_mission(file, discover()), discover(), seed=3, observers=[page], kind=FakeCell)
+    run = assemble(load_mission(file, discover()), discover(), RunOptions(3, kind=FakeCell), [page])
     page.open(run)
     page._server.kill()
     assert run.execute().status == "SUCCESS"

@@ -14,7 +14,8 @@ from executive.cells.fake.cell import FakeCell
 from executive.mission.load import load_mission
 from executive.plugins import discover
 from executive.record.find_run import find_run
-from executive.record.recorded_run import recorded_run
+from executive.record.recorded_run import record_run
+from executive.run.assembly import RunOptions
 
 MISSION = """\
 mission: trial
@@ -62,7 +63,7 @@ def recorded(folder: Path, kind: Callable[..., FakeCell]) -> Path:
     file.write_text(MISSION)
     loaded = load_mission(file, discover(), {"cell.kind": "fake", "cell.table.objects": "[2, 2]"})
     with contextlib.suppress(Cut):
-        recorded_run(loaded, discover(), seed=3, runs=folder / "my runs", kind=kind, requests=())
+        record_run(loaded, discover(), RunOptions(3, (), kind=kind), folder / "my runs")
     return find_run("latest", folder / "my runs")
 
 

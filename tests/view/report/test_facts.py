@@ -12,7 +12,9 @@ from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.mission.text.files import shipped_folder
 from executive.plugins import discover
-from executive.record.resumed_run import resumed_run
+from executive.record.recorded_run import RecordOptions
+from executive.record.resumed_run import resume_run
+from executive.run.assembly import RunOptions
 from executive.view.report.facts import CUT_OFF, Facts
 
 
@@ -39,7 +41,7 @@ def test_a_run_that_ended_is_told_by_its_result(failed):
 def test_a_run_that_was_cut_off_and_taken_up_again_is_told_as_one(killed, copy):
     run = copy(killed)
     assert Facts(run).status == CUT_OFF
-    resumed_run(run, discover(), frames=False, kind=FakeCell)
+    resume_run(run, discover(), RunOptions(3, kind=FakeCell), RecordOptions(frames=False))
     facts = Facts(run)
     assert (facts.status, facts.resume) == ("SUCCESS", "")
     transits = [span for span in facts.course if span.node.endswith("/Transit")]

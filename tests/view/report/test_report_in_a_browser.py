@@ -8,7 +8,8 @@ import pytest
 
 from executive.mission.load import load_mission
 from executive.plugins import discover
-from executive.record.recorded_run import recorded_run
+from executive.record.recorded_run import record_run
+from executive.run.assembly import RunOptions
 from executive.view.report.page import write_report
 
 pytestmark = pytest.mark.slow
@@ -17,7 +18,7 @@ MISSION = Path(__file__).parents[3] / "missions" / "sort_wrist.yaml"
 
 def test_verdict_pictures_timeline_and_tree_are_to_be_seen(visit, tmp_path: Path) -> None:
     skills = discover()
-    result = recorded_run(load_mission(MISSION, skills), skills, seed=3, runs=tmp_path)
+    result = record_run(load_mission(MISSION, skills), skills, RunOptions(3), tmp_path)
     file = write_report(Path(result["run"]))
     visit.page.goto(f"file://{file.resolve()}")
     assert visit.page.inner_text("h1") == "3 of 3 objects are in their bins."

@@ -1,0 +1,70 @@
+"""Replay of recorded inputs."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+from executive import errors
+from executive.errors import Fault
+from executive.replay.codec import PLAIN, Codec
+from executive.replay.input_log import InputLog, RecordedInput
+
+
+class Unrecorded(Fault):
+    """The replayed run reads an input that the recorded run never read: there is no answer."""
+
+
+class InputReplayer:
+    """Answers questions with the recorded answers, in the same control steps.
+
+    Args:
+        log: The recorded inputs.
+
+    Attributes:
+        unanswered: Message of the first question without an answer, or "".
+    """
+
+    def __init__(self, log: InputLog) -> None:
+        self._inputs = {name: deque(inputs) for name, inputs in log.inputs.items()}
+        self._tick = 0
+        self._reads: dict[str, int] = {}
+        self._last: dict[str, Any] = {}
+        self.unanswered = ""
+
+    def begin_step(self, tick: int) -> None:
+        """Begin the control step number `tick`: the count of reads starts again."""
+        self._tick = tick
+        self._reads.clear()
+
+    def read(self, name: str, codec: Codec = PLAIN) -> Any:
+        """Return the recorded answer.
+
+        Args:
+            name: Name of the input.
+            codec: Makes the answer from plain values.
+
+        Raises:
+            Unrecorded: The recorded run had never read this input before.
+            Exception: The cell raised an exception; this one has the same name and text.
+        """
+        nth = self._reads[name] = self._reads.get(name, 0) + 1
+        inputs = self._inputs.get(name, deque())
+        while inputs and (inputs[0].tick, inputs[0].nth) <= (self._tick, nth):
+            recorded = inputs.popleft()
+            if recorded.raised:
+                raise _exception(recorded)
+            self._last[name] = recorded.value
+        if name not in self._last:
+            message = f"the record holds no answer to what is asked here first: {name}"
+            self.unanswered = self.unanswered or message
+            raise Unrecorded(message)
+        return codec.read(self._last[name])
+
+
+def _exception(recorded: RecordedInput) -> BaseException:
+    """Return an exception with the recorded name and text."""
+    kind = getattr(errors, recorded.raised, None) or type(recorded.raised, (Exception,), {})
+    error = kind(recorded.value)
+    assert isinstance(error, BaseException)
+    return error
