@@ -34,8 +34,7 @@ def command(dataset: Path, out: Path, start: Path | None, rate: float | None, ep
         from executive.cli.progress import bar, report_polygons
         from executive.training.annotations import is_split
         from executive.training.samples import SPLITS
-        from executive.training.settings import Settings
-        from executive.training.train import train
+        from executive.training.train import Settings, train
 
         for split in (dataset / name for name in SPLITS):
             if is_split(split):

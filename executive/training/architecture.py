@@ -1,4 +1,4 @@
-"""The small RF-DETR this project trains: Nano with three encoder layers and fifty queries."""
+"""Architecture of the small RF-DETR: Nano with three encoder layers and fifty queries."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ RESOLUTION = 256
 
 ARCHITECTURE: dict[str, Any] = {
     "resolution": RESOLUTION,
-    # The encoder is read after its layers 1 and 3 and stops there: deeper ones vanish on export.
+    # The model uses the outputs of encoder layers 1 and 3; the export drops deeper layers.
     "out_feature_indexes": [1, 3],
-    # A table holds a handful of objects; 300 queries, the stock figure, would be paid for in every step.
+    # At most 20 objects lie on the table; each of the 300 default queries would cost time in every step.
     "num_queries": 50,
     "num_select": 50,
     "group_detr": 5,
@@ -29,20 +29,19 @@ def create(classes: int, start: Path | None = None, device: str = "cpu") -> Any:
 
     Args:
         classes: Number of object classes.
-        start: Checkpoint whose weights it starts from; None for random ones.
-        device: Torch device its weights live on.
-
+        start: Checkpoint with the initial weights; None: random weights.
+        device: Torch device of the weights.
     """
-    # albumentations, where installed, would ask a package index for its newest version at import.
+    # Without this variable, albumentations asks a package index for its newest version at import.
     os.environ.setdefault("NO_ALBUMENTATIONS_UPDATE", "1")
     declare_missing()
     from rfdetr import RFDETRNano
 
     with warnings.catch_warnings():
-        # It warns that training from random weights needs more data than fine-tuning. We bring it.
+        # RF-DETR warns that training from random weights needs more data than fine-tuning.
         warnings.simplefilter("ignore")
         return RFDETRNano(
-            # Bare names would be looked for among rfdetr's own downloads.
+            # rfdetr looks for a name without a folder among its own downloads.
             pretrain_weights=None if start is None else str(start.resolve()),
             num_classes=classes,
             device=device,

@@ -1,11 +1,13 @@
-"""Smaller ONNX files: weights stored in fewer bits and widened again when the model is loaded.
+"""Export of a checkpoint to an ONNX file whose weights are stored in fewer bits.
 
-The arithmetic stays in float32. Widening is written as `Cast` (and `Mul`), which onnxruntime folds into
-plain weights at load time; `DequantizeLinear` it would execute again for every image.
+The arithmetic stays in float32. The file widens the weights by `Cast` (and `Mul`), which onnxruntime folds
+into plain weights at load time; onnxruntime would execute `DequantizeLinear` again for every image.
 """
 
 from __future__ import annotations
 
+import tempfile
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,15 +15,35 @@ import onnx
 from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
-SMALLEST = 2048
-"""Number of values from which a weight is worth narrowing."""
+from executive.training.architecture import create
+
+OPSET = 17
+"""Version of the ONNX operators."""
+MIN_COMPRESSED_SIZE = 2048
+"""Smallest number of values of a weight that is compressed."""
+
+
+def export_onnx(checkpoint: Path, classes: int, out: Path) -> None:
+    """Write the model of a checkpoint with compressed weights to `out` (`.onnx`)."""
+    with tempfile.TemporaryDirectory() as folder:
+        model = export(create(classes, checkpoint), Path(folder))
+    out.parent.mkdir(parents=True, exist_ok=True)
+    onnx.save(compress(model), str(out))
+
+
+def export(detector: Any, folder: Path) -> onnx.ModelProto:
+    """Return the ONNX model of an `rfdetr.RFDETRNano`; the export leaves its files in `folder`."""
+    path = detector.export(
+        output_dir=str(folder), format="onnx", opset_version=OPSET, dynamic_batch=False, verbose=False
+    )
+    return onnx.load(str(path))
 
 
 def compress(model: onnx.ModelProto) -> onnx.ModelProto:
     """Return a copy of `model` whose large weights are stored as int8, with one scale per output channel.
 
-    Weights that are not matrices or filters become float16. This moves 99 of 100 box centres by less than
-    0.03 pixel against float32, measured.
+    Weights that are not matrices or filters become float16. Measured: 99 % of the box centres move by less
+    than 0.03 pixel against float32.
     """
     small = onnx.ModelProto()
     small.CopyFrom(model)
@@ -31,7 +53,7 @@ def compress(model: onnx.ModelProto) -> onnx.ModelProto:
     kept: list[onnx.TensorProto] = []
     for tensor in graph.initializer:
         values = numpy_helper.to_array(tensor)
-        if tensor.data_type != TensorProto.FLOAT or values.size < SMALLEST:
+        if tensor.data_type != TensorProto.FLOAT or values.size < MIN_COMPRESSED_SIZE:
             kept.append(tensor)
         elif tensor.name in channels:
             kept += _store_int8(tensor.name, values, channels[tensor.name], widening)

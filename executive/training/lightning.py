@@ -1,4 +1,4 @@
-"""What we change in RF-DETR's own training loop: symmetries as augmentation, fast arithmetic on CPUs."""
+"""Changes to RF-DETR's training loop: augmentation by symmetries, and mixed precision on CPUs."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from executive.training.symmetry import ELEMENTS, transform_boxes, transform_ima
 
 
 class SymmetricData(RFDETRDataModule):
-    """The data set, every training image shown under a random symmetry of the square.
+    """Data set whose training images are transformed by random symmetries of the square.
 
-    The cameras look straight down, so each of the eight is a view that could have been; no pixel is
-    resampled, so the boxes stay exact.
+    The cameras look straight down, so that each of the eight symmetries gives a possible image. No pixel is
+    resampled, so that the boxes stay exact.
     """
 
     def on_after_batch_transfer(self, batch: tuple[Any, Any], dataloader_idx: int) -> tuple[Any, Any]:
-        """Return the batch, its images turned and mirrored while training."""
+        """Return the batch; during training its images are rotated and mirrored."""
         samples, targets = super().on_after_batch_transfer(batch, dataloader_idx)
         if self.trainer is None or not self.trainer.training:
             return samples, targets
@@ -31,16 +31,22 @@ class SymmetricData(RFDETRDataModule):
 
 
 class Model(RFDETRModelModule):
-    """RF-DETR's training module, in mixed precision on CPUs too.
+    """RF-DETR's training module with mixed precision on CPUs.
 
-    Matrix products in bfloat16 are two and a half times as fast on CPUs that have them. Losses, matching
-    and reference boxes stay in float32: with eight bits of mantissa a box would sit on a raster of a pixel.
+    On CPUs with bfloat16, its matrix products are two and a half times as fast as in float32. Losses,
+    matching and
+    reference boxes stay in float32: with a mantissa of eight bits, boxes would be rounded to a pixel.
+
+    Args:
+        model_config: RF-DETR's configuration of the model.
+        train_config: RF-DETR's configuration of the training.
+        reduced: True to train in mixed precision.
     """
 
     def __init__(self, model_config: Any, train_config: Any, reduced: bool) -> None:
         super().__init__(model_config, train_config)
         self._reduced = reduced
-        # The decoder's reference boxes take the number type of the encoder's features.
+        # The decoder's reference boxes get the number type of the encoder's features.
         self.model.backbone[0].projector.register_forward_hook(
             lambda _module, _inputs, output: in_float32(output)
         )
@@ -61,7 +67,7 @@ class Model(RFDETRModelModule):
 
 
 def in_float32(value: Any) -> Any:
-    """Return `value`, a tensor or nested lists and mappings of them, its floating tensors in float32."""
+    """Return a tensor, or nested lists and mappings of tensors, with floating-point tensors as float32."""
     if isinstance(value, torch.Tensor):
         return value.float() if value.is_floating_point() else value
     if isinstance(value, dict):

@@ -1,35 +1,30 @@
-"""Telling how far a training is."""
+"""Callback that reports the progress of a training."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from pytorch_lightning import Callback
 
-Progress = Callable[[int, dict[str, float]], None]
-"""`progress(epoch, metrics)`: called after every epoch, from 1."""
-Batches = Callable[[int, int], None]
-"""`batches(done, all)`: called after every batch, epochs counted together."""
+from executive.training.train import ReportBatch, ReportEpoch
 
 
 class Report(Callback):
-    """Tells a function about every epoch, and another one about every batch."""
+    """Calls a function after each epoch, and another function after each batch."""
 
-    def __init__(self, progress: Progress, batches: Batches) -> None:
-        self._progress = progress
-        self._batches = batches
+    def __init__(self, report_epoch: ReportEpoch, report_batch: ReportBatch) -> None:
+        self._report_epoch, self._report_batch = report_epoch, report_batch
 
     def on_train_batch_end(
         self, trainer: Any, pl_module: Any, outputs: Any, batch: Any, batch_idx: int
     ) -> None:
-        """Report how many batches of how many are done."""
+        """Report the number of finished batches and of all batches."""
         del pl_module, outputs, batch
-        each = trainer.num_training_batches
-        self._batches(trainer.current_epoch * each + batch_idx + 1, trainer.max_epochs * each)
+        size = trainer.num_training_batches
+        self._report_batch(trainer.current_epoch * size + batch_idx + 1, trainer.max_epochs * size)
 
     def on_train_epoch_end(self, trainer: Any, pl_module: Any) -> None:
-        """Report the epoch's figures; validation has run by now."""
+        """Report the metrics of the epoch, those of the validation included."""
         del pl_module
         metrics = {name: float(value) for name, value in trainer.callback_metrics.items()}
-        self._progress(trainer.current_epoch + 1, metrics)
+        self._report_epoch(trainer.current_epoch + 1, metrics)

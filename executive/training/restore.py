@@ -16,7 +16,7 @@ from onnx import numpy_helper
 from executive.errors import InputError
 from executive.geometry import Array
 from executive.training.architecture import ARCHITECTURE, create
-from executive.training.export import export
+from executive.training.compress import export
 
 CLASS_BIAS = "class_embed.bias"
 """Name of the bias with one element for each class and one for "no object"."""

@@ -9,17 +9,17 @@ ELEMENTS = 8
 
 
 def transform_image(image: torch.Tensor, element: int) -> torch.Tensor:
-    """Return `image` `(..., N, N)` under a symmetry."""
+    """Return `image` `(..., N, N)` transformed by the symmetry number `element`."""
     mirrored = image.flip(-1) if element % 2 else image
     return mirrored.rot90(element // 2, (-2, -1))
 
 
 def transform_boxes(boxes: torch.Tensor, element: int) -> torch.Tensor:
-    """Return `boxes` `(N, 4)`, centre x, y, width, height in 0..1, under the same symmetry."""
+    """Return `boxes` `(N, 4)` (centre x, y, width, height; each 0 to 1) transformed by the same symmetry."""
     x, y, width, height = boxes.unbind(-1)
     if element % 2:
         x = 1 - x
     for _ in range(element // 2):
-        # A quarter turn anticlockwise on the screen: what was at the right edge is at the top.
+        # A quarter turn anticlockwise on the screen moves the right edge to the top.
         x, y, width, height = y, 1 - x, height, width
     return torch.stack((x, y, width, height), dim=-1)

@@ -1,8 +1,8 @@
-"""Let torchvision import beside a torch it was not built for.
+"""Declaration of torchvision's operators, for a torch that torchvision was not built for.
 
-A CPU build of torch beside the default torchvision is a common pair. The compiled half of torchvision
-then does not load, and its Python half stops at the operators it cannot find. Training here calls none
-of them, so it is enough that they are declared.
+With a CPU build of torch and the default build of torchvision, the compiled part of torchvision does not
+load, and its Python part raises an error at the missing operators. The training calls none of these
+operators: their declaration is enough.
 """
 
 from __future__ import annotations
@@ -17,8 +17,7 @@ def declare_missing() -> object | None:
     """Declare torchvision's operators if its compiled half does not load; call before importing it.
 
     Returns:
-        The library that holds the declarations for as long as the process lives, or None.
-
+        The library that keeps the declarations alive, or None.
     """
     import importlib.util
     from pathlib import Path

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from executive.errors import InputError
@@ -11,39 +12,62 @@ from executive.training.annotations import is_split, read_annotations
 from executive.training.evaluation.model_file import evaluate_folder
 from executive.training.model_card import ModelCard, read_epochs
 from executive.training.samples import SPLITS
-from executive.training.settings import Settings
 
-Progress = Callable[[int, dict[str, float]], None]
-Batches = Callable[[int, int], None]
+ReportEpoch = Callable[[int, dict[str, float]], None]
+"""Called after each epoch with its number, from 1, and its metrics by name."""
+ReportBatch = Callable[[int, int], None]
+"""Called after each batch with the number of finished batches and of all batches of all epochs."""
 
 CARD_THRESHOLD = 0.5
 """Confidence at which the card states precision and recall."""
+LEARNING_RATE = 3e-4
+"""Learning rate from random weights, or from the weights of a model with other classes."""
+FINE_TUNING_RATE = 1e-4
+"""Learning rate from the weights of a model with the same classes; larger steps would first undo them."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of a training that the user chooses.
+
+    Attributes:
+        start: Checkpoint (`.pth`) or exported model (`.onnx`) of this architecture to fine-tune, with any
+            classes; a `labels.txt` beside it names them. None: training starts from random weights.
+        rate: Learning rate; None: 1e-4 if `start` has the same classes, else 3e-4.
+        epochs: Number of passes over the data.
+        seed: Seed of weights, order and augmentation.
+    """
+
+    start: Path | None = None
+    rate: float | None = None
+    epochs: int = 20
+    seed: int = 0
 
 
 def train(
     dataset: Path,
     out: Path,
     settings: Settings,
-    progress: Progress = lambda _epoch, _metrics: None,
-    batches: Batches = lambda _done, _all: None,
+    report_epoch: ReportEpoch = lambda _epoch, _metrics: None,
+    report_batch: ReportBatch = lambda _done, _all: None,
 ) -> None:
-    """Leave a trained model in `out`.
+    """Train a model and write it to `out`.
 
-    `model.onnx` and `labels.txt` are what a detector of kind `rfdetr` needs, `card.md` says how good it
-    is on the validation images; `checkpoint_best_total.pth` is what a further training can start from,
-    `metrics.csv` the course of this one.
+    A detector of kind `rfdetr` needs `model.onnx` and `labels.txt`. `card.md` states the accuracy on the
+    validation images. A further training can start from `checkpoint_best_total.pth`. `metrics.csv` holds the
+    metrics of each epoch.
 
     Args:
         dataset: Folder as Roboflow exports it: `train/` and `valid/`, each with `_annotations.coco.json`, or
             a `data.yaml` for YOLO.
-        out: Folder to fill; made if missing.
-        settings: How to train.
-        progress: Called after every epoch with its number, from 1, and its figures.
-        batches: Called after every batch with how many of how many are done, all epochs together.
+        out: Output folder; created if missing.
+        settings: Settings of the training.
+        report_epoch: Called after each epoch.
+        report_batch: Called after each batch.
 
     Raises:
-        InputError: The folder is no data set, `start` is missing or no checkpoint, or the training packages
-            are not installed.
+        InputError: The folder is no data set, `start` does not exist, or the training packages are not
+            installed.
     """
     start, rate = settings.start, settings.rate
     _check(dataset, start)
@@ -52,7 +76,7 @@ def train(
 
         declare_missing()
         from executive.training.architecture import describe
-        from executive.training.export import export_onnx
+        from executive.training.compress import export_onnx
         from executive.training.run import fit
     except ImportError as error:
         raise InputError(
@@ -60,7 +84,7 @@ def train(
             "uv sync --extra train"
         ) from error
     out.mkdir(parents=True, exist_ok=True)
-    fit(dataset, out, settings, progress, batches)
+    fit(dataset, out, settings, report_epoch, report_batch)
     model, labels = out / "model.onnx", out / "labels.txt"
     export_onnx(out / "checkpoint_best_total.pth", len(read_labels(labels)), model)
     card = ModelCard(
@@ -80,6 +104,19 @@ def train(
     (out / "card.md").write_text(card.text(), encoding="utf-8")
 
 
+def learning_rate(start: Path | None, labels: list[str]) -> float:
+    """Return the learning rate for a training of `labels` from the model `start`.
+
+    The labels of the model are in `labels.txt`, or in `NAME.labels.txt` for a model `NAME.onnx`.
+    """
+    if start is None:
+        return LEARNING_RATE
+    files = (start.with_suffix(".labels.txt"), start.with_name("labels.txt"))
+    found = next((file for file in files if file.is_file()), None)
+    has_same_classes = found is not None and list(read_labels(found)) == labels
+    return FINE_TUNING_RATE if has_same_classes else LEARNING_RATE
+
+
 def _check(dataset: Path, start: Path | None) -> None:
     if start is not None and not start.is_file():
         raise InputError(f"there is no checkpoint {start} to start from; train one first, or leave it out")
@@ -96,5 +133,5 @@ def _check(dataset: Path, start: Path | None) -> None:
 
 
 def _validation(dataset: Path) -> Path:
-    """Return the split that is looked at between epochs; YOLO folders call it `valid` or `val`."""
+    """Return the folder of the validation split; YOLO data sets call it `valid` or `val`."""
     return next(path for path in (dataset / "valid", dataset / "val", dataset) if path.is_dir())

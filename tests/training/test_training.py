@@ -12,9 +12,7 @@ import pytest
 from executive.errors import InputError
 from executive.training.evaluation.figures import Evaluation, Spread
 from executive.training.model_card import ModelCard, read_epochs
-from executive.training.settings import Settings
-from executive.training.start import learning_rate
-from executive.training.train import train
+from executive.training.train import Settings, learning_rate, train
 
 
 @pytest.mark.parametrize(
@@ -78,7 +76,7 @@ def test_a_model_restored_from_its_export_gives_the_same_answers(tmp_path):
     import onnxruntime
 
     from executive.perception.detectors.embedded import MODEL
-    from executive.training.export import export
+    from executive.training.compress import export
     from executive.training.restore import restore
 
     onnx.save(export(restore(MODEL), tmp_path), str(tmp_path / "again.onnx"))
