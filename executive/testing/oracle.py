@@ -20,7 +20,7 @@ from executive.cell.config import CameraConfig, CellConfig, DetectorConfig
 from executive.cell.detection import Detection
 from executive.cell.frame import Frame
 from executive.cell.protocols import Clock
-from executive.cells.sim.arrangements import UNKNOWN
+from executive.cells.audit import UNKNOWN
 from executive.cells.sim.camera import Image, SimCamera
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.models import load_mesh

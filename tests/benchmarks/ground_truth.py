@@ -13,7 +13,7 @@ from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import CellConfig
 from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions
-from executive.cells.sim.arrangements import UNKNOWN
+from executive.cells.audit import UNKNOWN
 from executive.cells.sim.audit import audit
 from executive.cells.sim.cell import SimCell
 from executive.events import Emit

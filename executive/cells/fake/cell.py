@@ -14,7 +14,8 @@ from executive.cell.clock import StepClock
 from executive.cell.config import CellConfig
 from executive.cell.layout import bins_of, cell_without_hardware, object_classes
 from executive.cell.protocols import Cell, LeastTimes, Routes
-from executive.cell.workcell import PLACES, CellOptions, KeyPath
+from executive.cell.workcell import CellOptions, KeyPath
+from executive.cells.audit import FinalObject, audit_objects
 from executive.cells.fake.arm import FakeArm, FakeTool, out_of_reach
 from executive.cells.fake.camera import FakeCamera, FakeDetector
 from executive.cells.fake.command_log import FakeLog, read_state, restore
@@ -24,7 +25,6 @@ from executive.cells.fake.world import FakeObject, FakeWorld
 from executive.errors import InputError
 from executive.events import Emit, ignore
 from executive.geometry import Pose
-from executive.ledger.item import State
 from executive.ledger.tracker import ItemLedger
 from executive.mission.parse.cell_file import load_cell
 from executive.mission.text.files import shipped_folder
@@ -85,7 +85,6 @@ class FakeCell:
         if options.gui:
             raise InputError(f'cell {config.cell} is of kind "fake" and has no window; run it without --gui')
         self._config = config
-        self._gate = config.ledger.gate
         self.routes = dict(routes)
         classes = object_classes(config)
         self.world = FakeWorld(classes)
@@ -184,50 +183,30 @@ class FakeCell:
         return FakeScenery(self._config, self.world, lambda: self.arm.tool_pose)
 
     def audit(self) -> dict[str, int]:
-        """Return what became of the objects.
+        """Return the true final counts of the objects; see `executive.cells.audit.audit_objects`."""
+        world = self.world
+        objects = [
+            FinalObject(one.label, self._find_bin(one), one.stood, one.fell, one is world.held, is_removed)
+            for is_removed, group in ((False, world.objects), (True, world.removed))
+            for one in group
+        ]
+        return audit_objects(objects, self.ledger.records, self.routes, self._config.ledger.gate)
 
-        `elsewhere` counts what was taken away, if it was seen before, and what fell into a wrong bin, which
-        `fell_in_wrong_bin` counts again; `unseen` counts what lies there and was never seen. An object that
-        was taken out of a bin counts as if it still lay there.
-        """
-        counts = dict.fromkeys(PLACES, 0)
-        for thing in self.world.objects:
-            place = self._find_place(thing)
-            fell = place == "wrong_bin" and thing.fell
-            counts["elsewhere" if fell else place] += 1
-            counts["fell_in_wrong_bin"] += fell
-            counts["unseen"] += not self._was_seen(thing)
-        for thing in self.world.removed:
-            place = "elsewhere" if thing.fell else self._find_place(thing)
-            counts["elsewhere" if place == "left" else place] += self._was_seen(thing)
-        return counts
-
-    def _find_place(self, thing: FakeObject) -> str:
-        """Return `right`, `wrong_bin` or `left`, for an object on the table or in the tool."""
-        if thing is self.world.held:
-            return "left"
-        # Nothing stands on a wall: what does here would have fallen in, if not into the next bin.
-        wall = BIN_THICKNESS + self._cell.classes[thing.label].radius / 2
-        for beside in (0.0, wall):
+    def _find_bin(self, one: FakeObject) -> str:
+        """Return the name of the bin in which an object lies, or ""."""
+        # An object on the wall of a bin falls into the bin, unless it is inside of another bin.
+        wall = BIN_THICKNESS + self._cell.classes[one.label].radius / 2
+        for margin in (0.0, wall):
             for name, bin in self._cell.bins.items():
-                if bin.contains(thing.position, beside):
-                    return "right" if name in self.routes.get(thing.label, ()) else "wrong_bin"
-        return "left"
+                if bin.contains(one.position, margin):
+                    return name
+        return ""
 
     def close(self) -> None:
         """Close the log."""
         if self._log is not None:
             self._log.close()
             self._log = None
-
-    def _was_seen(self, thing: FakeObject) -> bool:
-        """Tell whether an item of the ledger was first seen where an object stood at some time."""
-        return any(
-            float(np.linalg.norm((record.first - place)[:2])) <= self._gate
-            for record in self.ledger.records
-            if record.state is not State.PHANTOM
-            for place in thing.stood
-        )
 
 
 @functools.cache

@@ -15,6 +15,7 @@ from pybullet_utils.bullet_client import BulletClient
 from executive.cell.bins import BIN_THICKNESS
 from executive.cell.clock import STEP
 from executive.cell.config import BinConfig, CameraConfig, CellConfig, Colour, ObjectConfig
+from executive.cells.audit import UNKNOWN
 from executive.cells.sim.models import add_body, load_mesh, upright
 from executive.cells.sim.variations import random_object_colour
 from executive.cells.sim.world import World, add_bin
@@ -24,8 +25,6 @@ MAX_OBJECTS_SPARSE, MAX_OBJECTS_DENSE = 7, 20
 """Largest number of objects in a sparse scene and in a dense scene."""
 SCALES = (0.75, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.2, 1.3)
 """Scale factors of objects whose size differs from that of their class."""
-UNKNOWN = "unknown"
-"""Label of an object without a class."""
 UNKNOWN_COUNT, DAMAGED_MODEL = 1000, 168
 """Count of the shapes in pybullet_data's `random_urdfs`, and number of the shape with a damaged mesh."""
 UNKNOWN_MODELS = tuple(number for number in range(800) if number != DAMAGED_MODEL)

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from executive.cell.config import CellConfig, NoiseConfig
 from executive.cell.frame import Box
+from executive.cells.audit import UNKNOWN
 from executive.cells.sim.arrangements import (
-    UNKNOWN,
     SceneObject,
     arrange,
     make_held_object,

@@ -10,7 +10,7 @@ import numpy as np
 
 from executive.cell.config import CellConfig
 from executive.cell.workcell import KeyPath
-from executive.cells.sim.arrangements import UNKNOWN
+from executive.cells.audit import UNKNOWN
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, UnknownConfig
 from executive.cells.sim.scene_world import paint_table, true_cell, unknown_objects

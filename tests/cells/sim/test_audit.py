@@ -11,7 +11,7 @@ import pytest
 
 from executive.cell.bins import Bin
 from executive.cell.workcell import PLACES
-from executive.cells.sim.arrangements import UNKNOWN
+from executive.cells.audit import UNKNOWN
 from executive.cells.sim.audit import audit
 from executive.geometry import Pose
 

@@ -17,8 +17,8 @@ import yaml
 from executive.cell.config import CellConfig, NoiseConfig
 from executive.cell.frame import Frame
 from executive.cell.workcell import CellOptions
+from executive.cells.audit import UNKNOWN
 from executive.cells.fake.cell import ROUTES, SilentOperator
-from executive.cells.sim.arrangements import UNKNOWN
 from executive.cells.sim.camera import CELL_LIGHT
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.models import load_mesh
