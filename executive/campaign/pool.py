@@ -1,4 +1,4 @@
-"""Many jobs in processes of their own, until they are done or somebody halts them."""
+"""Execution of many jobs in worker processes, with a controlled halt."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ J = TypeVar("J")
 R = TypeVar("R")
 
 PROMPT = 0.1
-"""Longest time after which a wish to halt is heeded [s]."""
+"""Longest time between a signal and the halt of the runs [s]."""
 
 
 def do_all(
@@ -32,21 +32,21 @@ def do_all(
     progress: Callable[[int, int], None] | None = None,
     halting: Callable[[], None] | None = None,
 ) -> list[R | None]:
-    """Do every job in some process and return the results in the order of the jobs.
+    """Do all jobs in worker processes and return the results in the order of the jobs.
 
-    After Ctrl-C or SIGTERM no further job begins, runs under way halt, and None is what those jobs have that
-    were not done. A second one ends the processes at once.
+    After Ctrl-C or SIGTERM no further job starts, running jobs halt, and the result of an unfinished job is
+    None. A second signal kills the processes immediately.
 
     Args:
-        jobs: What is to be done.
-        work: What does one job.
-        broken: Returns the result of a job whose work raised, or that took its process down.
-        workers: How many processes work at a time.
-        progress: Told how many jobs of how many are done.
-        halting: Told that somebody wished to halt, as soon as they do.
+        jobs: The jobs.
+        work: Does one job and returns its result.
+        broken: Returns the result of a job that raised an exception or ended its process.
+        workers: Number of processes.
+        progress: Called with the number of finished jobs and of all jobs.
+        halting: Called after the first signal.
 
     Raises:
-        KeyboardInterrupt: Somebody did not want to wait until the jobs under way have halted.
+        KeyboardInterrupt: A second signal arrived before the running jobs had halted.
     """
     to_do = deque(enumerate(jobs))
     results: dict[int, R] = {}
@@ -55,17 +55,17 @@ def do_all(
     try:
         with _wishes() as wished:
             while running or (to_do and not halted):
-                # No job waits in the pool: one that does could not be taken back.
+                # No job waits in the pool, from which it could not be removed.
                 while to_do and len(running) < workers and not (torn or halted or wished.is_set()):
                     number, job = to_do[0]
                     try:
                         running[pool.submit(work, job)] = number
-                    except BrokenExecutor:  # The process died since its last result was looked at.
+                    except BrokenExecutor:  # The process died after its last result was read.
                         torn = True
                     else:
                         to_do.popleft()
                 done, _ = wait(running, PROMPT, FIRST_COMPLETED)
-                # What comes at once, as from `timeout`, which tells the process and then its group, is one.
+                # Two signals within one period count as one: `timeout` signals the process and its group.
                 if wished.is_set():
                     wished.clear()
                     if halted:
@@ -80,7 +80,7 @@ def do_all(
                     number, error = running.pop(future), future.exception()
                     torn = torn or isinstance(error, BrokenExecutor)
                     if halted and isinstance(error, BrokenExecutor):
-                        continue  # Whoever halted this process halted its workers, too.
+                        continue  # The signal that halted this process also reached its workers.
                     results[number] = future.result() if error is None else broken(jobs[number], error)
                     if progress is not None:
                         progress(len(results), len(jobs))
@@ -93,7 +93,7 @@ def do_all(
 
 
 def _halt_runs() -> None:
-    """Ask every worker's run to halt; one that is still being made does not hear it and is asked again."""
+    """Send SIGINT to all workers; a run that is not ready for it gets the next one."""
     for process in multiprocessing.active_children():
         assert process.pid is not None
         with contextlib.suppress(ProcessLookupError):
@@ -102,7 +102,7 @@ def _halt_runs() -> None:
 
 @contextlib.contextmanager
 def _wishes() -> Iterator[threading.Event]:
-    """Set the event whenever somebody wishes to halt, instead of what the signal did before."""
+    """Replace the signal handlers by one that sets the event."""
     wished = threading.Event()
 
     def wish(number: int, frame: FrameType | None) -> None:

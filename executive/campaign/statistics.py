@@ -1,4 +1,4 @@
-"""The few figures that campaigns report."""
+"""Statistics that campaigns report."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def wilson(successes: int, total: int) -> tuple[float, float]:
 
 
 def spread(values: Sequence[float]) -> dict[str, float]:
-    """Return `least, median, mean, most` of `values`; all zero where there are none."""
+    """Return `least, median, mean, most` of `values`; all are 0 without values."""
     if not values:
         return dict.fromkeys(("least", "median", "mean", "most"), 0.0)
     return {

@@ -1,4 +1,4 @@
-"""A mission that a campaign runs again and again."""
+"""The mission of a campaign and the cell in which it runs."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from executive.skill import Skill
 
 @dataclass(frozen=True)
 class Subject:
-    """A mission, and the cell it is run in.
+    """A mission, and the cell in which it runs.
 
     Attributes:
         loaded: The mission and its cell file.
         skills: Installed skills by name.
-        kind: Makes the work cell; None: the kind that the cell file names.
-        cell: What that is, in words.
-        seed: Decides everything random; where there are many runs, that of the first.
+        kind: Function that makes the work cell; None: the kind in the cell file.
+        cell: Description of the kind of cell.
+        seed: Random seed; in a series of runs, the seed of the first run.
     """
 
     loaded: LoadedMission
@@ -35,5 +35,5 @@ class Subject:
 
     @property
     def requests(self) -> list[str]:
-        """What an operator asks for: every class in turn, as often as there may be objects."""
+        """Requests of the operator: each class in turn, as often as the maximum number of objects."""
         return [*self.loaded.routes] * self.loaded.cell_config.table.objects[1]

@@ -1,4 +1,4 @@
-"""What in a cell makes a skill fail with a reason, by the reason's name and what the skill declares."""
+"""Disturbances of a cell that make a skill fail with a given reason."""
 
 from __future__ import annotations
 
@@ -13,13 +13,15 @@ from executive.testing.faults.effect import Effect
 
 @dataclass(frozen=True)
 class Cause:
-    """What makes skills fail with a reason.
+    """A disturbance that makes skills fail with a reason.
 
     Attributes:
-        effect: What happens.
-        means: That in words.
-        needs: What a skill must do for it to happen there: `moves`, `senses`, or use a part; "" for none.
-        lasts: Whether it may go on for ever; else a campaign lets it happen so often at most.
+        effect: Effect of the disturbance.
+        means: Description of the effect.
+        needs: Property of the skills that it affects: `moves`, `senses`, or the name of a part that they use;
+        ""
+            for all skills.
+        lasts: True if it may last until the end; False: a campaign limits the number of activations.
     """
 
     effect: Effect
@@ -28,13 +30,13 @@ class Cause:
     lasts: bool = True
 
     def can(self, skill: type[Skill]) -> bool:
-        """Tell whether this may happen to a skill at all."""
+        """Return True if the disturbance affects a skill."""
         does = {"": True, "moves": skill.moves, "senses": skill.senses}
         return does.get(self.needs, self.needs in skill.uses)
 
 
 def causes(table: TableConfig) -> Mapping[str, Cause]:
-    """Return what makes skills fail, by the name of the reason; of one that is missing nobody knows."""
+    """Return the known causes of failures by the name of the reason."""
     aside = effects.object_bumped(table.x, table.y)
     return {
         "missed": Cause(effects.seal_fails(), "nothing seals", "tool"),

@@ -1,4 +1,4 @@
-"""One thing that goes wrong in a run."""
+"""Faults that a campaign injects into runs."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from typing import Literal
 from executive.testing.faults.script import Disturbance
 
 When = Literal["first", "middle", "late", "lasting"]
-"""When something goes wrong: the first time, half-way, towards the end, or again and again."""
+"""Time of a fault in a run: the first activation, the middle, near the end, or repeatedly."""
 
 
 class InjectedError(Exception):
-    """A bug that a campaign put into a skill."""
+    """The error that a campaign raises inside a skill to imitate a bug."""
 
 
 @dataclass(frozen=True)
 class Breakage:
-    """A skill that goes wrong by itself, where nothing in the cell makes it.
+    """A skill that misbehaves without a cause in the cell.
 
     Attributes:
         node: Path of its node.
-        how: It fails; it raises an error; or it raises one when it is halted.
-        reason: Why it fails.
-        starts: In which of its activations, counted from 1; empty for every one.
-        after: Control steps that it runs before.
+        how: The skill fails, raises an error, or raises an error when it is halted.
+        reason: Reason of the failure; "" for an error.
+        starts: Activations in which it misbehaves, counted from 1; empty: all activations.
+        after: Number of control steps of the skill before the error.
     """
 
     node: str
@@ -36,21 +36,22 @@ class Breakage:
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing that goes wrong in a run; a value that can be sent to another process.
+    """A fault that is injected into a run; a value that can be sent to another process.
 
     Attributes:
-        about: Path of the node, or what else is at fault: `detector`, `object`, `tool`.
-        name: Of the node's skill, or as `about`.
-        place: Where the node stands in the mission: file and line; "" for what is no node.
-        what: Reason that the node is to fail with, or what happens.
-        when: When it happens.
-        means: How it is brought about, in words.
-        happenings: What happens to the cell.
-        breakages: What goes wrong by itself.
-        reason: True where `what` is a reason of the node.
-        leads_to: Reason that skills fail with because of it, where `what` is none; "" where there is no one.
-        behind: True where the node runs only once something else has gone wrong.
-        instead_of: Number of the fault that this one is tried for, if that one does not come to its reason.
+        about: Path of the affected node, or the affected part: `detector`, `object`, `tool`.
+        name: Label or skill of the node, or the same as `about`.
+        place: File and line of the node in the mission; "" for a part.
+        what: Reason with which the node must fail, or a description of the fault.
+        when: Time of the fault in the run.
+        means: Description of the cause.
+        happenings: Disturbances of the cell that cause the fault.
+        breakages: Misbehaviour of skills that causes the fault.
+        reason: True if `what` is a reason of the node.
+        leads_to: Reason with which skills fail because of a fault of a part; "" if there is none.
+        behind: True if the node runs only after another fault.
+        instead_of: Number of the fault that this one replaces if that fault did not provoke its reason; 0 if
+            none.
     """
 
     about: str
@@ -68,9 +69,9 @@ class Fault:
 
     @property
     def ends_run(self) -> bool:
-        """True where the run ends as a fault, as after any bug."""
+        """True if the run ends with the status FAULT, as after any bug."""
         return any(breakage.how != "fails" for breakage in self.breakages)
 
     def __str__(self) -> str:
-        """Return it in words."""
+        """Return a description of the fault."""
         return f"{self.about} {self.what}, {self.when}: {self.means}"
