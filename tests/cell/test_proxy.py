@@ -9,7 +9,6 @@ import pytest
 from executive.cell.arm import Task
 from executive.cell.proxy import Access, intercept
 from executive.cells.fake.cell import FakeCell
-from executive.testing.conformance.watch import Watch
 
 
 def test_every_access_goes_through_the_interceptor_and_so_do_those_to_what_a_call_returns(
@@ -46,14 +45,3 @@ def test_only_the_members_of_the_protocol_are_offered(fake: FakeCell) -> None:
     for member in ("commanded", "_plans", "__deepcopy__"):
         with pytest.raises(AttributeError, match=member):
             getattr(cell.arm, member)
-
-
-def test_a_watch_notes_every_call(fake: FakeCell) -> None:
-    watch = Watch(fake.cell)
-    watch.tick = 7
-    assert watch.cell.operator.ask(["duck"]) is None
-    assert watch.cell.arm.plan("home").ready is False
-    assert [(call.tick, call.name, call.arguments) for call in watch.calls] == [
-        (7, "operator.ask", (["duck"],)),
-        (7, "arm.plan", ("home",)),
-    ]

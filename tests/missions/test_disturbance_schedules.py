@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from executive.cell.detection import Answer, Detection
 from executive.cells.fake.cell import FakeCell
 from executive.plugins import cell_kind
 from executive.testing.faults import Disturbance, after, during, object_bumped, with_probability
-from executive.testing.faults.detector import DetectorDisturbed
+from executive.testing.faults.detector import detector_disturbed
 from executive.testing.faults.effect import Effect, Occasion
 from executive.testing.run_mission import MissionResult, run_mission
 
@@ -21,46 +21,36 @@ SWAPPED = {"cube": "sphere", "sphere": "cube", "duck": "duck"}
 SEEDS = range(171000, 171006)
 
 
-@dataclass(frozen=True)
-class ObjectsExchanged(Effect):
-    """Somebody swaps the target object with one of another class, once."""
-
-    name = "objects_exchanged"
-
-    def act(self, now: Occasion) -> bool:
-        hand = now.scene.hand
-        if (first := now.scene.find("node", now.item)) is None:
-            return False
-        others = [
-            thing
-            for thing in hand.things
-            if thing.label != first.label
-            and not any(b.contains(thing.position) for b in now.scene.cell.bins.values())
-        ]
-        if not others:
-            return False
-        x, y = (others[0].position - first.position)[:2]
-        hand.move(first, (float(x), float(y)))
-        hand.move(others[0], (-float(x), -float(y)))
-        now.tell(first)
-        return True
-
-
-@dataclass(frozen=True)
-class BinEmptied(Effect):
-    """Somebody takes all objects out of the first bin that holds some, once."""
-
-    name = "bin_emptied"
-
-    def act(self, now: Occasion) -> bool:
-        for bin in now.scene.cell.bins.values():
-            inside = [thing for thing in now.scene.hand.things if bin.contains(thing.position)]
-            for thing in inside:
-                now.tell(thing)
-                now.scene.hand.remove(thing)
-            if inside:
-                return True
+def exchange_objects(now: Occasion) -> bool:
+    """Swap the target object with one of another class, once."""
+    hand = now.scene.hand
+    if (first := now.scene.find("node", now.item)) is None:
         return False
+    others = [
+        thing
+        for thing in hand.things
+        if thing.label != first.label
+        and not any(b.contains(thing.position) for b in now.scene.cell.bins.values())
+    ]
+    if not others:
+        return False
+    x, y = (others[0].position - first.position)[:2]
+    hand.move(first, (float(x), float(y)))
+    hand.move(others[0], (-float(x), -float(y)))
+    now.tell(first)
+    return True
+
+
+def empty_bin(now: Occasion) -> bool:
+    """Take all objects out of the first bin that holds some, once."""
+    for bin in now.scene.cell.bins.values():
+        inside = [thing for thing in now.scene.hand.things if bin.contains(thing.position)]
+        for thing in inside:
+            now.tell(thing)
+            now.scene.hand.remove(thing)
+        if inside:
+            return True
+    return False
 
 
 def detector_adds_false_box(seed: int) -> Effect:
@@ -71,7 +61,7 @@ def detector_adds_false_box(seed: int) -> Effect:
     def add(answer: Answer) -> Answer:
         return replace(answer, found=(*answer.found, Detection("cube", 0.9, box)))
 
-    return DetectorDisturbed("detector_adds_false_box", add)
+    return detector_disturbed("detector_adds_false_box", add)
 
 
 def detector_swaps_classes() -> Effect:
@@ -80,7 +70,7 @@ def detector_swaps_classes() -> Effect:
     def swap(answer: Answer) -> Answer:
         return replace(answer, found=tuple(replace(one, label=SWAPPED[one.label]) for one in answer.found))
 
-    return DetectorDisturbed("detector_swaps_classes", swap)
+    return detector_disturbed("detector_swaps_classes", swap)
 
 
 def schedule(kind: str, seed: int) -> list[Disturbance]:
@@ -91,9 +81,9 @@ def schedule(kind: str, seed: int) -> list[Disturbance]:
     if kind == "wrong classes in a third of the looks":
         return [with_probability(0.3, "*/Detect", detector_swaps_classes(), seed=seed)]
     if kind == "exchanged before an approach":
-        return [during("*/Approach", ObjectsExchanged(), nth=1 + seed % 3)]
+        return [during("*/Approach", Effect("objects_exchanged", exchange_objects), nth=1 + seed % 3)]
     assert kind == "emptied bin"
-    return [after(4.0 + seed % 6, BinEmptied())]
+    return [after(4.0 + seed % 6, Effect("bin_emptied", empty_bin))]
 
 
 KINDS = (

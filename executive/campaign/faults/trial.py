@@ -26,7 +26,6 @@ from executive.run.assembly import RunOptions, assemble
 from executive.run.outcome import Outcome
 from executive.testing.bounded_cell import BoundedCell
 from executive.testing.faults import DisturbedCell, disturbed
-from executive.testing.faults.objects import ObjectRemoved
 from executive.view.figures.fault_trials import Trial
 from executive.view.report.page import leave_report
 
@@ -95,7 +94,7 @@ class _Trying:
         """Return what came of the run, which is over."""
         run = self.run
         items, audit = run.items(), run.audit()
-        taken = judgement.count_of(self._events, ObjectRemoved.name)
+        taken = judgement.count_of(self._events, "object_removed")
         raised = any(self._raised(fault) for fault in self._faults.values() if fault.ends_run)
         faults = tuple(self._faults.values())
         problems = [

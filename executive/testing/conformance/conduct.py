@@ -1,4 +1,4 @@
-"""Checks of how a skill behaves in every situation, under every adversity, and halted at any moment."""
+"""Checks of how a skill behaves in every situation, under every fault, and halted at any moment."""
 
 from __future__ import annotations
 

@@ -5,38 +5,56 @@ from __future__ import annotations
 import copy
 import pickle
 from collections.abc import Mapping
+from dataclasses import dataclass
 from time import perf_counter
 from traceback import extract_tb
 from typing import Any
 
 from executive.cell.clock import STEP
+from executive.cell.protocols import Cell
+from executive.cell.proxy import Access, intercept
 from executive.errors import Fault
 from executive.events import Event
 from executive.skill import Skill, SkillFailed
-from executive.testing.conformance.adversities import Adversity
+from executive.testing.conformance.faults import SkillFault
 from executive.testing.conformance.patience import Stuck, patience
 from executive.testing.conformance.situations import Arrange, Situation, begin
 from executive.testing.conformance.source import place_in
-from executive.testing.conformance.watch import Watch
 from executive.testing.faults import DisturbedCell, during
 from executive.tree.skill_run import SkillRun
 
 MAX_TIME = 60.0
 """Time on the run's clock after which a skill must have ended [s]: nothing takes so long on a fake table."""
+_ROLES = ("arm", "tool", "camera", "detector", "ledger", "localizer", "operator")
+
+
+@dataclass(frozen=True)
+class Call:
+    """A call of a part of the cell.
+
+    Attributes:
+        tick: Control step in which it was made.
+        name: Part and method, for instance `arm.start`.
+        arguments: Arguments of the call.
+    """
+
+    tick: int
+    name: str
+    arguments: tuple[Any, ...]
 
 
 class Rehearsal:
     """One run of a skill, driven as the tree would.
 
     Args:
-        skill: Its class.
-        situation: The situation in which it begins.
-        arrange: What its author wants to be otherwise on the stage.
-        adversity: What goes wrong; None for nothing.
-        halt_at: Control step before which it is halted; None for a run to its end.
+        skill: Class of the skill.
+        situation: Situation in which the run begins.
+        arrange: Changes of the stage by the author of the skill.
+        fault: Injected fault, or None.
+        halt_at: Control step before which the skill is halted; None for a run to its end.
 
     Attributes:
-        where: The situation, and what goes wrong in it, for a sentence.
+        where: The situation and the fault, for a sentence.
         status: `SUCCESS`, `FAILURE`, `HALTED`, `RUNNING` if it did not end, `STUCK` if a tick did not come
             back, or `FAULT`.
         reason: Reason of a failure.
@@ -57,25 +75,24 @@ class Rehearsal:
         skill: type[Skill],
         situation: Situation,
         arrange: Arrange,
-        adversity: Adversity | None = None,
+        fault: SkillFault | None = None,
         halt_at: int | None = None,
     ) -> None:
         stage, values = begin(skill, situation, arrange)
         fake = stage.cell
         before = values if halt_at else copy.deepcopy(values, {id(fake): fake})
-        script = [during("*", adversity.effect)] * adversity.times if adversity else []
+        script = [during("*", fault.effect)] * fault.times if fault else []
         cell = DisturbedCell(fake, script)
-        watch = Watch(cell.cell)
-        self.where = " ".join(filter(None, (situation.name, adversity.name if adversity else "")))
+        self.where = f"{situation.name} {fault.name}" if fault else situation.name
         self.reason = self.message = ""
         self.ticks, self._skill, self._halt_at = 0, skill, halt_at
         self.outputs: Mapping[str, Any] = {}
-        self.calls, self.durations = watch.calls, list[float]()
-        disturbed_at = adversity.tick if adversity else 0
+        self.calls, self.durations = list[Call](), list[float]()
         self.held = fake.tool.holding
+        watched = intercept(cell.cell, self._watch, _ROLES)
         try:
             with patience(skill, lambda: self.ticks):
-                self.status = self._act(values, cell, watch, disturbed_at)
+                self.status = self._act(values, cell, watched, fault.tick if fault else 0)
         except Stuck as stuck:
             self.status, self.message = "STUCK", str(stuck)
         self.changed = [name for name in values if not is_same(values[name], before[name])]
@@ -98,7 +115,12 @@ class Rehearsal:
         """True if it started the arm."""
         return any(call.name == "arm.start" for call in self.calls)
 
-    def _act(self, values: Mapping[str, Any], cell: DisturbedCell, watch: Watch, disturbed_at: int) -> str:
+    def _watch(self, access: Access) -> Any:
+        if access.is_call and access.role in _ROLES:
+            self.calls.append(Call(self.ticks, access.name, access.all_arguments))
+        return access.proceed()
+
+    def _act(self, values: Mapping[str, Any], cell: DisturbedCell, watched: Cell, disturbed_at: int) -> str:
         """Run the skill and return its status at the end."""
         skill = self._skill
         run: SkillRun | None = None
@@ -109,8 +131,8 @@ class Rehearsal:
                     return "HALTED"
                 if self.ticks == disturbed_at:
                     cell.hear(Event("status", 0, 0.0, {"node": "skill", "status": "RUNNING"}))
-                watch.tick, began = self.ticks, perf_counter()
-                run = run or SkillRun(skill(**values), watch.cell)
+                began = perf_counter()
+                run = run or SkillRun(skill(**values), watched)
                 has_succeeded = run.step()
                 self.durations.append(perf_counter() - began)
                 if has_succeeded:

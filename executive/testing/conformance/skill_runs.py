@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from executive.skill import Skill
-from executive.testing.conformance.adversities import Adversity, adversities
+from executive.testing.conformance.faults import SkillFault, faults_of
 from executive.testing.conformance.rehearsal import Rehearsal
 from executive.testing.conformance.situations import Arrange, NotTried, Situation, situations
 
@@ -40,19 +40,19 @@ class SkillRuns:
 
     @cached_property
     def repeated_runs(self) -> list[tuple[Situation, Rehearsal, Rehearsal]]:
-        """Two runs to the end in every situation, without adversity."""
+        """Two runs to the end in every situation, without a fault."""
         return [(situation, self._run(situation), self._run(situation)) for situation in self.situations]
 
     @cached_property
     def complete_runs(self) -> list[Rehearsal]:
-        """Runs to the end: in every situation one without adversity, and one under each adversity."""
+        """Runs to the end: in every situation one without a fault, and one under each fault."""
         plain = [first for _, first, _ in self.repeated_runs]
         return plain + [
-            self._run(situation, adversity)
+            self._run(situation, fault)
             for situation, first, _ in self.repeated_runs
-            # If the undisturbed run does not end, a run under an adversity will not end either.
+            # If the undisturbed run does not end, a run under a fault will not end either.
             if first.status != "RUNNING"
-            for adversity in adversities(self.skill, first.ticks, holding=first.held)
+            for fault in faults_of(self.skill, first.ticks, holding=first.held)
         ]
 
     @cached_property
@@ -66,7 +66,7 @@ class SkillRuns:
         ]
 
     def _run(
-        self, situation: Situation, adversity: Adversity | None = None, halt_at: int | None = None
+        self, situation: Situation, fault: SkillFault | None = None, halt_at: int | None = None
     ) -> Rehearsal:
         """Run the skill once.
 
@@ -75,7 +75,7 @@ class SkillRuns:
         """
         if self._stuck:
             raise GotStuck(self._stuck)
-        rehearsal = Rehearsal(self.skill, situation, self._arrange, adversity, halt_at)
+        rehearsal = Rehearsal(self.skill, situation, self._arrange, fault, halt_at)
         if rehearsal.status == "STUCK":
             halted = ", halted there," if rehearsal.ticks == halt_at else ""
             self._stuck = (
@@ -84,7 +84,7 @@ class SkillRuns:
                 "and leave long computations to a detector."
             )
             raise GotStuck(self._stuck)
-        if adversity is not None or halt_at is not None:
+        if fault is not None or halt_at is not None:
             # The arguments of calls may be large: frames are among them.
             rehearsal.calls = [replace(call, arguments=()) for call in rehearsal.calls]
         return rehearsal

@@ -1,6 +1,6 @@
-"""Effects on detectors: dead, hanging, slow, blind, or unsure of everything.
+"""Faults of detectors: dead, hanging, slow, blind, or unsure of everything.
 
-Every request made while an effect lasts is affected; requests made before are answered as ever.
+A fault affects every request that is made while it lasts; earlier requests are answered as usual.
 """
 
 from __future__ import annotations
@@ -20,9 +20,8 @@ TIME_TOLERANCE = 1e-9
 """Rounding allowed when two times on the clock are compared [s]."""
 
 
-def unchanged(answer: Answer) -> Answer:
-    """Return an answer as it is."""
-    return answer
+Change = Callable[[Answer], Answer]
+"""Returns an answer instead of the true one; raises Unavailable for none."""
 
 
 def refuse(answer: Answer) -> Answer:
@@ -43,54 +42,23 @@ def overlook(answer: Answer) -> Answer:
     return replace(answer, found=(), doubtful=(), unknown=())
 
 
-@dataclass(frozen=True)
-class DetectorDisturbed(Effect):
-    """A detector that answers late, wrongly, or not at all.
+def detector_disturbed(
+    name: str, change: Change | None = None, delay: float = 0.0, until: float = 0.0
+) -> Effect:
+    """The detector answers late, wrongly, or not at all.
 
-    Attributes:
+    Args:
         name: Name of the effect in the record.
-        change: Returns the answer instead of the true one; raises Unavailable for none.
+        change: Returns the answer instead of the true one; None: the true one.
         delay: Time by which the answer is late [s].
         until: Time on the clock before which nothing is answered while the effect lasts [s].
     """
-
-    name: str
-    change: Callable[[Answer], Answer] = unchanged
-    delay: float = 0.0
-    until: float = 0.0
-
-    def request(self, ask: Callable[[], Request], now: Occasion) -> Request:
-        """Ask the detector, and disturb its answer."""
-        now.tell()
-        return DisturbedRequest(ask(), self, now)
-
-
-@dataclass
-class DisturbedRequest:
-    """A request to a disturbed detector; implements `Request`."""
-
-    asked: Request
-    effect: DetectorDisturbed
-    now: Occasion
-    _due: float = math.inf
-
-    @property
-    def ready(self) -> bool:
-        """True once the answer is due, its delay is over, and the detector does not hang any longer."""
-        time = self.now.scene.now
-        if math.isinf(self._due) and self.asked.ready:
-            self._due = time + self.effect.delay
-        does_hang = not self.now.over and time < self.effect.until - TIME_TOLERANCE
-        return time >= self._due - TIME_TOLERANCE and not does_hang
-
-    def result(self) -> Answer:
-        """Return the disturbed answer, or raise Unavailable."""
-        return self.effect.change(self.asked.result())
+    return Effect(name, answers={"request": _request}, arguments=(change, delay, until))
 
 
 def detector_dead() -> Effect:
     """Requests are not answered: `Detect` is `unavailable`."""
-    return DetectorDisturbed("detector_dead", refuse)
+    return detector_disturbed("detector_dead", refuse)
 
 
 def detector_hangs(until: float = math.inf) -> Effect:
@@ -99,7 +67,7 @@ def detector_hangs(until: float = math.inf) -> Effect:
     Args:
         until: Time on the run's clock at which they are answered in any case [s].
     """
-    return DetectorDisturbed("detector_hangs", until=until)
+    return detector_disturbed("detector_hangs", until=until)
 
 
 def detector_given_up(deadline: float) -> Effect:
@@ -108,7 +76,7 @@ def detector_given_up(deadline: float) -> Effect:
     Args:
         deadline: Time by which that is later than an answer would be [s].
     """
-    return DetectorDisturbed("detector_hangs", refuse, delay=deadline)
+    return detector_disturbed("detector_hangs", refuse, delay=deadline)
 
 
 def detector_slow(by: float) -> Effect:
@@ -122,14 +90,47 @@ def detector_slow(by: float) -> Effect:
     """
     if by < 0:
         raise InputError(f"a slow detector answers later, not by {by:g} s")
-    return DetectorDisturbed("detector_slow", delay=by)
+    return detector_disturbed("detector_slow", delay=by)
 
 
 def detector_unsure() -> Effect:
     """Everything is seen with less confidence than counts: `Detect` is `unsure`."""
-    return DetectorDisturbed("detector_unsure", doubt)
+    return detector_disturbed("detector_unsure", doubt)
 
 
 def detector_blind() -> Effect:
     """Nothing is seen: `Detect` succeeds with an empty list."""
-    return DetectorDisturbed("detector_blind", overlook)
+    return detector_disturbed("detector_blind", overlook)
+
+
+@dataclass
+class DisturbedRequest:
+    """A request to a disturbed detector; implements `Request`."""
+
+    asked: Request
+    now: Occasion
+    change: Change | None
+    delay: float
+    until: float
+    _due: float = math.inf
+
+    @property
+    def ready(self) -> bool:
+        """True once the answer is due, its delay is over, and the detector does not hang any longer."""
+        time = self.now.scene.now
+        if math.isinf(self._due) and self.asked.ready:
+            self._due = time + self.delay
+        does_hang = not self.now.over and time < self.until - TIME_TOLERANCE
+        return time >= self._due - TIME_TOLERANCE and not does_hang
+
+    def result(self) -> Answer:
+        """Return the disturbed answer, or raise Unavailable."""
+        answer = self.asked.result()
+        return answer if self.change is None else self.change(answer)
+
+
+def _request(
+    proceed: Callable[[], Request], now: Occasion, change: Change | None, delay: float, until: float
+) -> Request:
+    now.tell()
+    return DisturbedRequest(proceed(), now, change, delay, until)

@@ -1,36 +1,35 @@
-"""Base of everything that can disturb a cell, and one occurrence of it."""
+"""Base of the faults that can be injected into a cell, and one occurrence of a fault."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 from executive.errors import InputError
 from executive.testing.faults.hand import Thing
 from executive.testing.faults.scene import Scene
 
 
+@dataclass(frozen=True)
 class Effect:
-    """Something that happens to a cell while it lasts; a subclass defines it.
-
-    An effect is a value without state: the state of one occurrence is in its `Occasion`. A subclass acts by
-    itself (`act`), or between the skills and the cell: it then defines `close`, `open` (tool), `plan` (arm),
-    `sees_table`, `capture` (camera), `request` (detector), `localize` (localizer) or `ask` (operator). Each
-    of these methods gets a function that asks the cell, and the occasion, and returns the answer.
+    """A fault of a cell: an action, or other answers of the cell; a value without state.
 
     Attributes:
         name: Name of the effect in the record.
+        act: `act(occasion, *arguments)` changes the cell once and returns True, or returns False as long as
+            it cannot; called when the effect begins and after every control step. None: no action.
+        answers: Functions `answer(proceed, occasion, *arguments)` by the member of the cell whose result
+            they return: `close`, `open` (tool), `plan` (arm), `sees_table`, `capture` (camera), `request`
+            (detector), `localize` (localizer) or `ask` (operator). `proceed` asks the cell.
+        arguments: Further arguments of these functions.
     """
 
     name: str
-
-    def act(self, now: Occasion) -> bool:
-        """Do something to the cell, once; return False as long as it cannot be done yet.
-
-        Called when the effect begins, and after every control step until it is done or over.
-        """
-        del now
-        return False
+    act: Callable[..., bool] | None = None
+    answers: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
+    arguments: tuple[Any, ...] = ()
 
 
 @dataclass(eq=False)

@@ -1,115 +1,157 @@
-"""Effects on arm, tool, camera, localizer, table and operator."""
+"""Faults of arm, tool, camera, localizer, table and operator."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from executive.cell.arm import Motion, Planning
-from executive.cell.detection import Observation
 from executive.cell.frame import Frame
 from executive.errors import Blocked, NoDepth, Unreachable
 from executive.testing.faults.effect import Effect, Occasion, checked_share
 
 
-@dataclass(frozen=True)
-class SealFails(Effect):
-    """Nothing seals to the tool; an object that hangs there already stays."""
-
-    name = "seal_fails"
-
-    def close(self, do: Callable[[], None], now: Occasion) -> None:
-        """Leave the tool as it is."""
-        del do
-        now.tell()
+def seal_fails() -> Effect:
+    """Nothing seals to the tool while this lasts: `Grasp` is `missed`; a held object stays at the tool."""
+    return Effect("seal_fails", answers={"close": _answer}, arguments=(None,))
 
 
-@dataclass(frozen=True)
-class SealBreaks(Effect):
-    """The seal gives way, once, when the arm has carried an object so far."""
+def seal_breaks(share: float | None = 0.5) -> Effect:
+    """The seal breaks once, while the arm carries an object, which falls: `Transit` is `dropped`.
 
-    name = "seal_breaks"
-    share: float
+    Args:
+        share: Share of the motion after which the seal breaks, 0 to 1; None: at once, at rest too.
 
-    def act(self, now: Occasion) -> bool:
-        """Part tool and object, if the tool holds one and the arm is so far."""
-        held = now.scene.hand.held
-        if held is None or now.scene.progress < self.share:
-            return False
+    Raises:
+        InputError: The share is not more than 0 and less than 1.
+    """
+    return Effect("seal_breaks", _break_seal, arguments=(checked_share(share),))
+
+
+def seal_breaks_over_wrong_bin() -> Effect:
+    """The seal breaks once, over a bin that is wrong for the object, which falls into this bin."""
+    return Effect("seal_breaks", _break_seal_over_wrong_bin)
+
+
+def tool_sticks() -> Effect:
+    """The tool keeps its object when it opens while this lasts: `Release` is `stuck`."""
+    return Effect("tool_sticks", answers={"open": _keep_object})
+
+
+def arm_runs_into(what: str = "something", share: float = 0.5) -> Effect:
+    """The arm runs into an obstacle once and breaks off its motion: the skill is `blocked`.
+
+    Args:
+        what: The obstacle, for the message of the failure.
+        share: Share of the motion after which this happens, 0 to 1.
+
+    Raises:
+        InputError: The share is not more than 0 and less than 1.
+    """
+    return Effect("arm_runs_into", _block_arm, arguments=(what, checked_share(share)))
+
+
+def no_way(*, is_blocked: bool = False) -> Effect:
+    """The planner finds no motion while this lasts: the skill is `unreachable`, or `blocked`.
+
+    Args:
+        is_blocked: True if an obstacle is in the way; False if the goal is out of reach.
+    """
+    return Effect("no_way", answers={"plan": _plan_in_vain}, arguments=(is_blocked,))
+
+
+def workspace_hidden() -> Effect:
+    """The arm hides everything from the camera while this lasts: `Detect` is `hidden`, or sees nothing."""
+    return Effect("workspace_hidden", answers={"sees_table": _answer, "capture": _hide}, arguments=(False,))
+
+
+def no_depth() -> Effect:
+    """No detection can be localized while this lasts: `Localize` fails with `no_depth`."""
+    return Effect("no_depth", answers={"localize": _lose_depth})
+
+
+def table_bumped() -> Effect:
+    """Something bumps the table once, and the ledger is informed: frames and targets are `stale`."""
+    return Effect("table_bumped", _bump_table)
+
+
+def operator_quits() -> Effect:
+    """The operator wants nothing more while this lasts: `AwaitRequest` fails with `quit`."""
+    return Effect("operator_quits", answers={"ask": _answer}, arguments=(None,))
+
+
+def operator_asks_rescan() -> Effect:
+    """The operator wants a new look while this lasts: `AwaitRequest` fails with `rescan`."""
+    return Effect("operator_asks_rescan", answers={"ask": _answer}, arguments=("rescan",))
+
+
+def _answer(proceed: Callable[[], object], now: Occasion, answer: object) -> object:
+    """Return an answer without the cell."""
+    del proceed
+    now.tell()
+    return answer
+
+
+def _keep_object(proceed: Callable[[], None], now: Occasion) -> None:
+    if (held := now.scene.hand.held) is None:
+        proceed()
+    else:
         now.tell(held)
-        now.scene.hand.part()
-        return True
 
 
-@dataclass(frozen=True)
-class SealBreaksOverWrongBin(Effect):
-    """The seal gives way, once, when the object hangs over a bin that is wrong for it."""
-
-    name = "seal_breaks"
-
-    def act(self, now: Occasion) -> bool:
-        """Part tool and object there."""
-        scene, held = now.scene, now.scene.hand.held
-        if held is None or scene.progress == 0.0:
-            return False
-        right = scene.cell.routes.get(held.label, ())
-        bins = scene.cell.bins.items()
-        if not any(name not in right and bin.contains(held.position) for name, bin in bins):
-            return False
-        now.tell(held)
-        scene.hand.part()
-        return True
+def _break_seal(now: Occasion, share: float) -> bool:
+    held = now.scene.hand.held
+    if held is None or now.scene.progress < share:
+        return False
+    now.tell(held)
+    now.scene.hand.part()
+    return True
 
 
-@dataclass(frozen=True)
-class ToolSticks(Effect):
-    """The tool does not let go of what hangs there when it opens."""
-
-    name = "tool_sticks"
-
-    def open(self, do: Callable[[], None], now: Occasion) -> None:
-        """Leave the tool closed, if it holds something."""
-        if (held := now.scene.hand.held) is None:
-            do()
-        else:
-            now.tell(held)
+def _break_seal_over_wrong_bin(now: Occasion) -> bool:
+    scene, held = now.scene, now.scene.hand.held
+    if held is None or scene.progress == 0.0:
+        return False
+    right = scene.cell.routes.get(held.label, ())
+    bins = scene.cell.bins.items()
+    is_over_wrong_bin = any(name not in right and bin.contains(held.position) for name, bin in bins)
+    return is_over_wrong_bin and _break_seal(now, 0.0)
 
 
-@dataclass(frozen=True)
-class ArmRunsInto(Effect):
-    """The arm runs into something, once, when it has gone so far."""
-
-    name = "arm_runs_into"
-    what: str
-    share: float
-
-    def act(self, now: Occasion) -> bool:
-        """Stand in the way, if the arm is so far."""
-        if now.scene.progress < self.share:
-            return False
-        now.tell()
-        now.scene.hand.stand_in_the_way(f"the arm ran into {self.what}")
-        return True
+def _block_arm(now: Occasion, what: str, share: float) -> bool:
+    if now.scene.progress < share:
+        return False
+    now.tell()
+    now.scene.hand.stand_in_the_way(f"the arm ran into {what}")
+    return True
 
 
-@dataclass(frozen=True)
-class NoWay(Effect):
-    """The planner finds no motion."""
+def _bump_table(now: Occasion) -> bool:
+    now.tell()
+    now.scene.cell.ledger.bumped()
+    return True
 
-    name = "no_way"
-    is_blocked: bool
 
-    def plan(self, ask: Callable[[], Planning], now: Occasion) -> Planning:
-        """Take as long as ever, and find none."""
-        now.tell()
-        return PlanInVain(ask(), self.is_blocked)
+def _hide(proceed: Callable[[], Frame], now: Occasion, answer: object) -> Frame:
+    """Return a frame that shows the arm alone."""
+    del answer
+    now.tell()
+    frame = proceed()
+    return replace(frame, visible=np.zeros_like(frame.visible))
+
+
+def _lose_depth(proceed: Callable[[], Any], now: Occasion) -> Any:
+    del proceed
+    now.tell()
+    raise NoDepth("the frame has no depth there, as the test wants it")
 
 
 @dataclass(frozen=True)
 class PlanInVain:
-    """A motion being planned that does not exist; implements `Planning`."""
+    """A plan that takes its time and finds no motion; implements `Planning`."""
 
     planning: Planning
     is_blocked: bool
@@ -126,134 +168,6 @@ class PlanInVain:
         raise Unreachable("the planner finds no way, as the test wants it")
 
 
-@dataclass(frozen=True)
-class WorkspaceHidden(Effect):
-    """The arm hides everything from the camera."""
-
-    name = "workspace_hidden"
-
-    def sees_table(self, ask: Callable[[], bool], now: Occasion) -> bool:
-        """Say no."""
-        del ask
-        now.tell()
-        return False
-
-    def capture(self, ask: Callable[[], Frame], now: Occasion) -> Frame:
-        """Return a frame that shows the arm alone."""
-        now.tell()
-        frame = ask()
-        return replace(frame, visible=np.zeros_like(frame.visible))
-
-
-@dataclass(frozen=True)
-class DepthMissing(Effect):
-    """No detection can be localized."""
-
-    name = "no_depth"
-
-    def localize(self, ask: Callable[[], Sequence[Observation]], now: Occasion) -> Sequence[Observation]:
-        """Raise NoDepth."""
-        del ask
-        now.tell()
-        raise NoDepth("the frame has no depth there, as the test wants it")
-
-
-@dataclass(frozen=True)
-class TableBumped(Effect):
-    """Something bumps the table, once, and the ledger is informed: nothing need be where it was."""
-
-    name = "table_bumped"
-
-    def act(self, now: Occasion) -> bool:
-        """Put every position in doubt."""
-        now.tell()
-        now.scene.cell.ledger.bumped()
-        return True
-
-
-@dataclass(frozen=True)
-class OperatorSays(Effect):
-    """The operator gives an answer first, and only then those that they would have given."""
-
-    name: str
-    answer: str | None
-
-    def ask(self, ask: Callable[[], str | None], now: Occasion) -> str | None:
-        """Answer for the operator."""
-        del ask
-        now.tell()
-        return self.answer
-
-
-def seal_fails() -> Effect:
-    """Nothing seals to the tool while it lasts: `Grasp` is `missed`."""
-    return SealFails()
-
-
-def seal_breaks(share: float | None = 0.5) -> Effect:
-    """The seal gives way in mid-carry, once, and the object falls: `Transit` is `dropped`.
-
-    Args:
-        share: Share of its motion that the arm has then behind it, 0 to 1; None: at once, at rest too.
-
-    Raises:
-        InputError: There is no such share.
-    """
-    return SealBreaks(checked_share(share))
-
-
-def seal_breaks_over_wrong_bin() -> Effect:
-    """The seal gives way, once, over a bin that is wrong for the object, which falls in."""
-    return SealBreaksOverWrongBin()
-
-
-def tool_sticks() -> Effect:
-    """The tool does not let go when it is opened while it lasts: `Release` is `stuck`."""
-    return ToolSticks()
-
-
-def arm_runs_into(what: str = "something", share: float = 0.5) -> Effect:
-    """The arm runs into something on its way, once, and breaks its motion off: the skill is `blocked`.
-
-    Args:
-        what: The obstacle, for the text of the failure.
-        share: Share of its motion that the arm has then behind it, 0 to 1.
-
-    Raises:
-        InputError: There is no such share.
-    """
-    return ArmRunsInto(what, checked_share(share))
-
-
-def no_way(*, is_blocked: bool = False) -> Effect:
-    """The planner finds no way while it lasts: the skill is `unreachable`, or `blocked`.
-
-    Args:
-        is_blocked: Something is in the way; else the goal is out of reach.
-    """
-    return NoWay(is_blocked)
-
-
-def workspace_hidden() -> Effect:
-    """The arm hides everything from the camera while it lasts: `Detect` is `hidden`, or sees nothing."""
-    return WorkspaceHidden()
-
-
-def no_depth() -> Effect:
-    """No detection can be localized while it lasts: `Localize` fails with `no_depth`."""
-    return DepthMissing()
-
-
-def table_bumped() -> Effect:
-    """Something bumps the table, once, and the ledger hears of it: frames and targets are `stale`."""
-    return TableBumped()
-
-
-def operator_quits() -> Effect:
-    """The operator wants nothing more while it lasts: `AwaitRequest` fails with `quit`."""
-    return OperatorSays("operator_quits", None)
-
-
-def operator_asks_rescan() -> Effect:
-    """The operator wants a fresh look while it lasts: `AwaitRequest` fails with `rescan`."""
-    return OperatorSays("operator_asks_rescan", "rescan")
+def _plan_in_vain(proceed: Callable[[], Planning], now: Occasion, is_blocked: bool) -> Planning:
+    now.tell()
+    return PlanInVain(proceed(), is_blocked)

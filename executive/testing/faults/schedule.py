@@ -49,17 +49,16 @@ class Schedule:
         for occasion in self._happening:
             self._act(occasion)
 
-    def through(self, hook: str, ask: Callable[[], Any]) -> Any:
-        """Return the cell's answer to a question after everything that happens now has had to do with it.
+    def through(self, member: str, proceed: Callable[[], Any]) -> Any:
+        """Return the answer of a member of the cell, changed by all effects that last now.
 
-        `hook` says which method of an effect has to do with such questions, `ask` asks the cell.
+        `proceed` asks the cell.
         """
         self.step()
         for occasion in self._happening:
-            disturb = getattr(occasion.effect, hook, None)
-            if disturb is not None:
-                ask = partial(disturb, ask, occasion)
-        return ask()
+            if answer := occasion.effect.answers.get(member):
+                proceed = partial(answer, proceed, occasion, *occasion.effect.arguments)
+        return proceed()
 
     def _node_begins(self, path: str, item: str) -> None:
         for number, (effect, when) in enumerate(self._by_node):
@@ -79,5 +78,6 @@ class Schedule:
             self._happening.remove(occasion)
 
     def _act(self, occasion: Occasion) -> None:
-        if not occasion.done:
-            occasion.done = occasion.effect.act(occasion)
+        effect = occasion.effect
+        if effect.act is not None and not occasion.done:
+            occasion.done = effect.act(occasion, *effect.arguments)

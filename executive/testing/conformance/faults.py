@@ -1,0 +1,75 @@
+"""Faults under which a skill is tried: one at a time, in every situation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from executive.cells.fake.arm import FakeMotion
+from executive.skill import Skill
+from executive.testing import faults
+from executive.testing.faults.effect import Effect, Occasion
+
+SEAL_BREAKS = 20
+"""Number of moments, spread over a run, at which the seal breaks."""
+BRAKING_STEPS = 24
+"""Control steps for which the arm still moves at the start."""
+MAX_OBJECTS = 10
+"""Number of objects that are taken off the table."""
+
+
+@dataclass(frozen=True)
+class SkillFault:
+    """A fault of the cell in a run of a skill.
+
+    Attributes:
+        name: Description that continues a sentence: `while nothing seals`.
+        effect: The effect.
+        uses: Part that a skill must use to be affected; "" for any skill.
+        holding: True if the fault matters only if the tool holds something at the start.
+        times: Number of times that it happens at once.
+        tick: Control step before which it begins.
+    """
+
+    name: str
+    effect: Effect
+    uses: str = ""
+    holding: bool = False
+    times: int = 1
+    tick: int = 0
+
+
+def faults_of(skill: type[Skill], ticks: int, *, holding: bool) -> Iterator[SkillFault]:
+    """Yield the faults for a skill that takes `ticks` control steps without a fault."""
+    for fault in _FAULTS:
+        if (not fault.uses or fault.uses in skill.uses) and holding >= fault.holding:
+            yield fault
+    if "tool" in skill.uses:
+        for tick in sorted({round(ticks * part / SEAL_BREAKS) for part in range(SEAL_BREAKS + 1)}):
+            yield SkillFault(f"while the seal breaks at tick {tick}", faults.seal_breaks(None), tick=tick)
+
+
+def _move_arm(now: Occasion) -> bool:
+    """Start a motion, as if another skill had used the arm before."""
+    arm = now.scene.cell.arm
+    arm.start(FakeMotion([arm.tool_pose] * BRAKING_STEPS))
+    return True
+
+
+_FAULTS = (
+    SkillFault("while nothing seals", faults.seal_fails(), "tool"),
+    SkillFault("while what the tool holds does not come off", faults.tool_sticks(), "tool", holding=True),
+    SkillFault("while everything on the table is gone", faults.object_removed("nearest"), times=MAX_OBJECTS),
+    SkillFault("while the table has changed since the look", faults.table_bumped()),
+    SkillFault("while the arm runs into something", faults.arm_runs_into(), "arm"),
+    SkillFault("while the arm still moves at the start", Effect("arm_moves", _move_arm), "arm"),
+    SkillFault("while no plan reaches the goal", faults.no_way(), "arm"),
+    SkillFault("while every way is blocked", faults.no_way(is_blocked=True), "arm"),
+    SkillFault("while the arm hides the table", faults.workspace_hidden()),
+    SkillFault("while no depth is seen", faults.no_depth()),
+    SkillFault("while no detector answers", faults.detector_dead()),
+    SkillFault("while the detectors see nothing", faults.detector_blind()),
+    SkillFault("while the detectors are unsure", faults.detector_unsure()),
+    SkillFault("while the operator quits", faults.operator_quits()),
+    SkillFault("while the operator wants a fresh look", faults.operator_asks_rescan()),
+)
