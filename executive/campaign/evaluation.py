@@ -19,12 +19,12 @@ from executive.mission.findings import alternatives
 from executive.perception.detectors.registry import find_problems
 from executive.perception.localization.localizer import build_localizer
 from executive.training.evaluation.asking import CellDetector
-from executive.training.evaluation.evaluate import evaluate
+from executive.training.evaluation.evaluate import MIN_CONFIDENCE, MODEL_NAME, evaluate, model_detector
 from executive.training.evaluation.figures import Evaluation
 from executive.training.evaluation.misses import WorstMisses
-from executive.training.evaluation.model_file import FLOOR, MODEL_NAME, model_detector
+from executive.training.labelled_image import LabelledImage
 from executive.training.rendering import generate, run_frames
-from executive.training.samples import LabelledImage, Samples
+from executive.training.samples import Samples
 
 MAX_OBJECTS = 20
 """Largest number of objects in a scene, if the workspace has room for so many."""
@@ -96,7 +96,7 @@ def list_detectors(
     if weights is not None:
         alone = {MODEL_NAME: model_detector(weights, labels or _labels_beside(weights))}
     elif not cells:
-        alone = {"embedded": DetectorConfig(kind="embedded", floor=FLOOR)}
+        alone = {"embedded": DetectorConfig(kind="embedded", floor=MIN_CONFIDENCE)}
     if not cells:
         yield DetectorUnderTest(None, alone, next(iter(alone)), Path())
     for file, config in cells.items():

@@ -20,7 +20,7 @@ from executive.errors import InputError
 from executive.geometry import Array
 from executive.processes import Workers
 from executive.training.dataset import Entry, image_path, save_image, write_annotations
-from executive.training.samples import LabelledImage
+from executive.training.labelled_image import LabelledImage
 
 T = TypeVar("T")
 Progress = Callable[[int, int], None]

@@ -1,10 +1,9 @@
-"""Reading labelled images back, to measure a detector with: COCO and YOLO folders, Roboflow's among them."""
+"""Reader of labelled images in COCO and YOLO folders, for instance exports of Roboflow."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,40 +11,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.frame import Box
 from executive.errors import InputError
-from executive.geometry import Array
 from executive.training.annotations import COCO_FILE_NAME, is_split, read_annotations
+from executive.training.labelled_image import LabelledImage
 
 SPLITS = ("test", "valid", "val", "train")
-"""Folders of a data set in which labelled images are sought, those that no training has used first."""
-
-
-@dataclass(frozen=True, eq=False)
-class LabelledImage:
-    """An image and what is on it.
-
-    Attributes:
-        file: File name.
-        image: `(H, W, 3)` uint8, RGB.
-        labels: Class of each object.
-        boxes: Their boxes [pixel], one to one.
-        ignored: Boxes of objects that a detector may find or not.
-        truth: What the renderer knows beyond that: `camera`, `part`, `matrix`, `X_WC`, `positions`, …
-        area: Part of the image [pixel] that is searched and labelled; None: all of it.
-        depth: `(H, W)` [m], as in a `Frame`; None without a depth sensor.
-        second: Another image of the same scene from the same pose; None without one.
-    """
-
-    file: str
-    image: NDArray[np.uint8]
-    labels: tuple[str, ...]
-    boxes: tuple[Box, ...]
-    ignored: tuple[Box, ...] = ()
-    truth: Mapping[str, Any] = field(default_factory=dict)
-    area: Box | None = None
-    depth: Array | None = None
-    second: NDArray[np.uint8] | None = None
+"""Folders of a data set with labelled images, beginning with those that no training has used."""
 
 
 class Samples:

@@ -9,7 +9,7 @@ from pathlib import Path
 from executive.errors import InputError
 from executive.perception.detectors.onnx_model import read_labels
 from executive.training.annotations import is_split, read_annotations
-from executive.training.evaluation.model_file import evaluate_folder
+from executive.training.evaluation.evaluate import evaluate_folder
 from executive.training.model_card import ModelCard, read_epochs
 from executive.training.samples import SPLITS
 

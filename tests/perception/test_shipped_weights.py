@@ -10,7 +10,7 @@ from executive.perception.detectors.embedded import LABELS, MODEL, WEIGHTS
 from executive.perception.detectors.onnx_model import read_labels
 from executive.training.evaluation.asking import CellDetector
 from executive.training.evaluation.evaluate import evaluate
-from executive.training.samples import LabelledImage
+from executive.training.labelled_image import LabelledImage
 
 
 def test_the_weights_fit_into_a_package_and_a_card_goes_with_them(missions):

@@ -9,7 +9,7 @@ import numpy as np
 
 from executive.cell.detection import Detection
 from executive.cell.frame import Box
-from executive.training.samples import LabelledImage
+from executive.training.labelled_image import LabelledImage
 
 
 class AveragePrecision:

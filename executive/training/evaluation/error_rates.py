@@ -35,6 +35,17 @@ class CountedRate:
     trials: int
     bound: float
 
+    @staticmethod
+    def share(events: int, trials: int) -> CountedRate:
+        """Return the share of the trials that are events; its bound is 1 if every trial is one."""
+        bound = float(betaincinv(events + 1, trials - events, CONFIDENCE)) if events < trials else 1.0
+        return CountedRate(events, trials, bound)
+
+    @staticmethod
+    def per_trial(events: int, trials: int) -> CountedRate:
+        """Return the mean number of events in a trial, which may hold several."""
+        return CountedRate(events, trials, float(gammaincinv(events + 1, CONFIDENCE)) / trials)
+
 
 @dataclass(frozen=True)
 class MeasuredErrorRates:
@@ -56,25 +67,6 @@ class MeasuredErrorRates:
     repeated: float
     bias: float
 
-    @staticmethod
-    def of(
-        *,
-        full_view_count: int,
-        missed: int,
-        confused: int,
-        invented: int,
-        looks: int,
-        jitter: float,
-        repeated: float,
-        bias: float,
-    ) -> MeasuredErrorRates:
-        """Return the error rates; `full_view_count` counts objects, `looks` counts answers."""
-        return MeasuredErrorRates(
-            _bound_share(missed, full_view_count), _bound_share(confused, full_view_count - missed),
-            CountedRate(invented, looks, float(gammaincinv(invented + 1, CONFIDENCE)) / looks), jitter,
-            repeated, bias,
-        )  # fmt: skip
-
     @property
     def rates(self) -> StoredErrorRates:
         """Rates for the ledger, rounded up: the bounds, the repeated share and the standard deviations."""
@@ -86,12 +78,6 @@ class MeasuredErrorRates:
             repeated=min(round_up(self.repeated), MAX_SHARE),
             bias=round_up(self.bias),
         )
-
-
-def _bound_share(events: int, trials: int) -> CountedRate:
-    """Return a share with its upper bound, 1 if every trial is an event."""
-    bound = float(betaincinv(events + 1, trials - events, CONFIDENCE)) if events < trials else 1.0
-    return CountedRate(events, trials, bound)
 
 
 def round_up(value: float, digits: int = 2) -> float:

@@ -6,20 +6,27 @@ import contextlib
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import replace
+from pathlib import Path
 
-from executive.cell.config import TableConfig
+from executive.cell.config import DetectorConfig, TableConfig
+from executive.cell.detection import Answer
 from executive.cell.protocols import Localizer
 from executive.errors import Unavailable
 from executive.perception.envelope.frame_statistics import FrameRange, FrameStatistics, measure_frame
 from executive.training.evaluation.asking import CellDetector
 from executive.training.evaluation.average_precision import AveragePrecision
 from executive.training.evaluation.figures import Evaluation, Spread
-from executive.training.evaluation.matching import is_ignored, match
+from executive.training.evaluation.matching import Match, is_ignored, match
 from executive.training.evaluation.misses import WorstMisses
 from executive.training.evaluation.repeats import RepeatedErrors
 from executive.training.evaluation.tally import Tally
-from executive.training.evaluation.truth import as_frame
-from executive.training.samples import LabelledImage
+from executive.training.labelled_image import LabelledImage
+from executive.training.samples import Samples
+
+MIN_CONFIDENCE = 0.01
+"""Confidence from which boxes of a model file count for the mean average precision."""
+MODEL_NAME = "model"
+"""Name of the detector of a model file."""
 
 
 def evaluate(
@@ -47,7 +54,7 @@ def evaluate(
     answered: Counter[str] = Counter()
     unavailable, why = 0, ""
     for number, sample in enumerate(samples, 1):
-        frame = as_frame(sample, number)
+        frame = sample.as_frame(number)
         try:
             answer, latency = detector.ask(frame)
         except Unavailable as error:
@@ -55,17 +62,14 @@ def evaluate(
             continue
         answered[answer.detector] += 1
         latencies.append(latency)
-        found = [one for one in answer.found if not is_ignored(one, sample)]
-        precision.add(found, sample)
-        least = answer.error_rates.threshold if threshold is None else threshold
-        matches = match([one for one in found if one.confidence >= least], sample)
+        precision.add([one for one in answer.found if not is_ignored(one, sample)], sample)
+        min_confidence = answer.error_rates.threshold if threshold is None else threshold
+        matches = _match(answer, sample, min_confidence)
         tally.add(matches, sample, frame)
         if sample.second is not None:
             with contextlib.suppress(Unavailable):
                 second, _ = detector.ask(replace(frame, image=sample.second))
-                found = [one for one in second.found if not is_ignored(one, sample)]
-                sure = [one for one in found if one.confidence >= least]
-                repeats.add(matches, match(sure, sample), sample, frame)
+                repeats.add(matches, _match(second, sample, min_confidence), sample, frame)
         if table is not None and (statistics := measure_frame(frame, table)):
             frames.append(statistics)
         if worst is not None:
@@ -93,3 +97,37 @@ def evaluate(
         reliability=tally.estimate_error_rates(repeats),
         frames=FrameRange.of(frames),
     )
+
+
+def _match(answer: Answer, sample: LabelledImage, min_confidence: float) -> list[Match]:
+    """Return the matches of the detections that count."""
+    found = [one for one in answer.found if one.confidence >= min_confidence]
+    return match([one for one in found if not is_ignored(one, sample)], sample)
+
+
+def model_detector(model: Path, labels: Path) -> DetectorConfig:
+    """Return the section of a cell file for an exported RF-DETR.
+
+    Args:
+        model: The ONNX file.
+        labels: The text file that lists its class names.
+    """
+    files = {"model_path": str(model.absolute()), "labels": str(labels.absolute())}
+    return DetectorConfig.model_validate({"kind": "rfdetr", "floor": MIN_CONFIDENCE, **files})
+
+
+def evaluate_folder(model: Path, labels: Path, folder: Path, threshold: float) -> Evaluation:
+    """Return how good an exported RF-DETR is on a folder of labelled images.
+
+    Args:
+        model: The ONNX file.
+        labels: The text file that lists its class names.
+        folder: A split, or a data set whose `test` or else `valid` split is used.
+        threshold: Confidence from which a detection counts.
+
+    Raises:
+        InputError: Model, labels or images cannot be read.
+    """
+    detector = CellDetector({MODEL_NAME: model_detector(model, labels)}, MODEL_NAME, base=Path())
+    with contextlib.closing(detector):
+        return evaluate(detector, Samples(folder), threshold=threshold)

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from executive.cell.detection import Detection
 from executive.cell.frame import Box
 from executive.geometry import Array
-from executive.training.samples import LabelledImage
+from executive.training.labelled_image import LabelledImage
 
-COVERED = 0.2
+MIN_COVERING_OVERLAP = 0.2
 """Overlap (intersection over union) from which a box covers a part of another object."""
-MATCH = 0.5
-"""Overlap (intersection over union) from which a box is the object's."""
+MIN_OVERLAP = 0.5
+"""Overlap (intersection over union) from which a box is the object's, or two boxes are at the same place."""
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,19 @@ class Match:
         detection: The detection.
         number: Number of the object it lies on, or None where there is none.
         right: True if the detection has the class of that object.
+        box: Box of that object [pixel]; that of the detection where there is none.
     """
 
     detection: Detection
     number: int | None
     right: bool
+    box: Box
+
+    @property
+    def offset(self) -> Array:
+        """Vector from the centre of the object's box to that of the detection, `(2,)` [pixel]."""
+        left, top, right, bottom = self.box
+        return np.array(self.detection.centre) - [(left + right) / 2, (top + bottom) / 2]
 
 
 def match(found: Sequence[Detection], sample: LabelledImage) -> list[Match]:
@@ -47,31 +55,27 @@ def match(found: Sequence[Detection], sample: LabelledImage) -> list[Match]:
     for allowed in (same_class.reshape(overlaps.shape), np.ones_like(overlaps)):
         for rank in range(len(ranked)):
             scores = overlaps[rank] * allowed[rank]
-            if rank not in taken and scores.size and scores.max() >= MATCH:
+            if rank not in taken and scores.size and scores.max() >= MIN_OVERLAP:
                 taken[rank] = int(scores.argmax())
                 overlaps[:, taken[rank]] = 0.0
-    return [
-        Match(one, taken.get(rank), rank in taken and sample.labels[taken[rank]] == one.label)
-        for rank, one in enumerate(ranked)
-    ]
+    matches = []
+    for rank, one in enumerate(ranked):
+        number = taken.get(rank)
+        is_right = number is not None and sample.labels[number] == one.label
+        matches.append(Match(one, number, is_right, one.box if number is None else sample.boxes[number]))
+    return matches
 
 
 def is_covered(number: int, matches: Sequence[Match], sample: LabelledImage) -> bool:
     """Return True if a detection of another object overlaps an object: it is looked at again afterwards."""
     others = [one.detection.box for one in matches if one.number not in (None, number)]
-    return bool(overlap([sample.boxes[number]], others).max(initial=0.0) >= COVERED)
+    return bool(overlap([sample.boxes[number]], others).max(initial=0.0) >= MIN_COVERING_OVERLAP)
 
 
 def is_ignored(detection: Detection, sample: LabelledImage) -> bool:
     """Return True for a detection of one of the objects that may be found or not."""
     best = overlap([detection.box], sample.ignored).max(initial=0.0)
-    return bool(best >= MATCH and best > overlap([detection.box], sample.boxes).max(initial=0.0))
-
-
-def offset_of(one: Match, number: int, sample: LabelledImage) -> Array:
-    """Return the vector from the centre of object `number`'s box to that of the found one, `(2,)` [pixel]."""
-    left, top, right, bottom = sample.boxes[number]
-    return np.array(one.detection.centre) - [(left + right) / 2, (top + bottom) / 2]
+    return bool(best >= MIN_OVERLAP and best > overlap([detection.box], sample.boxes).max(initial=0.0))
 
 
 def overlap(boxes: Sequence[Box], others: Sequence[Box]) -> NDArray[np.float32]:

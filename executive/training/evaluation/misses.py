@@ -9,9 +9,8 @@ import numpy as np
 
 from executive.cell.detection import Detection
 from executive.cell.frame import Box
-from executive.training.evaluation.matching import Match, offset_of
-from executive.training.evaluation.truth import is_whole, visible_fraction
-from executive.training.samples import LabelledImage
+from executive.training.evaluation.matching import Match
+from executive.training.labelled_image import LabelledImage
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,32 +55,27 @@ class WorstMisses:
 
 
 def misses(matches: Sequence[Match], sample: LabelledImage) -> Iterator[Miss]:
-    """Yield everything that is wrong in the answer to one image, and every box that is right but off."""
+    """Yield the mistakes in the answer to one image, and every right detection with the offset of its box."""
     found = tuple(one.detection for one in matches)
     taken = {one.number for one in matches}
     for number, label in enumerate(sample.labels):
         if number not in taken:
-            share = visible_fraction(sample, number)
-            box = sample.boxes[number]
-            cut = "" if is_whole(box, sample) else ", cut off"
+            share = sample.visible_fraction(number)
+            cut = "" if sample.is_whole(number) else ", cut off"
             showing = "" if share >= 0.995 else f", {share:.0%} visible"
-            yield Miss(share / (2 if cut else 1), f"{label} overlooked{showing}{cut}", box, sample, found)
+            text = f"{label} overlooked{showing}{cut}"
+            yield Miss(share / (2 if cut else 1), text, sample.boxes[number], sample, found)
     for one in matches:
-        box, confidence = one.detection.box, one.detection.confidence
-        named = f"{one.detection.label} {confidence:.2f}"
-        if one.number is None:
-            yield Miss(confidence, f"no such thing: {named}", box, sample, found)
-        elif not one.right:
-            text = f"{sample.labels[one.number]} taken for {named}"
-            yield Miss(confidence, text, _around(box, sample.boxes[one.number]), sample, found)
+        box, severity = one.detection.box, one.detection.confidence
+        text = f"{one.detection.label} {severity:.2f}"
+        if one.right:
+            offset = float(np.hypot(*one.offset))
+            size = max(one.box[2] - one.box[0], one.box[3] - one.box[1], 1.0)
+            severity, text = min(offset / size, 1.0), f"{one.detection.label} off by {offset:.1f} px"
+        elif one.number is None:
+            text = f"no such thing: {text}"
         else:
-            true = sample.boxes[one.number]
-            offset = float(np.hypot(*offset_of(one, one.number, sample)))
-            size = max(true[2] - true[0], true[3] - true[1], 1.0)
-            text = f"{one.detection.label} off by {offset:.1f} px"
-            yield Miss(min(offset / size, 1.0), text, _around(box, true), sample, found)
-
-
-def _around(one: Box, other: Box) -> Box:
-    """Return the box around two boxes."""
-    return min(one[0], other[0]), min(one[1], other[1]), max(one[2], other[2]), max(one[3], other[3])
+            text = f"{sample.labels[one.number]} taken for {text}"
+        left, top, right, bottom = one.box
+        around = min(box[0], left), min(box[1], top), max(box[2], right), max(box[3], bottom)
+        yield Miss(severity, text, around, sample, found)

@@ -12,12 +12,8 @@ from executive.cell.frame import Frame
 from executive.cell.protocols import Localizer
 from executive.errors import NoDepth
 from executive.geometry import Array
-from executive.training.evaluation.matching import Match, is_covered, offset_of, overlap
-from executive.training.evaluation.truth import in_full_view, pixel_size
-from executive.training.samples import LabelledImage
-
-MIN_OVERLAP = 0.5
-"""Overlap (intersection over union) from which two false detections are at the same place."""
+from executive.training.evaluation.matching import MIN_OVERLAP, Match, is_covered, overlap
+from executive.training.labelled_image import LabelledImage
 
 
 class RepeatedErrors:
@@ -47,7 +43,7 @@ class RepeatedErrors:
         before = {one.number: one for one in first if one.number is not None}
         after = {one.number: one for one in second if one.number is not None}
         for number, label in enumerate(sample.labels):
-            if not in_full_view(sample, number):
+            if not sample.is_in_full_view(number):
                 continue
             one, other = before.get(number), after.get(number)
             if one is None and is_covered(number, first, sample):
@@ -82,8 +78,7 @@ class RepeatedErrors:
     def _compare(self, one: Match, other: Match, sample: LabelledImage, frame: Frame) -> None:
         """Compare the boxes and positions of one object in both looks."""
         assert one.number is not None
-        size = pixel_size(sample)
-        difference = (offset_of(one, one.number, sample) - offset_of(other, one.number, sample)) * size
+        difference = (one.offset - other.offset) * sample.pixel_size
         self._random += (difference**2 / 2).tolist()
         if self._localizer is None or "centres" not in sample.truth:
             return

@@ -1,4 +1,4 @@
-"""Running counts and measurements over the images."""
+"""Counts and measurements over all images."""
 
 from __future__ import annotations
 
@@ -12,25 +12,23 @@ from executive.cell.frame import Frame
 from executive.cell.protocols import Localizer
 from executive.errors import NoDepth
 from executive.perception.camera_model import intersect_plane
-from executive.training.evaluation.error_rates import MeasuredErrorRates
+from executive.training.evaluation.error_rates import CountedRate, MeasuredErrorRates
 from executive.training.evaluation.figures import NOTHING, ClassFigures
-from executive.training.evaluation.matching import Match, is_covered, offset_of
+from executive.training.evaluation.matching import Match, is_covered
 from executive.training.evaluation.repeats import RepeatedErrors
-from executive.training.evaluation.truth import in_full_view, is_whole, pixel_size
-from executive.training.samples import LabelledImage
+from executive.training.labelled_image import LabelledImage
 
 
 class Tally:
     """Counts of right and wrong detections, and distances between found and true places.
 
     Args:
-        localizer: Turns detections into positions, to be compared with the objects' true ones.
+        localizer: Computes the positions of detections, which are compared with the true ones.
 
     Attributes:
-        objects: Number of objects on the images.
         by_count: Numbers of `objects` in full view, `missed`, `confused` and `invented` ones by the number of
             objects on the image.
-        confusion: Number of times that a true class was taken for another, `nothing` among both.
+        confusion: Number of detections by true and found class, `nothing` among both.
         centre: Distances between the centres of found and true box, of right detections [pixel of the image].
         position: These distances in the world, at the object's height, of objects wholly in view [mm].
         localized: Distances from the localizer's position to the object's true middle, of the same [mm].
@@ -38,46 +36,43 @@ class Tally:
 
     def __init__(self, localizer: Localizer | None = None) -> None:
         self._localizer = localizer
-        self._looks = self.objects = self._found = self._right = 0
-        # Of objects in full view: how many there are, were overlooked and were given a wrong class.
-        self._whole = self._overlooked = self._confused = 0
+        self._looks = 0
         self._squares: list[float] = []
         self.by_count: dict[int, Counter[str]] = defaultdict(Counter)
         self.confusion: Counter[tuple[str, str]] = Counter()
-        self.centre: list[float] = []
-        self.position: list[float] = []
-        self.localized: list[float] = []
+        self.centre, self.position, self.localized = list[float](), list[float](), list[float]()
 
     def add(self, matches: Sequence[Match], sample: LabelledImage, frame: Frame) -> None:
         """Count the answer to one image, with the detections that count."""
         self._looks += 1
-        self.objects += len(sample.labels)
-        self._found += len(matches)
-        self._right += sum(one.right for one in matches)
+        counts = self.by_count[len(sample.labels)]
         taken = {one.number: one for one in matches if one.number is not None}
         for number, label in enumerate(sample.labels):
             one = taken.get(number)
             self.confusion[label, one.detection.label if one else NOTHING] += 1
-            if in_full_view(sample, number) and (one or not is_covered(number, matches, sample)):
-                missed, confused = one is None, one is not None and not one.right
-                self._whole += 1
-                self._overlooked += missed
-                self._confused += confused
-                self.by_count[len(sample.labels)].update(objects=1, missed=missed, confused=confused)
+            if sample.is_in_full_view(number) and (one or not is_covered(number, matches, sample)):
+                is_confused = one is not None and not one.right
+                counts.update(objects=1, missed=one is None, confused=is_confused)
             if one is not None and one.right:
                 self._measure(one, number, sample, frame)
         invented = [one.detection.label for one in matches if one.number is None]
         self.confusion.update((NOTHING, label) for label in invented)
-        self.by_count[len(sample.labels)].update(invented=len(invented))
+        counts.update(invented=len(invented))
+
+    @property
+    def objects(self) -> int:
+        """Number of objects on the images."""
+        return sum(count for (true, _), count in self.confusion.items() if true != NOTHING)
 
     @property
     def precision(self) -> float:
-        """Share of the detections that are right; 0 where there were none."""
-        return self._right / max(self._found, 1)
+        """Share of the detections that are right; 0 without detections."""
+        found = sum(count for (_, label), count in self.confusion.items() if label != NOTHING)
+        return self._right / max(found, 1)
 
     @property
     def recall(self) -> float:
-        """Share of the objects that were found; 0 where there were none."""
+        """Share of the objects that were found; 0 without objects."""
         return self._right / max(self.objects, 1)
 
     def by_class(self) -> dict[str, ClassFigures]:
@@ -91,7 +86,7 @@ class Tally:
         return figures
 
     def table(self) -> dict[str, dict[str, int]]:
-        """Return the table of confusions: true class, then the class found, then how often."""
+        """Return the table of confusions: true class, then found class, then number of detections."""
         rows, columns = (
             sorted({pair[side] for pair in self.confusion}, key=lambda label: (label == NOTHING, label))
             for side in (0, 1)
@@ -99,28 +94,30 @@ class Tally:
         return {true: {found: self.confusion[true, found] for found in columns} for true in rows}
 
     def estimate_error_rates(self, repeats: RepeatedErrors) -> MeasuredErrorRates | None:
-        """Return the error rates on objects in full view, None where nothing was answered."""
+        """Return the error rates on objects in full view, or None without an answer."""
         if not self._looks:
             return None
+        counts = sum(self.by_count.values(), Counter[str]())
         total = float(np.sqrt(np.mean(self._squares))) if self._squares else 0.0
-        return MeasuredErrorRates.of(
-            full_view_count=self._whole,
-            missed=self._overlooked,
-            confused=self._confused,
-            invented=sum(count for (true, _), count in self.confusion.items() if true == NOTHING),
-            looks=self._looks,
+        return MeasuredErrorRates(
+            misses=CountedRate.share(counts["missed"], counts["objects"]),
+            confused=CountedRate.share(counts["confused"], counts["objects"] - counts["missed"]),
+            invented=CountedRate.per_trial(counts["invented"], self._looks),
             jitter=total if repeats.jitter is None else repeats.jitter,
             repeated=repeats.repeated_share,
             bias=repeats.bias,
         )
 
+    @property
+    def _right(self) -> int:
+        return sum(count for (true, found), count in self.confusion.items() if true == found)
+
     def _measure(self, one: Match, number: int, sample: LabelledImage, frame: Frame) -> None:
-        """Measure how far a right detection is from the object `number`."""
-        offset = offset_of(one, number, sample)
-        self.centre.append(float(np.hypot(*offset)))
-        if in_full_view(sample, number):
-            self._squares += ((offset * pixel_size(sample)) ** 2).tolist()
-        if not is_whole(sample.boxes[number], sample):
+        """Measure the distance of a right detection from the object `number`."""
+        self.centre.append(float(np.hypot(*one.offset)))
+        if sample.is_in_full_view(number):
+            self._squares += ((one.offset * sample.pixel_size) ** 2).tolist()
+        if not sample.is_whole(number):
             return
         if "positions" in sample.truth:
             true = np.array(sample.truth["positions"][number])

@@ -13,7 +13,6 @@ from executive.errors import Unavailable
 from executive.perception.detectors.views import parts_of
 from executive.training.evaluation import asking
 from executive.training.evaluation.asking import WHOLE_IMAGE, CellDetector
-from executive.training.evaluation.truth import as_frame
 
 CONFIGS = {"eye": DetectorConfig(kind="embedded", threshold=0.6)}
 FOUND = tuple(Detection(label, 0.9, (1.0, 2.0, 3.0, 4.0)) for label in ("cube", "boat"))
@@ -64,7 +63,7 @@ def build(monkeypatch):
 
 @pytest.fixture
 def frame(sample):
-    return as_frame(sample, 1)
+    return sample.as_frame(1)
 
 
 def test_an_answer_is_waited_for_on_the_clock(build, frame):

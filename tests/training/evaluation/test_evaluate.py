@@ -9,7 +9,7 @@ import pytest
 
 from executive.errors import NoDepth
 from executive.perception.envelope.measurement import StoredErrorRates
-from executive.training.evaluation.error_rates import MeasuredErrorRates, round_up
+from executive.training.evaluation.error_rates import CountedRate, MeasuredErrorRates, round_up
 from executive.training.evaluation.evaluate import evaluate
 from executive.training.evaluation.figures import ClassFigures, Spread
 from executive.training.evaluation.misses import WorstMisses
@@ -143,9 +143,9 @@ def test_a_spread_names_its_quantiles():
 
 
 def rates(full_view_count, missed, confused, invented, looks, jitter):
-    return MeasuredErrorRates.of(
-        full_view_count=full_view_count, missed=missed, confused=confused, invented=invented, looks=looks,
-        jitter=jitter, repeated=0.751, bias=0.00112,
+    return MeasuredErrorRates(
+        CountedRate.share(missed, full_view_count), CountedRate.share(confused, full_view_count - missed),
+        CountedRate.per_trial(invented, looks), jitter, repeated=0.751, bias=0.00112,
     )  # fmt: skip
 
 

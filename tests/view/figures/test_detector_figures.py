@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from executive.training.evaluation.error_rates import MeasuredErrorRates
+from executive.training.evaluation.error_rates import CountedRate, MeasuredErrorRates
 from executive.training.evaluation.figures import ClassFigures, Evaluation, Spread
 from executive.view.figures.detector import print_figures
 
@@ -16,8 +16,9 @@ MEASURED = Evaluation(
     by_class={"cube": ClassFigures(900, 0.991, 0.98)},
     confusion={"cube": {"cube": 882, "nothing": 18}, "nothing": {"cube": 8, "nothing": 0}},
     answered_by={"eye": 300},
-    reliability=MeasuredErrorRates.of(
-        full_view_count=800, missed=2, confused=0, invented=8, looks=300, jitter=0.5, repeated=0.8, bias=0.001
+    reliability=MeasuredErrorRates(
+        CountedRate.share(2, 800), CountedRate.share(0, 798), CountedRate.per_trial(8, 300),
+        jitter=0.5, repeated=0.8, bias=0.001,
     ),
 )  # fmt: skip
 
