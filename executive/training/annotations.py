@@ -30,7 +30,7 @@ NORMALIZED_TOLERANCE = 1e-6
 """Accepted amount by which a normalized coordinate may lie outside of 0 to 1, because of rounding."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class ImageAnnotation:
     """The labelled objects of an image.
 
@@ -41,16 +41,26 @@ class ImageAnnotation:
         polygon_count: Number of boxes that were made from polygons.
     """
 
-    labels: tuple[str, ...] = ()
-    boxes: tuple[Box, ...] = ()
+    labels: list[str] = field(default_factory=list)
+    boxes: list[Box] = field(default_factory=list)
     is_normalized: bool = False
     polygon_count: int = 0
 
     def boxes_in_pixels(self, width: int, height: int) -> tuple[Box, ...]:
         """Return the boxes in pixels for an image of `width` by `height` pixels."""
-        if not self.is_normalized:
-            return self.boxes
-        return tuple((x0 * width, y0 * height, x1 * width, y1 * height) for x0, y0, x1, y1 in self.boxes)
+        x, y = (width, height) if self.is_normalized else (1, 1)
+        return tuple((x0 * x, y0 * y, x1 * x, y1 * y) for x0, y0, x1, y1 in self.boxes)
+
+    def add(self, label: str, box: Box, place: str) -> None:
+        """Add an object.
+
+        Raises:
+            InputError: The image has too many objects; the message begins with `place`.
+        """
+        if len(self.labels) == MAX_OBJECTS:
+            raise InputError(f"{place} more than {MAX_OBJECTS} objects; divide the image")
+        self.labels.append(label)
+        self.boxes.append(box)
 
 
 Annotations = Mapping[Path, ImageAnnotation]
@@ -85,15 +95,6 @@ class _YoloClassFile(BaseModel):
     names: dict[int, str] | list[str]
 
 
-@dataclass
-class _Objects:
-    """Mutable lists in which the objects of one image are collected while its file is read."""
-
-    labels: list[str] = field(default_factory=list)
-    boxes: list[Box] = field(default_factory=list)
-    polygon_count: int = 0
-
-
 def is_split(folder: Path) -> bool:
     """Return True if a folder holds labelled images."""
     return (folder / COCO_FILE_NAME).is_file() or (
@@ -116,7 +117,7 @@ def _read_coco(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
     file = split / COCO_FILE_NAME
     content = _parse(file, MAX_COCO_SIZE, lambda text: _CocoFile.model_validate_json(text))
     names = {category.id: category.name for category in content.categories}
-    objects = {image.id: _Objects() for image in content.images}
+    objects = {image.id: ImageAnnotation() for image in content.images}
     for what, values in (
         ("images have the same id", [image.id for image in content.images]),
         ("images have the same file_name", [split / image.file_name for image in content.images]),
@@ -133,17 +134,11 @@ def _read_coco(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
                 f"there are {', '.join(map(str, names))[:MAX_QUOTED] or 'none'}"
             )
         left, top, width, height = one.bbox
-        if len(objects[one.image_id].labels) == MAX_OBJECTS:
-            raise InputError(
-                f"{file}: annotations[{number}].image_id: image {one.image_id} has more than {MAX_OBJECTS} "
-                "objects; divide the image"
-            )
-        objects[one.image_id].labels.append(names[one.category_id])
-        objects[one.image_id].boxes.append((left, top, left + width, top + height))
+        box, place = (left, top, left + width, top + height), f"{file}: annotations[{number}].image_id"
+        objects[one.image_id].add(names[one.category_id], box, f"{place}: image {one.image_id} has")
     for number, image in enumerate(content.images):
         path = _find_image(split, image.file_name, f"{file}: images[{number}].file_name")
-        found = objects[image.id]
-        yield path, ImageAnnotation(tuple(found.labels), tuple(found.boxes))
+        yield path, objects[image.id]
 
 
 def _read_yolo(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
@@ -165,9 +160,9 @@ def _read_yolo(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
 
 def _read_labels(file: Path, names: Mapping[int, str]) -> ImageAnnotation:
     """Return the objects in the label file of a YOLO image; an image without a file has none."""
+    objects = ImageAnnotation(is_normalized=True)
     if not os.path.lexists(file):
-        return ImageAnnotation(is_normalized=True)
-    objects = _Objects()
+        return objects
     for number, line in enumerate(_read_text(file, MAX_LABEL_SIZE).splitlines(), start=1):
         if not line.strip():
             continue
@@ -190,22 +185,15 @@ def _read_labels(file: Path, names: Mapping[int, str]) -> ImageAnnotation:
         # The comparison is False for numbers that are not finite.
         if not all(-NORMALIZED_TOLERANCE <= value <= 1 + NORMALIZED_TOLERANCE for value in numbers):
             raise InputError(f'{file}:{number}: coordinates must be normalized (0 to 1), not "{line}"')
-        if len(objects.labels) == MAX_OBJECTS:
-            raise InputError(f"{file}:{number}: an image has at most {MAX_OBJECTS} objects; divide the image")
-        objects.labels.append(name)
-        objects.boxes.append(_polygon_to_box(numbers) if is_polygon else _centre_to_corner_box(numbers))
+        if is_polygon:
+            xs, ys = numbers[0::2], numbers[1::2]
+            box = min(xs), min(ys), max(xs), max(ys)
+        else:
+            x, y, width, height = numbers
+            box = x - width / 2, y - height / 2, x + width / 2, y + height / 2
+        objects.add(name, box, f"{file}:{number}: the image has")
         objects.polygon_count += is_polygon
-    return ImageAnnotation(tuple(objects.labels), tuple(objects.boxes), True, objects.polygon_count)
-
-
-def _polygon_to_box(polygon: list[float]) -> Box:
-    xs, ys = polygon[0::2], polygon[1::2]
-    return min(xs), min(ys), max(xs), max(ys)
-
-
-def _centre_to_corner_box(box: list[float]) -> Box:
-    x, y, width, height = box
-    return x - width / 2, y - height / 2, x + width / 2, y + height / 2
+    return objects
 
 
 def _find_image(folder: Path, name: str, place: str) -> Path:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import functools
+import importlib.util
 import os
 import warnings
 from pathlib import Path
 from typing import Any
-
-from executive.training.torchvision_ops import declare_missing
 
 RESOLUTION = 256
 """Side of the square input [pixel]."""
@@ -22,6 +22,9 @@ ARCHITECTURE: dict[str, Any] = {
     "group_detr": 5,
     "dec_layers": 2,
 }
+
+TORCHVISION_OPERATORS = ("nms", "qnms")
+"""Operators of torchvision that its Python part needs; the training calls none of them."""
 
 
 def create(classes: int, start: Path | None = None, device: str = "cpu") -> Any:
@@ -56,3 +59,28 @@ def describe() -> dict[str, str]:
         + ", ".join(f"{name} {value}" for name, value in ARCHITECTURE.items()),
         "input": f"{RESOLUTION} x {RESOLUTION} pixel, RGB",
     }
+
+
+@functools.cache
+def declare_missing() -> object | None:
+    """Declare torchvision's operators if its compiled part does not load; call before importing torchvision.
+
+    With a CPU build of torch and the default build of torchvision, the compiled part of torchvision does not
+    load, and its Python part raises an error at the missing operators.
+
+    Returns:
+        The library that keeps the declarations alive, or None.
+    """
+    import torch
+
+    package = importlib.util.find_spec("torchvision")
+    if package is None or package.origin is None:
+        return None
+    try:
+        torch.ops.load_library(str(next(Path(package.origin).parent.glob("_C*"))))
+    except (OSError, ImportError, StopIteration):
+        library = torch.library.Library("torchvision", "DEF")
+        for name in TORCHVISION_OPERATORS:
+            library.define(f"{name}(Tensor dets, Tensor scores, float iou_threshold) -> Tensor")
+        return library
+    return None

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import contextlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
@@ -66,9 +67,8 @@ def generate(
     for name, cell in configs.items():
         for key, sentence in missing_models(cell):
             raise InputError(f"{name}: {'.'.join(map(str, key))}: {sentence}")
-    first_valid = images - round(images * valid)
     write_annotations(out, layout, [], classes)
-    render = partial(_render_block, cells, out, layout, seed, first_valid)
+    render = partial(_render_block, cells, out, layout, seed, images - round(images * valid))
     write_annotations(out, layout, _in_blocks(render, images, workers, progress), classes)
 
 
@@ -110,26 +110,39 @@ def _in_blocks(
     return [made[number] for number in sorted(made)]
 
 
-def _sample_seed(seed: int, number: int) -> int:
-    return int(np.random.SeedSequence([seed, number]).generate_state(1, np.uint64)[0])
+def _draw(
+    cells: Sequence[CellConfig],
+    seed: int,
+    numbers: range,
+    *,
+    randomized: bool = True,
+    scene: SceneConfig = DECLARED_SCENE,
+) -> Iterator[tuple[int, str, Sample]]:
+    """Yield number, camera and sample of scenes of the cells, which take turns."""
+    cv2.setNumThreads(1)
+    cameras = [next(iter(cell.cameras)) for cell in cells]
+    with contextlib.ExitStack() as stack:
+        renderers = [
+            SceneRenderer(cell, camera, randomized=randomized, scene=scene)
+            for cell, camera in zip(cells, cameras, strict=True)
+        ]
+        for renderer in renderers:
+            stack.callback(renderer.close)
+        for number in numbers:
+            turn = number % len(cells)
+            sample_seed = int(np.random.SeedSequence([seed, number]).generate_state(1, np.uint64)[0])
+            yield number, cameras[turn], renderers[turn].sample(sample_seed)
 
 
 def _render_block(
     cells: Sequence[CellConfig], out: Path, layout: str, seed: int, first_valid: int, numbers: range
 ) -> dict[int, Entry]:
     """Render and save the images of these numbers; runs in a process of its own."""
-    cv2.setNumThreads(1)
-    cameras = [next(iter(cell.cameras)) for cell in cells]
-    renderers = [SceneRenderer(cell, camera) for cell, camera in zip(cells, cameras, strict=True)]
     entries = {}
-    for number in numbers:
-        turn = number % len(cells)
-        sample = renderers[turn].sample(_sample_seed(seed, number))
-        split, file = "train" if number < first_valid else "valid", f"{cameras[turn]}_{number:06d}.jpg"
+    for number, camera, sample in _draw(cells, seed, numbers):
+        split, file = "train" if number < first_valid else "valid", f"{camera}_{number:06d}.jpg"
         save_image(image_path(out, layout, split, file), sample.image)
-        entries[number] = _entry(sample, split, file, cameras[turn])
-    for renderer in renderers:
-        renderer.close()
+        entries[number] = _entry(sample, split, file, camera)
     return entries
 
 
@@ -137,44 +150,31 @@ def _take_frames(
     config: CellConfig, scene: SceneConfig, seed: int, numbers: range
 ) -> dict[int, LabelledImage]:
     """Take the frames of these numbers; runs in a process of its own."""
-    cv2.setNumThreads(1)
-    camera = next(iter(config.cameras))
-    renderer = SceneRenderer(config, camera, randomized=False, scene=scene)
-    frames = {}
-    for number in numbers:
-        sample = renderer.sample(_sample_seed(seed, number))
-        frames[number] = as_labelled_frame(sample, camera, f"{camera}_{number:06d}")
-    renderer.close()
-    return frames
+    drawn = _draw([config], seed, numbers, randomized=False, scene=scene)
+    return {
+        number: as_labelled_frame(sample, camera, f"{camera}_{number:06d}")
+        for number, camera, sample in drawn
+    }
 
 
 def _entry(sample: Sample, split: str, file: str, camera: str) -> Entry:
-    """Return the dataset entry of a sample, with what a localization can be measured against."""
-    return Entry(
-        split=split,
-        file=file,
-        size=(SIZE, SIZE),
-        labels=sample.labels,
-        boxes=_boxes(sample.boxes),
-        ignored=_boxes(sample.ignored),
-        truth={
-            "camera": camera,
-            "part": sample.part,
-            "matrix": sample.matrix.tolist(),
-            "X_WC": sample.X_WC.rounded(9),
-            "labels": sample.labels,
-            "positions": sample.positions.round(6).tolist(),
-            "centres": sample.centres.round(6).tolist(),
-            "visible_fraction": sample.visible_fraction.round(4).tolist(),
-        },
-    )
+    """Return the dataset entry of a sample, with the truth for measuring localizers."""
+    rounded = {
+        "matrix": sample.matrix.tolist(),
+        "positions": sample.positions.round(6).tolist(),
+        "centres": sample.centres.round(6).tolist(),
+        "visible_fraction": sample.visible_fraction.round(4).tolist(),
+    }
+    boxes, ignored = _boxes(sample.boxes), _boxes(sample.ignored)
+    truth = {**_truth(sample, camera, sample.part), **rounded}
+    return Entry(split, file, (SIZE, SIZE), sample.labels, boxes, ignored, truth)
 
 
 def as_labelled_frame(sample: Sample, camera: str, file: str) -> LabelledImage:
-    """Return the whole frame that a sample as a run begins with was cut from."""
+    """Return the whole frame from which a sample of an initial scene of a run was cut."""
     assert sample.frame is not None
     height, width = sample.frame.shape[:2]
-    left, top, right, bottom = sample.part
+    left, top, right, _ = sample.part
     scale, corner = (right - left) / SIZE, [left, top, left, top]
     return LabelledImage(
         file=file,
@@ -182,19 +182,25 @@ def as_labelled_frame(sample: Sample, camera: str, file: str) -> LabelledImage:
         labels=sample.labels,
         boxes=_boxes(sample.boxes * scale + corner),
         ignored=_boxes(sample.ignored * scale + corner),
-        truth={
-            "camera": camera,
-            "part": (0, 0, width, height),
-            "matrix": sample.matrix,
-            "X_WC": sample.X_WC.rounded(9),
-            "positions": sample.positions,
-            "centres": sample.centres,
-            "visible_fraction": sample.visible_fraction,
-        },
-        area=(left, top, right, bottom),
+        truth=_truth(sample, camera, (0, 0, width, height)),
+        area=sample.part,
         depth=sample.depth,
         second=sample.second,
     )
+
+
+def _truth(sample: Sample, camera: str, part: Box) -> dict[str, Any]:
+    """Return the renderer's knowledge about an image that shows `part` of the camera's image."""
+    return {
+        "camera": camera,
+        "part": part,
+        "matrix": sample.matrix,
+        "X_WC": sample.X_WC.rounded(9),
+        "labels": sample.labels,
+        "positions": sample.positions,
+        "centres": sample.centres,
+        "visible_fraction": sample.visible_fraction,
+    }
 
 
 def _boxes(boxes: Array) -> tuple[Box, ...]:

@@ -54,7 +54,7 @@ class Samples:
             yield LabelledImage(
                 path.name,
                 image,
-                annotation.labels,
+                tuple(annotation.labels),
                 annotation.boxes_in_pixels(image.shape[1], image.shape[0]),
                 tuple(map(tuple, ignored.get(path.name, ()))),
                 truth.get(path.name, {}),

@@ -72,10 +72,9 @@ def train(
     start, rate = settings.start, settings.rate
     _check(dataset, start)
     try:
-        from executive.training.torchvision_ops import declare_missing
+        from executive.training.architecture import declare_missing, describe
 
         declare_missing()
-        from executive.training.architecture import describe
         from executive.training.compress import export_onnx
         from executive.training.run import fit
     except ImportError as error:
