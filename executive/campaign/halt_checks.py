@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from executive.cell.workcell import Workcell
-from executive.run.outcome import Outcome
+from executive.events import NodeEnded, NodeStarted, RunEnded, TimedEvent
 
 AFTER = 6
 """Control steps after the end of a run in which the arm must not move any more."""
@@ -30,31 +29,30 @@ def check_rest(workcell: Workcell) -> Iterator[str]:
         yield f"the arm moved by {moved:.1e} after the run had ended"
 
 
-def check_journal(entries: Sequence[Mapping[str, Any]], outcome: Outcome) -> Iterator[str]:
+def check_journal(events: Sequence[TimedEvent], outcome: RunEnded) -> Iterator[str]:
     """Yield what the journal lacks: it has one end, its last entry, and every node that began has ended."""
-    ends = [number for number, entry in enumerate(entries) if entry["kind"] == "end"]
-    if ends != [len(entries) - 1]:
-        yield f"the journal has {len(ends)} ends in its {len(entries)} entries; only the last may be one"
-    elif any(entries[-1][key] != getattr(outcome, key) for key in ("status", "holds", "ticks")):
-        yield f"the journal ends with {entries[-1]}, and the run with {outcome}"
+    ends = [one.event for one in events if isinstance(one.event, RunEnded)]
+    if len(ends) != 1 or events[-1].event is not ends[0]:
+        yield f"the journal has {len(ends)} ends in its {len(events)} entries; only the last may be one"
+    elif ends[0] != outcome:
+        yield f"the journal ends with {ends[0]}, and the run with {outcome}"
     running: dict[str, int] = {}
-    for entry in entries:
-        if entry["kind"] != "status":
-            continue
-        if entry["status"] != "RUNNING":
-            running.pop(entry["node"], None)
-        elif entry["node"] in running:
-            yield f"the journal lets {entry['node']} begin at tick {entry['tick']} while it runs"
-        else:
-            running[entry["node"]] = entry["tick"]
+    for one in events:
+        match one.event:
+            case NodeEnded(node):
+                running.pop(node, None)
+            case NodeStarted(node) if node in running:
+                yield f"the journal lets {node} begin at tick {one.tick} while it runs"
+            case NodeStarted(node):
+                running[node] = one.tick
     for node, tick in running.items():
         yield f"the journal says no end of {node}, which began at tick {tick}"
 
 
-def check_tool(outcome: Outcome, workcell: Workcell) -> Iterator[str]:
+def check_tool(outcome: RunEnded, workcell: Workcell) -> Iterator[str]:
     """Yield a sentence if the run does not tell what its tool holds."""
     holding = workcell.cell.tool.holding
-    if holding and outcome.holds not in {row["item"] for row in workcell.accounts.rows()}:
+    if holding and outcome.holds not in {item.item for item in workcell.accounts.summaries()}:
         yield f'the tool holds an object, and the run says "{outcome.holds}"'
     if not holding and outcome.holds:
         yield f'the tool holds nothing, and the run says "{outcome.holds}"'

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from executive.events import Event
 from executive.geometry import Array, Pose
 
 Box = tuple[float, float, float, float]
@@ -97,3 +98,15 @@ class Frame:
         in_camera = self.X_WC.inverse().apply(points) @ self.matrix.T
         depth = in_camera[:, 2:]
         return in_camera[:, :2] / np.where(depth > 0, depth, np.inf), depth[:, 0] > 0
+
+
+@dataclass(frozen=True)
+class FrameTaken(Event):
+    """The image that the next `FrameSearched` is about; only for observers in this process.
+
+    Attributes:
+        frame: The frame with its image.
+    """
+
+    is_recorded = False
+    frame: Frame

@@ -14,7 +14,7 @@ from executive.cell.objects import ObjectClass, Target
 from executive.cell.protocols import Cell, Routes
 from executive.cell.workcell import KeyPath
 from executive.errors import Unreachable
-from executive.events import Emit
+from executive.events import Emit, TargetSelected
 from executive.geometry import Array
 
 Triple = tuple[float, float, float]
@@ -99,12 +99,12 @@ def object_classes(config: CellConfig) -> dict[str, ObjectClass]:
 def cell_without_hardware(config: CellConfig, routes: Routes, ledger: Ledger, emit: Emit) -> Cell:
     """Return the cell of a cell file; every hardware part is None until the cell kind replaces it.
 
-    Each target that a skill selects is emitted as a `decision` event.
+    Each target that a skill selects is emitted as an event.
     """
     missing: Any = None
 
     def emit_decision(target: Target, bin: str) -> None:
-        emit("decision", item=target.item, label=target.label, frame=target.frame, bin=bin)
+        emit(TargetSelected(target.item, target.label, target.frame, bin))
 
     return Cell(
         clock=missing,

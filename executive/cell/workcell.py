@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 from executive.cell.protocols import Cell, LeastTimes, Operator, Routes
 from executive.cell.visuals import Scenery
-from executive.events import Emit
+from executive.events import Emit, ItemChanged
 
 PLACES = ("right", "wrong_bin", "left", "elsewhere", "fell_in_wrong_bin", "unseen")
 """Keys of the counts of an audit; the last two count objects that the others count, too."""
@@ -38,8 +38,8 @@ class Accounts(Protocol):
     def doubts(self) -> Sequence[str]:
         """Reasons why error rates of detectors were assumed and not measured."""
 
-    def rows(self) -> list[dict[str, object]]:
-        """Return a plain row per item, in the order of first sight."""
+    def summaries(self) -> Sequence[ItemChanged]:
+        """Return the present state of each item, in the order of first sight."""
 
 
 class Workcell(Protocol):
@@ -51,7 +51,7 @@ class Workcell(Protocol):
 
     @property
     def accounts(self) -> Accounts:
-        """The ledger; at its end, the run closes the ledger and reads its counts and rows."""
+        """The ledger; at its end, the run closes the ledger and reads its counts and items."""
 
     @property
     def steps(self) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 
 import click
@@ -39,5 +38,5 @@ def command(ctx: click.Context, run: str, edited: Path | None, runs: Path, as_js
         else:
             click.echo(f"{done.decisions} decisions as recorded, then {done.difference} ({path})", err=True)
     if as_json:
-        print_json({"run": str(path), "same": done.same, **asdict(done)})
+        print_json({"run": str(path), "same": done.same, **done.as_json()})
     ctx.exit(0 if done.same else 1)

@@ -16,6 +16,7 @@ from executive.cli.output import print_json, stdout_kept_clean
 from executive.cli.streams import unescaped_stderr
 
 if TYPE_CHECKING:
+    from executive.events import RunStarted
     from executive.record.recorded_run import RecordOptions
     from executive.run.assembly import RunOptions
     from executive.skill import Skill
@@ -90,12 +91,13 @@ def command(
             if mission is None:
                 assert resume is not None
                 result, start = _resume(resume, runs, skills, options, record)
+                origin = start.file, start.seed, start.overrides
             else:
                 result = _start(mission, skills, overrides, options, runs, record)
-                start = {"seed": seed, "overrides": overrides}
+                origin = mission, seed, overrides
             # What was asked for by a person is asked for again.
             asked_for, used_scene = requests or result["requests"], RunDirectory(Path(result["run"])).scene
-            repeat = repeat_command(mission or start["file"], start, asked_for, used_scene)
+            repeat = repeat_command(*origin, asked_for, used_scene)
             report, problem = leave_report(result)
             if page is not None:
                 page.finish(result, report and str(Path(report).resolve()))
@@ -154,16 +156,15 @@ def _start(
 
 def _resume(
     name: str, runs: Path, skills: Mapping[str, type[Skill]], options: RunOptions, record: RecordOptions
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Resume a run; return its result, and the entry of its start."""
+) -> tuple[dict[str, Any], RunStarted]:
+    """Resume a run; return its result and its start."""
     from executive.record.find_run import find_run
-    from executive.record.journal import read_journal
+    from executive.record.journal import read_journal, start_of
     from executive.record.resumed_run import resume_run
 
     path = find_run(name, runs)
     result = resume_run(path, skills, options, record)
-    start, *_ = read_journal(path / "journal.jsonl")
-    return result, start
+    return result, start_of(read_journal(path / "journal.jsonl"), path, "run the mission anew")
 
 
 @contextlib.contextmanager

@@ -10,19 +10,23 @@ from executive.cli.output import print_json, stdout_kept_clean
 @click.command(name="schema")
 @click.option("--cell", is_flag=True, help="The schema of cell files.")
 @click.option("--library", is_flag=True, help="The schema of library files.")
-def command(cell: bool, library: bool) -> None:
+@click.option("--journal", is_flag=True, help="The schema of the lines of a journal.")
+def command(cell: bool, library: bool, journal: bool) -> None:
     """Print the JSON Schema of mission files, with the skills that are installed.
 
     A file that begins with `# yaml-language-server: $schema=mission.schema.json` names the schema beside
     it to every editor with the YAML language server.
     """
-    if cell and library:
-        raise click.UsageError("--cell and --library are two schemas; ask for one at a time")
+    if cell + library + journal > 1:
+        raise click.UsageError("--cell, --library and --journal are three schemas; ask for one at a time")
     with stdout_kept_clean():
         from executive.mission.schema.files import library_schema, mission_schema
         from executive.mission.schema.types import cell_schema
         from executive.plugins import discover
+        from executive.record.journal_format import journal_schema
 
-        of_missions = library_schema if library else mission_schema
-        schema = cell_schema() if cell else of_missions(discover())
+        if cell or journal:
+            schema = cell_schema() if cell else journal_schema()
+        else:
+            schema = (library_schema if library else mission_schema)(discover())
     print_json(schema)

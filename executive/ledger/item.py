@@ -13,6 +13,8 @@ from executive.cell.detection import Detection
 from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
 from executive.cell.objects import Target
+from executive.cell.plain import rounded
+from executive.events import ItemChanged
 from executive.geometry import Array
 from executive.ledger.independence import repeat_probability
 
@@ -192,18 +194,12 @@ class Record:
         )
 
     @property
-    def row(self) -> dict[str, object]:
-        """The item for the record, as plain values."""
-        return {
-            "item": self.item,
-            "label": self.label,
-            "state": self.state.value,
-            "position": [round(float(value), 4) for value in self.position],
-            "looks": self.looks,
-            "attempts": self.attempts,
-            "bin": self.bin,
-            "why": self.why,
-        }
+    def summary(self) -> ItemChanged:
+        """The item as an event, its position rounded to 0.1 mm."""
+        return ItemChanged(
+            self.item, self.label, self.state.value, rounded(self.position, 4),
+            self.looks, self.attempts, self.bin, self.why,
+        )  # fmt: skip
 
     def vote(self, label: str, by: ErrorRates, viewpoint: str = "", *, alone: bool = True) -> None:
         """Count one detection as `label`: that much likelier than any other class, by a detector's errors.

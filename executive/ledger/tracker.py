@@ -10,11 +10,11 @@ import numpy as np
 from executive.cell.bins import Bin
 from executive.cell.config import LedgerConfig, TableConfig
 from executive.cell.detection import Detections, Observation
-from executive.cell.frame import Frame
+from executive.cell.frame import Frame, FrameTaken
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Routes
 from executive.errors import Fault
-from executive.events import Emit
+from executive.events import Emit, ItemChanged
 from executive.geometry import Array
 from executive.ledger.accounts import (
     Remarks,
@@ -27,7 +27,7 @@ from executive.ledger.bins import Bins
 from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage
 from executive.ledger.item import LYING, OPEN, Record, State
-from executive.ledger.look_event import describe_look
+from executive.ledger.look_event import frame_searched
 from executive.ledger.staleness import Freshness
 from executive.ledger.update import Looks
 
@@ -89,7 +89,8 @@ class ItemLedger:
         if frame.id != self._frame:
             self._frame = frame.id
             self._take(detections, observations)
-        self._emit("look", **describe_look(detections, observations), frame_object=frame)
+        self._emit(FrameTaken(frame))
+        self._emit(frame_searched(detections, observations))
         return self.targets()
 
     def targets(self) -> Sequence[Target]:
@@ -151,7 +152,7 @@ class ItemLedger:
         elif record.touched != record.label and not (beside_top and self._certainty.count_low_touch(record)):
             record.contradiction = contradiction
             self._disturb(record.position, self._config.neighbourhood)
-            self._emit("item", **record.row)
+            self._emit(record.summary)
             return False
         return True
 
@@ -161,7 +162,7 @@ class ItemLedger:
         record.attempts += 1
         record.empty_probes += found_table
         self._disturb(record.position, math.inf)
-        self._emit("item", **record.row)
+        self._emit(record.summary)
 
     def held(self, item: Item) -> None:
         """Record that the tool holds the item; its neighbours may have moved.
@@ -256,20 +257,20 @@ class ItemLedger:
                 record.why = final[1]
                 self._change(record.item, final[0])
         for record in find_lost_elsewhere(self._records.values(), dropped):
-            self._emit("item", **record.row)
+            self._emit(record.summary)
 
     def reopen(self) -> None:
         """Forget the items that were left on the table; the next look enters those that still lie there."""
         for record in forget_rejected(self._records.values()):
-            self._emit("item", **record.row)
+            self._emit(record.summary)
 
     def balance(self) -> dict[str, int]:
         """Return the counts `seen, placed, rejected, skipped, lost, phantom`."""
         return count_states(self._records.values())
 
-    def rows(self) -> list[dict[str, object]]:
-        """Return a plain row per item, in the order of first sight."""
-        return [record.row for record in self._records.values()]
+    def summaries(self) -> Sequence[ItemChanged]:
+        """Return the present state of each item, in the order of first sight."""
+        return [record.summary for record in self._records.values()]
 
     def _take(self, detections: Detections, observations: Sequence[Observation]) -> None:
         bias = detections.error_rates.bias
@@ -277,7 +278,7 @@ class ItemLedger:
         on_table = [one for one, bin in inside if bin is None]
         for record in self._looks.take(self._records, detections, on_table):
             self._certainty.reject_if_uncertain(record, settled=self._looks.settled(record))
-            self._emit("item", **record.row)
+            self._emit(record.summary)
         if detections.view == "full":
             confident = [(one, bin) for one, bin in inside if one.confident]
             for record, bin in self._in_bins.fallen(detections, confident):
@@ -305,7 +306,7 @@ class ItemLedger:
     def _change(self, item: Item, state: State) -> Record:
         record = self._record(item)
         record.state = state
-        self._emit("item", **record.row)
+        self._emit(record.summary)
         return record
 
     def _disturb(self, centre: Array, radius: float) -> None:

@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 from executive.cell.arm import Goal, Motion, Task
 from executive.cell.protocols import Clock
 from executive.errors import Blocked, Unreachable
-from executive.events import Emit
+from executive.events import Emit, MotionPlanned
 from executive.geometry import Array
 
 M = TypeVar("M", bound=Motion)
@@ -78,7 +78,7 @@ class Plans(Generic[M]):
         self._ahead = self._plan = None
         duration = 0.0 if isinstance(plan.outcome, Exception) else plan.outcome.duration
         waits = max(0.0, plan.due - self._clock.now)
-        self._emit("plan", ahead=found is not None, waits=round(waits, 4), duration=round(duration, 4))
+        self._emit(MotionPlanned(found is not None, round(waits, 4), round(duration, 4)))
         return plan
 
     def _made(self, start: Array, goal: Goal | str, task: Task) -> Plan[M]:

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from executive.cell.detection import Detection
-from executive.cell.frame import Frame
-from executive.events import Event
+from executive.cell.frame import Frame, FrameTaken
+from executive.events import DetectedObject, FrameSearched, NodeEnded, TargetSelected, TimedEvent
 from executive.record.pictures.drawer import Drawer
 from executive.record.pictures.scene import Scene
-from executive.record.progress import Progress, is_skill, skill_name
+from executive.record.progress import Progress, skill_name
 
 KEPT = 24
 """Looks remembered [1.2 MB each at 640 x 480]: a decision may rest on an earlier one than the last."""
@@ -34,25 +33,30 @@ class Frames:
     def __init__(self, folder: Path) -> None:
         self._drawer = Drawer(folder)
         self._progress = Progress()
-        self._looks: dict[int, tuple[Frame, Mapping[str, Any]]] = {}
-        self._choices: dict[str, Event] = {}
+        self._taken: Frame | None = None
+        self._looks: dict[int, tuple[Frame, FrameSearched]] = {}
+        self._choices: dict[str, TargetSelected] = {}
         self._rests_on: int | None = None
         self._unshown: int | None = None
         self._drawn = 0
         self._left_out: Counter[str] = Counter()
 
-    def __call__(self, event: Event) -> None:
+    def __call__(self, timed: TimedEvent) -> None:
         """Remember a look; at a decision or a failure, have the frame it rests on drawn."""
-        if event.kind == "look" and event.data.get("frame_object") is not None:
+        event = timed.event
+        if isinstance(event, FrameTaken):
+            # Depth, which a picture does not need, is three times as large as the rest.
+            self._taken = replace(event.frame, depth=None)
+        elif isinstance(event, FrameSearched):
             self._remember(event)
-        elif event.kind == "decision" and "frame" in event.data:
-            self._choices[event.data["item"]] = event
-            self._rests_on = event.data["frame"]
-            self._show(event, event.data["frame"], event.data)
-        elif event.kind == "status" and event.data["status"] == "FAILURE" and is_skill(event.data):
-            self._fail(event)
+        elif isinstance(event, TargetSelected):
+            self._choices[event.item] = event
+            self._rests_on = event.frame
+            self._show(timed, event.frame, event, None)
+        elif isinstance(event, NodeEnded) and event.skill and event.status == "FAILURE":
+            self._show_failure(timed, event)
         # Last: a skill that fails now is still what the robot was doing.
-        self._progress(event)
+        self._progress(timed)
 
     def close(self, *, wait: bool = True) -> None:
         """Finish the waiting pictures, without `wait` only the one under way."""
@@ -64,25 +68,26 @@ class Frames:
         left_out = ", ".join(f"{count} {why}" for why, count in self._left_out.items())
         return self._drawer.problem or (f"pictures left out: {left_out}" if left_out else "")
 
-    def _remember(self, event: Event) -> None:
-        frame = event.data["frame_object"]
-        said = {key: event.data.get(key, "") for key in ("detector", "found")}
-        # Depth, which a picture does not need, is three times as large as the rest.
-        self._looks[frame.id] = replace(frame, depth=None), said
-        self._unshown = frame.id
+    def _remember(self, look: FrameSearched) -> None:
+        if self._taken is None or self._taken.id != look.frame:
+            return
+        self._looks[look.frame] = self._taken, look
+        self._unshown = look.frame
         if len(self._looks) > KEPT:
             # What the last decision rests on is wanted again if the attempt fails, however many looks later.
             del self._looks[next(number for number in self._looks if number != self._rests_on)]
 
-    def _fail(self, event: Event) -> None:
-        choice = self._choices.get(event.data["item"])
+    def _show_failure(self, timed: TimedEvent, failure: NodeEnded) -> None:
+        choice = self._choices.get(failure.item)
         if choice is not None:
-            self._show(event, choice.data["frame"], choice.data)
+            self._show(timed, choice.frame, choice, failure)
         elif self._unshown is not None:
-            self._show(event, self._unshown, {})
+            self._show(timed, self._unshown, None, failure)
 
-    def _show(self, event: Event, frame: int, choice: Mapping[str, Any]) -> None:
-        """Have the look with that number drawn, with what was chosen in it and what is said now."""
+    def _show(
+        self, timed: TimedEvent, frame: int, choice: TargetSelected | None, failure: NodeEnded | None
+    ) -> None:
+        """Have a look drawn, with the choice that rests on it and the failure of the attempt."""
         if frame == self._unshown:
             self._unshown = None
         look = self._looks.get(frame)
@@ -90,32 +95,37 @@ class Frames:
             self._left_out[f"of a look before the last {KEPT}"] += 1
         elif self._drawn == MOST:
             self._left_out[f"beyond the {MOST} that a run keeps"] += 1
-        elif not self._drawer.draw(_file(event, choice), self._scene(event, look, choice)):
+        elif not self._drawer.draw(_file(timed, choice, failure), self._scene(timed, look, choice, failure)):
             self._left_out["that came faster than they can be drawn"] += 1
         else:
             self._drawn += 1
 
-    def _scene(self, event: Event, look: tuple[Frame, Mapping[str, Any]], choice: Mapping[str, Any]) -> Scene:
-        frame, said = look
-        item = choice.get("item", "")
+    def _scene(
+        self,
+        timed: TimedEvent,
+        look: tuple[Frame, FrameSearched],
+        choice: TargetSelected | None,
+        failure: NodeEnded | None,
+    ) -> Scene:
+        frame, searched = look
+        item = choice.item if choice else ""
         known = self._progress.item(item)
-        reason = event.data.get("reason", "")
         return Scene(
             image=frame.image,
             visible=frame.visible,
-            seen=[Detection(box["label"], box["confidence"], tuple(box["box"])) for box in said["found"]],
-            chosen=_chosen(choice, said["found"], choice.get("position", known.get("position"))),
+            seen=[_detection(one) for one in searched.found],
+            chosen=_chosen(choice, searched.found, known.position if known else None),
             mission=self._progress.mission,
-            clock=event.clock,
+            clock=timed.clock,
             camera=frame.camera,
-            detector=said["detector"],
-            age=event.clock - frame.stamp,
+            detector=searched.detector,
+            age=timed.clock - frame.stamp,
             phase=self._progress.phase,
             item=item,
-            bin=choice.get("bin", ""),
-            attempts=known.get("attempts", 0),
-            failure=f"{skill_name(event.data['node'])}.{reason}" if reason else "",
-            message=event.data.get("message", ""),
+            bin=choice.bin if choice else "",
+            attempts=known.attempts if known else 0,
+            failure=f"{skill_name(failure.node)}.{failure.reason}" if failure else "",
+            message=failure.message if failure else "",
             fates=self._progress.fates(),
             classes=self._progress.classes,
         )
@@ -131,24 +141,28 @@ def picture_of(folder: Path, item: str, reason: str) -> Path | None:
     return max(pictures, key=lambda file: int(file.stem.partition("_")[0]), default=None)
 
 
-def _file(event: Event, choice: Mapping[str, Any]) -> str:
-    """Return the name of the file that shows a choice at an event."""
-    parts = (f"{event.tick:06d}", choice.get("item"), event.data.get("reason"))
+def _file(timed: TimedEvent, choice: TargetSelected | None, failure: NodeEnded | None) -> str:
+    """Return the name of the file that shows a choice or a failure."""
+    parts = (f"{timed.tick:06d}", choice.item if choice else "", failure.reason if failure else "")
     return "_".join(part for part in parts if part) + ".jpg"
 
 
 def _chosen(
-    choice: Mapping[str, Any], found: Sequence[Mapping[str, Any]], place: Sequence[float] | None
+    choice: TargetSelected | None, found: Sequence[DetectedObject], place: Sequence[float] | None
 ) -> int | None:
     """Return the number of the detection that was decided for, or None if it cannot be told.
 
     It is the one where the item was seen; an item's class is a matter of many looks, so the label of
     this one does not have to agree.
     """
-    if not choice:
+    if choice is None:
         return None
-    located = [number for number, box in enumerate(found) if box.get("position") is not None]
-    if place is not None and located:
-        return min(located, key=lambda n: math.dist(found[n]["position"], place))
-    alike = [number for number, box in enumerate(found) if box["label"] == choice.get("label")]
+    if place is not None and found:
+        return min(range(len(found)), key=lambda number: math.dist(found[number].position, place))
+    alike = [number for number, one in enumerate(found) if one.label == choice.label]
     return alike[0] if len(alike) == 1 else None
+
+
+def _detection(found: DetectedObject) -> Detection:
+    left, top, right, bottom = found.box
+    return Detection(found.label, found.confidence, (left, top, right, bottom))

@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from executive.events import Event
+from executive.events import TimedEvent
 
 if TYPE_CHECKING:
     from executive.record.recorded_run import View
@@ -31,9 +31,9 @@ class GuardedView:
         """Begin to show a run."""
         self._forward(lambda: self._view.open(run))
 
-    def __call__(self, event: Event) -> None:
+    def __call__(self, timed: TimedEvent) -> None:
         """Show an event."""
-        self._forward(lambda: self._view(event))
+        self._forward(lambda: self._view(timed))
 
     def close(self) -> None:
         """Stop showing."""

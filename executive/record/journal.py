@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+
+from pydantic_core import from_json
 
 from executive.errors import Fault, InputError, RecordLost, explained, reason_of
-from executive.events import Event
-from executive.record.entry import Entry, entry_of
+from executive.events import ItemChanged, RunEnded, RunStarted, TimedEvent, ToolCommanded
+from executive.record.journal_format import decode_all, encode
 from executive.record.lock import lock
-
-_ENCODER = json.JSONEncoder(ensure_ascii=False, allow_nan=False, check_circular=False)
 
 
 class Journal:
@@ -48,24 +46,22 @@ class Journal:
                 raise
         self._file: int | None = file
 
-    def __call__(self, event: Event) -> None:
-        """Append the entry for `event`; see `append`."""
-        self.append(entry_of(event))
-
-    def append(self, entry: Entry) -> None:
-        """Append `entry`.
+    def __call__(self, timed: TimedEvent) -> None:
+        """Append an event if its kind is recorded.
 
         Raises:
             RecordLost: The disk does not take it, or the file was deleted: the run must not go on unrecorded.
                 Later events are dropped without another fault, so that the arm can be brought to rest.
-            Fault: JSON has no words for it; only this entry is missing.
+            Fault: JSON cannot hold the event; only this event is missing.
         """
-        if self._file is None or self._broken:
+        if self._file is None or self._broken or not timed.event.is_recorded:
             return
-        line = self._encode(entry)
+        line = encode(timed)
         try:
             self._write(self._file, line)
-            if entry["kind"] in ("intent", "end") or entry.get("state") == "placed":
+            event = timed.event
+            is_placement = isinstance(event, ItemChanged) and event.state == "placed"
+            if is_placement or isinstance(event, ToolCommanded | RunEnded):
                 self._sync(self._file)
         except OSError as error:
             self._broken = True
@@ -96,16 +92,6 @@ class Journal:
             with contextlib.suppress(OSError):
                 os.close(file)
 
-    def _encode(self, entry: Entry) -> bytes:
-        try:
-            # Half a surrogate pair, in a text that is to be kept exactly, becomes an escape of JSON.
-            return (_ENCODER.encode(entry) + "\n").encode(errors="backslashreplace")
-        except (TypeError, ValueError, RecursionError) as error:
-            raise Fault(
-                f'the journal has no words for an event of kind "{entry["kind"]}": {error}; '
-                "what is to be kept exactly must be plain JSON already"
-            ) from error
-
     def _write(self, file: int, line: bytes) -> None:
         """Write all of `line`; a disk that is nearly full takes a part of it first."""
         # One unbuffered write per line: what was said before a crash is in the file.
@@ -123,69 +109,46 @@ class Journal:
             raise FileNotFoundError(errno.ENOENT, "it was deleted while the run went on")
 
 
-def read_journal(path: Path) -> list[Entry]:
-    """Return the journal's entries in the order in which they came about; that of line `n` is at `n - 1`.
+def read_journal(path: Path) -> list[TimedEvent]:
+    """Return the events of a journal in order; that of line `n` is at `n - 1`.
 
-    What a power cut tore at the end is left out: a part of the last line, zeros where its text was to come.
+    A line that a power cut left incomplete at the end, or zeros in its place, are left out.
 
     Raises:
-        InputError: The file cannot be read, or another line than the last is broken.
+        InputError: The file cannot be read, has another format, or a line holds no event.
     """
     with explained(InputError, f'cannot read the journal "{path}"'):
         content = path.read_bytes()
-    entries = []
-    for number, line in enumerate(content[: _whole(content)].splitlines(), start=1):
-        try:
-            entries.append(_entry_in(line))
-        except ValueError as error:
-            raise InputError(
-                f"{path}:{number}: this line is not JSON ({error}); a journal is only ever appended to, "
-                "so it was changed after the run, or the disk lost a part of it; bring back a copy of it"
-            ) from error
-    return entries
+    return decode_all(content[: _whole(content)].splitlines(), str(path))
 
 
-def start_of(entries: Sequence[Entry], path: Path, otherwise: str) -> Entry:
-    """Return the entry for how the run in the directory `path` began.
+def start_of(events: Sequence[TimedEvent], path: Path, otherwise: str) -> RunStarted:
+    """Return the start of the run in the directory `path`.
 
     Raises:
         InputError: It had not begun; `otherwise` says what follows from that.
     """
-    for entry in entries:
-        if entry["kind"] == "run":
-            return entry
+    for timed in events:
+        if isinstance(timed.event, RunStarted):
+            return timed.event
     raise InputError(f'the run in "{path}" had not begun when it was cut off; {otherwise}')
 
 
-def ending_of(entries: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
-    """Return the `end` of a run by its journal, or None: it was cut off, or goes on.
+def ending_of(events: Sequence[TimedEvent]) -> RunEnded | None:
+    """Return the end of a run by its journal, or None if the run was cut off or goes on.
 
-    A run that was taken up again has ended only when it ended again.
+    A resumed run has ended only when it ended again.
     """
-    return entries[-1] if entries and entries[-1].get("kind") == "end" else None
-
-
-def _entry_in(line: bytes) -> Entry:
-    """Return the entry that a line holds.
-
-    Raises:
-        ValueError: It holds none.
-    """
-    try:
-        entry = json.loads(line.decode())
-    except RecursionError as error:
-        raise ValueError("nested too deeply") from error
-    if not isinstance(entry, dict):
-        raise ValueError("it is no object")
-    return entry
+    last = events[-1].event if events else None
+    return last if isinstance(last, RunEnded) else None
 
 
 def _whole(content: bytes) -> int:
-    """Return how many bytes of a journal are whole lines; the last one may lack its line end."""
+    """Return the number of bytes in whole lines of a journal; the last line may lack its line end."""
     written = content.rstrip(b"\0")
     last = written.rfind(b"\n") + 1
     try:
-        _entry_in(written[last:])
+        from_json(written[last:])
     except ValueError:
         return last
     return len(written)

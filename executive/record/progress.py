@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
-from executive.events import Event
+from executive.events import FrameSearched, ItemChanged, NodeEnded, NodeStarted, RunStarted, TimedEvent
 
 _OPEN_FATES = ("held", "dropped", "rejected", "skipped", "lost")
 """States of items outside of bins that are reported; items on the table are not."""
@@ -18,27 +17,28 @@ class Progress:
     def __init__(self) -> None:
         self.mission = ""
         self._running: dict[str, str] = {}
-        self._items: dict[str, Mapping[str, Any]] = {}
+        self._items: dict[str, ItemChanged] = {}
         self._classes: dict[str, None] = {}
 
-    def __call__(self, event: Event) -> None:
+    def __call__(self, timed: TimedEvent) -> None:
         """Take an event."""
-        data = event.data
-        if event.kind == "status" and is_skill(data):
-            if data["status"] == "RUNNING":
-                self._running[data["node"]] = skill_name(data["node"])
-            else:
-                self._running.pop(data["node"], None)
-        elif event.kind == "item":
-            if data.get("state") != self.item(data["item"]).get("state"):
-                # What happened to it is news: it goes to the end of its list.
-                self._items.pop(data["item"], None)
-            self._items[data["item"]] = data
-        elif event.kind == "look":
-            # Classes of one look come in alphabetical order, so that most runs agree on the order.
-            self._classes |= dict.fromkeys(sorted(found["label"] for found in data.get("found", ())))
-        elif event.kind == "run":
-            self.mission = str(data.get("mission", ""))
+        event = timed.event
+        match event:
+            case NodeStarted(node, skill) if skill:
+                self._running[node] = skill_name(node)
+            case NodeEnded(node):
+                self._running.pop(node, None)
+            case ItemChanged(item):
+                known = self._items.get(item)
+                if known is None or known.state != event.state:
+                    # What happened to it is news: it goes to the end of its list.
+                    self._items.pop(item, None)
+                self._items[item] = event
+            case FrameSearched(found=found):
+                # Classes of one look come in alphabetical order, so that most runs agree on the order.
+                self._classes |= dict.fromkeys(sorted(one.label for one in found))
+            case RunStarted(mission):
+                self.mission = mission
 
     @property
     def phase(self) -> str:
@@ -50,26 +50,20 @@ class Progress:
         """Every class seen so far; a class keeps its place."""
         return tuple(self._classes)
 
-    def item(self, name: str) -> Mapping[str, Any]:
-        """Return what the ledger last said of an item; empty for an unknown one."""
-        return self._items.get(name, {})
+    def item(self, name: str) -> ItemChanged | None:
+        """Return the last state of an item, or None for an unknown item."""
+        return self._items.get(name)
 
     def fates(self) -> dict[str, tuple[str, ...]]:
         """Return the items by bin, then the others by what became of them."""
         placed: dict[str, list[str]] = defaultdict(list)
         others: dict[str, list[str]] = defaultdict(list)
         for name, item in self._items.items():
-            state = item.get("state")
-            if state == "placed":
-                placed[item["bin"]].append(name)
-            elif state in _OPEN_FATES:
-                others["in the tool" if state == "held" else state].append(name)
+            if item.state == "placed":
+                placed[item.bin].append(name)
+            elif item.state in _OPEN_FATES:
+                others["in the tool" if item.state == "held" else item.state].append(name)
         return {fate: tuple(names) for fate, names in (placed | others).items()}
-
-
-def is_skill(status: Mapping[str, Any]) -> bool:
-    """Tell whether a `status` event is a skill's: only those say which item they are about."""
-    return "item" in status
 
 
 def skill_name(path: str) -> str:

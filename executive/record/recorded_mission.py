@@ -12,9 +12,9 @@ from pydantic_core import to_json
 
 from executive.cell.config import CellConfig
 from executive.errors import InputError, explained
+from executive.events import RunStarted
 from executive.mission.outline import OutlineNode
 from executive.mission.parse.read_mission import GivenCell
-from executive.replay.input_log import Entry
 from executive.skill import Skill
 
 if TYPE_CHECKING:
@@ -24,13 +24,13 @@ _NODES = TypeAdapter(list[OutlineNode])
 
 
 def recorded_mission(
-    path: Path, run: Entry, skills: Mapping[str, type[Skill]], mission: Path | None = None
+    path: Path, run: RunStarted, skills: Mapping[str, type[Skill]], mission: Path | None = None
 ) -> LoadedMission:
     """Return the mission that a run directory holds, with the params and the cell of that run.
 
     Args:
         path: The run directory.
-        run: The `run` entry of its journal.
+        run: Start of the run.
         skills: Installed skills by name.
         mission: Another mission file to put in its place, or None.
 
@@ -40,8 +40,8 @@ def recorded_mission(
     """
     from executive.mission.load import load_mission
 
-    overrides = {key: text for key, text in run["overrides"].items() if not key.startswith("cell.")}
-    given = GivenCell(recorded_cell(path), Path(run["base"]) / "cell.yaml")
+    overrides = {key: text for key, text in run.overrides.items() if not key.startswith("cell.")}
+    given = GivenCell(recorded_cell(path), Path(run.base) / "cell.yaml")
     return load_mission(mission or path / "mission.yaml", skills, overrides, cell=given)
 
 

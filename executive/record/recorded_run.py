@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from executive.errors import ExecutiveError
-from executive.events import Event, Observer
+from executive.events import MotionPlanned, Observer, RequestGiven, RunEnded, TimedEvent
 from executive.mission.outline import outline
 from executive.mission.text.files import read_source
 from executive.record.diagnosis.diagnosis import Story
@@ -24,7 +24,6 @@ from executive.record.run_directory import RunDirectory
 if TYPE_CHECKING:
     from executive.mission.load import LoadedMission
     from executive.run.assembly import RunOptions
-    from executive.run.outcome import Outcome
     from executive.run.run import Run
     from executive.skill import Skill
 
@@ -35,7 +34,7 @@ class View(Protocol):
     def open(self, run: Run) -> None:
         """Begin to show a run, whose `control` stops, pauses and steps it."""
 
-    def __call__(self, event: Event) -> None:
+    def __call__(self, timed: TimedEvent) -> None:
         """Take an event and return at once."""
 
     def close(self) -> None:
@@ -139,10 +138,10 @@ class Recording:
     directory: RunDirectory
     recorder: Recorder
     views: Sequence[View]
-    past: Iterable[Event] = ()
+    past: Iterable[TimedEvent] = ()
 
     def __post_init__(self) -> None:
-        self._noted: list[dict[str, Any]] = []
+        self._noted: list[TimedEvent] = []
         self._story = Story(self.loaded, self.skills)
 
     def execute(self, seed: int, began: float) -> dict[str, Any]:
@@ -173,12 +172,12 @@ class Recording:
                 view.note("; ".join(filter(None, problems)))
         return result
 
-    def _note(self, event: Event) -> None:
+    def _note(self, timed: TimedEvent) -> None:
         """Keep plans and requests for the result."""
-        if event.kind in ("plan", "request"):
-            self._noted.append({"kind": event.kind, **event.data})
+        if isinstance(timed.event, MotionPlanned | RequestGiven):
+            self._noted.append(timed)
 
-    def _execute_observed(self) -> tuple[Outcome, dict[str, Any], Mapping[str, int] | None]:
+    def _execute_observed(self) -> tuple[RunEnded, dict[str, Any], Mapping[str, int] | None]:
         """Execute the run with all observers attached, and close them afterwards."""
         run, completed = self.run, False
         watchers: list[Observer] = [self._note, self._story, *self.views]

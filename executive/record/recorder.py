@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable
 
 from executive.errors import Fault
-from executive.events import Event
-from executive.record.entry import entry_of
+from executive.events import TimedEvent
 from executive.record.frames import Frames
 from executive.record.journal import Journal
 from executive.record.run_directory import RunDirectory
@@ -40,22 +38,21 @@ class Recorder:
         self._frames = Frames(directory.frames) if frames else None
         self._problem = ""
 
-    def __call__(self, event: Event) -> None:
-        """Record `event`; the trace first, for it cannot fail."""
-        entry = entry_of(event)
-        self._trace.take(entry)
-        self._journal.append(entry)
+    def __call__(self, timed: TimedEvent) -> None:
+        """Record an event; the trace first, because it cannot fail."""
+        self._trace(timed)
+        self._journal(timed)
         if self._frames is not None:
             try:
-                self._frames(event)
+                self._frames(timed)
             except Exception as error:
                 # A run can be explained without its pictures.
                 self._problem = f"not every picture was drawn: {type(error).__name__}: {error}"
 
-    def remember(self, past: Iterable[Mapping[str, Any]]) -> None:
-        """Take the entries of a run that goes on into the trace; they are in the journal already."""
-        for entry in past:
-            self._trace.take(dict(entry))
+    def remember(self, past: Iterable[TimedEvent]) -> None:
+        """Add the events of a resumed run to the trace; they are in the journal already."""
+        for timed in past:
+            self._trace(timed)
 
     def close(self, *, wait: bool = True) -> None:
         """Bring everything to the disk, with `wait` the pictures too; more calls do nothing.

@@ -3,32 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+
+from pydantic import JsonValue
 
 from executive.errors import InputError
-from executive.events import Event
+from executive.events import (
+    BranchChosen,
+    ItemChanged,
+    NodeEnded,
+    NodeStarted,
+    RunEnded,
+    TargetSelected,
+    TimedEvent,
+    ToolCommanded,
+)
 from executive.mission.load import LoadedMission
-from executive.record.entry import entry_of
-from executive.record.progress import is_skill, skill_name
+from executive.record.progress import skill_name
 from executive.record.recorded_mission import recorded_mission
-from executive.replay.input_log import Entry, InputLog
+from executive.replay.input_log import InputLog
 from executive.run.assembly import assemble_replay
 from executive.run.resume import ResumedRun
 from executive.skill import Skill
-
-Decision = Mapping[str, Any]
-"""A decision in a control step as plain values: `tick`, `clock`, `kind`, and the keys of `_DECIDING`."""
-
-_DECIDING = {
-    "status": ("node", "status", "reason", "item", "outputs"),
-    "choice": ("node", "choice", "reason"),
-    "decision": ("item", "label", "bin"),
-    "item": ("item", "state", "label", "bin"),
-    "intent": ("action",),
-}
-"""Compared keys by kind of event. Sentences are not compared: their wording may change."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +35,7 @@ class Replay:
     Attributes:
         decisions: Number of equal decisions.
         ticks: Number of control steps of the replay.
-        recorded: The first recorded decision that the replay did not repeat, or None.
+        recorded: The first recorded decision that the replay did not repeat, or None; without its messages.
         replayed: The decision of the replay instead, or None if there was none.
         edited: True if the mission is not the recorded one.
         unanswered: Message of the question without a recorded answer that ended the replay, or "".
@@ -46,8 +43,8 @@ class Replay:
 
     decisions: int
     ticks: int
-    recorded: Decision | None
-    replayed: Decision | None
+    recorded: TimedEvent | None
+    replayed: TimedEvent | None
     edited: bool
     unanswered: str = ""
 
@@ -66,9 +63,14 @@ class Replay:
             return both
         return f"{both}: {self.unanswered}; what would come of it only a run can tell"
 
+    def as_json(self) -> dict[str, JsonValue]:
+        """Return the attributes as JSON; a decision has its tick, clock, kind and the fields that are set."""
+        decisions = {"recorded": _as_json(self.recorded), "replayed": _as_json(self.replayed)}
+        return {**vars(self), **decisions}
+
 
 def replay(
-    path: Path, entries: Iterable[Entry], skills: Mapping[str, type[Skill]], mission: Path | None = None
+    path: Path, events: Iterable[TimedEvent], skills: Mapping[str, type[Skill]], mission: Path | None = None
 ) -> Replay:
     """Replay a recorded run and return the first decision that differs.
 
@@ -77,7 +79,7 @@ def replay(
 
     Args:
         path: The run directory.
-        entries: Entries of its journal.
+        events: Events of its journal.
         skills: Installed skills by name.
         mission: Another mission file to replay, or None for the recorded mission. For another mission only
             the decisions of skills and the states of items are compared.
@@ -85,15 +87,15 @@ def replay(
     Raises:
         InputError: The directory holds no run that can be replayed.
     """
-    log = InputLog.of(entries)
+    log = InputLog.of(events)
     run = log.start
     if run is None or not log.inputs:
         raise InputError(
-            f'"{path}" holds no run that can be replayed: its journal tells of no answers of a cell'
+            f'"{path}" holds no run that can be replayed: its journal holds no answers of a cell'
         )
     loaded = recorded_mission(path, run, skills, mission)
     edited = mission is not None and loaded.text != (path / "mission.yaml").read_text(encoding="utf-8")
-    return compare(loaded, skills, log, int(run["seed"]), edited=edited)
+    return compare(loaded, skills, log, run.seed, edited=edited)
 
 
 def compare(
@@ -129,18 +131,18 @@ class _Comparison:
     def __init__(self, log: InputLog, edited: bool) -> None:
         self._log = log
         self._edited = edited
-        self._recorded = [d for entry in log.entries if (d := _decision(entry, edited))]
+        self._recorded = [d for timed in log.events if (d := _decision(timed, edited))]
         # Of an interrupted run, the last control step may be incomplete.
-        self._is_complete = any(entry["kind"] == "end" for entry in log.entries)
+        self._is_complete = any(isinstance(timed.event, RunEnded) for timed in log.events)
         self._is_over = False
         self.same = 0
-        self.difference: tuple[Decision | None, Decision | None] = (None, None)
+        self.difference: tuple[TimedEvent | None, TimedEvent | None] = (None, None)
         self.unanswered = ""
 
-    def __call__(self, event: Event) -> None:
+    def __call__(self, timed: TimedEvent) -> None:
         if self._is_over:
             return
-        decision = _decision(entry_of(event), self._edited)
+        decision = _decision(timed, self._edited)
         if decision is None:
             return
         recorded = self._recorded[self.same] if self.same < len(self._recorded) else None
@@ -158,27 +160,51 @@ class _Comparison:
             self.difference = (self._recorded[self.same], None)
             self.unanswered = self.run.replayed.unanswered
 
-    def _counts(self, decision: Decision) -> bool:
+    def _counts(self, decision: TimedEvent) -> bool:
         """Return True if the control step of a decision is complete in the record."""
-        return bool(decision["tick"] < self._log.last_tick)
+        return decision.tick < self._log.last_tick
 
 
-def _decision(entry: Entry, edited: bool) -> Decision | None:
-    """Return the decision of an entry, or None if it is none."""
-    kind = entry["kind"]
-    if kind not in _DECIDING or (edited and (kind == "choice" or (kind == "status" and not is_skill(entry)))):
+def _decision(timed: TimedEvent, edited: bool) -> TimedEvent | None:
+    """Return an event without the fields that are not compared, or None if it is no decision.
+
+    Messages are not compared, because their wording may change.
+    """
+    event = timed.event
+    match event:
+        case NodeStarted(node, skill) | NodeEnded(node, _, skill):
+            if edited and not skill:
+                return None
+            event = replace(event, node=skill_name(node) if edited else node)
+            if isinstance(event, NodeEnded):
+                event = replace(event, message="", origin="")
+        case BranchChosen() if not edited:
+            event = replace(event, message="")
+        case TargetSelected():
+            event = replace(event, frame=0)
+        case ItemChanged():
+            event = replace(event, position=(), looks=0, attempts=0, why="")
+        case ToolCommanded():
+            pass
+        case _:
+            return None
+    return replace(timed, event=event)
+
+
+def _as_json(decision: TimedEvent | None) -> dict[str, JsonValue] | None:
+    if decision is None:
         return None
-    decision = {"tick": entry["tick"], "clock": entry["clock"], "kind": kind}
-    decision |= {key: entry[key] for key in _DECIDING[kind] if entry.get(key)}
-    if edited and "node" in decision:
-        decision["node"] = skill_name(decision["node"])
-    return decision
+    fields = {key: value for key, value in vars(decision.event).items() if value}
+    return {
+        "tick": decision.tick, "clock": decision.clock, "kind": type(decision.event).__name__, **fields
+    }  # fmt: skip
 
 
-def _describe(decision: Decision | None) -> str:
+def _describe(decision: TimedEvent | None) -> str:
     """Return a decision in words."""
     if decision is None:
         return "nothing more"
-    shown = {key: value for key, value in decision.items() if key not in ("tick", "clock", "kind", "outputs")}
-    what = ", ".join(f"{key} {value}" for key, value in shown.items())
-    return f"at {decision['clock']:.3f} s (step {decision['tick']}) {decision['kind']}: {what}"
+    event = decision.event
+    shown = {key: value for key, value in vars(event).items() if value and key not in ("outputs", "skill")}
+    values = ", ".join(f"{key} {value}" for key, value in shown.items())
+    return f"at {decision.clock:.3f} s (step {decision.tick}) {type(event).__name__}: {values}"

@@ -5,17 +5,15 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from executive.cell.plain import plain
 from executive.cell.workcell import PLACES
 from executive.errors import ExecutiveError, explained
+from executive.events import MotionPlanned, RequestGiven, RunEnded, RunResumed, TimedEvent
 from executive.record.journal import ending_of
-from executive.record.plain import plain
 from executive.record.run_directory import RunDirectory
 from executive.record.whole_file import write_whole
-
-if TYPE_CHECKING:
-    from executive.run.outcome import Outcome
 
 QUIT = "quit"
 """Word of the operator who wants nothing more."""
@@ -44,10 +42,10 @@ def result_of(
     *,
     mission: str,
     seed: int,
-    outcome: Outcome,
+    outcome: RunEnded,
     items: Mapping[str, Any],
     audit: Mapping[str, int] | None,
-    noted: Sequence[Mapping[str, Any]],
+    noted: Sequence[TimedEvent],
     story: Mapping[str, Any] | None,
     wall_time: float,
     trace: str,
@@ -55,7 +53,7 @@ def result_of(
 ) -> dict[str, Any]:
     """Return the result as a plain mapping; `wall_time` in seconds, `run` the run directory.
 
-    `audit` is None in a cell that has no ground truth; `noted` are the entries for plans and requests, and
+    `audit` is None in a cell that has no ground truth; `noted` are the plans and requests, and
     `story` is as `Story.tell` returns it.
     """
     return {
@@ -95,9 +93,9 @@ def write_result(path: Path, result: Mapping[str, Any]) -> None:
         write_whole(path, json.dumps(result, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 
-def read_result(directory: RunDirectory, entries: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
+def read_result(directory: RunDirectory, events: Sequence[TimedEvent]) -> Mapping[str, Any]:
     """Return the result that belongs to a journal, else the journal's end; empty if the run was cut off."""
-    ending = ending_of(entries)
+    ending = ending_of(events)
     try:
         result = json.loads(directory.result.read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -105,33 +103,33 @@ def read_result(directory: RunDirectory, entries: Sequence[Mapping[str, Any]]) -
     told = result if isinstance(result, dict) else {}
     if ending is not None:
         # Of a run that was taken up again it may be that of an end before the last.
-        same = all(told.get(key) == ending[key] for key in ("status", "ticks"))
-        return told if same else ending
+        same = (told.get("status"), told.get("ticks")) == (ending.status, ending.ticks)
+        return told if same else vars(ending)
     # Where the disk did not take the end, the result alone knows of it.
-    once = all(entry["kind"] != "resume" for entry in entries)
+    once = not any(isinstance(timed.event, RunResumed) for timed in events)
     return told if once and told.get("status") in EXIT_CODES else {}
 
 
-def requests_of(entries: Iterable[Mapping[str, Any]]) -> list[str]:
+def requests_of(events: Iterable[TimedEvent]) -> list[str]:
     """Return the requests that make the operator's answers the same again.
 
     An operator who is asked after the end of the list wants nothing more: that need not be listed, unless the
     list would be empty without it.
     """
-    words = [entry["wanted"] or QUIT for entry in entries if entry["kind"] == "request"]
+    words = [one.event.wanted or QUIT for one in events if isinstance(one.event, RequestGiven)]
     while len(words) > 1 and words[-1] == QUIT:
         words.pop()
     return words
 
 
-def planning_of(entries: Iterable[Mapping[str, Any]]) -> dict[str, float]:
+def planning_of(events: Iterable[TimedEvent]) -> dict[str, float]:
     """Return the number of plans asked for, of those made ahead, and the time waited for plans [s].
 
     A motion planned again counts once more, and one for which no way was found counts, too.
     """
-    plans = [entry for entry in entries if entry["kind"] == "plan"]
-    waited = sum(float(plan["waits"]) for plan in plans)
-    ahead = sum(bool(plan["ahead"]) for plan in plans)
+    plans = [one.event for one in events if isinstance(one.event, MotionPlanned)]
+    waited = sum(plan.waits for plan in plans)
+    ahead = sum(plan.ahead for plan in plans)
     return {"motions": len(plans), "ahead": ahead, "waited_s": round(waited, 4)}
 
 

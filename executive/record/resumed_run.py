@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from executive.errors import InputError
-from executive.events import Event
+from executive.events import MotionPlanned, RequestGiven, RunStarted
 from executive.record.journal import ending_of, read_journal, start_of
 from executive.record.recorded_mission import recorded_mission
 from executive.record.recorded_run import Recording, RecordOptions
@@ -18,13 +18,13 @@ from executive.record.recorder import Recorder
 from executive.record.replay import compare
 from executive.record.result import ENDED
 from executive.record.run_directory import RunDirectory
-from executive.replay.input_log import Entry, InputLog
+from executive.replay.input_log import InputLog
 
 if TYPE_CHECKING:
     from executive.run.assembly import RunOptions
     from executive.skill import Skill
 
-NOT_REPEATED = ("run", "plan", "request")
+NOT_REPEATED = (RunStarted, MotionPlanned, RequestGiven)
 """Kinds of events that a replay does not repeat."""
 
 
@@ -63,17 +63,17 @@ def resume_run(
     recorder = Recorder(directory, frames=record.frames, again=True)
     try:
         log, start = _read_log(directory)
-        seed = int(start["seed"])
+        seed = start.seed
         loaded = recorded_mission(path, start, skills)
         # Without the step of a halt or of a bug in a skill: a corrected skill may continue there.
-        certain = log if log.halt is None else log.before(int(log.halt["tick"]))
+        certain = log if log.halt is None else log.before(log.halt.tick)
         replay = compare(loaded, skills, certain, seed)
         if not replay.same:
             raise InputError(
                 f'the run in "{path}" cannot be taken up again: {replay.difference}. The executive or a '
                 "skill has been changed since; go back to what it was run with, or run the mission anew"
             )
-        options = replace(options, seed=seed, requests=start["requests"], scene=directory.scene)
+        options = replace(options, seed=seed, requests=start.requests, scene=directory.scene)
         run = assemble_resumed(loaded, skills, options, log, directory.world)
     except BaseException:
         recorder.close(wait=False)
@@ -82,35 +82,27 @@ def resume_run(
         if record.paused:
             run.control.pause()
         replayed = run.replayed.log
-        recorder.remember(replayed.entries)
-        past = _events_not_repeated(replayed)
+        recorder.remember(replayed.events)
+        past = [one for one in replayed.events if isinstance(one.event, NOT_REPEATED)]
         return Recording(run, loaded, skills, directory, recorder, record.views, past).execute(seed, began)
 
 
-def _read_log(directory: RunDirectory) -> tuple[InputLog, Entry]:
-    """Return the inputs of a run that can be resumed, and the entry of its start.
+def _read_log(directory: RunDirectory) -> tuple[InputLog, RunStarted]:
+    """Return the inputs of a run that can be resumed, and its start.
 
     Raises:
         InputError: The run cannot be resumed.
     """
-    entries = read_journal(directory.journal)
-    ending = ending_of(entries)
-    if ending is not None and ending["status"] == "INCOMPLETE" and ending["holds"]:
+    events = read_journal(directory.journal)
+    ending = ending_of(events)
+    if ending is not None and ending.status == "INCOMPLETE" and ending.holds:
         raise InputError(
-            f'the run in "{directory.path}" ended with {ending["holds"]} in the tool and cannot be '
+            f'the run in "{directory.path}" ended with {ending.holds} in the tool and cannot be '
             "resumed; take it out and run the mission anew"
         )
-    if ending is not None and ending["status"] in ENDED:
+    if ending is not None and ending.status in ENDED:
         raise InputError(
-            f'the run in "{directory.path}" came to its end: {ending["status"]}; '
+            f'the run in "{directory.path}" came to its end: {ending.status}; '
             "there is nothing to take up again"
         )
-    return InputLog.of(entries), start_of(entries, directory.path, "run the mission anew")
-
-
-def _events_not_repeated(log: InputLog) -> Iterator[Event]:
-    """Yield the recorded events that observers need, and that the replay does not repeat."""
-    for entry in log.entries:
-        if entry["kind"] in NOT_REPEATED:
-            data = {key: value for key, value in entry.items() if key not in ("tick", "clock", "kind")}
-            yield Event(entry["kind"], entry["tick"], entry["clock"], data)
+    return InputLog.of(events), start_of(events, directory.path, "run the mission anew")

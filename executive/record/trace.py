@@ -1,43 +1,41 @@
-"""The trace: one short hash over every decision of a run. Equal traces mean equal runs."""
+"""Trace of a run: one short hash of all its decisions. Runs with equal traces made the same decisions."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 
-from executive.events import Event
-from executive.record.entry import Entry, entry_of
-
-_DECIDING = {
-    "status": ("node", "status", "reason", "item", "outputs"),
-    "item": ("item", "state", "label", "position", "bin"),
-    "decision": ("item", "label", "frame"),
-}
-"""What counts, by kind of event. Sentences do not: they may be reworded without changing what is done."""
+from executive.events import ItemChanged, NodeEnded, NodeStarted, TargetSelected, TimedEvent
 
 _ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"), check_circular=False)
 
 
 class Trace:
-    """Hashes (tick, node path, status, reason, item, port values) as they happen.
+    """Hashes the starts and ends of nodes, the changes of items and the selected targets, with their ticks.
 
-    Wall time, paths and the run directory never enter it, so that the same mission, seed and weights
-    give the same trace on the same kind of machine.
+    Wall time, messages, paths and the run directory are not hashed, so the same mission, seed and weights
+    give the same trace on the same kind of processor.
     """
 
     def __init__(self) -> None:
         self._hash = hashlib.sha256()
 
-    def __call__(self, event: Event) -> None:
-        """Take the entry for `event` into the hash; see `take`."""
-        self.take(entry_of(event))
-
-    def take(self, entry: Entry) -> None:
-        """Take `entry` into the hash if it decides anything."""
-        keys = _DECIDING.get(entry["kind"])
-        if keys is not None:
-            decision = [entry["tick"], entry["kind"], *map(entry.get, keys)]
-            self._hash.update(_ENCODER.encode(decision).encode() + b"\n")
+    def __call__(self, timed: TimedEvent) -> None:
+        """Add an event to the hash if it is a decision."""
+        event = timed.event
+        match event:
+            case NodeStarted(node, skill, item):
+                decision = ["status", node, "RUNNING", *(("", item) if skill else (None, None)), None]
+            case NodeEnded(node, status, skill):
+                about = (event.reason, event.item) if skill else (event.reason or None, None)
+                decision = ["status", node, status, *about, event.outputs]
+            case ItemChanged(item, label, state, position):
+                decision = ["item", item, state, label, position, event.bin]
+            case TargetSelected(item, label, frame):
+                decision = ["decision", item, label, frame]
+            case _:
+                return
+        self._hash.update(_ENCODER.encode([timed.tick, *decision]).encode() + b"\n")
 
     def hexdigest(self) -> str:
         """Return the first 16 hexadecimal digits of the SHA-256 so far."""

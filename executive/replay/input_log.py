@@ -5,27 +5,30 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import NamedTuple
 
-Entry = Mapping[str, Any]
-"""Line of a journal: `tick`, `clock`, `kind` and the keys of the kind."""
+from executive.events import (
+    Event,
+    InputRead,
+    RunEnded,
+    RunHalted,
+    RunResumed,
+    RunStarted,
+    TimedEvent,
+    ToolCommanded,
+)
 
 
-@dataclass(frozen=True)
-class RecordedInput:
+class RecordedInput(NamedTuple):
     """One answer of a cell.
 
     Attributes:
         tick: Control step in which the answer was read.
-        nth: Number of times that the same input had been read in this step, this time included.
-        value: The answer as plain values, or the text of the exception.
-        raised: Name of the exception that the cell raised; "" for an answer.
+        read: The answer.
     """
 
     tick: int
-    nth: int
-    value: Any
-    raised: str = ""
+    read: InputRead
 
 
 @dataclass(frozen=True)
@@ -45,110 +48,124 @@ class Interruption:
     resumed: int
 
 
+class Halt(NamedTuple):
+    """Halt of a run: its control step, and True if the tree was ticked in this step."""
+
+    tick: int
+    ticked: bool
+
+
 @dataclass(frozen=True)
 class InputLog:
     """Inputs and interruptions of a run so far.
 
     Attributes:
-        entries: Entries of the journal that count, in order.
+        events: Events of the journal that count, in order.
         inputs: Recorded answers by name of the input, in order; repeated answers are left out.
         interruptions: Interruptions by `Interruption.complete`.
-        halt: Entry of the last halt, or None.
+        halt: The last halt, or None.
     """
 
-    entries: Sequence[Entry]
+    events: Sequence[TimedEvent]
     inputs: Mapping[str, Sequence[RecordedInput]] = field(default_factory=dict)
     interruptions: Mapping[int, Interruption] = field(default_factory=dict)
-    halt: Entry | None = None
+    halt: Halt | None = None
 
     @staticmethod
-    def of(entries: Iterable[Entry]) -> InputLog:
+    def of(events: Iterable[TimedEvent]) -> InputLog:
         """Return the log of a journal.
 
         A resumption makes everything void that happened in the incomplete control step before it, and later.
         """
-        kept: list[Entry] = []
-        for entry in entries:
-            if entry["kind"] == "resume":
-                kept = [one for one in kept if one["tick"] < entry["ticked"] or one["kind"] == "run"]
-            kept.append(entry)
+        kept: list[TimedEvent] = []
+        for timed in events:
+            if isinstance(timed.event, RunResumed):
+                kept = _before(kept, timed.event.ticked)
+            kept.append(timed)
         reopened = {end + 1 for end in _incomplete_ends(kept)}
-        interruptions = {
-            e["ticked"]: Interruption(e["ticked"], e["intent"], e["ticked"] in reopened, e["tick"])
-            for e in kept
-            if e["kind"] == "resume"
-        }
+        interruptions: dict[int, Interruption] = {}
         inputs: dict[str, list[RecordedInput]] = defaultdict(list)
-        for entry in kept:
-            if entry["kind"] == "sense":
-                inputs[entry["name"]].append(
-                    RecordedInput(entry["tick"], entry["nth"], entry["value"], entry.get("raised", ""))
-                )
-        halt = next((entry for entry in reversed(kept) if entry["kind"] == "halt"), None)
+        halt = None
+        for timed in kept:
+            tick, event = timed.tick, timed.event
+            match event:
+                case RunResumed(ticked, intent):
+                    interruptions[ticked] = Interruption(ticked, intent, ticked in reopened, tick)
+                case InputRead(name):
+                    inputs[name].append(RecordedInput(tick, event))
+                case RunHalted(ticked):
+                    halt = Halt(tick, ticked)
         return InputLog(kept, inputs, interruptions, halt)
 
     @property
-    def start(self) -> Entry | None:
-        """Entry of the start of the run, or None if the run had not started."""
-        return next((entry for entry in self.entries if entry["kind"] == "run"), None)
+    def start(self) -> RunStarted | None:
+        """Start of the run, or None if the run had not started."""
+        return next((one.event for one in self.events if isinstance(one.event, RunStarted)), None)
 
     @property
     def step(self) -> float:
         """Length of a control step [s]."""
         assert self.start is not None, "a run that is replayed has started"
-        return float(self.start["step"])
+        return self.start.step
 
     @property
     def last_tick(self) -> int:
-        """Last control step with an entry."""
-        return max((entry["tick"] for entry in self.entries), default=0)
+        """Last control step with an event."""
+        return max((timed.tick for timed in self.events), default=0)
 
     @property
     def last_action(self) -> str:
         """Last action of the tool, `open` or `close`; "" if there was none."""
-        return next((e["action"] for e in reversed(self.entries) if e["kind"] == "intent"), "")
+        events = (timed.event for timed in reversed(self.events))
+        return next((event.action for event in events if isinstance(event, ToolCommanded)), "")
 
     def interruption_after(self, steps: int) -> Interruption:
         """Return the interruption at the end of the log.
 
-        The last control step with an entry may be incomplete. The steps in which the arm only braked do not
+        The last control step with an event may be incomplete. The steps in which the arm only braked do not
         count: those from a halt on, and those of an interrupted resumption. A run that ended as INCOMPLETE
         counts as a whole.
 
         Args:
             steps: Number of control steps that the world of the cell has made.
         """
-        if self.last_tick in _incomplete_ends(self.entries):
+        if self.last_tick in _incomplete_ends(self.events):
             return Interruption(self.last_tick + 1, self.last_action, True, self.last_tick + 1)
-        complete = min(steps, self.last_tick + 1 if self.halt is None else int(self.halt["tick"]))
+        complete = min(steps, self.last_tick + 1 if self.halt is None else self.halt.tick)
         for earlier in reversed(list(self.interruptions.values())):
             if earlier.resumed >= complete:
                 complete = min(complete, earlier.complete)
-        return Interruption(complete, self.last_action, complete - 1 in _incomplete_ends(self.entries), steps)
+        return Interruption(complete, self.last_action, complete - 1 in _incomplete_ends(self.events), steps)
 
     def is_over(self, tick: int) -> bool:
         """Return True if the recorded run ended before its tree was ticked in this control step."""
         if self.halt is None:
             return tick > self.last_tick
-        return bool(self.halt["tick"] == tick and not self.halt["ticked"])
+        return self.halt == (tick, False)
 
     def is_halted_after_tick(self, tick: int) -> bool:
         """Return True if the recorded run was halted after its tree was ticked in this control step."""
-        return self.halt is not None and bool(self.halt["tick"] == tick and self.halt["ticked"])
+        return self.halt == (tick, True)
 
     def before(self, tick: int) -> InputLog:
         """Return the log of everything before a control step, and of the start of the run."""
-        return InputLog.of(e for e in self.entries if e["tick"] < tick or e["kind"] == "run")
+        return InputLog.of(_before(self.events, tick))
 
-    def number_of(self, kind: str) -> int:
-        """Return the number of entries of a kind."""
-        return sum(entry["kind"] == kind for entry in self.entries)
+    def number_of(self, kind: type[Event]) -> int:
+        """Return the number of events of a kind."""
+        return sum(isinstance(timed.event, kind) for timed in self.events)
 
     def number_of_answers(self, name: str) -> int:
         """Return the number of recorded answers of an input."""
         return len(self.inputs.get(name, ()))
 
 
-def _incomplete_ends(entries: Iterable[Entry]) -> frozenset[int]:
+def _before(events: Iterable[TimedEvent], tick: int) -> list[TimedEvent]:
+    return [one for one in events if one.tick < tick or isinstance(one.event, RunStarted)]
+
+
+def _incomplete_ends(events: Iterable[TimedEvent]) -> frozenset[int]:
     """Return the control steps in which the run ended as INCOMPLETE."""
-    return frozenset(e["tick"] for e in entries if e["kind"] == "end" and e.get("status") == "INCOMPLETE")
+    return frozenset(
+        one.tick for one in events if isinstance(one.event, RunEnded) and one.event.status == "INCOMPLETE"
+    )

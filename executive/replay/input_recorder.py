@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from executive.errors import Stopped
-from executive.events import Emit, Exact
+from executive.events import Emit, InputRead
 from executive.replay.codec import PLAIN, Codec
 
 Answer = TypeVar("Answer")
@@ -47,10 +47,10 @@ class InputRecorder:
         try:
             answer = ask()
         except (Exception, Stopped) as error:
-            self._emit("sense", name=name, nth=nth, value=str(error), raised=type(error).__name__)
+            self._emit(InputRead(name, nth, str(error), type(error).__name__))
             raise
         value = codec.write(answer)
         if name not in self._last or value != self._last[name]:
             self._last[name] = value
-            self._emit("sense", name=name, nth=nth, value=Exact(value))
+            self._emit(InputRead(name, nth, value))
         return answer

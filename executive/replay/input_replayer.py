@@ -7,8 +7,9 @@ from typing import Any
 
 from executive import errors
 from executive.errors import Fault
+from executive.events import InputRead
 from executive.replay.codec import PLAIN, Codec
-from executive.replay.input_log import InputLog, RecordedInput
+from executive.replay.input_log import InputLog
 
 
 class Unrecorded(Fault):
@@ -50,11 +51,11 @@ class InputReplayer:
         """
         nth = self._reads[name] = self._reads.get(name, 0) + 1
         inputs = self._inputs.get(name, deque())
-        while inputs and (inputs[0].tick, inputs[0].nth) <= (self._tick, nth):
-            recorded = inputs.popleft()
-            if recorded.raised:
-                raise _exception(recorded)
-            self._last[name] = recorded.value
+        while inputs and (inputs[0].tick, inputs[0].read.nth) <= (self._tick, nth):
+            read = inputs.popleft().read
+            if read.raised:
+                raise _exception(read)
+            self._last[name] = read.value
         if name not in self._last:
             message = f"the record holds no answer to what is asked here first: {name}"
             self.unanswered = self.unanswered or message
@@ -62,9 +63,9 @@ class InputReplayer:
         return codec.read(self._last[name])
 
 
-def _exception(recorded: RecordedInput) -> BaseException:
+def _exception(read: InputRead) -> BaseException:
     """Return an exception with the recorded name and text."""
-    kind = getattr(errors, recorded.raised, None) or type(recorded.raised, (Exception,), {})
-    error = kind(recorded.value)
+    kind = getattr(errors, read.raised, None) or type(read.raised, (Exception,), {})
+    error = kind(read.value)
     assert isinstance(error, BaseException)
     return error

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from executive.cell.clock import StepClock
 from executive.cell.protocols import Cell
 from executive.cell.proxy import Access, intercept
-from executive.events import Emit
+from executive.events import Emit, ToolCommanded
 from executive.replay.codec import (
     ANSWER,
     ARRAY,
@@ -91,12 +91,12 @@ _COMMAND = InputFormat("command", NOTHING)
 def recorded_cell(cell: Cell, recorder: InputRecorder, clock: StepClock, emit: Emit) -> Cell:
     """Return a copy of the cell that uses `clock`, and whose answers are recorded.
 
-    Each action of the tool is emitted as an `intent` before the action.
+    Each action of the tool is emitted as an event before the action.
     """
 
     def answer(access: Access) -> Any:
         if access.role == "tool" and access.name in COMMANDS:
-            emit("intent", action=access.member)
+            emit(ToolCommanded(access.member))
         name, codec = InputFormat.of(access)
         return recorder.read(name, access.proceed, codec)
 

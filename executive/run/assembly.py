@@ -8,7 +8,7 @@ from pathlib import Path
 
 from executive.cell.protocols import Operator
 from executive.cell.workcell import CellOptions, ResumePoint, Workcell
-from executive.events import Exact, Observer
+from executive.events import Observer, RequestGiven, RunStarted
 from executive.mission.build import TreeNode, build
 from executive.mission.load import LoadedMission
 from executive.plugins import cell_kind
@@ -71,17 +71,17 @@ def assemble(
     parts = _Parts(loaded, skills, options, observers)
     workcell = parts.build_cell()
     parts.context.connect(workcell, PlanningAhead(workcell.cell))
-    start = {
-        "mission": loaded.mission.name,
-        "file": str(loaded.path),
-        "seed": options.seed,
-        "params": loaded.params,
-        "overrides": loaded.overrides,
-        "requests": options.requests,
-        "base": str(loaded.cell_path.parent.resolve()),
-        "step": Exact(workcell.cell.clock.step),
-        "versions": versions(),
-    }
+    start = RunStarted(
+        loaded.mission.name,
+        str(loaded.path),
+        options.seed,
+        loaded.params,
+        loaded.overrides,
+        options.requests,
+        str(loaded.cell_path.parent.resolve()),
+        workcell.cell.clock.step,
+        versions(),
+    )
     root = parts.build_tree()
     name = loaded.mission.name
     return Run(parts.context, root, parts.control, name, start=start, realtime=options.realtime)
@@ -108,7 +108,7 @@ def assemble_resumed(
     """
     parts = _Parts(loaded, skills, options)
     frames, turns = (log.number_of_answers(f"camera.{name}") for name in ("frame", "next_pose"))
-    inner = parts.build_cell(ResumePoint(world, frames, turns), log.number_of("request"))
+    inner = parts.build_cell(ResumePoint(world, frames, turns), log.number_of(RequestGiven))
     return parts.build_resumed_run(inner, log, log.interruption_after(inner.steps))
 
 

@@ -8,7 +8,7 @@ import time
 from collections.abc import Sequence
 
 from executive.errors import InputError, Stopped
-from executive.events import Emit
+from executive.events import Emit, OperatorAsked, RequestGiven
 from executive.run.run_control import RunControl
 
 RESCAN = "rescan"
@@ -22,7 +22,7 @@ class ScriptedOperator:
     Args:
         requests: The list.
         choices: Classes that can be requested.
-        emit: Takes the `request` events.
+        emit: Takes the events.
         served: Number of requests of the list that an interrupted run has already served.
 
     Raises:
@@ -39,7 +39,7 @@ class ScriptedOperator:
     def ask(self, choices: Sequence[str]) -> str | None:
         """Return the next request, or None at the end of the list."""
         answer = interpret(self._requests.pop(0), choices) if self._requests else None
-        self._emit("request", wanted=answer)
+        self._emit(RequestGiven(answer))
         return answer
 
 
@@ -47,7 +47,7 @@ class TerminalOperator:
     """Asks at the terminal; the run's clock stands still meanwhile, and Ctrl-C works.
 
     Args:
-        emit: Takes the `asking` and `request` events.
+        emit: Takes the events.
         control: Tells whether the run has to halt, and gives answers from elsewhere, for instance a browser.
         keyboard: True if a person can type at the terminal; otherwise only `control` gives answers.
     """
@@ -64,7 +64,7 @@ class TerminalOperator:
         # An answer without a question, such as a second click, must not pick anything.
         while self._control.take_request() is not None:
             pass
-        self._emit("asking", choices=list(choices))
+        self._emit(OperatorAsked(list(choices)))
         numbered = "  ".join(f"{number} {label}" for number, label in enumerate(choices))
         while True:
             if self._keyboard:
@@ -73,7 +73,7 @@ class TerminalOperator:
             line = self._read_line()
             answer = interpret(line.strip(), choices) if line else None
             if answer != "":
-                self._emit("request", wanted=answer)
+                self._emit(RequestGiven(answer))
                 return answer
             sys.stderr.write(f'cannot pick "{line.strip()}"\n')
 

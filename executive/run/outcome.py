@@ -13,7 +13,7 @@ from executive.tree.failure import Failure
 
 @dataclass(frozen=True)
 class Ending:
-    """How the tick loop ended; see `Outcome`.
+    """How the tick loop ended; see `RunEnded`.
 
     Attributes:
         traceback: Traceback of the exception that caused a fault, or "".
@@ -28,33 +28,6 @@ class Ending:
 
 HALTED = Ending("HALTED", "halted", "halted by the user")
 """Somebody wanted the run to end."""
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """How a run ended.
-
-    Attributes:
-        status: `SUCCESS`; `INCOMPLETE`, if the tree succeeded and items were rejected; `FAILURE`, `FAULT` or
-            `HALTED`.
-        reason: What failed, for instance `Transit.dropped`; "" on success.
-        message: One sentence with numbers.
-        node: Path of the deciding node, or "".
-        empty: True if the run reported the table as empty: the ledger believed that nothing with a route was
-            left, and no look had shown a label that the cell does not know.
-        holds: What the tool holds now that the arm is at rest: an item, `something` that nobody knows, or "".
-        ticks: Control steps taken.
-        robot_time: Time on the run's clock [s].
-    """
-
-    status: str
-    reason: str
-    message: str
-    node: str
-    empty: bool
-    holds: str
-    ticks: int
-    robot_time: float
 
 
 def end_of_tree(failure: Failure | None) -> Ending:
@@ -75,12 +48,12 @@ def problems_of(do: Callable[[], None]) -> list[str]:
 
 def judge_items(accounts: Accounts) -> Ending:
     """Return the end of a run whose tree succeeded: its items decide whether it is a success."""
-    rows = accounts.rows()
-    lost = [str(row["item"]) for row in rows if row["state"] == "lost"]
+    items = accounts.summaries()
+    lost = [item.item for item in items if item.state == "lost"]
     if lost:
         message = f"{len(lost)} object(s) were lost and not found again: {', '.join(lost)}"
         return Ending("FAILURE", "lost", message)
-    rejected = [f"{row['item']} ({row['why']})" for row in rows if row["state"] == "rejected"]
+    rejected = [f"{item.item} ({item.why})" for item in items if item.state == "rejected"]
     if rejected:
         message = f"{len(rejected)} object(s) were not sorted: {', '.join(rejected)}"
         return Ending("INCOMPLETE", "rejected", message)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell
-from executive.events import Event
+from executive.events import FrameSearched, MotionPlanned, TargetSelected, TimedEvent, ToolCommanded
 from executive.manipulation.motions import carrying
 from executive.manipulation.tool_goals import approach, into, nearest_first
 
@@ -30,16 +30,17 @@ class PlanningAhead:
         self._is_closing = False
         self._approach_is_outdated = False
 
-    def observe(self, event: Event) -> None:
+    def observe(self, timed: TimedEvent) -> None:
         """Update the expected next motions from an event of the run."""
-        if event.kind == "decision":
-            item, bin = event.data["item"], event.data["bin"]
+        event = timed.event
+        if isinstance(event, TargetSelected):
+            item, bin = event.item, event.bin
             # A skill may choose an item or a bin that the cell does not know; then no motion can be planned.
             known = bin in self._cell.bins and item in {target.item for target in self._cell.ledger.targets()}
             self._selected = (item, bin) if known else None
-        elif event.kind == "intent":
-            self._is_closing = event.data["action"] == "close"
-        elif event.kind in ("look", "plan"):
+        elif isinstance(event, ToolCommanded):
+            self._is_closing = event.action == "close"
+        elif isinstance(event, FrameSearched | MotionPlanned):
             self._approach_is_outdated = True
 
     def step(self) -> None:

@@ -10,11 +10,10 @@ from py_trees.common import Status
 
 from executive.cell.protocols import Cell
 from executive.errors import Fault
-from executive.events import Observer
+from executive.events import Observer, RunEnded, RunResumed
 from executive.mission.build import TreeNode
 from executive.replay.input_log import Interruption
 from executive.replay.replayed_cell import ReplayedCell
-from executive.run.outcome import Outcome
 from executive.run.planning_ahead import PlanningAhead
 from executive.run.run import Run
 from executive.run.run_context import RunContext, come_to_rest
@@ -63,7 +62,7 @@ class ResumedRun(Run):
         """Call `recorder` with every event from the moment at which the real cell takes over."""
         self._recorders.append(recorder)
 
-    def _execute_tree(self) -> Outcome:
+    def _execute_tree(self) -> RunEnded:
         """Execute the run as often as it ended as INCOMPLETE and was resumed, and return the last outcome."""
         outcome = super()._execute_tree()
         while outcome.status == "INCOMPLETE" and self.replayed.is_reopened:
@@ -98,7 +97,7 @@ class ResumedRun(Run):
         if replayed.is_live:
             self._wall_start = time.monotonic() - context.now
             ticked, intent = interruption.complete, interruption.last_action
-            context.emit("resume", ticked=ticked, intent=intent, versions=versions())
+            context.emit(RunResumed(ticked, intent, versions()))
         restart_skills(self.root)
         require_rest(context.come_to_rest)
         if interruption.reopens:

@@ -5,19 +5,18 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 from py_trees.common import Status
 
 from executive.cell.workcell import Workcell
 from executive.errors import ExecutiveError, Fault, Stopped
-from executive.events import Observer
+from executive.events import FaultRaised, Observer, RunEnded, RunHalted, RunStarted
 from executive.mission.build import TreeNode
 from executive.run.outcome import (
     HALTED,
     Ending,
-    Outcome,
     close_books,
     end_of_tree,
     judge_items,
@@ -37,7 +36,7 @@ class Run:
         root: The tree, which uses the cell and the events of `context`.
         control: Stops, pauses and steps the run.
         mission: Name of the mission.
-        start: Data of the first event; None: the run continues an earlier one.
+        start: The first event; None: the run continues an earlier one.
         realtime: Pace the run by the wall clock.
 
     Attributes:
@@ -53,7 +52,7 @@ class Run:
         control: RunControl,
         mission: str,
         *,
-        start: Mapping[str, Any] | None = None,
+        start: RunStarted | None = None,
         realtime: bool = False,
     ) -> None:
         self.root, self.control, self.mission = root, control, mission
@@ -87,20 +86,20 @@ class Run:
         """Call `recorder` with every event from now on, before the observers."""
         self._context.observe(recorder, first=True)
 
-    def execute(self) -> Outcome:
+    def execute(self) -> RunEnded:
         """Tick the tree to its end and return the outcome; the arm is then at rest.
 
         Ctrl-C halts the tree and brakes the arm; a second one ends the process at once.
         """
         outcome = self._execute_tree()
-        if broken := problems_of(lambda: self._context.emit("end", **asdict(outcome))):
+        if broken := problems_of(lambda: self._context.emit(outcome)):
             outcome = replace(outcome, status="FAULT", reason="fault", message=broken[0], node="")
         return outcome
 
     def items(self) -> dict[str, Any]:
         """Return the ledger's balance, its `unknown` and `doubts`, and a row per item as `rows`."""
         accounts = self.workcell.accounts
-        more = {"unknown": accounts.unknown, "doubts": accounts.doubts, "rows": accounts.rows()}
+        more = {"unknown": accounts.unknown, "doubts": accounts.doubts, "rows": accounts.summaries()}
         return {**accounts.balance(), **more}
 
     def audit(self) -> Mapping[str, int] | None:
@@ -111,7 +110,7 @@ class Run:
         """Release the work cell."""
         self.workcell.close()
 
-    def _execute_tree(self) -> Outcome:
+    def _execute_tree(self) -> RunEnded:
         """Tick the tree to its end, let the arm come to rest, close the ledger and return the outcome."""
         context = self._context
         with stopped_by_signals(self.control):
@@ -119,7 +118,7 @@ class Run:
             problems = [*halt(self.root), *filter(None, [context.come_to_rest()])]
         if ending.traceback:
             # After braking: a record that cannot be written must not keep the arm from braking.
-            problems += problems_of(lambda: context.emit("fault", traceback=ending.traceback))
+            problems += problems_of(lambda: context.emit(FaultRaised(ending.traceback)))
         succeeded = ending.status == "SUCCESS"
         problems += problems_of(self._ask_tool)
         problems += problems_of(self._ask_ledger)
@@ -135,7 +134,7 @@ class Run:
         context, control, ticked = self._context, self.control, False
         try:
             if self._start is not None:
-                context.emit("run", **self._start)
+                context.emit(self._start)
             context.begin_step(context.tick)
             self._wall_start = time.monotonic() - context.now
             control.wait()
@@ -159,7 +158,7 @@ class Run:
             message = str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"
             node = error.node if isinstance(error, Fault) else ""
             ending = Ending("FAULT", "fault", message, node, traceback.format_exc())
-        broken = problems_of(lambda: context.emit("halt", ticked=ticked))
+        broken = problems_of(lambda: context.emit(RunHalted(ticked)))
         if broken and ending.status != "FAULT":
             ending = Ending("FAULT", "fault", broken[0])
         return ending
@@ -175,8 +174,8 @@ class Run:
         ledger = self._context.cell.ledger
         self._is_empty = ledger.believes_empty() and not ledger.unknown
 
-    def _outcome(self, ending: Ending) -> Outcome:
+    def _outcome(self, ending: Ending) -> RunEnded:
         if ending.status == "SUCCESS":
             ending = judge_items(self.workcell.accounts)
         end = (self._is_empty, self._held_item, self.tick, round(self.now, 6))
-        return Outcome(ending.status, ending.reason, ending.message, ending.node, *end)
+        return RunEnded(ending.status, ending.reason, ending.message, ending.node, *end)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 from executive.cell.clock import StepClock
 from executive.cell.protocols import Cell
 from executive.cell.workcell import Workcell
-from executive.events import Event, Observer
+from executive.events import Event, Observer, TimedEvent
 from executive.replay.input_recorder import InputRecorder
 from executive.replay.recorded_cell import recorded_cell
 from executive.run.planning_ahead import PlanningAhead
@@ -62,11 +61,11 @@ class RunContext:
         """Call `observer` with every event from now on, `first` before all others."""
         self._observers.insert(0 if first else len(self._observers), observer)
 
-    def emit(self, kind: str, **data: Any) -> None:
-        """Stamp an event with control step and time, and pass it to all observers."""
-        event = Event(kind, self.tick, round(self.now, 6), data)
+    def emit(self, event: Event) -> None:
+        """Pass an event with its control step and time to all observers."""
+        timed = TimedEvent(self.tick, round(self.now, 6), event)
         for observer in self._observers:
-            observer(event)
+            observer(timed)
 
     def begin_step(self, tick: int) -> None:
         """Begin the control step number `tick`: read the clock."""

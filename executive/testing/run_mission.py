@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -12,12 +12,11 @@ from executive.cell.cell_wrapper import innermost
 from executive.cell.workcell import Workcell
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
-from executive.events import Event, Observer
+from executive.events import FaultInjected, NodeEnded, NodeStarted, Observer, RunEnded, TimedEvent
 from executive.mission.load import load_mission
 from executive.plugins import discover
 from executive.record.result import agrees
 from executive.run.assembly import RunOptions, assemble
-from executive.run.outcome import Outcome
 from executive.run.run import Run
 from executive.skill import Skill
 from executive.testing.bounded_cell import BoundedCell
@@ -30,7 +29,7 @@ LONGEST = 600.0
 
 
 @dataclass(frozen=True)
-class MissionResult(Outcome):
+class MissionResult(RunEnded):
     """How a mission ended, and what is to be known of it.
 
     Attributes:
@@ -40,7 +39,7 @@ class MissionResult(Outcome):
         cell: The cell it ran in, closed; without what was wrapped around it.
     """
 
-    events: Sequence[Event]
+    events: Sequence[TimedEvent]
     items: Mapping[str, Any]
     audit: Mapping[str, int] | None
     cell: Any
@@ -52,22 +51,18 @@ class MissionResult(Outcome):
 
     def entered(self, pattern: str) -> list[str]:
         """Return the path of every node that was activated and whose path fits a pattern, in order."""
-        return [data["node"] for data in self._statuses("RUNNING", pattern)]
+        started = (one.event.node for one in self.events if isinstance(one.event, NodeStarted))
+        return [node for node in started if fnmatchcase(node, pattern)]
 
     def reasons(self, pattern: str = "*") -> list[str]:
         """Return the reason of every failure of a skill whose node fits a pattern, in order."""
-        failures = self._statuses("FAILURE", pattern)
-        return [data["reason"] for data in failures if "origin" not in data]
+        ended = (one.event for one in self.events if isinstance(one.event, NodeEnded))
+        failures = (event for event in ended if event.skill and event.status == "FAILURE")
+        return [event.reason for event in failures if fnmatchcase(event.node, pattern)]
 
-    def disturbances(self) -> list[Mapping[str, Any]]:
-        """Return what was done to the cell, in order: the data of every `disturbance`."""
-        return [event.data for event in self.events if event.kind == "disturbance"]
-
-    def _statuses(self, status: str, pattern: str) -> Iterator[Mapping[str, Any]]:
-        for event in self.events:
-            data = event.data
-            if event.kind == "status" and data["status"] == status and fnmatchcase(data["node"], pattern):
-                yield data
+    def disturbances(self) -> list[FaultInjected]:
+        """Return the injected faults, in order."""
+        return [one.event for one in self.events if isinstance(one.event, FaultInjected)]
 
 
 def run_mission(
@@ -104,7 +99,7 @@ def run_mission(
     """
     skills = discover()
     loaded = load_mission(mission, skills, set)
-    events: list[Event] = []
+    events: list[TimedEvent] = []
 
     def arranged(*args: Any, **options: Any) -> BoundedCell:
         workcell = kind(*args, **options)

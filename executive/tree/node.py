@@ -15,7 +15,7 @@ from py_trees.common import Status
 from py_trees.composites import Composite
 
 from executive.errors import Fault
-from executive.events import Emit, ignore
+from executive.events import BranchChosen, Emit, NodeEnded, NodeStarted, ignore
 from executive.tree.failure import Failure
 from executive.tree.halting import halt
 
@@ -79,7 +79,7 @@ class ControlNode(Composite):
         if self.status is not Status.RUNNING:
             self.failure = None
             self.status = Status.RUNNING
-            self._emit("status", node=self.path, status="RUNNING")
+            self._emit(NodeStarted(self.path))
             self.start()
         status = self.step()
         if status is not Status.RUNNING:
@@ -103,7 +103,7 @@ class ControlNode(Composite):
             self.status = new_status
             if was_running:
                 self.clean_up()
-                self._emit("status", node=self.path, status=new_status.value)
+                self._emit(NodeEnded(self.path, new_status.value))
 
     def run_child(self, child: Behaviour) -> Status:
         """Tick a child and return its status."""
@@ -141,13 +141,11 @@ class ControlNode(Composite):
     def choose(self, choice: str, why: Failure | None = None) -> None:
         """Tell the observers what the node does next, and about which failure, if it is about one."""
         reason, message = (str(why), why.message) if why else ("", "")
-        self._emit("choice", node=self.path, choice=choice, reason=reason, message=message)
+        self._emit(BranchChosen(self.path, choice, reason, message))
 
     def _end(self, status: Status) -> None:
         self.status = status
         self.clean_up()
-        why: dict[str, str] = {}
-        if self.failure is not None and status is Status.FAILURE:
-            failure = self.failure
-            why = {"reason": str(failure), "message": failure.message, "origin": failure.path}
-        self._emit("status", node=self.path, status=status.value, **why)
+        failure = self.failure if status is Status.FAILURE else None
+        reason, message, origin = (str(failure), failure.message, failure.path) if failure else ("", "", "")
+        self._emit(NodeEnded(self.path, status.value, reason=reason, message=message, origin=origin))

@@ -8,10 +8,13 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
+from pydantic import JsonValue
 
 from executive.cell.objects import Target
+from executive.cell.plain import plain_or_type
 from executive.cell.protocols import Cell
 from executive.errors import Fault
+from executive.events import NodeEnded, NodeStarted
 from executive.skill import Skill, SkillFailed
 from executive.tree.blackboard import Scope
 from executive.tree.failure import Failure
@@ -116,14 +119,14 @@ class SkillNode(Behaviour):
                 run.halt()
         except Fault as fault:
             raise self._fault(str(fault)) from fault
-        self._tell(new_status.value)
+        self._emit_end(new_status)
 
     def _start(self) -> SkillRun:
         self.failure = None
         self.status = Status.RUNNING
         inputs = self._read()
         self._item = self._item_of(inputs)
-        self._tell("RUNNING")
+        self._emit(NodeStarted(self.path, self.skill_name, self._item))
         self._run = SkillRun(self.skill_type(**self.wiring.constants, **inputs), self._cell)
         return self._run
 
@@ -151,26 +154,32 @@ class SkillNode(Behaviour):
         self._scope.write({self.wiring.outputs[port]: value for port, value in outputs.items()})
         self._item = self._item_of(outputs) or self._item
         self._close(Status.SUCCESS)
-        self._tell("SUCCESS", outputs=outputs)
+        plain = {port: plain_or_type(value) for port, value in outputs.items()}
+        self._emit_end(Status.SUCCESS, outputs=plain)
 
     def _fail(self, failed: SkillFailed) -> None:
         labels = (self.label,) if self.label else ()
         self.failure = Failure(failed.reason, failed.message, self.skill_name, self.path, labels)
         self._close(Status.FAILURE)
-        self._tell("FAILURE", reason=failed.reason, message=failed.message)
+        self._emit_end(Status.FAILURE, failed.reason, failed.message)
 
     def _fault(self, message: str) -> Fault:
         self._close(Status.INVALID)
-        self._tell("INVALID", reason="fault", message=message)
+        self._emit_end(Status.INVALID, "fault", message)
         return Fault(f"{self.name}: {message}", self.path)
 
     def _close(self, status: Status) -> None:
         self.status, self._run = status, None
 
-    def _tell(self, status: str, reason: str = "", message: str = "", **more: Any) -> None:
-        self._emit(
-            "status", node=self.path, status=status, reason=reason, message=message, item=self._item, **more
-        )
+    def _emit_end(
+        self,
+        status: Status,
+        reason: str = "",
+        message: str = "",
+        outputs: Mapping[str, JsonValue] | None = None,
+    ) -> None:
+        event = NodeEnded(self.path, status.value, self.skill_name, self._item, reason, message, "", outputs)
+        self._emit(event)
 
 
 def _bare(wired: Mapping[str, str]) -> dict[str, str]:

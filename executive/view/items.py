@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from dataclasses import dataclass, replace
 
-from executive.events import Event
+from executive.record.entry import OldEvent as Event
 
 
 @dataclass(frozen=True)

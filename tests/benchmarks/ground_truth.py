@@ -16,7 +16,7 @@ from executive.cell.workcell import CellOptions
 from executive.cells.audit import UNKNOWN
 from executive.cells.sim.audit import audit
 from executive.cells.sim.cell import SimCell
-from executive.events import Emit
+from executive.events import Emit, ItemChanged
 from executive.ledger.item import State
 from executive.mission.load import load_mission
 from executive.perception.detectors.setting import ClosableDetector
@@ -263,7 +263,7 @@ def run_audited(
     journal = next((path for path in journals if path.stat().st_mtime >= began), None)
     if journal is None:
         return run
-    clock = max((entry["clock"] for entry in read_journal(journal)), default=0.0)
+    clock = max((timed.clock for timed in read_journal(journal)), default=0.0)
     message = f"{problem}; its clock had come to {clock:.1f} s"
     return replace(run, message=message, robot_time_s=clock, run=str(journal.parent))
 
@@ -300,8 +300,6 @@ def _run_in_this_process(
 
 def read_reports(journal: Path) -> dict[str, Report]:
     """Return what a journal says last about each item, by item."""
-    return {
-        entry["item"]: Report(entry["label"], entry["state"], entry["why"])
-        for entry in read_journal(journal)
-        if entry["kind"] == "item"
-    }
+    events = (timed.event for timed in read_journal(journal))
+    changes = (event for event in events if isinstance(event, ItemChanged))
+    return {change.item: Report(change.label, change.state, change.why) for change in changes}

@@ -27,6 +27,7 @@ from executive.cell.clock import STEP
 from executive.cell.workcell import Workcell
 from executive.cells.sim.arm import SimArm
 from executive.errors import ExecutiveError
+from executive.events import RunEnded
 from executive.geometry import Array
 from executive.motion.limits import JointLimits
 from executive.motion.trajectory import Trajectory
@@ -34,7 +35,6 @@ from executive.plugins import cell_kind
 from executive.record.journal import Journal, read_journal
 from executive.record.trace import Trace
 from executive.run.assembly import RunOptions, assemble
-from executive.run.outcome import Outcome
 from tests.benchmarks.forks import ForkRunner
 from tests.benchmarks.report import Figures, describe, record_subject, run_mission_command
 
@@ -241,7 +241,7 @@ class _RunWithHalts:
         self._motion = self._arm._motion if isinstance(self._arm, SimArm) else None
         self._run.control.stop()
 
-    def _check(self, outcome: Outcome) -> Figures:
+    def _check(self, outcome: RunEnded) -> Figures:
         """Return the figures and problems of the halt that this child has made."""
         run, workcell = self._run, self._run.workcell
         self._journal.close()

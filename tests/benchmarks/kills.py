@@ -22,6 +22,7 @@ from executive.campaign.subject import Subject
 from executive.cell.config import TableConfig
 from executive.cli.options import runs_option
 from executive.errors import ExecutiveError
+from executive.events import ItemChanged, NodeEnded, NodeStarted, TimedEvent
 from executive.geometry import Array
 from executive.plugins import cell_kind
 from executive.record.find_run import LATEST, find_run
@@ -108,11 +109,12 @@ def resume_killed_run(subject: Subject, seed: int, runs: Path, change: str) -> F
     """Change the world if asked to, resume a killed run, and return its figures and problems."""
     path = find_run(LATEST, runs)
     past = InputLog.of(read_journal(path / "journal.jsonl"))
-    status = {e["node"]: e["status"] for e in past.entries if e["kind"] == "status" and "item" in e}
+    nodes = (timed.event for timed in past.events if isinstance(timed.event, NodeStarted | NodeEnded))
+    last = {event.node: event for event in nodes if event.skill}
     kill: Figures = {
         "run": str(path),
-        "clock_s": max(entry["clock"] for entry in past.entries),
-        "running": [node.rpartition("/")[2] for node, value in status.items() if value == "RUNNING"],
+        "clock_s": max(timed.clock for timed in past.events),
+        "running": [event.skill for event in last.values() if isinstance(event, NodeStarted)],
         "change": change,
         "status": "none",
     }
@@ -122,7 +124,7 @@ def resume_killed_run(subject: Subject, seed: int, runs: Path, change: str) -> F
         options = RunOptions(seed, kind=subject.kind)
         result = resume_run(path, subject.skills, options, RecordOptions(frames=False))
         after = InputLog.of(read_journal(path / "journal.jsonl"))
-        problems = [*check_result(result, change_made=done), *find_handled_twice(after.entries)]
+        problems = [*check_result(result, change_made=done), *find_handled_twice(after.events)]
         difference = compare(subject.loaded, subject.skills, after, seed).difference
         if difference:
             problems.append(f"the replay differs: {difference}")
@@ -193,15 +195,14 @@ def check_result(result: Mapping[str, Any], *, change_made: str) -> list[str]:
     return problems
 
 
-def find_handled_twice(entries: Sequence[Mapping[str, Any]]) -> list[str]:
+def find_handled_twice(events: Sequence[TimedEvent]) -> list[str]:
     """Return a sentence for every item that was handled again after it had been placed."""
     problems, last = [], dict[str, str]()
-    for entry in entries:
-        if entry["kind"] == "item":
-            item, state = entry["item"], entry["state"]
-            if last.get(item) == "placed" != state:
-                problems.append(f"{item} was {state} after it had been placed")
-            last[item] = state
+    for timed in events:
+        if isinstance(change := timed.event, ItemChanged):
+            if last.get(change.item) == "placed" != change.state:
+                problems.append(f"{change.item} was {change.state} after it had been placed")
+            last[change.item] = change.state
     return problems
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from events import at, item_changed
 from py_trees.common import Status
 
 from executive.campaign.subject import Subject
@@ -20,6 +21,7 @@ from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
 from executive.cells.fake.cell import FakeCell
 from executive.cli.subject import load_subject
+from executive.events import TimedEvent
 from executive.motion.braking import brake
 from executive.motion.limits import JointLimits
 from executive.motion.point_to_point import Connector
@@ -157,8 +159,8 @@ class TestKills:
         assert not list(tmp_path.glob("kills/[0-9]*"))
 
     def test_an_item_that_is_handled_twice_is_found(self) -> None:
-        def entries(*states: str) -> list[dict[str, str]]:
-            return [{"kind": "item", "item": "cube-1", "state": state} for state in states]
+        def entries(*states: str) -> list[TimedEvent]:
+            return [at(tick, item_changed("cube-1", state)) for tick, state in enumerate(states)]
 
         assert kills.find_handled_twice(entries("seen", "held", "placed", "placed")) == []
         assert kills.find_handled_twice(entries("held", "placed", "held", "placed")) == [

@@ -16,7 +16,6 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any
 
 import click
 from py_trees import composites, decorators
@@ -25,7 +24,7 @@ from py_trees.common import Status
 
 from executive.cell.protocols import Cell
 from executive.cells.fake.cell import FakeCell
-from executive.events import Event, Observer
+from executive.events import Event, Observer, TimedEvent
 from executive.record.recorder import Recorder
 from executive.record.run_directory import RunDirectory
 from executive.skill import Skill
@@ -116,10 +115,10 @@ def build_ours(nodes: int, last_skill: type[Skill], *observers: Observer) -> Beh
     """
     cell, scope, number = FakeCell().cell, Scope(), itertools.count(1)
 
-    def emit(kind: str, **data: Any) -> None:
-        event = Event(kind, 0, round(cell.clock.now, 6), data)
+    def emit(event: Event) -> None:
+        timed = TimedEvent(0, round(cell.clock.now, 6), event)
         for observer in observers:
-            observer(event)
+            observer(timed)
 
     def make_site(name: str) -> Site:
         return Site(f"tree/repeat/do/{next(number)}:{name}", emit=emit)

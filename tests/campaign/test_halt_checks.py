@@ -7,22 +7,23 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from events import at, item_changed
 
 from executive.campaign.halt_checks import check_journal, check_rest, check_tool
 from executive.cell.arm import Task
 from executive.cells.fake.cell import FakeCell
-from executive.run.outcome import Outcome
+from executive.events import NodeEnded, NodeStarted, RunEnded, TimedEvent
 
-HALTED = Outcome("HALTED", "halted", "halted by the user", "", False, "", 40, 0.166667)
+HALTED = RunEnded("HALTED", "halted", "halted by the user", "", False, "", 40, 0.166667)
 
 
-def entries(*statuses: tuple[str, str], **end: Any) -> list[dict[str, Any]]:
-    """A journal of these nodes and statuses, one a tick, and an end."""
-    told = [
-        {"kind": "status", "tick": tick, "node": node, "status": status}
+def journal_of(*statuses: tuple[str, str], end: RunEnded = HALTED) -> list[TimedEvent]:
+    """Return a journal of these nodes and statuses, one per tick, and an end."""
+    events = [
+        at(tick, NodeStarted(node) if status == "RUNNING" else NodeEnded(node, status))
         for tick, (node, status) in enumerate(statuses)
     ]
-    return [*told, {"kind": "end", "tick": 40, "status": "HALTED", "holds": "", "ticks": 40, **end}]
+    return [*events, at(40, end)]
 
 
 def test_an_arm_that_moves_is_told(fake: FakeCell) -> None:
@@ -47,19 +48,21 @@ def test_an_arm_that_moves_is_told(fake: FakeCell) -> None:
 def test_every_node_of_a_journal_begins_once_and_ends(
     told: list[tuple[str, str]], problems: list[str]
 ) -> None:
-    assert list(check_journal(entries(*told), HALTED)) == problems
+    assert list(check_journal(journal_of(*told), HALTED)) == problems
 
 
-@pytest.mark.parametrize("journal", [[], [*entries(), *entries()], [*entries(), {"kind": "item"}]])
-def test_a_journal_without_one_end_at_its_end_is_told(journal: list[dict[str, Any]]) -> None:
+@pytest.mark.parametrize(
+    "journal", [[], [*journal_of(), *journal_of()], [*journal_of(), at(41, item_changed("cube-1"))]]
+)
+def test_a_journal_without_one_end_at_its_end_is_told(journal: list[TimedEvent]) -> None:
     (problem,) = check_journal(journal, HALTED)
-    ends = sum(entry["kind"] == "end" for entry in journal)
+    ends = sum(isinstance(timed.event, RunEnded) for timed in journal)
     assert problem == f"the journal has {ends} ends in its {len(journal)} entries; only the last may be one"
 
 
 def test_a_journal_that_ends_otherwise_than_the_run_is_told() -> None:
-    (problem,) = check_journal(entries(holds="cube_1"), HALTED)
-    assert problem.startswith("the journal ends with {'kind': 'end'")
+    (problem,) = check_journal(journal_of(end=replace(HALTED, holds="cube_1")), HALTED)
+    assert problem.startswith("the journal ends with RunEnded(status='HALTED'")
 
 
 @pytest.mark.parametrize(
@@ -75,6 +78,6 @@ def test_a_journal_that_ends_otherwise_than_the_run_is_told() -> None:
 def test_what_the_tool_holds_must_be_told_by_name(holding: bool, told: str, problem: list[str]) -> None:
     workcell: Any = SimpleNamespace(
         cell=SimpleNamespace(tool=SimpleNamespace(holding=holding)),
-        accounts=SimpleNamespace(rows=lambda: [{"item": "cube_1"}]),
+        accounts=SimpleNamespace(summaries=lambda: [item_changed("cube_1")]),
     )
     assert list(check_tool(replace(HALTED, holds=told), workcell)) == problem

@@ -70,7 +70,7 @@ def test_a_replay_says_what_is_decided_otherwise(runs: Path, tmp_path: Path) -> 
     other = invoke("replay", str(path), "--mission", str(edited), "--json")
     assert other.exit_code == 1
     told = json.loads(other.stdout)
-    assert (told["same"], told["edited"], told["recorded"]["kind"]) == (False, True, "decision")
+    assert (told["same"], told["edited"], told["recorded"]["kind"]) == (False, True, "TargetSelected")
 
 
 @pytest.mark.parametrize(

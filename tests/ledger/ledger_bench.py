@@ -12,6 +12,7 @@ from executive.cell.detection import Detection, Detections, Observation
 from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
 from executive.cell.objects import Target
+from executive.events import Event
 from executive.ledger.tracker import ItemLedger
 from tests.camera_poses import looking_down
 
@@ -42,7 +43,7 @@ class Bench:
 
     def __init__(self, distinct_by_touch: Sequence[str] = ()) -> None:
         self.config = LedgerConfig()
-        self.events: list[tuple[str, dict]] = []
+        self.events: list[Event] = []
         size, slots = np.array([0.22, 0.24, 0.06]), np.zeros((6, 2))
         bins = {
             "red_bin": Bin("red_bin", np.array([0.2, -0.44, 0]), size, slots),
@@ -54,7 +55,7 @@ class Bench:
             TableConfig(),
             bins,
             {"cube": ("red_bin", "pink_bin")},
-            lambda kind, **data: self.events.append((kind, data)),
+            self.events.append,
             distinct_by_touch,
         )
         self.frames = 0

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from ledger_bench import Bench, Thing
 
+from executive.events import ItemChanged
+
 OVER = np.array([0.2, -0.44, 0.025])
 """The middle of the red bin, which the image of the view `table` does not show."""
 CUBE: Thing = ("cube", 0.5, 0.0)
@@ -34,7 +36,7 @@ def test_what_came_down_in_its_bin_is_there_though_no_look_shows_it(
     for _ in range(3):
         bench.look()
     assert bench.end() == {"cube-1": final}
-    assert bench.ledger.rows()[0]["why"] == ("it fell there" if final[0] == "placed" else final[1])
+    assert bench.ledger.summaries()[0].why == ("it fell there" if final[0] == "placed" else final[1])
     assert bench.ledger.attempts("cube-1") == 1
 
 
@@ -58,8 +60,8 @@ def test_what_must_have_fallen_into_a_bin_takes_a_place_there_until_a_look_shows
     assert (bench.ledger.objects_in("red_bin"), bench.states()["cube-1"][0]) == (0, "dropped")
     bench.look(IN_RED, view="full")
     assert bench.ledger.objects_in("red_bin") == 1
-    (row,) = bench.ledger.rows()
-    assert (row["state"], row["bin"], row["why"]) == ("placed", "red_bin", "")
+    (row,) = bench.ledger.summaries()
+    assert (row.state, row.bin, row.why) == ("placed", "red_bin", "")
 
 
 @pytest.mark.parametrize(
@@ -93,7 +95,7 @@ def test_given_up_and_found_on_the_table_it_stays_given_up_and_never_found_it_is
         one.ledger.rejected("cube-1", "12 attempts failed")
     assert bench.look(("cube", 0.55, 0.1)) == []
     assert bench.states() == {"cube-1": ("rejected", "12 attempts failed")}
-    assert bench.ledger.rows()[0]["position"] == [0.55, 0.1, 0.025]
+    assert bench.ledger.summaries()[0].position == [0.55, 0.1, 0.025]
     for _ in range(2):
         other.look(view="full")
     assert other.end() == {"cube-1": LOST}
@@ -120,9 +122,9 @@ def test_no_name_is_given_out_twice(bench: Bench) -> None:
     bench.drop("cube-1")
     bench.look(("cube", 0.45, 0.1), ("cube", 0.60, 0.1))
     bench.look(("cube", 0.45, 0.1), ("cube", 0.60, 0.1), ("cube", 0.55, -0.2))
-    rows = bench.ledger.rows()
-    assert len({row["item"] for row in rows}) == len(rows) == 3
-    assert sorted(row["position"][0] for row in rows) == [0.45, 0.55, 0.60]  # type: ignore[index]
+    rows = bench.ledger.summaries()
+    assert len({row.item for row in rows}) == len(rows) == 3
+    assert sorted(row.position[0] for row in rows) == [0.45, 0.55, 0.60]  # type: ignore[index]
 
 
 def test_one_object_more_in_a_bin_of_its_class_than_was_let_go_there_is_the_dropped_one(
@@ -149,6 +151,6 @@ def test_a_dropped_item_is_placed_once_in_a_bin_of_its_class(
     bench.look(CUBE)
     bench.drop("cube-1")
     assert bench.look(*shown, view="full") == []
-    told = [data["bin"] for kind, data in bench.events if kind == "item" and data["state"] == "placed"]
-    assert told == placed
+    changes = [event for event in bench.events if isinstance(event, ItemChanged)]
+    assert [change.bin for change in changes if change.state == "placed"] == placed
     assert len(bench.ledger.records) == 1, "what lies in a bin is no item"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from ledger_bench import Bench
 
+from executive.events import FrameSearched, ItemChanged
 from executive.ledger.certainty import MAX_UNSURE_LOOKS
 
 THERE = ("cube", 0.5, 0.0)
@@ -14,10 +15,10 @@ PHANTOM = ("phantom", "more looks missed it than saw it")
 
 def test_what_is_only_glimpsed_is_an_item_in_doubt(bench: Bench) -> None:
     assert [target.item for target in bench.look(unsure=[THERE])] == ["cube-1"]
-    assert (bench.ledger.rows()[0]["looks"], bench.ledger.is_sure("cube-1")) == (0, False)
+    assert (bench.ledger.summaries()[0].looks, bench.ledger.is_sure("cube-1")) == (0, False)
     assert bench.ledger.in_doubt() == ["cube-1"]
-    (_, look), *_ = [event for event in bench.events if event[0] == "look"]
-    assert (look["found"], [told["label"] for told in look["unsure"]]) == ([], ["cube"])
+    look = next(event for event in bench.events if isinstance(event, FrameSearched))
+    assert (look.found, [one.label for one in look.unsure]) == ([], ["cube"])
 
 
 @pytest.mark.parametrize("unsure", [[], [THERE], [("duck", 0.5, 0.0)]], ids=["nothing", "cube", "no route"])
@@ -62,7 +63,7 @@ def test_a_glimpse_where_nothing_can_have_been_overlooked_or_in_a_bin_is_nothing
     for _ in range(3):
         bench.look()
     bench.look(unsure=[THERE])
-    assert bench.ledger.rows() == []
+    assert bench.ledger.summaries() == []
 
 
 def test_a_sure_look_makes_an_item_of_a_glimpse_as_good_as_any(bench: Bench) -> None:
@@ -78,7 +79,7 @@ def test_a_sure_look_makes_an_item_of_a_glimpse_as_good_as_any(bench: Bench) -> 
 
 def test_a_look_that_is_unsure_of_a_known_item_does_not_miss_it(bench: Bench) -> None:
     bench.look(THERE, unsure=[("duck", 0.51, 0.01)])
-    assert (len(bench.ledger.rows()), bench.ledger.records[0].glimpses) == (1, 0), "a second, weaker box"
+    assert (len(bench.ledger.summaries()), bench.ledger.records[0].glimpses) == (1, 0), "a second, weaker box"
     for _ in range(5):
         bench.look(unsure=[("duck", 0.51, 0.0)])
     record = bench.ledger.records[0]
@@ -124,6 +125,7 @@ def test_a_new_item_that_proves_to_be_one_that_fell_is_reported_as_none(bench: B
     bench.drop("cube-1")
     bench.look(unsure=[("cube", 0.6, 0.1)])
     bench.look(("cube", 0.6, 0.1))
-    states = {data["item"]: (data["state"], data["why"]) for kind, data in bench.events if kind == "item"}
+    changes = [event for event in bench.events if isinstance(event, ItemChanged)]
+    states = {change.item: (change.state, change.why) for change in changes}
     assert states == {"cube-1": ("seen", ""), "cube-2": ("phantom", "it is cube-1")}
     assert not bench.ledger.is_open("cube-2")

@@ -9,6 +9,7 @@ from ledger_bench import Bench, Thing
 from executive.cell.error_rates import ErrorRates
 from executive.cell.objects import Target
 from executive.errors import Fault
+from executive.events import DetectedObject, FrameSearched, ItemChanged
 
 CUBE: Thing = ("cube", 0.5, 0.0)
 FAR: Thing = ("cube", 0.6, 0.2)
@@ -179,8 +180,8 @@ def test_an_item_that_is_given_up_in_the_tool_stays_there_until_it_is_released(b
     bench.ledger.rejected("cube-1", "slippery")
     assert bench.ledger.in_tool() == "cube-1"
     bench.ledger.placed("cube-1", "red_bin")
-    (row,) = bench.ledger.rows()
-    assert (row["state"], row["bin"], row["why"]) == ("placed", "red_bin", "")
+    (row,) = bench.ledger.summaries()
+    assert (row.state, row.bin, row.why) == ("placed", "red_bin", "")
 
 
 def test_an_item_that_is_given_up_in_the_tool_and_put_back_is_rejected(bench: Bench) -> None:
@@ -205,17 +206,12 @@ def test_every_change_is_reported_and_the_accounts_balance(bench: Bench) -> None
     assert bench.ledger.balance() == {
         "seen": 3, "placed": 1, "rejected": 2, "skipped": 0, "lost": 0, "phantom": 0,
     }  # fmt: skip
-    items = [data for kind, data in bench.events if kind == "item" and data["item"] == "cube-1"]
-    assert [data["state"] for data in items] == ["seen", "seen", "held", "placed"]
-    assert items[-1] == {
-        "item": "cube-1", "label": "cube", "state": "placed", "position": [0.5, 0.0, 0.025], "looks": 2,
-        "attempts": 0, "bin": "red_bin", "why": "",
-    }  # fmt: skip
-    _, look = bench.events[-2]
-    assert (look["frame"], look["detector"], look["view"], look["found"]) == (3, "eye", "full", [])
-    assert bench.events[3][1]["found"][0] == {
-        "label": "cube", "confidence": 0.9, "box": [0.0, 0.0, 1.0, 1.0], "position": [0.5, 0.0, 0.025],
-    }  # fmt: skip
+    changes = [event for event in bench.events if isinstance(event, ItemChanged) and event.item == "cube-1"]
+    assert [change.state for change in changes] == ["seen", "seen", "held", "placed"]
+    assert changes[-1] == ItemChanged("cube-1", "cube", "placed", [0.5, 0.0, 0.025], 2, 0, "red_bin", "")
+    looks = [event for event in bench.events if isinstance(event, FrameSearched)]
+    assert looks[-1] == FrameSearched(3, looks[-1].camera, "eye", "full", [], [], [])
+    assert looks[0].found[0] == DetectedObject("cube", 0.9, [0.0, 0.0, 1.0, 1.0], [0.5, 0.0, 0.025], "")
 
 
 def test_an_item_nobody_entered_is_a_fault(bench: Bench) -> None:
@@ -265,9 +261,9 @@ def test_a_misread_object_is_nobody_who_is_missed_before_its_class_is_sure(bench
     for label in ("cube", "cube", "duck", "duck", "duck", "duck", "duck"):
         bench.look((label, 0.60, 0.10), by=bad)
     bench.look(("duck", 0.60, 0.10), CUBE, by=bad)
-    rows = {row["item"]: row for row in bench.ledger.rows() if row["state"] == "seen"}
-    assert rows["duck-1"]["position"] == pytest.approx([0.60, 0.10, 0.025])
-    assert rows["cube-1"]["position"] == pytest.approx([0.50, 0.0, 0.025])
+    rows = {row.item: row for row in bench.ledger.summaries() if row.state == "seen"}
+    assert rows["duck-1"].position == pytest.approx([0.60, 0.10, 0.025])
+    assert rows["cube-1"].position == pytest.approx([0.50, 0.0, 0.025])
 
 
 def test_what_is_believed_on_the_table_stands_there_given_up_or_not(bench: Bench) -> None:

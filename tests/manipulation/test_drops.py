@@ -50,8 +50,8 @@ def test_the_ledger_is_told_once(fake: FakeCell, held: str) -> None:
     fake.tool.part()
     assert slipped(fake.cell, held)
     assert slipped(fake.cell, held)
-    (row,) = fake.ledger.rows()
-    assert (row["state"], row["attempts"]) == ("dropped", 1)
+    (row,) = fake.ledger.summaries()
+    assert (row.state, row.attempts) == ("dropped", 1)
 
 
 @pytest.mark.parametrize(
@@ -65,4 +65,4 @@ def test_what_slips_away_over_its_bin_is_believed_there_unless_it_was_thrown(
     fake.tool.part()
     assert slipped(fake.cell, held)
     fake.ledger.close(completed=True)
-    assert [row["state"] for row in fake.ledger.rows()] == [state]
+    assert [row.state for row in fake.ledger.summaries()] == [state]

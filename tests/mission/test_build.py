@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from py_trees.common import Status
 
-from executive.events import ignore
+from executive.events import Event, NodeEnded, ignore
 from executive.mission.build import build
 from executive.mission.load import LoadedMission
 from executive.mission.outline import outline
@@ -88,17 +88,17 @@ def test_the_outline_reads_like_the_mission_and_paths_are_unique(built: Any) -> 
 
 def test_a_built_tree_runs_and_moves_values_along(built: Any) -> None:
     scope = Scope()
-    events: list[dict[str, Any]] = []
+    events: list[Event] = []
     root = built(
         HEAD + "tree: [Look, {Pick: {held: $thing}}, {Drop: {held: $thing, bin: red_bin}}]\n",
         scope,
-        lambda kind, **data: events.append(data),
+        events.append,
     )
     for _ in range(4):
         root.tick_once()
     assert root.status is Status.SUCCESS
     assert dict(scope) == {"seen": [1], "thing": "thing"}
-    assert [event["node"] for event in events if event["status"] == "SUCCESS"] == [
+    assert [event.node for event in events if isinstance(event, NodeEnded) and event.status == "SUCCESS"] == [
         "tree/Look", "tree/Pick", "tree/Drop", "tree",
     ]  # fmt: skip
 

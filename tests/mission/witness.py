@@ -6,11 +6,10 @@ from collections.abc import Mapping
 
 from py_trees.common import Status
 
-from executive.events import Event
+from executive.events import NodeStarted, RunEnded, TimedEvent
 from executive.mission.flow.analysis import Analysis
 from executive.mission.load import LoadedMission
 from executive.mission.model.nodes import SkillNode
-from executive.run.outcome import Outcome
 from executive.run.run import Run
 from executive.skill import EMPTY, HOLDING, Skill
 from executive.tree.blackboard import Scope
@@ -39,10 +38,10 @@ class Witness:
         self._broken: list[str] = []
         self.cell: UnkindCell | None = None
 
-    def __call__(self, event: Event) -> None:
-        if self.cell is None or event.kind != "status" or event.data["status"] != "RUNNING":
+    def __call__(self, timed: TimedEvent) -> None:
+        if self.cell is None or not isinstance(timed.event, NodeStarted):
             return
-        path = event.data["node"]
+        path = timed.event.node
         entry = self._flow.entry.get(path)
         if entry is None:
             self._broken.append(f"{path} runs, which the check says it never does")
@@ -56,7 +55,7 @@ class Witness:
         if before is HOLDING and not self.cell.tool.holding and not self.cell.has_dropped:
             self._broken.append(f"{path} needs something in the tool and has nothing")
 
-    def problems(self, run: Run, outcome: Outcome) -> list[str]:
+    def problems(self, run: Run, outcome: RunEnded) -> list[str]:
         """Return everything in the run and its outcome that must not be."""
         assert self.cell is not None
         success, found = self._flow.result.success, list(dict.fromkeys(self._broken))

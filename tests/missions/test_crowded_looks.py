@@ -126,7 +126,7 @@ def assert_ended_as_crowded(result: Mapping[str, Any], journal: str, count: int)
     assert result["wall_time_s"] < MAX_WALL_TIME
     entries = [json.loads(line)["kind"] for line in journal.splitlines()]
     assert len(entries) < MAX_JOURNAL_ENTRIES
-    assert not {"look", "item"} & set(entries)
+    assert not {"FrameSearched", "ItemChanged"} & set(entries)
 
 
 @pytest.mark.parametrize("moving", [False, True], ids=["fixed", "moving"])

@@ -12,12 +12,11 @@ import pytest
 
 from executive.cell.workcell import Workcell
 from executive.cells.fake.cell import FakeCell
-from executive.events import Event
+from executive.events import MotionPlanned, RunEnded, TimedEvent
 from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import cell_kind, discover
 from executive.record.result import agrees
 from executive.run.assembly import RunOptions, assemble
-from executive.run.outcome import Outcome
 from executive.testing.oracle import oracle_cell
 
 MISSIONS = {path.stem: path for path in sorted((Path(__file__).parents[2] / "missions").glob("*.yaml"))}
@@ -34,7 +33,7 @@ slow = pytest.mark.slow
 class Done:
     """A mission that was run: its outcome, the ledger's items, the audit, and if each plan was made ahead."""
 
-    outcome: Outcome
+    outcome: RunEnded
     items: dict[str, Any]
     audit: dict[str, int]
     ahead: list[bool]
@@ -50,9 +49,9 @@ def execute(mission: LoadedMission, seed: int, kind: Callable[..., Workcell] = F
     """Run a mission."""
     ahead: list[bool] = []
 
-    def observe(event: Event) -> None:
-        if event.kind == "plan":
-            ahead.append(event.data["ahead"])
+    def observe(timed: TimedEvent) -> None:
+        if isinstance(timed.event, MotionPlanned):
+            ahead.append(timed.event.ahead)
 
     # Where an operator is asked, every class is asked for until there can be none of it left.
     requests = [*mission.routes] * 6
@@ -122,7 +121,7 @@ def test_only_rehearsals_are_left_out_of_the_simulated_world() -> None:
 def test_no_kit_gets_a_part_twice_and_a_full_table_gives_two_whole_kits(seed: int, second: list[str]) -> None:
     kits: dict[str, list[str]] = {}
     for row in execute(loaded("kit_fasteners"), seed).items["rows"]:
-        kits.setdefault(row["bin"], []).append(row["label"])
+        kits.setdefault(row.bin, []).append(row.label)
     assert sorted(kits["tray_1"]) == ["bolt", "nut", "washer"]
     assert sorted(kits["tray_2"]) == second
 
@@ -131,8 +130,8 @@ def test_no_kit_gets_a_part_twice_and_a_full_table_gives_two_whole_kits(seed: in
 def test_no_bin_gets_more_than_its_quota(quota: int) -> None:
     overrides = {"quota": str(quota), "cell.table.objects": "[6, 6]"}
     done = execute(load_mission(MISSIONS["sort_by_priority"], discover(), overrides), 5)
-    placed = [row["label"] for row in done.items["rows"] if row["bin"]]
-    there = [row["label"] for row in done.items["rows"]]
+    placed = [row.label for row in done.items["rows"] if row.bin]
+    there = [row.label for row in done.items["rows"]]
     assert {label: placed.count(label) for label in placed} == {
         label: min(quota, there.count(label)) for label in set(there)
     }

@@ -9,6 +9,7 @@ import pytest
 
 from executive.cell.detection import Detection
 from executive.cells.fake.cell import FakeCell
+from executive.events import FrameSearched
 from executive.testing.run_mission import MissionResult, run_mission
 
 Answers = Callable[[int, Sequence[Detection]], Sequence[Detection] | str]
@@ -27,7 +28,7 @@ def sort(**answers: Answers) -> MissionResult:
 
 def asked(result: MissionResult) -> list[str]:
     """Return the name of the detector of every look, in order."""
-    return [event.data["detector"] for event in result.events if event.kind == "look"]
+    return [one.event.detector for one in result.events if isinstance(one.event, FrameSearched)]
 
 
 def assert_all_right(result: MissionResult) -> None:

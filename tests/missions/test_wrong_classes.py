@@ -35,7 +35,7 @@ def test_a_class_that_is_always_mistaken_is_in_no_wrong_bin_and_rejected_by_its_
     result = sorted_with(mission, {"cube": "sphere"})
     assert (result.status, result.items["placed"], result.items["rejected"]) == ("INCOMPLETE", 2, 2)
     assert (result.audit["wrong_bin"], result.agrees) == (0, True)
-    reasons = [row["why"] for row in result.items["rows"] if row["state"] == "rejected"]
+    reasons = [row.why for row in result.items["rows"] if row.state == "rejected"]
     # The fake tool feels a surface from 2 mm above it.
     height = "it was touched 52 mm above the table, and a sphere is 60 mm high"
     assert reasons == [f"could not be picked: {height}"] * 2

@@ -6,16 +6,18 @@ import json
 import pickle
 import re
 from pathlib import Path
-from typing import Any
 
 import pytest
+from events import at, read, skill_ended, skill_started
 from failed_runs import PICK, FailedRun
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from executive.events import Event, Exact
+from executive.cell.frame import FrameTaken
+from executive.events import OperatorAsked, RunEnded, RunHalted, TimedEvent
 from executive.plugins import discover
 from executive.record.diagnosis.course import Course
+from executive.record.entry import old_event
 
 CUBE = [("cube", 0.5, 0.1)]
 
@@ -87,23 +89,18 @@ def test_a_recovery_that_failed_in_an_earlier_round_explains_nothing() -> None:
     assert story["chain"][2]["why"] == "tries again only after IsHolding.empty"
 
 
-def node(name: str, status: str, tick: int, **data: Any) -> Event:
-    return Event("status", tick, tick / 240, {"node": f"tree/{name}", "status": status, **data})
-
-
-def sense(name: str, value: Any, tick: int, **data: Any) -> Event:
-    return Event("sense", tick, tick / 240, {"name": name, "nth": 1, "value": value, **data})
-
-
 def test_a_failure_remembers_what_the_cell_had_answered_until_then_and_no_list_or_picture() -> None:
     course = Course()
     for event in (
-        sense("arm.met", Exact(None), 1), sense("arm.q", Exact([0.0] * 7), 1),
-        node("Approach", "RUNNING", 2, item="cube-1"), sense("arm.met", Exact("a wrench"), 3),
-        node("Approach", "FAILURE", 3, item="cube-1", reason="blocked", message="a wrench"),
-        sense("arm.met", Exact(None), 4), sense("tool.holding", Exact(True), 4),
-    ):  # fmt: skip
-        course(event)
+        at(1, read("arm.met", None)),
+        at(1, read("arm.q", [0.0] * 7)),
+        at(2, skill_started("tree/Approach", "cube-1")),
+        at(3, read("arm.met", "a wrench")),
+        at(3, skill_ended("tree/Approach", "FAILURE", "cube-1", reason="blocked", message="a wrench")),
+        at(4, read("arm.met", None)),
+        at(4, read("tool.holding", True)),
+    ):
+        course(old_event(event))
     ran = course.node("tree/Approach")
     assert [(sense.name, sense.value, sense.tick) for sense in ran.senses] == [("arm.met", "a wrench", 3)]
 
@@ -160,25 +157,27 @@ def test_what_was_let_go_as_the_run_ended_is_to_be_looked_for() -> None:
 
 def test_a_halt_at_a_question_says_so() -> None:
     run = FailedRun("pick_on_request", requests=None)
-    run.run.observe(lambda event: run.run.control.stop() if event.kind == "asking" else None)
+    run.run.observe(lambda timed: run.run.control.stop() if isinstance(timed.event, OperatorAsked) else None)
     assert run.tell()["verdict"] == "halted by the user while the operator was asked"
 
 
 @pytest.mark.slow
 def test_the_memory_of_a_run_does_not_grow_with_its_length() -> None:
     run = FailedRun("sort_overhead")
-    events: list[Event] = []
+    events: list[TimedEvent] = []
     run.run.observe(events.append)
     run.slip(2)
     assert run.tell() is None
-    before_the_end = [event for event in events if event.kind not in ("end", "halt")][:-1]
+    before_the_end = [one for one in events if not isinstance(one.event, RunEnded | RunHalted | FrameTaken)][
+        :-1
+    ]
     course, sizes = Course(), []
     for round in range(40):
         for event in before_the_end:
-            data = {key: value for key, value in event.data.items() if key != "frame_object"}
-            if data.get("item"):
-                data["item"] += f"-{round}"
-            course(Event(event.kind, event.tick, event.clock, data))
+            old = old_event(event)
+            if old.data.get("item"):
+                old.data["item"] += f"-{round}"
+            course(old)
         sizes.append(len(pickle.dumps(course)))
     # The names of the items grow by a digit.
     assert sizes[-1] < 1.01 * sizes[1]

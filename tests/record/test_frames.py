@@ -2,49 +2,53 @@
 
 from __future__ import annotations
 
+from itertools import chain
+
 import cv2
 import numpy as np
 import pytest
+from events import at, detected, frame_searched, item_changed, run_started, skill_ended, skill_started
 
-from executive.cell.frame import Frame
-from executive.events import Event
+from executive.cell.frame import Frame, FrameTaken
+from executive.events import DetectedObject, NodeEnded, TargetSelected, TimedEvent
 from executive.geometry import Pose
 from executive.record import frames as module
 from executive.record.frames import KEPT, Frames, picture_of
 from executive.record.pictures.drawer import Drawer
 
-CUBE = {"label": "cube", "confidence": 0.9, "box": (20, 40, 50, 70), "position": (0.5, 0.1, 0.02)}
-NEAR = {"label": "cube", "confidence": 0.8, "box": (90, 40, 120, 70), "position": (0.5, -0.1, 0.02)}
-DUCK = {"label": "duck", "confidence": 0.7, "box": (20, 90, 50, 120), "position": (0.6, 0.1, 0.02)}
+CUBE = detected("cube")
+NEAR = detected("cube", box=[90, 40, 120, 70], position=[0.5, -0.1, 0.02])
+DUCK = detected("duck", box=[20, 90, 50, 120], position=[0.6, 0.1, 0.02])
 
 
-def look(number: int, *found: dict) -> Event:
+def look(number: int, *found: DetectedObject) -> list[TimedEvent]:
     image = np.full((160, 160, 3), 150, np.uint8)
     visible = np.ones((160, 160), bool)
     frame = Frame(number, "overhead", image, None, np.eye(3), Pose.identity(), 0.5, visible, 0)
-    data = {"frame": number, "frame_object": frame, "detector": "embedded", "found": found}
-    return Event("look", number, 0.5, data)
+    return [at(number, FrameTaken(frame), 0.5), at(number, frame_searched(*found, frame=number), 0.5)]
 
 
-def decision(frame: int = 1, tick: int = 12, **chosen) -> Event:
-    data = {"item": "cube-1", "label": "cube", "frame": frame, "bin": "red_bin", **chosen}
-    return Event("decision", tick, 0.75, data)
+def decision(frame: int = 1, tick: int = 12) -> list[TimedEvent]:
+    return [at(tick, TargetSelected("cube-1", "cube", frame, "red_bin"), 0.75)]
 
 
-def item(name: str, state: str, **more) -> Event:
-    return Event("item", 1, 0.0, {"item": name, "state": state, **more})
+def item(name: str, state: str, **more) -> list[TimedEvent]:
+    return [at(1, item_changed(name, state, **more), 0.0)]
 
 
-def skill(name: str, status: str, item: str = "", reason: str = "", tick: int = 90) -> Event:
-    message = f"it was {reason}" if reason else ""
-    data = {"node": f"tree/do/{name}", "status": status, "item": item, "reason": reason, "message": message}
-    return Event("status", tick, 2.0, data)
+def started(name: str, item: str = "") -> list[TimedEvent]:
+    return [at(90, skill_started(f"tree/do/{name}", item), 2.0)]
 
 
-def shown(folder, *events: Event) -> Frames:
+def failed(name: str, reason: str, item: str = "", tick: int = 90) -> list[TimedEvent]:
+    event = skill_ended(f"tree/do/{name}", "FAILURE", item, reason=reason, message=f"it was {reason}")
+    return [at(tick, event, 2.0)]
+
+
+def shown(folder, *events: list[TimedEvent]) -> Frames:
     """Return an observer that has seen events."""
     frames = Frames(folder)
-    for event in events:
+    for event in chain.from_iterable(events):
         frames(event)
     return frames
 
@@ -63,7 +67,12 @@ def drawn(monkeypatch):
 
 
 def test_a_decision_is_drawn_on_the_frame_it_rests_on(tmp_path):
-    frames = shown(tmp_path / "frames", look(1, CUBE, DUCK), decision(position=(0.5, 0.1, 0.02)))
+    frames = shown(
+        tmp_path / "frames",
+        look(1, CUBE, DUCK),
+        item("cube-1", "seen", position=[0.5, 0.1, 0.02]),
+        decision(),
+    )
     frames.close()
     assert frames.problem == ""
     image = cv2.imread(str(tmp_path / "frames" / "000012_cube-1.jpg"))
@@ -75,39 +84,43 @@ def test_a_decision_is_drawn_on_the_frame_it_rests_on(tmp_path):
 
 def test_a_picture_says_what_the_run_is_about(tmp_path, drawn):
     shown(
-        tmp_path, Event("run", 0, 0.0, {"mission": "sort"}), look(1, DUCK, CUBE),
-        skill("SelectTarget", "RUNNING"), item("duck-1", "placed", bin="yellow_bin"),
+        tmp_path, [at(0, run_started(mission="sort"))], look(1, DUCK, CUBE),
+        started("SelectTarget"), item("duck-1", "placed", bin="yellow_bin"),
         item("cube-1", "seen", position=(0.5, 0.1, 0.02), attempts=1), decision(),
     )  # fmt: skip
     scene = drawn["000012_cube-1.jpg"]
     assert (scene.mission, scene.clock, scene.age) == ("sort", 0.75, 0.25)
     assert (scene.camera, scene.detector) == ("overhead", "embedded")
     assert (scene.phase, scene.item, scene.bin, scene.attempts) == ("SelectTarget", "cube-1", "red_bin", 1)
-    assert [(seen.label, seen.box) for seen in scene.seen] == [("duck", DUCK["box"]), ("cube", CUBE["box"])]
+    assert [(seen.label, seen.box) for seen in scene.seen] == [
+        ("duck", (20, 90, 50, 120)),
+        ("cube", (20, 40, 50, 70)),
+    ]
     assert (scene.chosen, scene.failure, scene.message) == (1, "", "")
     assert scene.fates == {"yellow_bin": ("duck-1",)}
     assert scene.classes == ("cube", "duck")
 
 
 @pytest.mark.parametrize(
-    ("found", "chosen", "expected"),
+    ("found", "position", "expected"),
     [
-        ((CUBE, DUCK), {}, 0),
-        ((CUBE, NEAR), {"position": (0.5, -0.09, 0.02)}, 1),
-        ((CUBE, NEAR), {}, None),
-        ((DUCK,), {}, None),
+        ((CUBE, DUCK), None, 0),
+        ((CUBE, NEAR), [0.5, -0.09, 0.02], 1),
+        ((CUBE, NEAR), None, None),
+        ((DUCK,), None, None),
     ],
 )
-def test_the_chosen_box_is_the_nearest_else_the_only_of_its_class(tmp_path, drawn, found, chosen, expected):
-    shown(tmp_path, look(1, *found), decision(**chosen))
+def test_the_chosen_box_is_the_nearest_else_the_only_of_its_class(tmp_path, drawn, found, position, expected):
+    known = [] if position is None else item("cube-1", "seen", position=position)
+    shown(tmp_path, look(1, *found), known, decision())
     assert drawn["000012_cube-1.jpg"].chosen == expected
 
 
 def test_a_failed_attempt_is_drawn_on_what_was_decided_from(tmp_path, drawn):
     shown(
-        tmp_path, look(1, CUBE), decision(), look(2), skill("Grasp", "RUNNING", "cube-1"),
+        tmp_path, look(1, CUBE), decision(), look(2), started("Grasp", "cube-1"),
         item("cube-1", "seen", position=(0.5, 0.1, 0.02), attempts=1),
-        skill("Grasp", "FAILURE", "cube-1", "missed"),
+        failed("Grasp", "missed", "cube-1"),
     )  # fmt: skip
     scene = drawn["000090_cube-1_missed.jpg"]
     assert (scene.failure, scene.message) == ("Grasp.missed", "it was missed")
@@ -118,8 +131,8 @@ def test_a_failed_attempt_is_drawn_on_what_was_decided_from(tmp_path, drawn):
 
 def test_a_look_that_leads_to_nothing_is_drawn_once(tmp_path, drawn):
     shown(
-        tmp_path, look(1, DUCK), skill("SelectTarget", "FAILURE", reason="unseen", tick=20),
-        skill("MoveToScan", "FAILURE", reason="blocked", tick=30),
+        tmp_path, look(1, DUCK), failed("SelectTarget", "unseen", tick=20),
+        failed("MoveToScan", "blocked", tick=30),
     )  # fmt: skip
     ((name, scene),) = drawn.items()
     assert name == "000020_unseen.jpg"
@@ -127,8 +140,7 @@ def test_a_look_that_leads_to_nothing_is_drawn_once(tmp_path, drawn):
 
 
 def test_what_fails_because_a_skill_failed_is_not_drawn_again(tmp_path, drawn):
-    failed = {"node": "tree/do", "status": "FAILURE", "reason": "Grasp.missed"}
-    shown(tmp_path, look(1, CUBE), Event("status", 90, 2.0, failed))
+    shown(tmp_path, look(1, CUBE), [at(90, NodeEnded("tree/do", "FAILURE", reason="Grasp.missed"))])
     assert not drawn
 
 
@@ -141,7 +153,7 @@ def test_an_earlier_look_is_found_again_and_old_ones_are_forgotten(tmp_path, dra
 
 def test_what_the_last_decision_rests_on_is_kept(tmp_path, drawn):
     looks = [look(number) for number in range(1, 2 * KEPT)]
-    missed = skill("Grasp", "FAILURE", "cube-1", "missed")
+    missed = failed("Grasp", "missed", "cube-1")
     shown(tmp_path, look(0, CUBE), decision(frame=0), *looks, missed, decision(frame=KEPT, tick=91))
     assert list(drawn) == ["000012_cube-1.jpg", "000090_cube-1_missed.jpg"]
 

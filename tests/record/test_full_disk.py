@@ -11,6 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from executive.cli.main import main
+from executive.events import TargetSelected
 from executive.record.journal import read_journal
 from executive.record.pictures.drawer import Drawer
 from executive.record.recorder import Recorder
@@ -64,7 +65,7 @@ def test_wherever_the_disk_fills_up_the_run_ends_at_rest_and_says_so(run, monkey
     disk = Disk(monkeypatch, RECORD)
     shown, whole = run()
     assert shown.exit_code == 0, shown.output
-    kinds = [entry["kind"] for entry in read_journal(whole / "journal.jsonl")]
+    kinds = [type(one.event).__name__ for one in read_journal(whole / "journal.jsonl")]
     codes = []
     while True:
         disk.room, disk.asked = len(codes), 0
@@ -117,7 +118,7 @@ def test_a_run_whose_directory_is_deleted_ends_at_rest_and_says_so(run, monkeypa
 
     def steal(self, event):
         record(self, event)
-        if event.kind == "decision":
+        if isinstance(event.event, TargetSelected):
             shutil.rmtree(self._journal._path.parent)
 
     monkeypatch.setattr(Recorder, "__call__", steal)

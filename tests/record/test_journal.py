@@ -4,19 +4,44 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
 from contextlib import closing
-from dataclasses import dataclass, field
-from functools import reduce
+from pathlib import Path
 
-import numpy as np
 import pytest
-from pydantic_core import from_json
+from events import (
+    at,
+    detected,
+    frame_searched,
+    item_changed,
+    read,
+    run_ended,
+    run_started,
+    skill_ended,
+)
+from jsonschema import Draft7Validator
 
 from executive.errors import Fault, InputError
-from executive.events import Event, Exact
-from executive.record.entry import entry_of
-from executive.record.journal import Journal, ending_of, read_journal
+from executive.events import (
+    BranchChosen,
+    FaultInjected,
+    FaultRaised,
+    InputRead,
+    MotionPlanned,
+    NodeEnded,
+    NodeStarted,
+    OperatorAsked,
+    RequestGiven,
+    RunHalted,
+    RunResumed,
+    TargetSelected,
+    ToolCommanded,
+)
+from executive.record import journal_format
+from executive.record.journal import Journal, ending_of, read_journal, start_of
+from executive.record.journal_format import KINDS, encode, journal_schema
+
+NODE, END = NodeStarted("a"), run_ended()
+FIRST = encode(at(1, run_started()))
 
 
 @pytest.fixture
@@ -38,66 +63,30 @@ def write(path, *events, again=False):
             journal(event)
 
 
-def test_writes_an_object_per_line_with_its_stamp_first_and_no_pixels_and_nothing_once_it_is_closed(path):
+def test_writes_an_object_per_line_with_its_kind_and_time_first_and_nothing_once_it_is_closed(path):
     journal = Journal(path)
-    data = {"node": "größe", "at": np.array([1 / 3]), "tick": 9, "kind": "other", "frame_object": object()}
-    journal(Event("status", 3, 0.0125, data))
+    journal(at(3, NodeStarted("größe"), 0.0125))
     journal.close()
     journal.close()
-    journal(Event("end", 4, 0.0, {}))
-    text = '{"tick": 3, "clock": 0.0125, "kind": "status", "node": "größe", "at": [0.333333]}\n'
+    journal(at(4, END))
+    text = '{"kind": "NodeStarted", "tick": 3, "clock": 0.0125, "node": "größe", "skill": "", "item": ""}\n'
     assert path.read_text() == text
 
 
-class Shy(Mapping):
-    """Raises whenever it is asked for what it holds."""
-
-    def __iter__(self):
-        raise RuntimeError
-
-    __len__ = __getitem__ = __iter__
-
-
-@dataclass
-class Unfinished:
-    value: object = field(init=False)
-
-
-ENDLESS: list = [1]
-ENDLESS.append(ENDLESS)
-DEEP = reduce(lambda inner, number: [inner] if number % 2 else {"a": inner}, range(5000), 1)
-
-
 @pytest.mark.parametrize(
-    "value",
-    [Shy(), Unfinished(), ENDLESS, DEEP, np.array([1, None], dtype=object), np.void(b"a"), "\ud800"],
-    ids=lambda value: type(value).__name__,
-)
-def test_whatever_is_told_becomes_one_line_of_json_that_reads_back(path, value):
-    event = Event("status", 0, 0.0, {"a": 1, "outputs": value})
-    write(path, event)
-    (line,) = path.read_bytes().splitlines()
-    told = entry_of(event)
-    # Python reads more than is JSON.
-    assert read_journal(path) == [told] == [from_json(line, allow_inf_nan=False)]
-    if isinstance(value, (Shy, Unfinished, list, dict)):
-        assert told["outputs"] == type(value).__name__
-
-
-@pytest.mark.parametrize(
-    ("kind", "data", "synced"),
+    ("event", "synced"),
     [
-        ("intent", {"action": "close"}, True),
-        ("item", {"state": "placed"}, True),
-        ("item", {"state": "held"}, False),
-        ("status", {}, False),
-        ("sense", {}, False),
-        ("end", {}, True),
+        (ToolCommanded("close"), True),
+        (item_changed("cube-1", "placed"), True),
+        (item_changed("cube-1", "held"), False),
+        (NODE, False),
+        (read("arm.q", []), False),
+        (END, True),
     ],
 )
-def test_intents_placements_and_the_end_are_on_the_disk_at_once(path, syncs, kind, data, synced):
+def test_commands_of_the_tool_placements_and_the_end_are_on_the_disk_at_once(path, syncs, event, synced):
     with closing(Journal(path)) as journal:
-        journal(Event(kind, 1, 0.0, data))
+        journal(at(1, event))
         assert syncs == [path.stat().st_size] * synced
 
 
@@ -110,47 +99,48 @@ def full(*args):
 def test_a_full_disk_is_one_fault_then_silence_and_no_part_of_a_line(path, monkeypatch, again, taken):
     path.write_bytes(FIRST[:-1] * again)
     journal = Journal(path, again=again)
-    journal(Event("status", 0, 0.0, {}))
+    journal(at(0, NODE))
     before = path.read_bytes()
     write, parts = os.write, iter([taken] * (taken > 0))
     monkeypatch.setattr(os, "write", lambda file, line: write(file, line[: next(parts, None) or full()]))
     with pytest.raises(Fault, match=r"cannot be written: no space left on device; the run stops"):
-        journal(Event("status", 1, 0.0, {}))
-    journal(Event("end", 1, 0.0, {}))
+        journal(at(1, NODE))
+    journal(at(1, END))
     journal.close()
-    assert path.read_bytes() == before == FIRST * again + b'{"tick": 0, "clock": 0.0, "kind": "status"}\n'
+    assert path.read_bytes() == before == FIRST * again + encode(at(0, NODE))
 
 
 def test_what_reaches_the_disk_only_at_the_close_is_not_believed_unseen(path, monkeypatch):
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(Fault, match=r"may lack its last lines: no space left on device; believe"):
-        write(path, Event("status", 0, 0.0, {}))
+        write(path, at(0, NODE))
 
 
 @pytest.mark.parametrize("whole", [True, False])
-@pytest.mark.parametrize("kind", ["intent", "end"])
-def test_a_journal_deleted_meanwhile_is_a_fault_at_the_next_intent_or_the_end(tmp_path, kind, whole):
+@pytest.mark.parametrize("event", [ToolCommanded("open"), END])
+def test_a_journal_deleted_meanwhile_is_a_fault_at_the_next_command_of_the_tool_or_the_end(
+    tmp_path, event, whole
+):
     directory = tmp_path / "run"
     directory.mkdir()
     journal = Journal(directory / "journal.jsonl")
     (directory / "journal.jsonl").unlink()
     if whole:
         directory.rmdir()
-    journal(Event("status", 1, 0.0, {}))
+    journal(at(1, NODE))
     with pytest.raises(Fault, match="cannot be written: it was deleted while the run went on; the run stops"):
-        journal(Event(kind, 2, 0.0, {}))
+        journal(at(2, event))
     journal.close()
 
 
 def test_a_line_the_disk_takes_in_parts_is_whole(path, monkeypatch):
     take = os.write
     monkeypatch.setattr(os, "write", lambda file, line: take(file, line[:5]))
-    write(path, Event("end", 1, 0.0, {"status": "SUCCESS"}))
-    assert read_journal(path)[0]["status"] == "SUCCESS"
+    write(path, at(0, run_started()), at(1, END))
+    assert ending_of(read_journal(path)) == END
 
 
-FIRST = b'{"tick": 1, "kind": "run"}\n'
-LAST = '{"tick": 2, "kind": "ä"}'.encode()
+LAST = encode(at(2, NodeStarted("ä")))[:-1]
 ENDS = {
     b"": 0,
     FIRST: 1,
@@ -171,11 +161,13 @@ ENDS = {
 def test_a_torn_end_is_left_out_and_cut_off_where_the_journal_goes_on(path, content):
     path.write_bytes(content)
     ticks = [1, 2][: ENDS[content]]
-    assert [entry["tick"] for entry in read_journal(path)] == ticks
-    write(path, Event("resume", 3, 0.0, {}), again=True)
-    entries = [json.loads(line) for line in path.read_bytes().splitlines()]
-    assert [entry["tick"] for entry in entries] == [*ticks, 3]
-    assert read_journal(path) == entries
+    assert [timed.tick for timed in read_journal(path)] == ticks
+    resumed = at(3, RunResumed(3, "", {}))
+    write(path, resumed, again=True)
+    if ticks:
+        assert [timed.tick for timed in read_journal(path)] == [*ticks, 3]
+    else:
+        assert path.read_bytes() == encode(resumed)
 
 
 def test_a_torn_end_is_cut_on_the_disk_before_anything_is_appended(path, syncs):
@@ -200,45 +192,124 @@ def test_a_new_run_needs_a_new_journal_and_one_that_goes_on_an_old_one(path):
 @pytest.mark.parametrize(
     ("line", "why"),
     [
-        (b'{"tick"', "Expecting"),
-        (b"", "Expecting value"),
+        (b'{"tick"', "EOF while parsing"),
+        (b"", "EOF while parsing"),
         (b"[1]", "it is no object"),
-        (b"\0\0\0\0", "Expecting value"),
-        (b'{"a": "\xc3"}', "can't decode"),
-        (b"[" * 100_000, "nested too deeply"),
+        (b"\0\0\0\0", "expected value"),
+        (b'{"a": "\xc3"}', "invalid unicode code point"),
+        (b"[" * 100_000, "recursion limit exceeded"),
+        (
+            b'{"kind": "status", "tick": 1, "clock": 0.1}',
+            "\"kind\" is 'status'; allowed are RunStarted, NodeS",
+        ),
+        (
+            b'{"kind": "RunHalted", "tick": 1, "clock": 0.1}',
+            'RunHalted has no key "ticked"; its keys are kind',
+        ),
+        (b'{"kind": "RunHalted", "tick": 1, "clock": 0.1, "ticked": true, "x": 1}', 'the unknown key "x"'),
+        (
+            b'{"kind": "RunHalted", "tick": 1, "clock": 0.1, "ticked": 1}',
+            '"ticked" of RunHalted: input should',
+        ),
+        (
+            b'{"kind": "RunHalted", "tick": 1.0, "clock": 0.1, "ticked": true}',
+            '"tick" is 1.0, not an integer',
+        ),
+        (b'{"kind": "RunHalted", "tick": 1e12, "clock": 0.1, "ticked": true}', '"tick" is 1000000000000.0'),
+        (b'{"kind": "RunHalted", "tick": 1, "clock": "0", "ticked": true}', "\"clock\" is '0', not a time"),
+        (b'{"kind": "RunHalted", "tick": 1, "clock": NaN, "ticked": true}', "expected value"),
+        (
+            b'{"kind": "RunHalted", "tick": 240, "clock": 3.0, "ticked": true}',
+            '"tick" 240 and "clock" 3.0 contra',
+        ),
+        (encode(at(1, NodeEnded("a", "SUCCESS"))).replace(b"SUCC", b"ODDN"), '"status" of NodeEnded: string'),
+        (
+            encode(at(1, frame_searched(detected("cube")))).replace(b'"label"', b'"name"'),
+            '"found.0.label" of Fr',
+        ),
     ],
 )
-def test_a_broken_line_in_the_middle_is_an_error_with_its_number(path, line, why):
-    path.write_bytes(FIRST + line + b"\n" + FIRST)
+def test_a_line_that_is_no_event_is_an_error_with_its_number(path, line, why):
+    path.write_bytes(FIRST + line + b"\n" + encode(at(2, NODE)))
     with pytest.raises(InputError) as raised:
         read_journal(path)
-    start, end = str(raised.value).split(why)
-    assert start.startswith(f"{path}:2: this line is not JSON (")
-    assert end.endswith(
-        "it was changed after the run, or the disk lost a part of it; bring back a copy of it"
+    message = str(raised.value)
+    assert message.startswith(f"{path}:2: this line is no event (")
+    assert why in message
+    assert message.endswith(
+        "somebody changed it after the run, or the disk lost a part of it; restore a copy"
+    )
+
+
+@pytest.mark.parametrize(
+    ("first", "version"),
+    [
+        (b'{"tick": 0, "kind": "run", "versions": {"executive": "0.1.0"}}', "0.1.0"),
+        (b'{"kind": "run"}', "0.1"),
+    ],
+)
+def test_a_journal_of_the_first_format_is_named(path, first, version):
+    path.write_bytes(first + b"\n" + FIRST)
+    with pytest.raises(InputError) as raised:
+        read_journal(path)
+    assert str(raised.value) == (
+        f"{path}: this journal has format 1, written by executive {version}; this version reads format 2; "
+        f"read it with executive {version}, or run the mission again"
     )
 
 
 @pytest.mark.parametrize(
     ("kinds", "ended"),
-    [("", None), ("run status", None), ("run status end", 2), ("run end resume status", None),
-     ("run end resume end", 3)],
+    [("", False), ("run node", False), ("run node end", True), ("run end resume node", False),
+     ("run end resume end", True)],
 )  # fmt: skip
-def test_a_run_has_ended_where_nothing_comes_after_its_end(kinds, ended):
-    entries = [{"tick": number, "kind": kind} for number, kind in enumerate(kinds.split())]
-    assert ending_of(entries) == (None if ended is None else entries[ended])
+def test_a_run_has_ended_if_nothing_comes_after_its_end(kinds, ended):
+    samples = {"run": run_started(), "node": NODE, "end": END, "resume": RunResumed(1, "", {})}
+    events = [at(tick, samples[kind]) for tick, kind in enumerate(kinds.split())]
+    assert ending_of(events) == (END if ended else None)
 
 
-def test_an_exact_value_comes_back_as_it_was(path):
-    value = {"q": [0.1 + 0.2, -0.0, 5e-324], "text": "caf\udce9 ä\n", "off": None, "n": 2**70, "on": True}
-    write(path, Event("sense", 0, 0.0, {"value": Exact(value)}))
-    assert repr(read_journal(path)[0]["value"]) == repr(value)
+def test_every_kind_of_event_comes_back_as_it_was(path):
+    value = {"q": [0.1 + 0.2, -0.0, 5e-324], "text": "ä\n", "off": None, "n": 2**70, "on": True}
+    events = [
+        run_started(requests=["cube"], params={"a": [1, 0.5]}), NODE,
+        skill_ended("a/Grasp", outputs={"x": [1]}),
+        BranchChosen("a", "again", "Grasp.missed", "no seal"),
+        frame_searched(detected("cube"), unknown=["x"]),
+        item_changed("cube-1"), TargetSelected("cube-1", "cube", 1, "red_bin"), MotionPlanned(True, 0.0, 1.5),
+        ToolCommanded("close"), InputRead("arm.q", 1, value), OperatorAsked(["cube"]), RequestGiven(None),
+        FaultInjected("seal_breaks", "a", "cube-1", "cube", [0.5]), RunHalted(True),
+        RunResumed(3, "close", {"python": "3.11"}), FaultRaised("Traceback"), END,
+    ]  # fmt: skip
+    timed = [at(tick, event) for tick, event in enumerate(events)]
+    write(path, *timed)
+    assert repr(read_journal(path)) == repr(timed)
+    assert {type(event).__name__ for event in events} == KINDS.keys()
+
+
+def test_a_text_that_is_not_unicode_is_kept_readable(path):
+    write(path, at(0, run_started(file="caf\udce9.yaml")))
+    assert start_of(read_journal(path), path, "").file == "caf?.yaml"
 
 
 @pytest.mark.parametrize("value", [float("nan"), {"a": [float("inf")]}, object(), b"", {1, 2}, {(1,): 2}])
-def test_an_exact_value_that_is_not_json_is_a_fault_and_the_journal_goes_on(path, value):
+def test_a_value_that_is_not_json_is_a_fault_and_the_journal_goes_on(path, value):
     with closing(Journal(path)) as journal:
-        with pytest.raises(Fault, match=r'no words for an event of kind "sense": .*; what is .* plain JSON'):
-            journal(Event("sense", 0, 0.0, {"value": Exact(value)}))
-        journal(Event("end", 1, 0.0, {}))
-    assert [entry["kind"] for entry in read_journal(path)] == ["end"]
+        journal(at(0, run_started()))
+        with pytest.raises(Fault, match="the journal cannot hold an event of kind InputRead: "):
+            journal(at(0, read("arm.q", value)))
+        journal(at(1, END))
+    assert ending_of(read_journal(path)) == END
+
+
+def test_the_schema_that_ships_describes_the_events():
+    shipped = Path(journal_format.__file__).with_name("journal.schema.json")
+    made = "executive schema --journal > executive/record/journal.schema.json"
+    assert json.loads(shipped.read_text(encoding="utf-8")) == journal_schema(), f"run: {made}"
+
+
+def test_every_line_of_a_journal_fits_the_schema(path):
+    write(path, at(0, run_started()), at(1, NODE), at(2, frame_searched(detected("cube"))), at(3, END))
+    validator = Draft7Validator(journal_schema())
+    for line in path.read_text().splitlines():
+        validator.validate(json.loads(line))

@@ -9,6 +9,7 @@ import pytest
 
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
+from executive.events import RunEnded, RunStarted, TargetSelected
 from executive.mission.load import load_mission
 from executive.plugins import discover
 from executive.record.journal import Journal, read_journal
@@ -27,7 +28,7 @@ class Watcher:
         self.seen.append(run.root)
 
     def __call__(self, event):
-        self.seen.append(event.kind)
+        self.seen.append(type(event.event))
 
     def close(self):
         self.seen.append("closed")
@@ -61,11 +62,10 @@ def test_leaves_a_directory_that_explains_the_run(run, tmp_path):
     }  # fmt: skip
     assert json.loads((left / "result.json").read_text()) == result
     assert result["audit"]["agrees"]
-    entries = read_journal(left / "journal.jsonl")
-    (decision,) = (entry for entry in entries if entry["kind"] == "decision")
-    assert (left / "frames" / f"{decision['tick']:06d}_{decision['item']}.jpg").is_file()
-    assert (entries[0]["kind"], entries[-1]["kind"]) == ("run", "end")
-    assert "frame_object" not in (left / "journal.jsonl").read_text()
+    events = read_journal(left / "journal.jsonl")
+    (decision,) = (one for one in events if isinstance(one.event, TargetSelected))
+    assert (left / "frames" / f"{decision.tick:06d}_{decision.event.item}.jpg").is_file()
+    assert (type(events[0].event), type(events[-1].event)) == (RunStarted, RunEnded)
 
 
 def test_a_view_is_told_the_tree_first_and_the_end_last(run):
@@ -74,7 +74,7 @@ def test_a_view_is_told_the_tree_first_and_the_end_last(run):
     assert view.seen == other.seen
     root, first, *_, last, closed = view.seen
     assert isinstance(root, py_trees.behaviour.Behaviour)
-    assert (first, last, closed) == ("run", "end", "closed")
+    assert (first, last, closed) == (RunStarted, RunEnded, "closed")
 
 
 @pytest.mark.parametrize("error", [InputError("no such weights"), KeyboardInterrupt()])

@@ -5,14 +5,15 @@ from __future__ import annotations
 import os
 
 import pytest
+from events import at, run_ended
 
-from executive.events import Event
+from executive.events import NodeStarted
 from executive.record.frames import Frames
 from executive.record.journal import read_journal
 from executive.record.recorder import Recorder
 from executive.record.run_directory import RunDirectory
 
-STATUS, END = Event("status", 0, 0.0, {"node": "a"}), Event("end", 1, 0.0, {})
+STATUS, END = at(0, NodeStarted("a")), at(1, run_ended())
 
 
 @pytest.fixture
@@ -31,7 +32,7 @@ def test_a_picture_that_cannot_be_drawn_is_told_and_ends_nothing(directory, monk
     recorder(STATUS)
     recorder(END)
     recorder.close()
-    problem = "not every picture was drawn: TypeError: 'Event' object is not subscriptable"
+    problem = "not every picture was drawn: TypeError: 'TimedEvent' object is not subscriptable"
     assert (recorder.problem, len(read_journal(directory.journal))) == (problem, 2)
 
 

@@ -9,9 +9,16 @@ import pytest
 
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
+from executive.events import (
+    BranchChosen,
+    ItemChanged,
+    NodeEnded,
+    NodeStarted,
+    TargetSelected,
+    ToolCommanded,
+)
 from executive.mission.load import load_mission
 from executive.plugins import discover
-from executive.record.entry import entry_of
 from executive.record.find_run import find_run
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
@@ -67,30 +74,28 @@ def test_the_first_decision_of_an_edited_mission_that_differs_is_told(missions: 
     done = again(path, edited(path, "try: {SelectTarget: {prefer: surest}}", "try: SelectTarget"))
     assert done.edited
     before, now = (
-        f"at {each['clock']:.3f} s (step {each['tick']}) decision: "
-        f"item {each['item']}, label {each['label']}, bin {each['bin']}"
+        f"at {each.clock:.3f} s (step {each.tick}) TargetSelected: "
+        f"item {each.event.item}, label {each.event.label}, bin {each.event.bin}"
         for each in (done.recorded, done.replayed)
     )
-    assert done.recorded["item"] != done.replayed["item"]
+    assert done.recorded.event.item != done.replayed.event.item
     assert done.difference == f"the record says {before}, and now it is {now}"
 
 
 def test_a_mission_that_gives_up_sooner_says_where(missions: Path) -> None:
     file, skills = missions / "sort_overhead.yaml", discover()
     four_times = [during("*/Grasp", seal_fails(), nth=(1, 2, 3, 4))]
-    log = InputLog.of(
-        [entry_of(event) for event in run_mission(file, seed=3, disturbances=four_times).events]
-    )
+    log = InputLog.of(run_mission(file, seed=3, disturbances=four_times).events)
     assert compare(load_mission(file, skills), skills, log, 3).same
     done = compare(load_mission(file, skills, {"attempts": "2"}), skills, log, 3, edited=True)
-    assert done.replayed["node"] == "RejectTarget"
+    assert done.replayed.event.node == "RejectTarget"
 
 
 def test_where_the_record_has_no_answer_it_says_so(missions: Path, tmp_path: Path) -> None:
     path = recorded(missions, tmp_path, "sort_fruit")
     stock = "  - use: take_stock\n"
     done = again(path, edited(path, stock, "  - {MoveToScan: {pose: aside}}\n" + stock))
-    assert (done.replayed["node"], done.replayed["status"]) == ("MoveToScan", "INVALID")
+    assert (done.replayed.event.node, done.replayed.event.status) == ("MoveToScan", "INVALID")
     assert done.difference.endswith(
         "reason fault: the record holds no answer to what is asked here first: plan.ready; "
         "what would come of it only a run can tell"
@@ -98,19 +103,18 @@ def test_where_the_record_has_no_answer_it_says_so(missions: Path, tmp_path: Pat
 
 
 def test_a_directory_without_answers_cannot_be_replayed(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"no run that can be replayed: its journal tells of no answers"):
+    with pytest.raises(InputError, match=r"no run that can be replayed: its journal holds no answers"):
         replay(tmp_path, [], discover())
 
 
 def test_a_decision_too_many_is_a_difference_in_a_run_that_was_cut_off_too(missions: Path) -> None:
     """What the record did not decide in a step that it ended was not decided."""
     file, skills = missions / "sort_overhead.yaml", discover()
-    entries = [entry_of(event) for event in run_mission(file, seed=3).events]
-    cut = [entry for entry in entries if entry["tick"] <= 600]
-    missing = next(n for n, entry in enumerate(cut) if entry["kind"] == "intent")
-    decided = ("status", "choice", "decision", "item", "intent")
-    without = [e for n, e in enumerate(cut) if n < missing or e["kind"] not in decided]
+    cut = [timed for timed in run_mission(file, seed=3).events if timed.tick <= 600]
+    missing = next(n for n, timed in enumerate(cut) if isinstance(timed.event, ToolCommanded))
+    decided = NodeStarted | NodeEnded | BranchChosen | TargetSelected | ItemChanged | ToolCommanded
+    without = [one for n, one in enumerate(cut) if n < missing or not isinstance(one.event, decided)]
     loaded = load_mission(file, skills)
     assert compare(loaded, skills, InputLog.of(cut), 3).same
     done = compare(loaded, skills, InputLog.of(without), 3)
-    assert (done.recorded, done.replayed and done.replayed["kind"]) == (None, "intent")
+    assert (done.recorded, done.replayed and type(done.replayed.event)) == (None, ToolCommanded)

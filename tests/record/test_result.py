@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from events import at, run_ended
 
 from executive.errors import ExecutiveError
+from executive.events import MotionPlanned, OperatorAsked, RequestGiven
 from executive.record.result import (
     disagreement,
     exit_code,
@@ -18,32 +19,22 @@ from executive.record.result import (
     write_result,
 )
 
-
-@dataclass(frozen=True)
-class Ended:
-    status: str = "SUCCESS"
-    reason: str = ""
-    message: str = ""
-    node: str = ""
-    empty: bool = True
-    holds: str = ""
-    ticks: int = 240
-    robot_time: float = 1.0
-
-
 ITEMS = {"seen": 3, "placed": 2, "rejected": 1, "skipped": 0, "lost": 0, "phantom": 1, "rows": [{}]}
 AUDIT = {"right": 2, "wrong_bin": 0, "left": 1, "elsewhere": 0, "fell_in_wrong_bin": 0, "unseen": 0}
 NOTED = [
-    {"kind": "plan", "ahead": False, "waits": 0.05}, {"kind": "plan", "ahead": True, "waits": 0.02},
-    {"kind": "plan", "ahead": True, "waits": 0.0}, {"kind": "request", "wanted": "cube"},
-]  # fmt: skip
+    at(1, MotionPlanned(False, 0.05, 1.0)),
+    at(2, MotionPlanned(True, 0.02, 1.0)),
+    at(3, MotionPlanned(True, 0.0, 1.0)),
+    at(4, RequestGiven("cube")),
+]
 STORY = {"verdict": "Grasp failed"}
 
 
 def result(items=ITEMS, audit=AUDIT, **ended) -> dict:
+    end = run_ended(**{"empty": True, "ticks": 240, "robot_time": 1.0} | ended)
     return result_of(
-        mission="sort", seed=7, outcome=Ended(**ended), items=items, audit=audit, noted=NOTED, story=STORY,
-        wall_time=0.5, trace="ab", run=Path("r"),
+        mission="sort", seed=7, outcome=end, items=items,
+        audit=audit, noted=NOTED, story=STORY, wall_time=0.5, trace="ab", run=Path("r"),
     )  # fmt: skip
 
 
@@ -64,8 +55,8 @@ def test_has_every_field_that_is_promised():
      (["cube", None, "duck", None, None], ["cube", "quit", "duck"])],
 )  # fmt: skip
 def test_the_end_of_the_list_is_a_wish_to_quit_and_goes_without_saying(wanted, words):
-    entries = [{"kind": "request", "wanted": word} for word in wanted]
-    assert requests_of([{"kind": "asking", "choices": ["cube"]}, *entries]) == words
+    events = [at(1, RequestGiven(word)) for word in wanted]
+    assert requests_of([at(0, OperatorAsked(["cube"])), *events]) == words
 
 
 def test_is_written_and_can_be_read_again(tmp_path):

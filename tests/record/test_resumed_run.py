@@ -13,7 +13,7 @@ import pytest
 
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
-from executive.events import Event
+from executive.events import ItemChanged, MotionPlanned, NodeEnded, NodeStarted, RunResumed, TimedEvent
 from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import discover
 from executive.record.find_run import find_run
@@ -43,8 +43,8 @@ class Cutter:
     def open(self, run: object) -> None:
         """Begin."""
 
-    def __call__(self, event: Event) -> None:
-        if event.tick >= self._tick:
+    def __call__(self, timed: TimedEvent) -> None:
+        if timed.tick >= self._tick:
             self._nth -= 1
             if self._nth <= 0:
                 raise Cut
@@ -89,11 +89,11 @@ def placed(path: Path) -> Counter[str]:
     """How often each item came into a bin."""
     states: dict[str, str] = {}
     counts: Counter[str] = Counter()
-    for entry in read_journal(path / "journal.jsonl"):
-        if entry["kind"] == "item":
-            if entry["state"] == "placed" != states.get(entry["item"]):
-                counts[entry["item"]] += 1
-            states[entry["item"]] = entry["state"]
+    for timed in read_journal(path / "journal.jsonl"):
+        if isinstance(change := timed.event, ItemChanged):
+            if change.state == "placed" != states.get(change.item):
+                counts[change.item] += 1
+            states[change.item] = change.state
     return counts
 
 
@@ -140,14 +140,18 @@ def test_it_may_be_cut_off_again_and_again(missions: Path, tmp_path: Path) -> No
             resumed(path, views=[Cutter(after)])
     assert resumed(path)["status"] == "SUCCESS"
     assert set(placed(path).values()) == {1}
-    assert [e["kind"] for e in read_journal(path / "journal.jsonl")].count("resume") == 4
+    assert [type(one.event) for one in read_journal(path / "journal.jsonl")].count(RunResumed) == 4
     assert redecided(path) == ""
 
 
 def moment(path: Path, skill: str) -> int:
     """Control step in the middle of the second activation of a skill in a whole run."""
-    entries = read_journal(path / "journal.jsonl")
-    ticks = [e["tick"] for e in entries if e["kind"] == "status" and e["node"].endswith(f"/{skill}")]
+    events = read_journal(path / "journal.jsonl")
+    ticks = [
+        one.tick
+        for one in events
+        if isinstance(one.event, NodeStarted | NodeEnded) and one.event.skill == skill
+    ]
     return (ticks[2] + ticks[3]) // 2
 
 
@@ -171,8 +175,8 @@ def test_what_fell_from_the_tool_is_picked_again(missions: Path, tmp_path: Path,
 
 def test_a_run_that_was_halted_goes_on(missions: Path, tmp_path: Path) -> None:
     class Stopper(Cutter):
-        def __call__(self, event: Event) -> None:
-            if event.kind == "item" and event.data["state"] == "held":
+        def __call__(self, timed: TimedEvent) -> None:
+            if isinstance(timed.event, ItemChanged) and timed.event.state == "held":
                 os.kill(os.getpid(), signal.SIGINT)
 
     halted = run_of(load(missions, "sort_overhead"), tmp_path, views=[Stopper(0, 0)])
@@ -182,9 +186,9 @@ def test_a_run_that_was_halted_goes_on(missions: Path, tmp_path: Path) -> None:
     assert (result["status"], result["items"]["placed"]) == ("SUCCESS", 6)
     assert set(placed(path).values()) == {1}
     assert redecided(path) == ""
-    entries = read_journal(path / "journal.jsonl")
-    since = [entry["kind"] for entry in entries].index("resume")
-    ahead = [entry["ahead"] for entry in entries[since:] if entry["kind"] == "plan"]
+    events = [one.event for one in read_journal(path / "journal.jsonl")]
+    since = [type(event) for event in events].index(RunResumed)
+    ahead = [event.ahead for event in events[since:] if isinstance(event, MotionPlanned)]
     assert sum(ahead) == 6 + 5, "on the cell itself the ways into bins and to next targets are planned ahead"
 
 

@@ -2,35 +2,31 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
+from events import at, read, run_ended, run_started
 
+from executive.events import RequestGiven, RunHalted, RunResumed, TimedEvent, ToolCommanded
 from executive.replay.input_log import InputLog, Interruption
 
 
-def entry(tick: int, kind: str, **data: Any) -> dict[str, Any]:
-    return {"tick": tick, "clock": tick / 240, "kind": kind, **data}
+def sense(tick: int, value: object, name: str = "tool.holding", nth: int = 1) -> TimedEvent:
+    return at(tick, read(name, value, nth))
 
 
-def sense(tick: int, value: object, name: str = "tool.holding", nth: int = 1) -> dict[str, Any]:
-    return entry(tick, "sense", name=name, nth=nth, value=value)
+def resume(tick: int, ticked: int, intent: str = "") -> TimedEvent:
+    return at(tick, RunResumed(ticked, intent, {}))
 
 
-def resume(tick: int, ticked: int, intent: str = "") -> dict[str, Any]:
-    return entry(tick, "resume", ticked=ticked, intent=intent)
-
-
-START = entry(0, "run", step=1 / 240, seed=3)
+START = at(0, run_started())
 
 
 def values(log: InputLog) -> list[object]:
-    return [one.value for one in log.inputs["tool.holding"]]
+    return [one.read.value for one in log.inputs["tool.holding"]]
 
 
 def test_answers_are_in_order_by_the_name_of_the_input() -> None:
     log = InputLog.of([START, sense(0, False), sense(0, "arm", name="arm.met"), sense(7, True, nth=2)])
-    assert [(one.tick, one.nth, one.value) for one in log.inputs["tool.holding"]] == [
+    assert [(one.tick, one.read.nth, one.read.value) for one in log.inputs["tool.holding"]] == [
         (0, 1, False),
         (7, 2, True),
     ]
@@ -38,7 +34,7 @@ def test_answers_are_in_order_by_the_name_of_the_input() -> None:
 
 
 def test_an_incomplete_control_step_is_void_once_the_run_was_resumed() -> None:
-    killed = [START, sense(4, True), sense(5, False), entry(5, "intent", action="open")]
+    killed = [START, sense(4, True), sense(5, False), at(5, ToolCommanded("open"))]
     assert InputLog.of(killed).last_action == "open"
     resumed = InputLog.of([*killed, resume(5, 5, "open"), sense(5, True, nth=3)])
     assert values(resumed) == [True, True]
@@ -55,7 +51,7 @@ def test_a_second_resumption_voids_only_the_end_of_the_first() -> None:
 
 
 def test_the_steps_after_a_halt_do_not_count() -> None:
-    halted = [START, sense(8, 1), entry(9, "halt", ticked=True), sense(30, 2), entry(30, "end")]
+    halted = [START, sense(8, 1), at(9, RunHalted(True)), sense(30, 2), at(30, run_ended())]
     log = InputLog.of(halted)
     assert (log.interruption_after(30).complete, values(log.before(9))) == (9, [1])
     # Once the run was resumed, the halt is void.
@@ -80,13 +76,13 @@ def test_a_resumption_that_was_interrupted_at_once_is_repeated_from_its_beginnin
 
 
 def test_a_run_that_ended_as_incomplete_is_reopened() -> None:
-    log = InputLog.of([START, sense(8, 1), entry(9, "end", status="INCOMPLETE")])
+    log = InputLog.of([START, sense(8, 1), at(9, run_ended("INCOMPLETE"))])
     assert log.interruption_after(9) == Interruption(10, "", True, 10)
-    log = InputLog.of([*log.entries, resume(10, 10), sense(11, 2)])
+    log = InputLog.of([*log.events, resume(10, 10), sense(11, 2)])
     assert log.interruptions[10].reopens
 
 
 def test_the_start() -> None:
     assert InputLog.of([]).start is None
-    log = InputLog.of([START, entry(3, "request"), entry(4, "request")])
-    assert (log.step, log.number_of("request")) == (1 / 240, 2)
+    log = InputLog.of([START, at(3, RequestGiven(None)), at(4, RequestGiven(None))])
+    assert (log.step, log.number_of(RequestGiven)) == (1 / 240, 2)

@@ -6,10 +6,12 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from events import at, read
 from hypothesis import given
 from hypothesis import strategies as st
 
 from executive.errors import Fault, Unreachable
+from executive.events import Event, TimedEvent
 from executive.replay.input_log import InputLog
 from executive.replay.input_recorder import InputRecorder
 from executive.replay.input_replayer import InputReplayer, Unrecorded
@@ -19,22 +21,19 @@ class Recording:
     """A recorder and its events."""
 
     def __init__(self) -> None:
-        self.entries: list[dict[str, Any]] = []
+        self.events: list[TimedEvent] = []
         self.tick = 0
         self.recorder = InputRecorder(self.emit)
 
-    def emit(self, kind: str, **data: Any) -> None:
-        value = data.pop("value")
-        self.entries.append(
-            {"tick": self.tick, "kind": kind, "value": getattr(value, "value", value), **data}
-        )
+    def emit(self, event: Event) -> None:
+        self.events.append(at(self.tick, event))
 
     def begin(self, tick: int) -> None:
         self.tick = tick
         self.recorder.begin_step()
 
     def replayer(self) -> InputReplayer:
-        return InputReplayer(InputLog.of(self.entries))
+        return InputReplayer(InputLog.of(self.events))
 
 
 def raising(error: Exception) -> Callable[[], Any]:
@@ -83,4 +82,4 @@ def test_only_answers_unlike_the_one_before_are_recorded() -> None:
     recording = Recording()
     answers = [recording.recorder.read("x", lambda value=value: value) for value in (1, 1, 5, 5, 1)]
     assert answers == [1, 1, 5, 5, 1]
-    assert [(entry["value"], entry["nth"]) for entry in recording.entries] == [(1, 1), (5, 3), (1, 5)]
+    assert [one.event for one in recording.events] == [read("x", 1), read("x", 5, 3), read("x", 1, 5)]

@@ -6,7 +6,7 @@ from executive.cell.clock import StepClock
 from executive.cell.protocols import Cell
 from executive.cell.proxy import IS_METHOD
 from executive.cells.fake.cell import FakeCell
-from executive.events import Emit, ignore
+from executive.events import Emit, Event, ToolCommanded, ignore
 from executive.replay.input_recorder import InputRecorder
 from executive.replay.recorded_cell import COMMANDS, INPUT_FORMATS, RECORDED_ROLES, recorded_cell
 
@@ -36,9 +36,9 @@ def test_an_intent_is_emitted_before_the_tool_acts() -> None:
     fake = FakeCell()
     intents: list[tuple[str, bool]] = []
 
-    def emit(kind: str, **data: object) -> None:
-        if kind == "intent":
-            intents.append((str(data["action"]), fake.tool.holding))
+    def emit(event: Event) -> None:
+        if isinstance(event, ToolCommanded):
+            intents.append((event.action, fake.tool.holding))
 
     tool = recorded(fake, emit).tool
     tip = fake.arm.tool_pose.position

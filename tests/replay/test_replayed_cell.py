@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
+from events import STEP, at, read, run_started
 
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault, Stopped
+from executive.events import RunHalted, RunResumed, TimedEvent
 from executive.replay.input_log import InputLog, Interruption
 from executive.replay.replayed_cell import ReplayedCell
 
-STEP = 1 / 240
+
+def sense(tick: int, name: str, value: object, raised: str = "") -> TimedEvent:
+    return at(tick, read(name, value, raised=raised))
 
 
-def entry(tick: int, kind: str, **data: Any) -> dict[str, Any]:
-    return {"tick": tick, "clock": tick / 240, "kind": kind, **data}
+START = [at(0, run_started()), sense(0, "clock", 0.0)]
 
 
-def sense(tick: int, name: str, value: object, **data: Any) -> dict[str, Any]:
-    return entry(tick, "sense", name=name, nth=1, value=value, **data)
-
-
-START = [entry(0, "run", step=STEP, seed=3), sense(0, "clock", 0.0)]
-
-
-def log(*entries: dict[str, Any]) -> InputLog:
-    return InputLog.of([*START, *entries])
+def log(*events: TimedEvent) -> InputLog:
+    return InputLog.of([*START, *events])
 
 
 def test_questions_are_answered_from_the_log_and_commands_are_not_executed() -> None:
@@ -65,9 +59,7 @@ def test_after_the_last_interruption_the_cell_inside_takes_over() -> None:
 
 
 def test_a_recorded_interruption_leaves_out_the_steps_in_which_nothing_was_decided() -> None:
-    replayed = ReplayedCell(
-        FakeCell(), log(entry(5, "resume", ticked=1, intent="open"), sense(5, "arm.at_rest", True))
-    )
+    replayed = ReplayedCell(FakeCell(), log(at(5, RunResumed(1, "open", {})), sense(5, "arm.at_rest", True)))
     replayed.advance()
     assert replayed.interruption == Interruption(1, "open", False, 5)
     replayed.resume()
@@ -76,7 +68,7 @@ def test_a_recorded_interruption_leaves_out_the_steps_in_which_nothing_was_decid
 
 @pytest.mark.parametrize("ticked", [False, True])
 def test_it_ends_where_the_recorded_run_was_halted(ticked: bool) -> None:
-    replayed = ReplayedCell(FakeCell(), log(entry(1, "halt", ticked=ticked)))
+    replayed = ReplayedCell(FakeCell(), log(at(1, RunHalted(ticked))))
     assert not replayed.is_over
     replayed.advance()
     assert replayed.is_over is not ticked

@@ -15,6 +15,7 @@ from scipy.optimize import minimize_scalar
 
 from executive.cell.clock import STEP
 from executive.cells.sim.cell import SimCell
+from executive.events import NodeEnded, NodeStarted, RunEnded
 from executive.geometry import Array
 from executive.mission.load import load_mission
 from executive.motion.limits import JointLimits
@@ -22,7 +23,6 @@ from executive.motion.trajectory import Trajectory
 from executive.plugins import discover
 from executive.record.journal import Journal, read_journal
 from executive.run.assembly import RunOptions, assemble
-from executive.run.outcome import Outcome
 from executive.testing.oracle import oracle_cell
 
 pytestmark = pytest.mark.slow
@@ -47,7 +47,7 @@ class Halt:
     """
 
     tick: int
-    outcome: Outcome
+    outcome: RunEnded
     path: Trajectory
     commands: Array
     measured: Array
@@ -131,7 +131,10 @@ def test_braking_stays_on_the_planned_path_and_within_the_stop_limits(halt: Halt
 
 
 def test_no_node_goes_on_and_the_journal_is_complete(halt: Halt) -> None:
-    assert (halt.running, [entry["kind"] for entry in halt.journal].count("end")) == ([], 1)
-    assert (halt.journal[-1]["kind"], halt.journal[-1]["status"]) == ("end", "HALTED")
-    left = {e["node"]: e["status"] for e in halt.journal if e["kind"] == "status"}
-    assert "RUNNING" not in left.values()
+    ends = [timed.event for timed in halt.journal if isinstance(timed.event, RunEnded)]
+    assert (halt.running, ends) == ([], [halt.journal[-1].event])
+    assert ends[0].status == "HALTED"
+    nodes = (timed.event for timed in halt.journal if isinstance(timed.event, NodeStarted | NodeEnded))
+    assert not [
+        event for event in {event.node: event for event in nodes}.values() if isinstance(event, NodeStarted)
+    ]

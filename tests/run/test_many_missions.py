@@ -14,11 +14,11 @@ from py_trees.behaviour import Behaviour
 from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 
+from executive.cell.plain import plain
 from executive.cells.fake.cell import FakeCell
 from executive.mission.build import build
 from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import discover
-from executive.record.plain import plain
 from executive.record.trace import Trace
 from executive.run.assembly import RunOptions, assemble
 from executive.run.planning_ahead import PlanningAhead
@@ -60,7 +60,7 @@ class Interleaved:
     def story(self) -> Story:
         self._fake.accounts.close(completed=self._root.status is Status.SUCCESS)
         accounts = self._fake.accounts
-        told = {"unknown": accounts.unknown, "doubts": accounts.doubts, "rows": accounts.rows()}
+        told = {"unknown": accounts.unknown, "doubts": accounts.doubts, "rows": accounts.summaries()}
         items = {**accounts.balance(), **told}
         return (
             self._root.status.value, self._context.tick, self._trace.hexdigest(), variables(self._root),

@@ -13,10 +13,9 @@ import pytest
 
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError, Stopped
-from executive.events import Event
+from executive.events import Event, NodeEnded, NodeStarted, OperatorAsked, RequestGiven, TimedEvent
 from executive.mission.load import load_mission
 from executive.plugins import discover
-from executive.record.entry import entry_of
 from executive.record.replay import compare
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions, assemble
@@ -38,9 +37,9 @@ def test_what_a_word_means(word: str, meaning: str | None) -> None:
     assert interpret(word, CHOICES) == meaning
 
 
-class Heard(list[tuple[str, dict[str, Any]]]):
-    def __call__(self, kind: str, **data: Any) -> None:
-        self.append((kind, data))
+class Heard(list[Event]):
+    def __call__(self, event: Event) -> None:
+        self.append(event)
 
 
 def test_a_script_is_followed_and_then_quits_for_good() -> None:
@@ -48,7 +47,7 @@ def test_a_script_is_followed_and_then_quits_for_good() -> None:
     operator = ScriptedOperator(["duck", "0", "s", "q"], CHOICES, heard)
     answers = [operator.ask(CHOICES) for _ in range(5)]
     assert answers == ["duck", "cube", "rescan", None, None]
-    assert heard == [("request", {"wanted": answer}) for answer in answers]
+    assert heard == [RequestGiven(answer) for answer in answers]
 
 
 def test_a_script_with_an_unknown_word_is_refused_before_anything_moves() -> None:
@@ -95,7 +94,7 @@ def test_the_terminal_lists_the_classes_and_takes_numbers_and_names(
     heard = Heard()
     assert TerminalOperator(heard, RunControl()).ask(CHOICES) == meant
     assert capsys.readouterr().err == "pick what?  0 cube  1 sphere  2 duck  s rescan  q quit > "
-    assert heard == [("asking", {"choices": [*CHOICES]}), ("request", {"wanted": meant})]
+    assert heard == [OperatorAsked([*CHOICES]), RequestGiven(meant)]
 
 
 def test_the_terminal_asks_again_after_an_unknown_word(
@@ -114,7 +113,7 @@ def test_the_end_of_the_input_means_quit(type_in: Any) -> None:
     type_in("", closed=True)
     heard = Heard()
     assert TerminalOperator(heard, RunControl()).ask(CHOICES) is None
-    assert heard[-1] == ("request", {"wanted": None})
+    assert heard[-1] == RequestGiven(None)
 
 
 @pytest.mark.parametrize("keyboard", [True, False])
@@ -128,22 +127,21 @@ def test_ctrl_c_ends_the_wait_for_an_answer(type_in: Any, keyboard: bool) -> Non
 
 
 def test_ctrl_c_at_the_question_halts_the_run_instead_of_ending_it_well(missions: Path, type_in: Any) -> None:
-    def interrupt(event: Event) -> None:
-        if event.kind == "asking":
+    def interrupt(timed: TimedEvent) -> None:
+        if isinstance(timed.event, OperatorAsked):
             os.kill(os.getpid(), signal.SIGINT)
 
     type_in("")
     loaded = load_mission(missions / "pick_on_request.yaml", discover())
-    events: list[Event] = []
+    events: list[TimedEvent] = []
     run = assemble(loaded, discover(), RunOptions(1, kind=FakeCell), [events.append, interrupt])
     outcome = run.execute()
     assert (outcome.status, outcome.message) == ("HALTED", "halted by the user")
-    ends = {event.data["status"] for event in events if event.kind == "status"}
-    assert ends == {"RUNNING", "INVALID"}, "nothing failed, and nobody quit"
-    entries = [entry_of(event) for event in events]
-    again = compare(loaded, discover(), InputLog.of(entries), 1)
+    ends = {one.event.status for one in events if isinstance(one.event, NodeEnded)}
+    assert ends == {"INVALID"}, "nothing failed, and nobody quit"
+    again = compare(loaded, discover(), InputLog.of(events), 1)
     assert again.difference == ""
-    assert again.decisions == sum(entry["kind"] == "status" for entry in entries) > 0
+    assert again.decisions == sum(isinstance(one.event, NodeStarted | NodeEnded) for one in events) > 0
 
 
 @pytest.mark.parametrize(
@@ -158,4 +156,4 @@ def test_requests_from_elsewhere_are_answers(before: list[str], after: list[str]
     threading.Timer(0.2, lambda: [control.request(word) for word in after]).start()
     operator = TerminalOperator(heard, control, keyboard=False)
     assert operator.ask(CHOICES) == answer
-    assert heard == [("asking", {"choices": list(CHOICES)}), ("request", {"wanted": answer})]
+    assert heard == [OperatorAsked(list(CHOICES)), RequestGiven(answer)]

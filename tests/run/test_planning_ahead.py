@@ -12,7 +12,7 @@ import pytest
 from executive.cell.arm import Goal
 from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
-from executive.events import Event
+from executive.events import MotionPlanned, TargetSelected, TimedEvent
 from executive.manipulation.tool_goals import nearest_first
 from executive.run.planning_ahead import PlanningAhead
 from executive.run.run_context import RunContext
@@ -32,12 +32,12 @@ class Bench:
     """A fake cell with a cube in the middle of its table, driven by skills as a run drives it.
 
     Attributes:
-        plans: Data of every `plan` event.
+        plans: Planned motions.
         decisions: Items of all `decision` events.
     """
 
     def __init__(self) -> None:
-        self.plans: list[dict[str, Any]] = []
+        self.plans: list[MotionPlanned] = []
         self.decisions: list[str] = []
         self.context = RunContext([self.note])
         self.fake = FakeCell(emit=self.context.emit)
@@ -46,11 +46,11 @@ class Bench:
         self.look = partial(at_hand.look, self.fake)
         self.fake.world.put("cube", 0.5, 0.0)
 
-    def note(self, event: Event) -> None:
-        if event.kind == "plan":
-            self.plans.append(event.data)
-        elif event.kind == "decision":
-            self.decisions.append(event.data["item"])
+    def note(self, timed: TimedEvent) -> None:
+        if isinstance(timed.event, MotionPlanned):
+            self.plans.append(timed.event)
+        elif isinstance(timed.event, TargetSelected):
+            self.decisions.append(timed.event.item)
 
     def run(self, skill: Skill, meanwhile: Callable[[], object] = lambda: None) -> Skill:
         """Run a skill to its end; call `meanwhile` once, 30 control steps after its beginning."""
@@ -78,7 +78,7 @@ class Bench:
     @property
     def ahead(self) -> list[bool]:
         """For each motion so far, True if it was planned ahead."""
-        return [plan["ahead"] for plan in self.plans]
+        return [plan.ahead for plan in self.plans]
 
 
 @pytest.fixture
@@ -93,7 +93,7 @@ def test_after_the_first_approach_nothing_is_waited_for(bench: Bench, label: str
     bench.carry(targets)
     bench.carry(targets)
     assert bench.ahead == [False, True, True, True]
-    assert [plan["waits"] for plan in bench.plans] == [LATENCY, 0, 0, 0]
+    assert [plan.waits for plan in bench.plans] == [LATENCY, 0, 0, 0]
 
 
 def test_the_next_target_is_the_one_that_is_selected_when_the_arm_is_free(bench: Bench) -> None:
@@ -133,7 +133,7 @@ def test_an_approach_that_was_not_foreseen_is_waited_for(bench: Bench, change: s
         duck.position[0] += 0.002
         targets = bench.look()
     bench.run(Approach(target=nearest_first(bench.context.cell, targets)[change == "another"]))
-    assert (bench.ahead[-1], bench.plans[-1]["waits"]) == (False, LATENCY)
+    assert (bench.ahead[-1], bench.plans[-1].waits) == (False, LATENCY)
 
 
 def test_a_carry_to_another_bin_is_waited_for_and_the_approach_after_it_is_not(bench: Bench) -> None:
@@ -215,7 +215,7 @@ def test_a_decision_for_something_unknown_plans_nothing_and_ends_nothing(
 ) -> None:
     targets = bench.look()
     bench.run(Approach(target=targets[0]))
-    bench.context.emit("decision", item=item, label="cube", frame=1, bin=bin)
+    bench.context.emit(TargetSelected(item, "cube", 1, bin))
     bench.run(Grasp(target=targets[0]))
     bench.run(Transit(held="cube-1", bin="red_bin"))
     assert bench.ahead[-1] is False

@@ -38,9 +38,9 @@ def test_tool_and_ledger_agree_afterwards(
     if known:
         fake.ledger.held(item)
     reconcile(fake.cell, intent)
-    (row,) = fake.ledger.rows()
-    assert (fake.tool.holding, fake.ledger.in_tool() == item, row["state"]) == left
-    assert row["attempts"] == (row["state"] == "dropped")
+    (row,) = fake.ledger.summaries()
+    assert (fake.tool.holding, fake.ledger.in_tool() == item, row.state) == left
+    assert row.attempts == (row.state == "dropped")
 
 
 def test_everything_on_the_table_is_in_doubt(fake: FakeCell) -> None:

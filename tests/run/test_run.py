@@ -11,7 +11,7 @@ from py_trees.common import Status
 from executive.cell.detection import Detection
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
-from executive.events import Event
+from executive.events import Event, NodeEnded, RequestGiven, RunEnded, TimedEvent, ToolCommanded
 from executive.mission.load import load_mission
 from executive.plugins import discover
 from executive.run.assembly import RunOptions, assemble
@@ -43,13 +43,13 @@ def test_an_object_that_cannot_be_had_is_rejected_and_the_others_go_on(missions:
     fake.tool.seals = lambda: fake.world.under(fake.arm.tool_pose.position) is not stubborn
     outcome, items, audit = run.execute(), run.items(), run.audit()
     assert (outcome.status, outcome.reason) == ("INCOMPLETE", "rejected")
-    named = next(row["item"] for row in items["rows"] if row["state"] == "rejected")
+    named = next(row.item for row in items["rows"] if row.state == "rejected")
     why = "could not be picked (6 failed attempts)"
     assert outcome.message == f"1 object(s) were not sorted: {named} ({why})"
     assert (items["rejected"], audit["left"]) == (1, 1)
     assert items["placed"] == audit["right"] == items["seen"] - 1
-    rejected = next(row for row in items["rows"] if row["state"] == "rejected")
-    assert rejected["why"] == "could not be picked (6 failed attempts)"
+    rejected = next(row for row in items["rows"] if row.state == "rejected")
+    assert rejected.why == "could not be picked (6 failed attempts)"
 
 
 def test_a_reason_nobody_catches_ends_the_mission(missions: Path) -> None:
@@ -73,12 +73,12 @@ def test_a_bug_in_a_part_is_a_fault_and_the_arm_is_at_rest(missions: Path) -> No
     outcome = run.execute()
     assert (outcome.status, outcome.node.rpartition("/")[2]) == ("FAULT", "Grasp")
     assert "vacuum gauge" in outcome.message and fake.arm.at_rest
-    assert (running(run), events[-1].kind) == ([], "end")
+    assert (running(run), type(events[-1].event)) == ([], RunEnded)
 
 
 def test_ctrl_c_halts_every_node_and_brakes_the_arm(missions: Path) -> None:
-    def interrupt(event: Event) -> None:
-        if event.kind == "intent" and not sent:
+    def interrupt(timed: TimedEvent) -> None:
+        if isinstance(timed.event, ToolCommanded) and not sent:
             sent.append(1)
             os.kill(os.getpid(), signal.SIGINT)
 
@@ -88,7 +88,7 @@ def test_ctrl_c_halts_every_node_and_brakes_the_arm(missions: Path) -> None:
     outcome = run.execute()
     assert (outcome.status, outcome.message) == ("HALTED", "halted by the user")
     assert fake_of(run).arm.at_rest
-    assert (running(run), events[-1].kind) == ([], "end")
+    assert (running(run), type(events[-1].event)) == ([], RunEnded)
     assert signal.getsignal(signal.SIGINT) is before
 
 
@@ -100,7 +100,12 @@ def test_requests_are_served_in_order_and_the_rest_is_left(missions: Path) -> No
         fake.world.put(label, x, y)
     outcome, items, audit = run.execute(), run.items(), run.audit()
     assert outcome.status == "SUCCESS"
-    assert [e.data["wanted"] for e in events if e.kind == "request"] == ["cube", "rescan", "cube", None]
+    assert [one.event.wanted for one in events if isinstance(one.event, RequestGiven)] == [
+        "cube",
+        "rescan",
+        "cube",
+        None,
+    ]
     assert (items["placed"], items["skipped"]) == (2, 1) == (audit["right"], audit["left"])
 
 
@@ -121,7 +126,8 @@ def test_a_box_that_stays_in_doubt_ends_in_an_empty_table_and_not_in_a_failure(m
     assert (outcome.status, outcome.message) == (
         "INCOMPLETE", "1 object(s) were not sorted: duck-1 (no look is sure of it)",
     )  # fmt: skip
-    assert sum(e.data.get("reason") == "unsure" and e.data["node"].endswith("Detect") for e in events) >= 6
+    ends = (one.event for one in events if isinstance(one.event, NodeEnded))
+    assert sum((end.skill, end.reason) == ("Detect", "unsure") for end in ends) >= 6
 
 
 def test_an_object_that_slips_out_of_the_cup_every_time_is_given_up_in_the_end(missions: Path) -> None:
@@ -141,7 +147,7 @@ def test_an_object_that_slips_out_of_the_cup_every_time_is_given_up_in_the_end(m
     assert outcome.status == "INCOMPLETE", outcome
     assert (items["rejected"], audit["left"]) == (1, 1)
     assert items["placed"] == audit["right"] == items["seen"] - 1
-    assert next(row for row in items["rows"] if row["state"] == "rejected")["attempts"] == 12
+    assert next(row for row in items["rows"] if row.state == "rejected").attempts == 12
 
 
 def test_books_that_do_not_balance_are_a_fault(missions: Path) -> None:
@@ -155,4 +161,4 @@ def test_books_that_do_not_balance_are_a_fault(missions: Path) -> None:
         "the books do not balance: 3 seen, 1 placed, 0 rejected, 0 skipped, 1 lost, 0 phantom; "
         "seen must be what was placed, rejected, skipped and lost"
     )
-    assert events[-1].kind == "end"
+    assert isinstance(events[-1].event, RunEnded)

@@ -9,7 +9,7 @@ import pytest
 
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault
-from executive.events import Event
+from executive.events import Event, FaultRaised, ItemChanged, RunEnded, TimedEvent
 from executive.mission.load import load_mission
 from executive.plugins import discover
 from executive.run.assembly import RunOptions, assemble
@@ -49,23 +49,25 @@ def test_a_paused_run_can_be_stopped(missions: Path) -> None:
 
 
 def test_what_the_tool_holds_at_the_end_is_told(missions: Path) -> None:
-    def stop(event: Event) -> None:
-        if event.kind == "item" and event.data["state"] == "held":
+    def stop(timed: TimedEvent) -> None:
+        if isinstance(timed.event, ItemChanged) and timed.event.state == "held":
             run.control.stop()
 
     run = make(missions, stop)
     held = run.execute().holds
-    assert held in {row["item"] for row in run.items()["rows"]}
+    assert held in {row.item for row in run.items()["rows"]}
 
 
-@pytest.mark.parametrize("kind", ["item", "end", "fault"])
-def test_a_record_that_breaks_at_the_very_end_is_a_fault_with_an_outcome(missions: Path, kind: str) -> None:
-    def refuse(event: Event) -> None:
-        if event.tick >= 100:
+@pytest.mark.parametrize("kind", [ItemChanged, RunEnded, FaultRaised])
+def test_a_record_that_breaks_at_the_very_end_is_a_fault_with_an_outcome(
+    missions: Path, kind: type[Event]
+) -> None:
+    def refuse(timed: TimedEvent) -> None:
+        if timed.tick >= 100:
             run.control.stop()
-        if run.control.stopped and event.kind == kind:
+        if run.control.stopped and isinstance(timed.event, kind):
             raise Fault("the disk is full")
-        if kind == "fault" and event.tick >= 100:
+        if kind is FaultRaised and timed.tick >= 100:
             raise Fault("the disk is full")
 
     run = make(missions, refuse)

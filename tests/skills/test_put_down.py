@@ -98,8 +98,8 @@ def test_what_cannot_be_carried_away_and_was_not_lifted_is_left_where_it_stood(
     nowhere(Blocked("bolt-2 is too near"))
     result = run_skill(PutDown(held=held), fake)
     assert (result.status, fake.tool.holding, fake.ledger.in_tool()) == ("SUCCESS", False, None)
-    (row,) = fake.ledger.rows()
-    assert (row["state"], row["position"][:2]) == ("seen", [0.5, 0.0])
+    (row,) = fake.ledger.summaries()
+    assert (row.state, row.position[:2]) == ("seen", [0.5, 0.0])
 
 
 def test_what_hangs_in_the_air_and_cannot_be_carried_on_is_not_let_fall(fake: FakeCell, held: str) -> None:

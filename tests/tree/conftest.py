@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import pytest
 from hand_set_clock import Clock
@@ -11,6 +10,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from scripted_leaf import Leaf
 
+from executive.events import Event
 from executive.tree.node import Site
 
 
@@ -30,16 +30,13 @@ def clock() -> Clock:
 
 
 @pytest.fixture
-def events() -> list[dict[str, Any]]:
+def events() -> list[Event]:
     return []
 
 
 @pytest.fixture
-def site(events: list[dict[str, Any]]) -> Callable[..., Site]:
-    def emit(kind: str, **data: Any) -> None:
-        events.append({"kind": kind, **data})
-
-    return lambda path="node", label="": Site(path, label, emit)
+def site(events: list[Event]) -> Callable[..., Site]:
+    return lambda path="node", label="": Site(path, label, events.append)
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from scripted_leaf import Leaf
 
+from executive.events import BranchChosen, Event, NodeEnded, NodeStarted
 from executive.tree.backoff import Backoff
 from executive.tree.blackboard import Scope
 from executive.tree.fallback import Fallback
@@ -47,10 +48,14 @@ class World:
     scope: Scope = field(default_factory=Scope)
     log: list[str] = field(default_factory=list)
 
-    def emit(self, kind: str, **data: Any) -> None:
-        said = {"RUNNING": "starts", "INVALID": "halted"}
-        what = data["choice"] if kind == "choice" else said.get(data["status"], data["status"])
-        self.log.append(f"{data['node']} {what} {data.get('reason', '')}".rstrip())
+    def emit(self, event: Event) -> None:
+        match event:
+            case NodeStarted(node):
+                self.log.append(f"{node} starts")
+            case NodeEnded(node, status):
+                self.log.append(f"{node} {status.replace('INVALID', 'halted')} {event.reason}".rstrip())
+            case BranchChosen(node, choice, reason):
+                self.log.append(f"{node} {choice} {reason}".rstrip())
 
 
 def grow(plan: Plan, world: World, path: str = "root") -> Behaviour:

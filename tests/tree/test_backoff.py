@@ -67,7 +67,7 @@ def test_every_wait_is_the_next_one_of_the_backoff(leaf: Any, site: Any, clock: 
 def test_the_wait_is_told_and_is_in_the_details(leaf: Any, site: Any, clock: Any, events: Any) -> None:
     node = Retry(site(), leaf("A", "lost"), 3, [("A", "lost")], None, Backoff(0.5, 2, 8), clock)
     node.tick_once()
-    assert (events[-1]["choice"], events[-1]["reason"]) == ("attempt 2 of 3 in 0.5 s", "A.lost")
+    assert (events[-1].choice, events[-1].reason) == ("attempt 2 of 3 in 0.5 s", "A.lost")
     assert node.detail == "up to 3 attempts, on A.lost, backoff 0.5 s, times 2 each, at most 8 s"
     with pytest.raises(InputError, match="node: a retry with a backoff needs a clock to wait on"):
         Retry(site(), leaf("A"), 3, backoff=Backoff(0.5))

@@ -9,6 +9,7 @@ import pytest
 from py_trees.common import Status
 
 from executive.errors import Fault
+from executive.events import NodeEnded, NodeStarted
 from executive.tree.halting import halt
 from executive.tree.sequence import Sequence
 from executive.tree.timeout import Timeout
@@ -71,12 +72,9 @@ def test_labels_gather_on_the_way_up(leaf: Any, site: Any, ticks: Any) -> None:
 def test_every_change_of_status_is_told_once(leaf: Any, site: Any, ticks: Any, events: Any) -> None:
     ticks(Sequence(site("tree"), [leaf("A", "R R lost")]))
     assert events == [
-        {"kind": "status", "node": "tree", "status": "RUNNING"},
-        {
-            "kind": "status", "node": "tree", "status": "FAILURE",
-            "reason": "A.lost", "message": "lost happened", "origin": "A",
-        },
-    ]  # fmt: skip
+        NodeStarted("tree"),
+        NodeEnded("tree", "FAILURE", reason="A.lost", message="lost happened", origin="A"),
+    ]
 
 
 def test_a_stock_behaviour_may_stand_in_a_tree(site: Any, ticks: Any) -> None:

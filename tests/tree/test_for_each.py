@@ -11,6 +11,7 @@ from py_trees.common import Status
 
 from executive.cell.objects import Target
 from executive.errors import Fault
+from executive.events import BranchChosen
 from executive.skill import In, Skill
 from executive.tree.blackboard import Scope
 from executive.tree.for_each import ForEach
@@ -52,7 +53,7 @@ def make(site: Any, scope: Scope, used: list[Any]) -> Any:
 
 
 def told(events: Any) -> list[str]:
-    return [event["choice"] for event in events if event["kind"] == "choice"]
+    return [event.choice for event in events if isinstance(event, BranchChosen)]
 
 
 def test_a_text_names_the_variable_that_holds_the_list(
@@ -79,8 +80,7 @@ def test_the_element_at_hand_is_told(make: Any, ticks: Any, events: Any) -> None
     assert told(events) == [
         "element 1 of 4: cube", "element 2 of 4: None", "element 3 of 4: cube-2", "element 4 of 4: dict",
     ]  # fmt: skip
-    (first, *_) = [event for event in events if event["kind"] == "choice"]
-    assert (first["node"], first["reason"], first["message"]) == ("loop", "", "")
+    assert BranchChosen("loop", "element 1 of 4: cube") in events
 
 
 @pytest.mark.parametrize("end", ["success", "halt", "fault"])

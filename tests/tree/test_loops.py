@@ -8,6 +8,7 @@ import pytest
 from py_trees.common import Status
 
 from executive.errors import InputError
+from executive.events import BranchChosen
 from executive.tree.repeat import Repeat
 from executive.tree.retry import Retry
 from executive.tree.sequence import Sequence
@@ -18,9 +19,7 @@ def test_a_failed_condition_is_a_success_that_is_told(leaf: Any, site: Any, tick
     node = While(site("here"), leaf("more", "none"), leaf("A"))
     assert ticks(node) == "S"
     assert node.failure is None
-    assert events[1] == {
-        "kind": "choice", "node": "here", "choice": "done", "reason": "more.none", "message": "none happened",
-    }  # fmt: skip
+    assert events[1] == BranchChosen("here", "done", "more.none", "none happened")
 
 
 def test_a_loop_of_many_rounds_needs_no_deep_stack(leaf: Any, site: Any) -> None:

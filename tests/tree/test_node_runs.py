@@ -9,6 +9,7 @@ import pytest
 from py_trees.behaviour import Behaviour
 from scripted_leaf import Leaf
 
+from executive.events import BranchChosen, Event
 from executive.tree.blackboard import Scope
 from executive.tree.fallback import Fallback
 from executive.tree.for_each import ForEach
@@ -48,9 +49,9 @@ class Make:
         handlers = [(names, self.one(text)) for names, text in catches]
         return Try(self.site, self.one(body), handlers, self.one(last) if last else None)
 
-    def _emit(self, kind: str, **data: Any) -> None:
-        if kind == "choice":
-            self.choices.append(f"{data['choice']}, {data['reason']}")
+    def _emit(self, event: Event) -> None:
+        if isinstance(event, BranchChosen):
+            self.choices.append(f"{event.choice}, {event.reason}")
 
 
 @pytest.mark.parametrize(

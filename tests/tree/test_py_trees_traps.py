@@ -73,7 +73,7 @@ def test_the_old_status_of_a_child_that_was_not_ticked_decides_nothing_and_is_to
     assert ghost.status is Status.SUCCESS
     events.clear()
     assert ticks(node) == "S"
-    assert "ghost" not in {event["node"] for event in events}
+    assert "ghost" not in {event.node for event in events}
     # Nor is it taken for a success later on, when the node does get there.
     assert ticks(node) == "F"
 

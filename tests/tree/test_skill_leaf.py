@@ -11,6 +11,7 @@ from py_trees.common import Status
 
 from executive.cell.objects import Target
 from executive.errors import Fault
+from executive.events import NodeEnded, NodeStarted
 from executive.skill import In, Out, Skill, param, port
 from executive.tree.blackboard import Scope
 from executive.tree.halting import halt
@@ -120,7 +121,7 @@ def test_a_bug_in_a_skill_is_a_fault(make: Any, way: str, sentence: str, events:
         node.tick_once()
     assert (str(caught.value), caught.value.node) == (sentence, "tree/Worker")
     assert (node.status, isinstance(caught.value.__cause__, ValueError)) == (Status.INVALID, way == "break")
-    assert (events[-1]["status"], events[-1]["reason"]) == ("INVALID", "fault")
+    assert (events[-1].status, events[-1].reason) == ("INVALID", "fault")
 
 
 def test_a_missing_input_is_a_fault_that_names_it(make: Any, scope: Scope) -> None:
@@ -136,7 +137,7 @@ def test_halting_runs_the_finally_of_the_skill_unless_it_ended(make: Any, ticks:
     node = make()
     node.tick_once()
     assert halt(node) == []
-    assert (Worker.cleaned, node.status, events[-1]["status"]) == (["ok"], Status.INVALID, "INVALID")
+    assert (Worker.cleaned, node.status, events[-1].status) == (["ok"], Status.INVALID, "INVALID")
     assert ticks(node) == "RS"
     before = len(events)
     node.stop(Status.INVALID)
@@ -185,10 +186,9 @@ def test_events_say_what_happened_to_which_item(site: Any, events: Any) -> None:
     node = SkillNode(site("tree/Take"), "Take", Take, wiring, None, scope)  # type: ignore[arg-type]
     node.tick_once()
     node.tick_once()
-    common = {"kind": "status", "node": "tree/Take", "reason": "", "message": "", "item": "cube-2"}
     assert events == [
-        {**common, "status": "RUNNING"},
-        {**common, "status": "SUCCESS", "outputs": {"held": "cube-2"}},
+        NodeStarted("tree/Take", "Take", "cube-2"),
+        NodeEnded("tree/Take", "SUCCESS", "Take", "cube-2", outputs={"held": "cube-2"}),
     ]
 
 
@@ -214,7 +214,7 @@ def test_the_item_is_what_a_port_names_that_the_skill_always_has(
     inputs = {name: name for name in ("unlike", "colour", "box")}
     wiring = Wiring({}, inputs, {"found": "found"})
     assert ticks(SkillNode(site(), "Sort", Sort, wiring, None, scope)) == "RS"  # type: ignore[arg-type]
-    assert [event["item"] for event in events] == items
+    assert [event.item for event in events] == items
 
 
 def test_a_forgotten_variable_is_gone_and_need_not_have_been_there() -> None:

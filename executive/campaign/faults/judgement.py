@@ -10,12 +10,11 @@ from py_trees.common import Status
 
 from executive.campaign.faults.fault import Fault, InjectedError
 from executive.cell.bins import BIN_THICKNESS, Bin
-from executive.cell.frame import Frame
-from executive.events import Event
+from executive.cell.frame import Frame, FrameTaken
+from executive.events import FaultInjected, FrameSearched, ItemChanged, RunEnded, TimedEvent
 from executive.ledger.accounts import is_balanced
 from executive.ledger.item import State
 from executive.mission.flow.endings import Ending
-from executive.run.outcome import Outcome
 from executive.testing.faults.hand import Thing
 
 REACHES = frozenset({"object_removed", "object_moved", "seal_breaks"})
@@ -35,7 +34,7 @@ NOTHING_HIDDEN = Hidden(0, 0)
 
 
 def check_end(
-    outcome: Outcome, faults: Sequence[Fault], endings: Sequence[Ending], raised: bool
+    outcome: RunEnded, faults: Sequence[Fault], endings: Sequence[Ending], raised: bool
 ) -> Iterator[str]:
     """Yield how the run ended as it must not; `raised` tells whether a bug that was put in came up."""
     if outcome.status == "FAULT":
@@ -59,19 +58,24 @@ def check_tree(root: Behaviour) -> Iterator[str]:
             yield f"{getattr(node, 'path', node.name)} is still running"
 
 
-def out_of_sight(things: Sequence[Thing], bins: Collection[Bin], events: Sequence[Event]) -> Hidden:
+def out_of_sight(things: Sequence[Thing], bins: Collection[Bin], events: Sequence[TimedEvent]) -> Hidden:
     """Return how many things lie where no look has shown a place since the tool last dropped anything."""
-    dropped = [e.tick for e in events if e.kind == "item" and e.data["state"] == State.DROPPED.value]
+    dropped = [
+        one.tick
+        for one in events
+        if isinstance(one.event, ItemChanged) and one.event.state == State.DROPPED.value
+    ]
     if not dropped:
         return NOTHING_HIDDEN
-    looks = [e.data["frame_object"] for e in events if e.kind == "look" and e.tick > dropped[-1]]
+    later = (one.event for one in events if one.tick > dropped[-1])
+    looks = [event.frame for event in later if isinstance(event, FrameTaken)]
     hidden = [thing for thing in things if not any(_is_shown(thing, frame) for frame in looks)]
     inside = sum(any(bin.contains(thing.position, BIN_THICKNESS) for bin in bins) for thing in hidden)
     return Hidden(len(hidden) - inside, inside)
 
 
 def check_books(
-    outcome: Outcome,
+    outcome: RunEnded,
     items: Mapping[str, Any],
     audit: Mapping[str, int] | None,
     taken: int = 0,
@@ -108,16 +112,16 @@ def check_books(
 
 
 def check_success(
-    outcome: Outcome, audit: Mapping[str, int] | None, events: Sequence[Event]
+    outcome: RunEnded, audit: Mapping[str, int] | None, events: Sequence[TimedEvent]
 ) -> Iterator[str]:
     """Yield a sentence if the run looked, says success, and never saw what lies there."""
-    looked = any(event.kind == "look" for event in events)
+    looked = any(isinstance(one.event, FrameSearched) for one in events)
     completed = outcome.status in ("SUCCESS", "INCOMPLETE")
     if looked and completed and audit is not None and audit["unseen"]:
         yield f"success, and {audit['unseen']} objects were never seen; the audit {counts_text(audit)}"
 
 
-def check_losses(audit: Mapping[str, int] | None, events: Sequence[Event]) -> Iterator[str]:
+def check_losses(audit: Mapping[str, int] | None, events: Sequence[TimedEvent]) -> Iterator[str]:
     """Yield a sentence if more objects are out of reach than the faults can have put there."""
     reached = sum(count_of(events, what) for what in REACHES)
     if audit is not None and audit["elsewhere"] > reached:
@@ -130,12 +134,12 @@ def _is_shown(thing: Thing, frame: Frame) -> bool:
     return bool((frame.is_in_area(place, (0, 0, width, height), EDGE) & frame.is_unobstructed(place))[0])
 
 
-def count_of(events: Sequence[Event], what: str) -> int:
+def count_of(events: Sequence[TimedEvent], what: str) -> int:
     """Return how often something happened to the cell."""
-    return sum(event.kind == "disturbance" and event.data["what"] == what for event in events)
+    return sum(isinstance(one.event, FaultInjected) and one.event.name == what for one in events)
 
 
-def remark(outcome: Outcome, faults: Sequence[Fault]) -> str:
+def remark(outcome: RunEnded, faults: Sequence[Fault]) -> str:
     """Return a sentence if the run failed for another reason than those that were brought about, or ""."""
     if outcome.status != "FAILURE" or outcome.reason == "lost":
         return ""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from executive.campaign.faults.judgement import counts_text
 from executive.campaign.subject import Subject
 from executive.errors import InputError
-from executive.events import Event
+from executive.events import NodeEnded, NodeStarted, TimedEvent
 from executive.record.result import agrees
 from executive.run.assembly import RunOptions, assemble
 
@@ -49,16 +49,14 @@ class Activations:
         self.began: dict[str, int] = {}
         self.lasted: dict[str, list[int]] = defaultdict(list)
 
-    def __call__(self, event: Event) -> None:
+    def __call__(self, timed: TimedEvent) -> None:
         """Note an event."""
-        if event.kind != "status":
-            return
-        node = event.data["node"]
-        if event.data["status"] == "RUNNING":
-            self.counts[node] += 1
-            self.began[node] = event.tick
-        elif node in self.began:
-            self.lasted[node].append(event.tick - self.began.pop(node))
+        match timed.event:
+            case NodeStarted(node):
+                self.counts[node] += 1
+                self.began[node] = timed.tick
+            case NodeEnded(node) if node in self.began:
+                self.lasted[node].append(timed.tick - self.began.pop(node))
 
 
 def rehearse(subject: Subject) -> Rehearsal:

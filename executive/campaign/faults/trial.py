@@ -18,12 +18,11 @@ from executive.campaign.halt_checks import check_journal, check_rest, check_tool
 from executive.campaign.subject import Subject
 from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.workcell import Workcell
-from executive.events import Event
+from executive.events import FaultInjected, InputRead, NodeEnded, RunEnded, TimedEvent
 from executive.plugins import cell_kind
 from executive.record.recorded_run import Recording, new_directory
 from executive.record.recorder import Recorder
 from executive.run.assembly import RunOptions, assemble
-from executive.run.outcome import Outcome
 from executive.testing.bounded_cell import BoundedCell
 from executive.testing.faults import DisturbedCell, disturbed
 from executive.view.figures.fault_trials import Trial
@@ -54,7 +53,7 @@ def record(subject: Subject, rehearsal: Rehearsal, faults: Numbered, runs: Path)
         recording = Recording(trying.run, loaded, subject.skills, directory, Recorder(directory), ())
         result = recording.execute(subject.seed, began)
         leave_report(result)
-        outcome = Outcome(
+        outcome = RunEnded(
             result["status"], result["reason"], result["message"], result["node"], result["empty"],
             result["holds"], result["ticks"], result["robot_time_s"],
         )  # fmt: skip
@@ -73,7 +72,7 @@ class _Trying:
 
     def __init__(self, subject: Subject, rehearsal: Rehearsal, faults: Numbered) -> None:
         self._subject, self._rehearsal, self._faults = subject, rehearsal, faults
-        self._events: list[Event] = []
+        self._events: list[TimedEvent] = []
         self._breakages = [breakage for fault in faults.values() for breakage in fault.breakages]
         self._activations = Activations()
         self._stopped = False
@@ -90,7 +89,7 @@ class _Trying:
         assert isinstance(workcell, DisturbedCell)
         self.run.observe(workcell.hear)
 
-    def judged(self, outcome: Outcome) -> Trial:
+    def judged(self, outcome: RunEnded) -> Trial:
         """Return what came of the run, which is over."""
         run = self.run
         items, audit = run.items(), run.audit()
@@ -100,7 +99,7 @@ class _Trying:
         problems = [
             *judgement.check_end(outcome, faults, self._subject.loaded.endings, raised),
             *judgement.check_tree(run.root),
-            *check_journal([_entry(event) for event in self._events], outcome),
+            *check_journal(self._events, outcome),
             *judgement.check_books(outcome, items, audit, taken, self._hidden()),
             *judgement.check_success(outcome, audit, self._events),
             *judgement.check_losses(audit, self._events),
@@ -130,9 +129,9 @@ class _Trying:
         bounded = BoundedCell(kind(*args, **options), self._rehearsal.longest)
         return CellWrapper(bounded, after=self._stop_if_due)
 
-    def _see(self, event: Event) -> None:
-        if event.kind != "sense":
-            self._events.append(event)
+    def _see(self, timed: TimedEvent) -> None:
+        if not isinstance(timed.event, InputRead):
+            self._events.append(timed)
 
     def _stop_if_due(self) -> None:
         """Wish a stop where a skill is to be halted."""
@@ -153,7 +152,8 @@ class _Trying:
     def _happened(self, fault: Fault) -> bool:
         """Tell whether a fault found its occasion."""
         names = {happening.what.name for happening in fault.happenings}
-        if any(event.kind == "disturbance" and event.data["what"] in names for event in self._events):
+        injected = (one.event for one in self._events if isinstance(one.event, FaultInjected))
+        if any(event.name in names for event in injected):
             return True
         return bool(fault.breakages) and self._raised(fault)
 
@@ -161,18 +161,14 @@ class _Trying:
         """Tell whether a node failed as it was to; True for a fault that is about none."""
         if fault.ends_run:
             name = InjectedError.__name__
-            told = (event.data.get("message", "") for event in self._of(fault, "INVALID"))
-            return any(name in message for message in told)
+            return any(name in event.message for event in self._ends(fault, "INVALID"))
         if not fault.reason:
             return True
-        failures = [event for event in self._of(fault, "FAILURE") if event.data["reason"] == fault.what]
-        return any(not fault.breakages or event.data["message"] == WANTED for event in failures)
+        failures = [event for event in self._ends(fault, "FAILURE") if event.reason == fault.what]
+        return any(not fault.breakages or event.message == WANTED for event in failures)
 
-    def _of(self, fault: Fault, status: str) -> Iterator[Event]:
-        for event in self._events:
-            if event.kind == "status" and (event.data["node"], event.data["status"]) == (fault.about, status):
+    def _ends(self, fault: Fault, status: str) -> Iterator[NodeEnded]:
+        for one in self._events:
+            event = one.event
+            if isinstance(event, NodeEnded) and (event.node, event.status) == (fault.about, status):
                 yield event
-
-
-def _entry(event: Event) -> dict[str, Any]:
-    return {"kind": event.kind, "tick": event.tick, **event.data}

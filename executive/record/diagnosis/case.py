@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from executive.events import RunEnded
 from executive.mission.model import nodes
 from executive.mission.model.nodes import Node
 from executive.record.diagnosis.chain import attempts, chain, way
@@ -13,7 +14,6 @@ from executive.record.progress import skill_name
 
 if TYPE_CHECKING:
     from executive.mission.load import LoadedMission
-    from executive.run.outcome import Outcome
 
 MOST = 5
 """Items that a sentence names one by one."""
@@ -38,7 +38,7 @@ class Case:
         item: The item it was all about, or "".
     """
 
-    def __init__(self, loaded: LoadedMission, course: Course, outcome: Outcome) -> None:
+    def __init__(self, loaded: LoadedMission, course: Course, outcome: RunEnded) -> None:
         self.loaded, self.course, self.outcome = loaded, course, outcome
         failed = outcome.status == "FAILURE"
         self.links = chain(loaded.tree, course, outcome.node, outcome.reason) if failed else ()

@@ -10,9 +10,8 @@ from pathlib import PurePath
 from typing import Any
 
 from executive.errors import RecordLost
-from executive.events import Event, Exact
 from executive.record.diagnosis.items import ItemCourses
-from executive.record.progress import is_skill
+from executive.record.entry import OldEvent as Event
 from executive.skill import Skill
 
 _PLACE = re.compile(r'File "(?P<file>[^"]+)", line (?P<line>\d+), in (?P<function>\S+)')
@@ -130,11 +129,11 @@ class Course:
         node.item = str(data.get("item", "")) or node.item
         if status != "INVALID":
             node.cut, self._cut = tuple(self._cut), []
-        elif is_skill(data):
+        elif "item" in data:
             self._cut.append(path)
-        if is_skill(data) and node.reason:
+        if "item" in data and node.reason:
             node.senses = tuple(self._senses.values())
-        if is_skill(data) and status == "FAILURE":
+        if "item" in data and status == "FAILURE":
             self.items.failed(event)
         if path == self._root and status != "RUNNING":
             self.items.close()
@@ -151,7 +150,6 @@ class Course:
 
     def _sense(self, event: Event) -> None:
         name, value = str(event.data["name"]), event.data.get("value")
-        value = value.value if isinstance(value, Exact) else value
         self._senses.pop(name, None)
         # Poses, images and lists are no answers that a sentence could hold.
         if isinstance(value, _WORTH_TELLING):

@@ -7,7 +7,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from executive.events import Event
+from executive.cell.plain import plain
+from executive.events import RunEnded, TimedEvent
 from executive.mission.model import nodes
 from executive.mission.model.nodes import Node
 from executive.mission.model.paths import name_of
@@ -16,14 +17,13 @@ from executive.record.diagnosis.case import Case, verdict
 from executive.record.diagnosis.chain import why
 from executive.record.diagnosis.course import Course, Sense
 from executive.record.diagnosis.items import ItemCourse
+from executive.record.entry import old_event
 from executive.record.frames import picture_of
-from executive.record.plain import plain
 from executive.record.result import ENDED
 from executive.record.run_directory import RunDirectory
 
 if TYPE_CHECKING:
     from executive.mission.load import LoadedMission
-    from executive.run.outcome import Outcome
     from executive.skill import Skill
 
 DECIDING: Mapping[str, tuple[str, ...]] = {
@@ -47,11 +47,11 @@ class Story:
         self._skills = skills
         self._course = Course()
 
-    def __call__(self, event: Event) -> None:
+    def __call__(self, timed: TimedEvent) -> None:
         """Take an event."""
-        self._course(event)
+        self._course(old_event(timed))
 
-    def tell(self, outcome: Outcome, run: Path, at_rest: Callable[[], bool]) -> dict[str, Any] | None:
+    def tell(self, outcome: RunEnded, run: Path, at_rest: Callable[[], bool]) -> dict[str, Any] | None:
         """Return the story as plain values, or None for a run whose tree succeeded and that lost nothing.
 
         Args:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from executive.events import Event
+from executive.record.entry import OldEvent as Event
 from executive.record.progress import skill_name
 
 Look = dict[str, Any]

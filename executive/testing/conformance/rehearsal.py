@@ -14,7 +14,7 @@ from executive.cell.clock import STEP
 from executive.cell.protocols import Cell
 from executive.cell.proxy import Access, intercept
 from executive.errors import Fault
-from executive.events import Event
+from executive.events import NodeStarted, TimedEvent
 from executive.skill import Skill, SkillFailed
 from executive.testing.conformance.faults import SkillFault
 from executive.testing.conformance.patience import Stuck, patience
@@ -130,7 +130,7 @@ class Rehearsal:
                     run.halt()
                     return "HALTED"
                 if self.ticks == disturbed_at:
-                    cell.hear(Event("status", 0, 0.0, {"node": "skill", "status": "RUNNING"}))
+                    cell.hear(TimedEvent(0, 0.0, NodeStarted("skill")))
                 began = perf_counter()
                 run = run or SkillRun(skill(**values), watched)
                 has_succeeded = run.step()

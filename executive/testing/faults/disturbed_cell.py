@@ -10,7 +10,7 @@ from executive.cell.protocols import Cell
 from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import Workcell
 from executive.errors import InputError
-from executive.events import Emit, Event, ignore
+from executive.events import Emit, TimedEvent, ignore
 from executive.testing.faults.hand import Hand, hand_of
 from executive.testing.faults.scene import Scene
 from executive.testing.faults.schedule import Schedule
@@ -61,9 +61,9 @@ class DisturbedCell(CellWrapper):
         """What reaches into its world."""
         return self._scene.hand
 
-    def hear(self, event: Event) -> None:
+    def hear(self, timed: TimedEvent) -> None:
         """Observe the run that drives this cell."""
-        self._schedule.hear(event)
+        self._schedule.hear(timed)
 
     def require_nodes(self, paths: Sequence[str]) -> None:
         """Return if every disturbance that waits for a node may find one among these `paths`.

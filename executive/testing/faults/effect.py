@@ -7,7 +7,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from executive.cell.plain import rounded
 from executive.errors import InputError
+from executive.events import FaultInjected
 from executive.testing.faults.hand import Thing
 from executive.testing.faults.scene import Scene
 
@@ -56,18 +58,13 @@ class Occasion:
     _told: float = -math.inf
 
     def tell(self, thing: Thing | None = None) -> None:
-        """Emit a `disturbance` of the cell, or of one object in it; at most one per control step."""
+        """Emit the fault, and the object that it concerns; at most one event per control step."""
         if self._told == self.scene.now:
             return
         self._told = self.scene.now
-        self.scene.emit(
-            "disturbance",
-            what=self.effect.name,
-            node=self.node,
-            item=self.item,
-            object=thing.label if thing else "",
-            position=[round(float(value), 4) for value in thing.position] if thing else [],
-        )
+        label = thing.label if thing else ""
+        position = rounded(thing.position, 4) if thing else []
+        self.scene.emit(FaultInjected(self.effect.name, self.node, self.item, label, position))
 
 
 def checked_share(share: float | None) -> float:

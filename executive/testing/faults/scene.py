@@ -82,12 +82,12 @@ class Scene:
         return self._taken_for(item) if which == "node" and item else self._nearest()
 
     def _taken_for(self, item: Item) -> Thing | None:
-        row = next((row for row in self._workcell.accounts.rows() if row["item"] == item), None)
-        if row is None or row["state"] == "placed":
+        known = next((one for one in self._workcell.accounts.summaries() if one.item == item), None)
+        if known is None or known.state == "placed":
             return None
-        if row["state"] == "held":
+        if known.state == "held":
             return self.hand.held
-        return self._closest(np.array(row["position"]), NEAR)
+        return self._closest(np.array(known.position), NEAR)
 
     def _nearest(self) -> Thing | None:
         return self._closest(self.cell.arm.tool_pose.position, np.inf)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from executive.events import Event
+from executive.events import NodeEnded, NodeStarted, TimedEvent
 from executive.testing.faults.effect import Occasion
 from executive.testing.faults.scene import Scene
 from executive.testing.faults.script import Disturbance, DuringNode, DuringTime
@@ -31,12 +31,13 @@ class Schedule:
         self._activations: Counter[int] = Counter()
         self._happening: list[Occasion] = []
 
-    def hear(self, event: Event) -> None:
+    def hear(self, timed: TimedEvent) -> None:
         """Begin and end what happens while a node runs."""
-        if event.kind == "status" and event.data["status"] == "RUNNING":
-            self._node_begins(event.data["node"], event.data.get("item", ""))
-        elif event.kind == "status":
-            self._end(lambda occasion: occasion.node == event.data["node"])
+        match timed.event:
+            case NodeStarted(node, _, item):
+                self._node_begins(node, item)
+            case NodeEnded(node):
+                self._end(lambda occasion: occasion.node == node)
 
     def step(self) -> None:
         """Begin and end what happens at its time, and do what can be done now."""

@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from executive.events import Event
 from executive.mission.outline import OutlineNode
+from executive.record.entry import OldEvent
 from executive.record.progress import skill_name
-from executive.replay.input_log import Entry
 from executive.view.items import ItemTable, Row
 from executive.view.tree.outline import skills
 
@@ -33,7 +32,7 @@ class Course:
     """
 
     def __init__(
-        self, entries: Sequence[Entry], nodes: Sequence[OutlineNode], pictures: Sequence[Path]
+        self, entries: Sequence[Mapping[str, Any]], nodes: Sequence[OutlineNode], pictures: Sequence[Path]
     ) -> None:
         self.status: dict[str, str] = {}
         self.beside: dict[str, str] = {}
@@ -84,12 +83,12 @@ class Course:
         while self._pictures and int(self._pictures[-1].stem.partition("_")[0]) <= step:
             self.picture = self._pictures.pop()
 
-    def _take(self, entry: Entry) -> None:
+    def _take(self, entry: Mapping[str, Any]) -> None:
         kind = entry["kind"]
         if kind == "status":
             self._take_status(entry)
         elif kind == "item":
-            self._items(Event(kind, entry["tick"], entry["clock"], entry))
+            self._items(OldEvent(kind, entry["tick"], entry["clock"], dict(entry)))
         elif kind == "decision":
             self._bins[entry["item"]] = entry["bin"]
         elif kind in ("halt", "fault"):

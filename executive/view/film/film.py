@@ -38,7 +38,7 @@ def film(
         workers: Processes that take the pictures.
         progress: Takes the number of frames that are done, and of all frames.
     """
-    each = speed / format.rate / source.start["step"]
+    each = speed / format.rate / source.start.step
     steps = shown_steps(steps_in(source.directory.world), each)
     held = round(HOLD * format.rate)
 
@@ -62,16 +62,14 @@ def _pages(
 ) -> Generator[Image.Image, None, None]:
     """Yield the frames of a film: a page for each of these control steps, and the last one for a while."""
     start, directory = source.start, source.directory
-    note = f"seed {start['seed']} · cell {source.config.cell}" + (
-        f" · {speed:g}x speed" if speed != 1 else ""
-    )
-    length = steps[-1] * start["step"]
+    note = f"seed {start.seed} · cell {source.config.cell}" + (f" · {speed:g}x speed" if speed != 1 else "")
+    length = steps[-1] * start.step
     course = Course(source.entries, source.nodes, list(directory.frames.glob("*.jpg")))
     view = overview(source.config, STAGE, SHOWN)
-    shoot = Shoot(source.config, int(start["seed"]), directory.world, view, directory.scene)
+    shoot = Shoot(source.config, start.seed, directory.world, view, directory.scene)
     with closing(shots(shoot, steps, workers)) as pictures:
         for step, picture in zip(steps, pictures, strict=True):
-            course.go_to(step, step * start["step"])
+            course.go_to(step, step * start.step)
             yield draw_page(source, picture, course, note, length)
     last = draw_ending(draw_page(source, picture, course, note, length, caption=False), source.result)
     for _ in range(held):

@@ -53,7 +53,7 @@ def draw_page(
     if caption and (course.trouble or course.doing):
         lines = wrapped(course.trouble, _TYPE, CAPTION, 2) or [clipped(course.doing, _TYPE, CAPTION)]
         _draw_caption(page, lines, FAILURE if course.trouble else RUNNING)
-    _draw_head(page, str(source.start["mission"]), note, course.clock, length)
+    _draw_head(page, source.start.mission, note, course.clock, length)
     top = HEIGHT - _BELOW - panel.height(source.items)
     ImageDraw.Draw(page).line((LEFT, top - 10, RIGHT, top - 10), RULE, 1)
     panel.draw_items(page, (LEFT, top, RIGHT, HEIGHT), course.items, source.bins)

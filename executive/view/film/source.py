@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from executive.cells.sim.command_log import is_log
 from executive.errors import InputError
+from executive.record.entry import old_entry
 from executive.record.journal import read_journal, start_of
 from executive.record.recorded_mission import read_tree, recorded_cell
 from executive.record.result import read_result
@@ -33,10 +34,10 @@ class Source:
 
     def __init__(self, directory: RunDirectory) -> None:
         _require_log(directory)
-        entries = read_journal(directory.journal)
+        events = read_journal(directory.journal)
         self.directory = directory
-        self.start = start_of(entries, directory.path, "there is nothing to film")
-        self.entries = InputLog.of(entries).entries
+        self.start = start_of(events, directory.path, "there is nothing to film")
+        self.entries = [old_entry(timed) for timed in InputLog.of(events).events]
         self.nodes = read_tree(directory.tree)
         self.config = recorded_cell(directory.path)
         self.bins = {
@@ -44,7 +45,7 @@ class Source:
             for name, bin in self.config.bins.items()
         }
         self.items = len({entry["item"] for entry in self.entries if entry["kind"] == "item"})
-        self.result = read_result(directory, entries)
+        self.result = read_result(directory, events)
 
 
 def _require_log(directory: RunDirectory) -> None:

@@ -16,11 +16,13 @@ from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from typing import Any
 
+from executive.cell.frame import Frame, FrameTaken
 from executive.cell.visuals import Scenery
 from executive.errors import InputError
-from executive.events import Event
+from executive.events import FrameSearched, TimedEvent
 from executive.mission.outline import outline
 from executive.processes import program
+from executive.record.entry import old_event
 from executive.run.run import Run
 from executive.view.live.telling import News, Teller, picture, poses
 from executive.view.tree.svg import Note, svg
@@ -78,7 +80,8 @@ class LivePage:
         self._due = 0.0
         self._period = PERIOD
         self._paused = False
-        self._last_look: Event | None = None
+        self._taken: Frame | None = None
+        self._last_look: tuple[Frame, FrameSearched] | None = None
         self._teller = Teller()
         self.problem = ""
         """What went wrong with the page first, or ""."""
@@ -104,14 +107,17 @@ class LivePage:
         run.control.between_ticks(self._look_around)
         self._look_around()
 
-    def __call__(self, event: Event) -> None:
+    def __call__(self, timed: TimedEvent) -> None:
         """Tell of an event what a person wants to see."""
+        event = timed.event
         with self._harmless():
-            if event.kind == "look" and event.data.get("frame_object") is not None:
-                self._last_look = event
+            if isinstance(event, FrameTaken):
+                self._taken = event.frame
+            elif isinstance(event, FrameSearched) and self._taken is not None:
+                self._last_look = self._taken, event
                 if self._watched and self._keeps_up:
-                    self._tell(**picture(event))
-            elif (news := self._teller.news(event)) is not None:
+                    self._tell(**picture(*self._last_look))
+            elif (news := self._teller.news(old_event(timed))) is not None:
                 self._tell(**news)
 
     def close(self) -> None:
@@ -205,7 +211,7 @@ class LivePage:
             self._watched = wish["by"]
             self._period = SPARING_PERIOD if wish["sparing"] else PERIOD
             if self._watched and self._last_look is not None:
-                self._tell(**picture(self._last_look))
+                self._tell(**picture(*self._last_look))
         elif control is not None and what == "request":
             control.request(wish["word"])
         elif control is not None and what in ("pause", "resume", "step", "stop"):

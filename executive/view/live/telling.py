@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from executive.events import Event
+from executive.cell.frame import Frame
+from executive.events import FrameSearched
 from executive.geometry import Pose
+from executive.record.entry import OldEvent as Event
 
 News = dict[str, Any]
 """Changes of the page: `clock` [s], `nodes` and `items` by name, and one key for each other part."""
@@ -51,21 +53,19 @@ class Teller:
         return {**ends, "status": status.lower(), "said": why, "item": data.get("item", "")}
 
 
-def picture(look: Event) -> News:
+def picture(frame: Frame, look: FrameSearched) -> News:
     """Return the news of a look: the image `(H, W, 3)`, the pixels that the arm hides, and what was found."""
-    frame = look.data["frame_object"]
     found = [
-        {"label": box["label"], "confidence": float(box["confidence"]), "box": _plain(box["box"]),
-         "position": _plain(box.get("position"))}
-        for box in look.data.get("found", ())
-    ]  # fmt: skip
+        {"label": one.label, "confidence": one.confidence, "box": one.box, "position": one.position}
+        for one in look.found
+    ]
     return {
         "look": {
             "image": frame.image,
             "hidden": None if frame.visible is None or frame.visible.all() else ~frame.visible,
             "frame": frame.id,
             "camera": frame.camera,
-            "detector": look.data.get("detector", ""),
+            "detector": look.detector,
             "stamp": frame.stamp,
             "found": found,
         }

@@ -5,8 +5,8 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
-from executive.events import Event
 from executive.mission.text.files import shipped_folder
+from executive.record.entry import OldEvent, old_entry
 from executive.record.journal import read_journal, start_of
 from executive.record.recorded_mission import read_tree
 from executive.record.result import ENDED, read_result, requests_of
@@ -50,16 +50,17 @@ class Facts:
 
     def __init__(self, path: Path) -> None:
         directory = RunDirectory(path)
-        entries = read_journal(directory.journal)
-        start = start_of(entries, path, "there is nothing to report")
+        events = read_journal(directory.journal)
+        entries = [old_entry(timed) for timed in events]
+        start = start_of(events, path, "there is nothing to report")
         table = ItemTable()
         for entry in entries:
             if entry["kind"] == "item":
-                table(Event("item", entry["tick"], entry["clock"], entry))
+                table(OldEvent("item", entry["tick"], entry["clock"], entry))
         decisions = [(entry["clock"], entry["item"]) for entry in entries if entry["kind"] == "decision"]
         self.path = path
         self.start = start
-        self.result = read_result(directory, entries)
+        self.result = read_result(directory, events)
         self.status = self.result.get("status", CUT_OFF)
         self.end = entries[-1]["clock"]
         self.nodes = read_tree(directory.tree)
@@ -67,13 +68,13 @@ class Facts:
         self.objects = [row for row in table.rows if row.state != "phantom"]
         self.shares = shares(self.course, self.nodes, decisions, self.end)
         self.pictures = pictures(directory.frames, [row.item for row in table.rows])
-        self.requests = requests_of(entries)
+        self.requests = requests_of(events)
         self.disturbances = [
             (each["clock"], each["what"]) for each in entries if each["kind"] == "disturbance"
         ]
-        file = Path(start["file"])
+        file = Path(start.file)
         mission = file.stem if file.parent == shipped_folder() else str(file)
-        self.repeat = repeat_command(mission, start, self.requests, directory.scene)
+        self.repeat = repeat_command(mission, start.seed, start.overrides, self.requests, directory.scene)
         ended = self.status in ENDED
         self.resume = "" if ended else shlex.join(["executive", "run", "--resume", str(path)])
         self.replay = shlex.join(["executive", "replay", str(path)])

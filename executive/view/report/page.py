@@ -62,7 +62,7 @@ def report(facts: Facts) -> str:
     """Return the report as HTML. Whatever a mission or a skill says in it is text, and never markup."""
     told = facts.result.get("story")
     items = [row.item for row in facts.objects]
-    params = facts.start["params"]
+    params = facts.start.params
     rows = facts.shares.rows
     return render(
         "report/report.html",
@@ -75,7 +75,7 @@ def report(facts: Facts) -> str:
         titles={node.path: node.title for node in facts.nodes},
         colours=_colours(facts.shares.activities),
         sums={item: sum(spent.values()) for item, spent in rows.items()},
-        tree=Markup(svg(facts.nodes, facts.start["mission"], _notes(facts))),
+        tree=Markup(svg(facts.nodes, facts.start.mission, _notes(facts))),
         timeline=Markup(timeline(facts.course, facts.nodes, facts.end)),
         params=yaml.safe_dump(dict(params), sort_keys=False, allow_unicode=True) if params else "",
         other=[each for each in facts.pictures if each.reason and each.item not in items],

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TextIO
 
-from executive.events import Event
+from executive.events import TimedEvent
 from executive.mission.outline import outline
+from executive.record.entry import OldEvent as Event
+from executive.record.entry import old_event
 from executive.view.items import ItemTable
 from executive.view.tree.outline import skills
 
@@ -34,8 +36,9 @@ class Lines:
         self._names = {node.path: node.name for node in nodes}
         self._skills = skills(nodes)
 
-    def __call__(self, event: Event) -> None:
+    def __call__(self, timed: TimedEvent) -> None:
         """Write the line that `event` deserves, if any."""
+        event = old_event(timed)
         text = self._text(event)
         if text:
             self._stream.write(f"{event.clock:9.2f} s  {text}\n")

@@ -11,8 +11,9 @@ from rich.table import Table
 from rich.text import Text
 
 from executive.errors import escape_control_characters
-from executive.events import Event
+from executive.events import TimedEvent
 from executive.mission.outline import OutlineNode, outline
+from executive.record.entry import old_event
 from executive.run.run import Run
 from executive.run.run_control import RunControl
 from executive.view.items import ItemTable
@@ -65,8 +66,9 @@ class Terminal:
             self._keys = Keys(self._keyboard, run.control)
         self._show(True)
 
-    def __call__(self, event: Event) -> None:
-        """Note what `event` changes; step aside while the operator is asked something."""
+    def __call__(self, timed: TimedEvent) -> None:
+        """Show an event; step aside while the operator is asked something."""
+        event = old_event(timed)
         if event.kind in ("asking", "request"):
             self._show(event.kind == "request")
         data = event.data

@@ -27,18 +27,23 @@ _JOINED = "\N{NO-BREAK SPACE}"
 
 
 def repeat_command(
-    mission: str, start: Mapping[str, Any], requests: Iterable[str] = (), scene: Path | None = None
+    mission: str,
+    seed: int,
+    overrides: Mapping[str, str],
+    requests: Iterable[str] = (),
+    scene: Path | None = None,
 ) -> str:
     """Return the command line that repeats a run exactly.
 
     Args:
         mission: Its name or file.
-        start: Its `seed` and `overrides`, as in its event `run`.
+        seed: Its seed.
+        overrides: Params and keys of the cell as given on the command line.
         requests: What the operator asked for.
         scene: Its scene file, or None.
     """
-    words = ["executive", "run", mission, "--seed", str(start["seed"])]
-    for key, value in start["overrides"].items():
+    words = ["executive", "run", mission, "--seed", str(seed)]
+    for key, value in overrides.items():
         words += ["--set", f"{key}={value}"]
     for request in requests:
         words += ["--request", request]

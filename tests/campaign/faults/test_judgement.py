@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from events import at, frame_searched, item_changed
 
 from executive.campaign.faults.fault import Breakage, Fault
 from executive.campaign.faults.judgement import (
@@ -17,10 +18,10 @@ from executive.campaign.faults.judgement import (
     out_of_sight,
     remark,
 )
+from executive.cell.frame import FrameTaken
 from executive.cells.fake.cell import FakeCell
-from executive.events import Event
+from executive.events import FaultInjected, RunEnded
 from executive.mission.flow.endings import Ending
-from executive.run.outcome import Outcome
 from executive.testing.faults.hand import Thing
 
 BUG = Fault("tree/Grasp", "Grasp", "", "raises", "first", "", breakages=(Breakage("tree/Grasp", "raises"),))
@@ -33,15 +34,15 @@ PLACES = ((0.5, 0.0, 0.025), (1.6, 0.0, 0.025), (0.24, -0.48, 0.025))
 """In the workspace, far beside it, and in a bin that the camera shows."""
 
 
-def outcome(status: str, reason: str = "", message: str = "", node: str = "") -> Outcome:
-    return Outcome(status, reason, message, node, True, "", 10, 1.0)
+def outcome(status: str, reason: str = "", message: str = "", node: str = "") -> RunEnded:
+    return RunEnded(status, reason, message, node, True, "", 10, 1.0)
 
 
 def books(*args: Any) -> list[str]:
     return list(check_books(*args))
 
 
-def end(out: Outcome, fault: Fault, *, raised: bool = False) -> list[str]:
+def end(out: RunEnded, fault: Fault, *, raised: bool = False) -> list[str]:
     return list(check_end(out, [fault], ENDINGS, raised))
 
 
@@ -99,7 +100,7 @@ def test_what_nobody_saw_is_no_disagreement_unless_the_run_says_success(
 ) -> None:
     unseen = {**AUDIT, "left": 2, "unseen": 1}
     assert books(outcome(status, reason), ITEMS, unseen) == []
-    assert list(check_success(outcome(status, reason), unseen, [Event("look", 1, 0.1, {})] * looked)) == said
+    assert list(check_success(outcome(status, reason), unseen, [at(1, frame_searched())] * looked)) == said
 
 
 def test_what_fell_just_before_a_run_ended_early_may_lie_anywhere() -> None:
@@ -120,8 +121,8 @@ def test_what_was_taken_where_nobody_had_to_look_is_no_disagreement() -> None:
 
 def test_only_what_the_fault_reached_for_may_be_out_of_reach() -> None:
     gone = {**AUDIT, "elsewhere": 1}
-    taken = Event("disturbance", 1, 0.1, {"what": "object_removed"})
-    slow = Event("disturbance", 1, 0.1, {"what": "detector_slow"})
+    taken = at(1, FaultInjected("object_removed", "", "", "", []))
+    slow = at(1, FaultInjected("detector_slow", "", "", "", []))
     assert list(check_losses(gone, [taken])) == list(check_losses(None, [])) == []
     assert list(check_losses(gone, [slow])) == ["1 objects are out of reach, and the fault reached for 0"]
 
@@ -160,9 +161,9 @@ def test_an_object_is_out_of_sight_if_no_look_since_the_last_fall_shows_its_plac
     camera, bins = fake.cell.camera, fake.cell.bins.values()
     seen, beside = (Thing(body, "cube", np.array(place)) for body, place in enumerate(PLACES[:2]))
     inside = Thing(2, "cube", np.array(PLACES[2]))
-    fall = Event("item", 10, 0.0, {"item": "cube-1", "state": "dropped"})
-    look = Event("look", 20, 0.0, {"frame_object": camera.capture()})
-    before = Event("look", 5, 0.0, look.data)
+    fall = at(10, item_changed("cube-1", "dropped"))
+    look = at(20, FrameTaken(camera.capture()))
+    before = at(5, look.event)
     things = [seen, beside, inside]
     assert out_of_sight(things, bins, [fall, look]) == Hidden(1, 0)
     assert out_of_sight(things, bins, [before, fall]) == Hidden(2, 1), "what was seen before it fell is old"

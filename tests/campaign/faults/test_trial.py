@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -14,6 +12,7 @@ from executive.campaign.faults.campaign import Campaign
 from executive.campaign.faults.fault import Breakage
 from executive.campaign.faults.trial import record, try_out
 from executive.cells.fake.cell import FakeCell
+from executive.events import FaultInjected, ItemChanged, NodeEnded, RunEnded
 from executive.plugins import discover
 from executive.record.journal import read_journal
 from executive.testing.run_mission import run_mission
@@ -143,8 +142,8 @@ def test_a_fault_repeated_is_recorded(campaign: Campaign, tmp_path: Path) -> Non
     numbers = (number_of(campaign, "Grasp", "missed"),)
     trial, path = record(campaign.subject, campaign.rehearsal, campaign.these(numbers), tmp_path)
     assert trial == tried(campaign, *numbers)
-    kinds = [entry["kind"] for entry in read_journal(path / "journal.jsonl")]
-    assert (kinds.count("disturbance"), kinds[-1]) == (1, "end")
+    kinds = [type(timed.event) for timed in read_journal(path / "journal.jsonl")]
+    assert (kinds.count(FaultInjected), kinds[-1]) == (1, RunEnded)
     assert (path / "report.html").is_file()
 
 
@@ -155,8 +154,8 @@ def test_a_skill_that_says_in_its_second_start_that_it_dropped_something_has_let
     )
     breakages = [Breakage(path, "fails", "dropped", (2,))]
     result = run_mission("sort_overhead", substitutes=broken_skills(breakages, {path: skills["Transit"]}))
-    states: list[Mapping[str, Any]] = [event.data for event in result.events if event.kind == "item"]
-    assert "dropped" in {state["state"] for state in states}
-    ends = [event.data for event in result.events if event.kind == "status" and event.data["node"] == path]
-    assert [end["reason"] for end in ends if end["status"] != "RUNNING"][:3] == ["", "dropped", ""]
+    events = [timed.event for timed in result.events]
+    assert "dropped" in {event.state for event in events if isinstance(event, ItemChanged)}
+    ends = [event for event in events if isinstance(event, NodeEnded) and event.node == path]
+    assert [end.reason for end in ends][:3] == ["", "dropped", ""]
     assert (result.status, result.agrees) == ("SUCCESS", True)

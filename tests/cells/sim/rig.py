@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import Any
 
 from executive.cell.arm import Goal, Task
 from executive.cell.clock import STEP
@@ -13,6 +12,7 @@ from executive.cells.sim.clock import SimClock
 from executive.cells.sim.collision import PathClearance
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import World
+from executive.events import Event
 from executive.geometry import Array, Pose
 from executive.motion.arms import build_planner
 from executive.motion.trajectory import Trajectory
@@ -34,16 +34,12 @@ class Rig:
         self.clearance = PathClearance(config)
         self.planner = build_planner(config, self.clearance.check)
         self.clock = SimClock(self.world, STEP)
-        self.events: list[dict[str, Any]] = []
+        self.events: list[Event] = []
         self.tool = SuctionTool(self.world, config.tool)
         self.arm = SimArm(
-            self.world, self.planner, config, self.clock, lambda: self.tool.held_body, self.emit
+            self.world, self.planner, config, self.clock, lambda: self.tool.held_body, self.events.append
         )
         self.commands = deque([self.arm.q], maxlen=400)
-
-    def emit(self, kind: str, **data: Any) -> None:
-        """Keep an event."""
-        self.events.append({"kind": kind, **data})
 
     def add(self, label: str, x: float, y: float, z: float | None = None) -> int:
         """Put an object into the world, standing at (x, y) or with its middle at height z [m]."""

@@ -11,6 +11,7 @@ from rig import Rig
 from executive.cell.arm import Goal, Motion, Task
 from executive.cell.objects import Obstacle
 from executive.errors import Fault, Unreachable
+from executive.events import MotionPlanned
 
 OVER = Goal((0.5, 0.1, 0.15))
 BESIDE = Goal((0.5, -0.1, 0.15))
@@ -35,7 +36,7 @@ def test_a_plan_takes_its_time_on_the_clock_and_is_told(rig: Rig) -> None:
         waited += 1
     assert waited == round(rig.config.motion.planning * 240) == 24
     duration = round(planning.result().duration, 4)
-    assert rig.events == [{"kind": "plan", "ahead": False, "waits": 0.1, "duration": duration}]
+    assert rig.events == [MotionPlanned(False, 0.1, duration)]
 
 
 def test_a_motion_planned_ahead_is_known_at_once_and_begins_where_the_running_one_ends(rig: Rig) -> None:
@@ -46,8 +47,8 @@ def test_a_motion_planned_ahead_is_known_at_once_and_begins_where_the_running_on
     rig.run()
     planning = rig.arm.plan(BESIDE)
     assert planning.ready
-    assert rig.events[-1]["ahead"] is True
-    assert rig.events[-1]["waits"] == 0.0
+    assert rig.events[-1].ahead is True
+    assert rig.events[-1].waits == 0.0
     second = planning.result()
     assert np.array_equal(second.start, first.end)
     rig.arm.start(second)
@@ -61,7 +62,7 @@ def test_a_motion_planned_ahead_too_late_is_waited_for_as_long_as_it_takes(rig: 
     rig.arm.plan_ahead("home")
     rig.step(4)
     assert not rig.arm.plan("home").ready
-    assert rig.events[-1]["waits"] == pytest.approx(20 / 240, abs=1e-4)
+    assert rig.events[-1].waits == pytest.approx(20 / 240, abs=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -78,7 +79,7 @@ def test_what_was_planned_ahead_answers_no_other_question(rig: Rig, goal: Goal |
     rig.arm.plan_ahead(BESIDE)
     rig.step(20)
     assert not rig.arm.plan(goal, task).ready
-    assert rig.events[-1]["ahead"] is False
+    assert rig.events[-1].ahead is False
 
 
 def test_what_was_planned_ahead_is_of_no_use_once_the_arm_was_stopped_on_its_way(rig: Rig) -> None:
@@ -111,7 +112,7 @@ def test_what_cannot_be_reached_is_said_by_the_result_in_its_time(rig: Rig) -> N
     assert planning.ready
     with pytest.raises(Unreachable, match=r"the tool cannot reach \(0\.900, 0\.000, 0\.114\) m"):
         planning.result()
-    assert rig.events[-1]["duration"] == 0.0
+    assert rig.events[-1].duration == 0.0
 
 
 def test_an_unknown_pose_is_a_fault_that_lists_the_known_ones(rig: Rig) -> None:

@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from events import at
 
 from executive.cell.detection import Observation
 from executive.cell.protocols import Request
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Blocked, NoDepth, Unavailable, Unreachable
-from executive.events import Event
+from executive.events import Event, NodeStarted, RequestGiven
 from executive.testing import faults as effects
 from executive.testing.faults import Disturbance, DisturbedCell, between, during
 from executive.testing.faults.effect import Effect
@@ -29,9 +30,9 @@ def cell_with(*what: Effect, start: float = 0.0, end: float = 100.0) -> Disturbe
     fake = FakeCell()
     for label, place in PLACES.items():
         fake.world.put(label, *place)
-    told: list[dict[str, Any]] = []
+    told: list[Event] = []
     script = [between(start, end, effect) for effect in what]
-    cell = DisturbedCell(fake, script, lambda kind, **data: told.append({"kind": kind, **data}))
+    cell = DisturbedCell(fake, script, told.append)
     cell.told, cell.fake = told, fake  # type: ignore[attr-defined]
     return cell
 
@@ -95,7 +96,7 @@ def test_a_mission_deals_with_it_and_its_books_are_right(
     result = run_mission("sort_overhead", disturbances=[one])
     assert result.reasons(pattern) == reasons
     assert (result.status, result.items["rejected"], result.agrees) == (status, rejected, True)
-    assert {told["what"] for told in result.disturbances()} == {one.what.name}
+    assert {fault.name for fault in result.disturbances()} == {one.what.name}
 
 
 def test_an_operator_wants_something_else_first() -> None:
@@ -105,8 +106,8 @@ def test_an_operator_wants_something_else_first() -> None:
     ]
     result = run_mission("pick_on_request", requests=["cube", "cube"], disturbances=script)
     assert result.reasons("*/AwaitRequest") == ["rescan", "quit"]
-    assert [told["what"] for told in result.disturbances()] == ["operator_asks_rescan", "operator_quits"]
-    assert [e.data["wanted"] for e in result.events if e.kind == "request"] == ["cube"]
+    assert [fault.name for fault in result.disturbances()] == ["operator_asks_rescan", "operator_quits"]
+    assert [one.event.wanted for one in result.events if isinstance(one.event, RequestGiven)] == ["cube"]
 
 
 def ask(cell: DisturbedCell) -> Request:
@@ -169,9 +170,9 @@ def test_it_happens_so_far_on_the_way(name: str, share: float) -> None:
         cell.advance()
     gone = float(np.linalg.norm(cell.cell.arm.tool_pose.position - start))
     assert gone / whole == pytest.approx(share, abs=0.03)
-    if cell.told[0]["what"] == "seal_breaks":
+    if cell.told[0].name == "seal_breaks":
         assert not cell.fake.tool.holding and not cell.cell.arm.at_rest
-        assert cell.told[0]["object"] == "cube" and cell.told[0]["position"][2] > 0.1, "it hung in the air"
+        assert cell.told[0].object == "cube" and cell.told[0].position[2] > 0.1, "it hung in the air"
         assert cell.fake.world.objects[0].position[2] == pytest.approx(0.025)
     else:
         assert cell.fake.tool.holding and cell.cell.arm.at_rest
@@ -210,7 +211,7 @@ def test_a_tool_that_sticks_lets_go_when_it_is_opened_once_more() -> None:
     hold(cell)
     cell.cell.tool.open()
     wait(cell, 0.1)
-    assert cell.fake.tool.holding and [one["object"] for one in cell.told] == ["cube"]
+    assert cell.fake.tool.holding and [one.object for one in cell.told] == ["cube"]
     cell.cell.tool.open()
     assert not cell.fake.tool.holding
 
@@ -243,7 +244,7 @@ def test_nothing_that_the_arm_hides_is_believed_and_it_is_told_once_a_control_st
     cell: Any = cell_with(effects.workspace_hidden())
     assert run_skill(Detect, cell).reason == "hidden"
     assert not cell.cell.camera.sees_table() and not cell.cell.camera.capture().visible.any()
-    assert [one["what"] for one in cell.told] == ["workspace_hidden"]
+    assert [one.name for one in cell.told] == ["workspace_hidden"]
     assert run_skill(Detect, cell, inputs={"hidden": "pass"}).outputs["detections"].found == ()
 
 
@@ -258,7 +259,7 @@ def test_an_object_is_meant_by_its_number_or_by_where_it_is(which: Any, gone: st
     cell: Any = cell_with(effects.object_removed(which))
     cell.advance()
     assert labels(cell) == [label for label in PLACES if label != gone]
-    assert [one["object"] for one in cell.told] == [gone] * bool(gone)
+    assert [one.object for one in cell.told] == [gone] * bool(gone)
 
 
 def test_the_nearest_is_none_that_lies_in_a_bin_or_hangs_at_the_tool() -> None:
@@ -270,7 +271,7 @@ def test_the_nearest_is_none_that_lies_in_a_bin_or_hangs_at_the_tool() -> None:
 
 
 def node(cell: DisturbedCell, item: str) -> None:
-    cell.hear(Event("status", 1, 0.0, {"node": "tree/Approach", "status": "RUNNING", "item": item}))
+    cell.hear(at(1, NodeStarted("tree/Approach", "Approach", item)))
 
 
 def test_the_object_of_a_node_is_what_the_ledger_takes_for_its_item() -> None:

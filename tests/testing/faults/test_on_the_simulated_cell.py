@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from executive.cells.sim.cell import SimCell
-from executive.events import Event
+from executive.events import FaultInjected, NodeEnded, TimedEvent
 from executive.geometry import Array
 from executive.testing import faults as effects
 from executive.testing.faults import Disturbance, after, during
@@ -24,14 +24,15 @@ class Watched:
         self.seen: dict[str, object] = {}
         self._cell: SimCell | None = None
 
-    def run(self, disturbance: Disturbance, look: Callable[[SimCell, Event], object]) -> MissionResult:
-        """Run sort_overhead; keep what the first `look` at each kind of event, or reason, returns."""
+    def run(self, disturbance: Disturbance, look: Callable[[SimCell], object]) -> MissionResult:
+        """Run sort_overhead; keep what the first `look` at each kind of event, state or reason returns."""
 
-        def watch(event: Event) -> None:
+        def watch(timed: TimedEvent) -> None:
             assert self._cell is not None
-            for name in (event.kind, event.data.get("reason")):
+            event = timed.event
+            for name in (type(event).__name__, getattr(event, "reason", ""), getattr(event, "state", "")):
                 if name and name not in self.seen:
-                    self.seen[name] = look(self._cell, event)
+                    self.seen[name] = look(self._cell)
 
         def keep(cell: SimCell) -> None:
             self._cell = cell
@@ -46,12 +47,12 @@ def watched() -> Watched:
     return Watched()
 
 
-def places(cell: SimCell, event: Event) -> dict[int, Array]:
+def places(cell: SimCell) -> dict[int, Array]:
     """Return where every object is, by body `(3,)` [m]."""
     return {thing.body: thing.position for thing in hand_of(cell).things}
 
 
-def holding(cell: SimCell, event: Event) -> bool:
+def holding(cell: SimCell) -> bool:
     return cell.cell.tool.holding
 
 
@@ -59,10 +60,10 @@ def holding(cell: SimCell, event: Event) -> bool:
 def test_when_a_seal_breaks_in_mid_carry_the_object_falls_and_is_picked_up_again(watched: Watched) -> None:
     result = watched.run(during("*/Transit", effects.seal_breaks(), nth=3), places)
     (told,) = result.disturbances()
-    hung = watched.seen["disturbance"]
+    hung = watched.seen["FaultInjected"]
     fallen = watched.seen["SelectTarget.unseen"]
     assert isinstance(hung, dict) and isinstance(fallen, dict)
-    (body,) = (body for body, place in hung.items() if np.allclose(place, told["position"], atol=1e-3))
+    (body,) = (body for body, place in hung.items() if np.allclose(place, told.position, atol=1e-3))
     assert hung[body][2] > 0.1
     assert fallen[body][2] < 0.05
     assert (result.status, result.reasons("*/Transit")) == ("SUCCESS", ["dropped"])
@@ -77,7 +78,7 @@ def test_what_falls_or_is_put_down_is_not_taken_for_something_else(name: str) ->
 
 def test_what_is_taken_out_of_the_tool_is_parted_from_it_first(watched: Watched) -> None:
     result = watched.run(during("*/Transit", effects.object_removed(), nth=2), holding)
-    assert (watched.seen["disturbance"], watched.seen["dropped"]) == (True, False)
+    assert (watched.seen["FaultInjected"], watched.seen["dropped"]) == (True, False)
     assert (result.reason, result.items["lost"], result.agrees) == ("lost", 1, True)
 
 
@@ -85,9 +86,9 @@ def test_what_is_taken_out_of_the_tool_is_parted_from_it_first(watched: Watched)
 def test_what_is_moved_is_found_where_it_is_now(watched: Watched) -> None:
     result = watched.run(during("*/Approach", effects.object_moved((0.0, 0.06)), nth=2), places)
     (told,) = result.disturbances()
-    before, felt = watched.seen["disturbance"], watched.seen["no_contact"]
+    before, felt = watched.seen["FaultInjected"], watched.seen["no_contact"]
     assert isinstance(before, dict) and isinstance(felt, dict)
-    (body,) = (body for body, place in before.items() if np.allclose(place, told["position"], atol=1e-3))
+    (body,) = (body for body, place in before.items() if np.allclose(place, told.position, atol=1e-3))
     assert np.allclose(felt[body][:2] - before[body][:2], [0.0, 0.06], atol=0.005)
     assert (result.status, result.items["lost"], result.agrees) == ("SUCCESS", 0, True)
 
@@ -95,11 +96,12 @@ def test_what_is_moved_is_found_where_it_is_now(watched: Watched) -> None:
 @pytest.mark.slow
 def test_an_arm_that_runs_into_something_brakes(watched: Watched) -> None:
     hand = during("*/Approach", effects.arm_runs_into("a hand"), nth=2)
-    result = watched.run(hand, lambda cell, event: cell.cell.arm.at_rest)
-    assert (watched.seen["disturbance"], watched.seen["blocked"]) == (False, True)
-    failed = next(event for event in result.events if event.data.get("reason") == "blocked")
-    assert failed.data["message"] == "the arm ran into a hand"
-    told = next(event for event in result.events if event.kind == "disturbance")
+    result = watched.run(hand, lambda cell: cell.cell.arm.at_rest)
+    assert (watched.seen["FaultInjected"], watched.seen["blocked"]) == (False, True)
+    failed = next(one for one in result.events if getattr(one.event, "reason", "") == "blocked")
+    assert isinstance(failed.event, NodeEnded)
+    assert failed.event.message == "the arm ran into a hand"
+    told = next(one for one in result.events if isinstance(one.event, FaultInjected))
     assert 10 < failed.tick - told.tick < 120, "it brakes along its path"
     assert (result.status, result.items["rejected"], result.agrees) == ("SUCCESS", 0, True)
 

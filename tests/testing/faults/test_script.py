@@ -15,7 +15,7 @@ from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import FakeCell, SilentOperator, bare_table
 from executive.errors import InputError
-from executive.events import ignore
+from executive.events import FaultInjected, FrameSearched, NodeEnded, ToolCommanded, ignore
 from executive.testing import faults as effects
 from executive.testing.faults import (
     Disturbance,
@@ -40,12 +40,8 @@ def sorted_with(*script: Disturbance) -> MissionResult:
 
 def slipped(result: MissionResult) -> list[int]:
     """Return which grasps missed, counted from 1."""
-    grasps = [
-        event.data["status"]
-        for event in result.events
-        if event.kind == "status" and event.data["node"].endswith("/Grasp")
-    ]
-    ends = [status for status in grasps if status != "RUNNING"]
+    events = (one.event for one in result.events)
+    ends = [event.status for event in events if isinstance(event, NodeEnded) and event.skill == "Grasp"]
     return [number for number, status in enumerate(ends, start=1) if status == "FAILURE"]
 
 
@@ -60,7 +56,7 @@ def test_it_happens_in_the_activations_it_is_meant_for(nth: int | Sequence[int],
 
 def test_it_lasts_from_one_time_until_before_another() -> None:
     result = sorted_with(between(2.0, 6.0, effects.detector_dead()))
-    times = [e.clock for e in result.events if e.kind == "disturbance"]
+    times = [one.clock for one in result.events if isinstance(one.event, FaultInjected)]
     assert times
     assert 2.0 <= min(times) <= max(times) < 6.0
     assert max(event.clock for event in result.events) > 6.0
@@ -69,8 +65,8 @@ def test_it_lasts_from_one_time_until_before_another() -> None:
 def test_after_a_time_it_lasts_until_the_end() -> None:
     result = sorted_with(after(3.0, effects.seal_fails()))
     assert result.status == "INCOMPLETE"
-    closed = [e.clock for e in result.events if e.kind == "intent" and e.data["action"] == "close"]
-    told = [e.clock for e in result.events if e.kind == "disturbance"]
+    closed = [one.clock for one in result.events if one.event == ToolCommanded("close")]
+    told = [one.clock for one in result.events if isinstance(one.event, FaultInjected)]
     assert told == [clock for clock in closed if clock >= 3.0]
     assert result.items["rejected"] == result.audit["left"] > 0  # type: ignore[index]
 
@@ -117,13 +113,15 @@ def test_a_script_is_a_value_that_can_be_sent_to_another_process_and_used_again(
 def test_what_happens_to_a_node_is_told_with_node_item_and_object() -> None:
     result = sorted_with(during("*/Transit", effects.seal_breaks(), nth=1), between(500.0, 600.0, SLIPS))
     (told,) = result.disturbances()
-    assert (told["what"], told["node"].rpartition("/")[2]) == ("seal_breaks", "Transit")
-    assert told["item"].startswith(f"{told['object']}-") and len(told["position"]) == 3
+    assert (told.name, told.node.rpartition("/")[2]) == ("seal_breaks", "Transit")
+    assert told.item.startswith(f"{told.object}-") and len(told.position) == 3
 
 
 def test_a_mission_waits_for_a_detector_and_a_test_for_a_mission_for_so_long_only() -> None:
     result = sorted_with(between(4.0, 9.0, effects.detector_hangs()))
-    assert not [e for e in result.events if e.kind == "look" and 4.1 < e.clock < 9.0]
+    assert not [
+        one for one in result.events if isinstance(one.event, FrameSearched) and 4.1 < one.clock < 9.0
+    ]
     assert (result.status, result.agrees) == ("SUCCESS", True)
     script = [during("tree/look/*/Detect", effects.detector_hangs())]
     result = run_mission("sort_overhead", disturbances=script, longest=5.0)

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from events import run_started
 from PIL import Image, ImageColor
 from small_tree import NODES, node, status
 
@@ -130,7 +131,7 @@ def test_a_page_shows_picture_camera_caption_and_how_far_the_run_is(tmp_path) ->
     entries = [status(0, "tree", "RUNNING"), status(1, "tree/Grasp", "RUNNING", item="cube-1")]
     course = Course(entries, NODES, [tmp_path / "000000_cube-1.jpg"])
     course.go_to(240, 1.0)
-    source = SimpleNamespace(start={"mission": "sort"}, items=0, bins={}, nodes=NODES)
+    source = SimpleNamespace(start=run_started(mission="sort"), items=0, bins={}, nodes=NODES)
     picture = np.full((720, 800, 3), 128, np.uint8)
     page = np.asarray(draw_page(source, picture, course, "seed 5", 4.0))
     for part, ends in ((np.s_[:360, :800], (20, 20, 205, 251)), (np.s_[360:, :800], (303, 20, 340, 155))):

@@ -8,42 +8,55 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 import pytest
+from events import (
+    at,
+    detected,
+    frame_searched,
+    item_changed,
+    read,
+    run_ended,
+    run_started,
+    skill_ended,
+    skill_started,
+)
 
-from executive.events import Event
+from executive.events import Event, OperatorAsked, RequestGiven, RunResumed, TargetSelected
 from executive.geometry import Pose
+from executive.record.entry import OldEvent, old_event
 from executive.view.live.board import Board
 from executive.view.live.telling import Teller, picture, poses
 
 
-def status(status: str, **more: str) -> Event:
-    return Event("status", 360, 1.5, {"node": "tree/Grasp", "status": status, **more})
+def ended(status: str, **fields: str) -> OldEvent:
+    return old_event(at(360, skill_ended("tree/Grasp", status, **fields)))
 
 
 @pytest.mark.parametrize(
     ("event", "news"),
     [
-        (Event("run", 0, 0.0, {"mission": "sort", "seed": 7, "params": {}}),
-         {"run": {"mission": "sort", "seed": 7}}),
-        (Event("decision", 1, 0.0, {"item": "cube-1", "bin": "red_bin", "position": 1}),
-         {"decision": {"item": "cube-1", "bin": "red_bin"}}),
-        (Event("item", 1, 0.0, {"item": "cube-1", "state": "held", "position": np.array([0.5]), "looks": 3}),
-         {"items": {"cube-1": {"item": "cube-1", "state": "held", "position": [0.5]}}}),
-        (Event("asking", 1, 0.0, {"choices": ("cube", "duck")}), {"asking": ["cube", "duck"]}),
-        (Event("request", 1, 0.0, {"wanted": "cube"}), {"asking": None}),
-        (Event("end", 1, 0.0, {"status": "SUCCESS"}), {"asking": None, "over": True}),
-        (Event("resume", 1, 0.0, {"ticked": 3}), {}),
-        (Event("sense", 1, 0.0, {"name": "arm.q", "value": []}), None),
+        (run_started(mission="sort", seed=7), {"run": {"mission": "sort", "seed": 7}}),
+        (TargetSelected("cube-1", "cube", 3, "red_bin"),
+         {"decision": {"item": "cube-1", "label": "cube", "frame": 3, "bin": "red_bin"}}),
+        (item_changed("cube-1", "held"),
+         {"items": {"cube-1": {"item": "cube-1", "label": "cube", "state": "held", "bin": "", "why": "",
+                               "position": [0.5, 0.0, 0.02]}}}),
+        (OperatorAsked(["cube", "duck"]), {"asking": ["cube", "duck"]}),
+        (RequestGiven("cube"), {"asking": None}),
+        (run_ended(), {"asking": None, "over": True}),
+        (RunResumed(3, "", {}), {}),
+        (read("arm.q", []), None),
     ],
 )  # fmt: skip
 def test_the_news_of_an_event_is_what_a_person_wants_to_see(event: Event, news: dict | None) -> None:
-    assert Teller().news(event) == (None if news is None else {"clock": 0.0, **news})
+    assert Teller().news(old_event(at(0, event))) == (None if news is None else {"clock": 0.0, **news})
 
 
 def test_every_end_of_a_node_is_counted() -> None:
     teller = Teller()
-    for word in ("RUNNING", "SUCCESS", "RUNNING", "SUCCESS", "RUNNING", "INVALID", "RUNNING"):
-        teller.news(status(word))
-    assert teller.news(status("FAILURE", reason="missed", message="no seal", item="cube-1")) == {
+    for status in ("SUCCESS", "SUCCESS", "INVALID"):
+        teller.news(old_event(at(1, skill_started("tree/Grasp"))))
+        teller.news(ended(status))
+    assert teller.news(ended("FAILURE", reason="missed", message="no seal", item="cube-1")) == {
         "clock": 1.5,
         "nodes": {
             "tree/Grasp": {
@@ -82,15 +95,14 @@ def test_an_image_is_shown_with_what_the_arm_hides_darker() -> None:
     visible[:, 32:] = False
     image = np.full((48, 64, 3), (200, 100, 50), np.uint8)
     frame = SimpleNamespace(image=image, visible=visible, id=3, camera="wrist", stamp=0.5)
-    box = {"label": "cube", "confidence": np.float32(0.5), "box": (1, 2, 3, 4), "position": None}
-    data = {"frame_object": frame, "found": [box | {"mask": object()}], "detector": "embedded"}
+    box = detected("cube", confidence=0.5, box=[1, 2, 3, 4], position=[0.5, 0.0, 0.02])
     board = Board()
-    board.take(picture(Event("look", 1, 0.5, data)))
+    board.take(picture(frame, frame_searched(box)))
     look = dict(board.everything["look"])
     data = base64.b64decode(look.pop("source").removeprefix("data:image/jpeg;base64,"))
     assert look == {
         "frame": 3, "camera": "wrist", "detector": "embedded", "stamp": 0.5, "width": 64, "height": 48,
-        "found": [{"label": "cube", "confidence": 0.5, "box": [1, 2, 3, 4], "position": None}],
+        "found": [{"label": "cube", "confidence": 0.5, "box": [1, 2, 3, 4], "position": [0.5, 0.0, 0.02]}],
     }  # fmt: skip
     shown = cv2.cvtColor(cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
     assert np.allclose(shown[24, 8], (200, 100, 50), atol=6)

@@ -16,13 +16,14 @@ from typing import Any
 import aiohttp
 import numpy as np
 import pytest
+from events import at, frame_searched
 
+from executive.cell.frame import FrameTaken
 from executive.cells.fake.cell import FakeCell
-from executive.events import Event
+from executive.events import RunEnded
 from executive.mission.load import load_mission
 from executive.plugins import discover
 from executive.run.assembly import RunOptions, assemble
-from executive.run.outcome import Outcome
 from executive.run.run import Run
 from executive.view.live.page import MAX_QUEUED_NEWS, LivePage
 from tests.record.conftest import MISSION
@@ -48,7 +49,7 @@ class Watched:
         await self.socket.send_json(what)
 
 
-def watch(text: str, folder: Path, do: Callable[[Watched], Awaitable[None]]) -> Outcome:
+def watch(text: str, folder: Path, do: Callable[[Watched], Awaitable[None]]) -> RunEnded:
     """Execute a run that is paused first, while something is done at its page."""
     file = folder / "mission.yaml"
     file.write_text(text)
@@ -59,7 +60,7 @@ def watch(text: str, folder: Path, do: Callable[[Watched], Awaitable[None]]) -> 
     run = assemble(loaded, discover(), options, [page])
     run.control.pause()
     page.open(run)
-    outcomes: list[Outcome] = []
+    outcomes: list[RunEnded] = []
     # Signals are heard in the main thread only, so the run goes on as it would there.
     runner = threading.Thread(target=lambda: outcomes.append(run.execute()))
 
@@ -167,7 +168,8 @@ def test_a_page_that_hangs_is_told_no_more_than_so_much_and_costs_a_few_seconds(
     image = np.zeros((480, 640, 3), np.uint8)
     frame = SimpleNamespace(image=image, visible=None, id=1, camera="overhead", stamp=0.0)
     for tick in range(200):
-        page(Event("look", tick, 0.1, {"frame_object": frame, "found": ()}))
+        page(at(tick, FrameTaken(frame)))
+        page(at(tick, frame_searched()))
     assert page._queue.qsize() <= MAX_QUEUED_NEWS
     page.finish({"status": "SUCCESS"})
     assert page._server.returncode == -signal.SIGKILL
@@ -177,7 +179,8 @@ def test_what_goes_wrong_with_it_is_said_and_the_run_goes_on() -> None:
     page = LivePage()
     try:
         for page._watched in (0, 1, 1):
-            page(Event("look", 1, 0.1, {"frame_object": object(), "found": ()}))
+            page(at(1, FrameTaken(object())))
+            page(at(1, frame_searched()))
         assert page.problem == (
             "not all was shown on the page: AttributeError: 'object' object has no attribute 'image'"
         )

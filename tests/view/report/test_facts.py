@@ -7,20 +7,23 @@ import shlex
 from pathlib import Path
 
 import pytest
+from events import at, run_ended
 
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
+from executive.events import Event, FaultInjected, RequestGiven, RunResumed
 from executive.mission.text.files import shipped_folder
 from executive.plugins import discover
+from executive.record.journal_format import encode
 from executive.record.recorded_run import RecordOptions
 from executive.record.resumed_run import resume_run
 from executive.run.assembly import RunOptions
 from executive.view.report.facts import CUT_OFF, Facts
 
 
-def append(run: Path, **entry: object) -> None:
-    with (run / "journal.jsonl").open("a") as journal:
-        journal.write(json.dumps(entry) + "\n")
+def append(run: Path, tick: int, event: Event) -> None:
+    with (run / "journal.jsonl").open("ab") as journal:
+        journal.write(encode(at(tick, event)))
 
 
 def without_end(run: Path) -> None:
@@ -52,11 +55,10 @@ def test_a_run_that_was_cut_off_and_taken_up_again_is_told_as_one(killed, copy):
 
 def test_a_result_from_before_the_run_was_taken_up_again_is_not_its_end(failed, copy):
     run = copy(failed)
-    append(run, tick=310, clock=1.3, kind="resume", ticked=310, intent=None)
+    append(run, 312, RunResumed(310, "", {}))
     facts = Facts(run)
     assert (facts.status, facts.result, facts.end) == (CUT_OFF, {}, 1.3)
-    end = {"status": "HALTED", "reason": "halted", "message": "halted by the user", "ticks": 400}
-    append(run, tick=400, clock=1.6, kind="end", **end)
+    append(run, 400, run_ended("HALTED", reason="halted", message="halted by the user", ticks=400))
     facts = Facts(run)
     assert (facts.status, facts.result["message"]) == ("HALTED", "halted by the user")
     assert facts.resume == shlex.join(["executive", "run", "--resume", str(run)])
@@ -76,7 +78,7 @@ def test_a_result_that_is_none_tells_nothing(failed, copy, content):
     run = copy(failed)
     (run / "result.json").write_bytes(content.encode(errors="surrogatepass"))
     facts = Facts(run)
-    assert (facts.status, facts.result["kind"]) == ("FAILURE", "end")
+    assert (facts.status, facts.result["holds"]) == ("FAILURE", "")
     without_end(run)
     assert (Facts(run).status, Facts(run).result) == (CUT_OFF, {})
 
@@ -86,8 +88,8 @@ def test_a_shipped_mission_is_repeated_by_its_name_and_with_what_was_asked_for(d
     start, *others = (run / "journal.jsonl").read_text().splitlines()
     shipped = json.loads(start) | {"file": str(shipped_folder() / "sort_fruit.yaml"), "overrides": {}}
     (run / "journal.jsonl").write_text("\n".join([json.dumps(shipped), *others]) + "\n")
-    append(run, tick=400, clock=1.7, kind="request", wanted="apple")
-    append(run, tick=401, clock=1.8, kind="disturbance", what="object removed")
+    append(run, 420, RequestGiven("apple"))
+    append(run, 432, FaultInjected("object removed", "", "", "", []))
     facts = Facts(run)
     assert facts.repeat == "executive run sort_fruit --seed 3 --request apple"
     assert facts.replay == shlex.join(["executive", "replay", str(run)])

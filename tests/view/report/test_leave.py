@@ -19,9 +19,8 @@ def test_a_run_that_ended_leaves_its_report(done, copy):
 @pytest.mark.parametrize(
     ("file", "content", "sentence"),
     [
-        ("journal.jsonl", "no JSON\n{}\n", "{run}/journal.jsonl:1: this line is not JSON"),
-        ("journal.jsonl", '{"kind": "run"}\n',
-         "KeyError: 'clock'; `executive --debug report {run}` shows where"),
+        ("journal.jsonl", "no JSON\n{}\n", "{run}/journal.jsonl:1: this line is no event (expected ident"),
+        ("journal.jsonl", '{"kind": "run"}\n', "{run}/journal.jsonl: this journal has format 1, written by"),
         ("tree.json", "[{}]", '"{run}/tree.json" holds no tree of a run: field required'),
         ("report.html", None, 'cannot write the report "{run}/report.html": is a directory; '),
         ("frames/000001_odd.jpg", None, "IsADirectoryError: "),

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from page_reader import SECTIONS, Page
 
-from executive.record.journal import read_journal
+from executive.record.journal import read_journal, start_of
 from executive.view.report.facts import Facts
 from executive.view.report.page import report, write_report
 
@@ -78,7 +78,10 @@ def test_every_object_is_there_with_its_fate_its_time_its_picture_and_what_went_
 
 def test_the_rows_of_time_sum_up_to_the_time_of_the_run(failed, done, killed, copy):
     braked = copy(done)
-    change(braked / "journal.jsonl", lambda entry: entry | ({"clock": 2.5} if entry["kind"] == "end" else {}))
+    change(
+        braked / "journal.jsonl",
+        lambda entry: entry | ({"tick": 600, "clock": 2.5} if entry["kind"] == "RunEnded" else {}),
+    )
     assert "no object" in page(braked).texts["objects"]
     for run in (failed, done, killed, braked):
         facts = Facts(run)
@@ -93,8 +96,8 @@ def test_params_versions_and_the_commands_that_repeat_it_are_there(failed):
     assert "attempts: 2 note: größer" in made
     assert "cell.table.objects=[2, 2]" in made
     assert "python 3." in made
-    start = read_journal(failed / "journal.jsonl")[0]
-    repeat = ["executive", "run", start["file"], "--seed", "3"]
+    start = start_of(read_journal(failed / "journal.jsonl"), failed, "")
+    repeat = ["executive", "run", start.file, "--seed", "3"]
     repeat += ["--set", "cell.kind=fake", "--set", "cell.table.objects=[2, 2]"]
     assert f"repeat {shlex.join(repeat)} decide anew" in again
     assert f"executive replay {shlex.quote(str(failed))}" in again
@@ -115,14 +118,21 @@ def test_a_run_whose_result_is_gone_has_the_verdict_of_its_journal(failed, done,
     run = copy(failed)
     (run / "result.json").unlink()
     assert page(run).texts["header"].startswith("FAILURE Grasp.missed no seal on sphere-1")
-    change(run / "journal.jsonl", lambda entry: entry | ({"message": ""} if entry["kind"] == "end" else {}))
+    change(
+        run / "journal.jsonl", lambda entry: entry | ({"message": ""} if entry["kind"] == "RunEnded" else {})
+    )
     assert "It came to its end; only the journal is left of its result." in page(run).texts["header"]
 
 
 def test_the_time_and_the_pictures_of_what_was_no_object_are_shown_all_the_same(failed, copy):
     run = copy(failed)
     phantom = {"state": "phantom"}
-    change(run / "journal.jsonl", lambda entry: entry | (phantom if entry.get("item") == "sphere-1" else {}))
+    change(
+        run / "journal.jsonl",
+        lambda entry: (
+            entry | (phantom if (entry["kind"], entry.get("item")) == ("ItemChanged", "sphere-1") else {})
+        ),
+    )
     found = page(run)
     assert "sphere-1 missed at step 325" in found.texts["objects"]
     assert "What the decision for sphere-1 was made from" not in found.texts["objects"]

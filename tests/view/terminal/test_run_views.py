@@ -8,11 +8,13 @@ from types import SimpleNamespace
 
 import py_trees
 import pytest
+from events import at, item_changed, run_started, skill_started
 from py_trees.behaviour import Behaviour
 from rich.console import Console
 
-from executive.events import Event
+from executive.events import BranchChosen, NodeEnded, NodeStarted, TimedEvent
 from executive.mission.outline import outline
+from executive.record.entry import old_event
 from executive.run.run_control import RunControl
 from executive.view.items import ItemTable
 from executive.view.terminal.lines import Lines
@@ -35,13 +37,16 @@ TREE = node("sort", "tree/sort", REPEAT, node("Release", "tree/sort/Release", de
 RUN = SimpleNamespace(root=TREE, control=RunControl())
 
 
-def item(state: str, **data) -> Event:
-    row = {"item": "cube-1", "label": "cube", "state": state, "bin": "", "why": "", "position": [0.5, 0.1, 0]}
-    return Event("item", 9, 1.5, row | data)
+def item(state: str, item: str = "cube-1", **fields) -> TimedEvent:
+    return at(9, item_changed(item, state, position=[0.5, 0.1, 0.0], **fields), 1.5)
 
 
-def status(node: str, status: str, clock: float = 1.0, **data) -> Event:
-    return Event("status", 1, clock, {"node": node, "status": status, **data})
+def started(node: str, item: str = "", clock: float = 1.0) -> TimedEvent:
+    return at(1, skill_started(node, item) if node == GRASP else NodeStarted(node), clock)
+
+
+def failed(node: str, clock: float = 1.0, **fields) -> TimedEvent:
+    return at(1, NodeEnded(node, "FAILURE", "Grasp" if node == GRASP else "", **fields), clock)
 
 
 def test_skills_are_the_leaves_and_what_rests_is_folded():
@@ -55,17 +60,16 @@ def test_skills_are_the_leaves_and_what_rests_is_folded():
 
 
 MISSED = {"item": "cube-1", "reason": "missed", "message": "no seal 0.1 s after contact"}
-AGAIN = {"node": "tree/sort/repeat", "choice": "attempt 2 of 3", "reason": "Grasp.missed"}
+AGAIN = BranchChosen("tree/sort/repeat", "attempt 2 of 3", "Grasp.missed")
 
 
 @pytest.mark.parametrize(
     ("events", "shown"),
     [
-        ([status(GRASP, "RUNNING", 1.0, item="cube-1"), status(GRASP, "FAILURE", 1.1, **MISSED)],
+        ([started(GRASP, "cube-1"), failed(GRASP, 1.1, **MISSED)],
          ["     1.00 s  Grasp [cube-1] ...",
           "     1.10 s  Grasp [cube-1] failed: missed: no seal 0.1 s after contact"]),
-        ([status("tree/sort/repeat", "RUNNING"), Event("choice", 1, 2.0, AGAIN),
-          status("tree/sort/repeat", "FAILURE", reason="Grasp.missed")],
+        ([started("tree/sort/repeat"), at(1, AGAIN, 2.0), failed("tree/sort/repeat", reason="Grasp.missed")],
          ["     2.00 s  repeat: attempt 2 of 3, after Grasp.missed"]),
         ([item("seen"), item("seen", looks=2), item("placed", bin="red_bin")],
          ["     1.50 s  cube-1 seen", "     1.50 s  cube-1 placed in red_bin"]),
@@ -93,8 +97,8 @@ def test_the_live_view_shows_the_running_path_the_items_and_the_clock():
     view = Terminal(Console(file=io.StringIO(), force_terminal=True, width=100, color_system=None))
     view.open(RUN)
     for event in (
-        Event("run", 0, 0.0, {"mission": "sort", "seed": 7}), status("tree/sort", "RUNNING"),
-        status("tree/sort/repeat", "RUNNING"), status(GRASP, "FAILURE", reason="missed"),
+        at(0, run_started(mission="sort", seed=7)), started("tree/sort"), started("tree/sort/repeat"),
+        failed(GRASP, reason="missed"),
         item("placed", bin="red_bin"),
     ):  # fmt: skip
         view(event)
@@ -111,7 +115,7 @@ def test_the_live_view_redraws_ten_times_a_second(monkeypatch):
     view = Terminal(Console(file=io.StringIO(), force_terminal=True, width=100))
     view.open(RUN)
     for tick in range(300):
-        view(status("tree/sort/repeat/Detect", "RUNNING", tick / 240))
+        view(at(tick, skill_started("tree/sort/repeat/Detect")))
     time.sleep(0.55)
     view.close()
     assert 3 < len(renders) <= 10
@@ -129,8 +133,8 @@ def test_the_summary_says_how_it_ended_how_long_it_took_and_how_to_repeat_it_in_
         item("placed", bin="red_bin"), item("placed", item="cube-2", bin="red_bin"),
         item("rejected", item="duck-1", why="three misses"),
     ):  # fmt: skip
-        items(event)
-    repeat = repeat_command("my mission.yaml", {"seed": 7, "overrides": {"attempts": "a b"}}, ["cube"])
+        items(old_event(event))
+    repeat = repeat_command("my mission.yaml", 7, {"attempts": "a b"}, ["cube"])
     lines = [
         "FAILURE Transit.dropped at sort/0/3: lost at 1.2 m/s",
         "34.2 s on the robot's clock, 6.8 s by the wall clock",

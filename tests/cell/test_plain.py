@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, IntEnum
+from functools import reduce
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
@@ -17,9 +19,8 @@ from hypothesis import strategies as st
 from executive.cell.detection import Detection
 from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
-from executive.events import Exact
+from executive.cell.plain import LONGEST, plain, plain_or_type
 from executive.geometry import Pose
-from executive.record.plain import LONGEST, plain
 
 
 class Corner(NamedTuple):
@@ -66,7 +67,6 @@ DUCK = {"label": "duck", "confidence": 0.6, "box": [1, 2.5, 3.0, 4], "rival": 0.
         pytest.param(-(2**LONGEST), "-0x1" + "0" * (LONGEST // 4), id="too large"),
         ("größe", "größe"), ("caf\udce9 ü", "caf\\udce9 ü"), ({"\ud800": 1}, {"\\ud800": 1}),
         (Path("a\udcff"), "a\\udcff"), (np.str_("\udfff"), "\\udfff"),
-        ([Exact([1 / 3, "\udfff"]), 1 / 3], [[1 / 3, "\udfff"], 0.333333]),
     ],
 )  # fmt: skip
 def test_becomes_plain(value, kept):
@@ -77,3 +77,24 @@ def test_becomes_plain(value, kept):
 @given(st.recursive(st.floats() | st.integers() | st.text(), lambda inner: st.lists(inner, max_size=3)))
 def test_everything_plain_is_json(value):
     json.dumps(plain(value), allow_nan=False)
+
+
+class Shy(Mapping):
+    """Raises whenever it is asked for its content."""
+
+    def __iter__(self):
+        raise RuntimeError
+
+    __len__ = __getitem__ = __iter__
+
+
+ENDLESS: list = [1]
+ENDLESS.append(ENDLESS)
+DEEP = reduce(lambda inner, number: [inner] if number % 2 else {"a": inner}, range(5000), 1)
+
+
+@pytest.mark.parametrize(
+    ("value", "kept"), [(Shy(), "Shy"), (ENDLESS, "list"), (DEEP, "list"), (1 / 3, 0.333333)]
+)
+def test_a_value_without_a_plain_form_is_named_by_its_type(value, kept):
+    assert plain_or_type(value) == kept

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import Enum
 from pathlib import PurePath
 from typing import Any
@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from executive.cell.frame import Frame
-from executive.events import Exact
 from executive.geometry import Pose
 
 DIGITS = 6
@@ -29,9 +28,24 @@ def plain(value: Any) -> Any:
 
     What JSON does not have (infinities, NaN, integers beyond `LONGEST`) becomes text, and so does the half
     of a surrogate pair that stands in a file name which is not UTF-8: a record stays readable by any parser.
-    Only what is `Exact` is taken over as it is.
     """
     return _rule(value.__class__)(value)
+
+
+def plain_or_type(value: Any) -> Any:
+    """Return `value` as JSON can hold it, or the name of its type if it has no plain form.
+
+    Skills set outputs of any type; a value whose content cannot be read must not end the run.
+    """
+    try:
+        return plain(value)
+    except Exception:
+        return type(value).__name__
+
+
+def rounded(values: Iterable[float], digits: int) -> list[float]:
+    """Return the values rounded to a number of decimal places; -0.0 becomes 0.0."""
+    return [round(float(value), digits) + 0.0 for value in values]
 
 
 def _text(value: str) -> str:
@@ -59,7 +73,6 @@ _RULES: Sequence[tuple[type | tuple[type, ...], Callable[[Any], Any]]] = (
     (Mapping, lambda mapping: {_text(str(key)): plain(value) for key, value in mapping.items()}),
     ((list, tuple), lambda values: [plain(value) for value in values]),
     ((set, frozenset), lambda values: sorted((plain(value) for value in values), key=repr)),
-    (Exact, lambda exact: exact.value),
     (PurePath, lambda path: _text(str(path))),
 )
 """Functions that make values of these types plain; the first that fits counts."""
