@@ -110,4 +110,4 @@ def test_an_arm_that_runs_into_something_brakes(watched: Watched) -> None:
 def test_the_world_goes_on_without_what_was_removed_before_anybody_looked(watched: Watched) -> None:
     result = watched.run(after(0.0, effects.object_removed(1)), places)
     assert (result.status, result.agrees) == ("SUCCESS", True)
-    assert result.items["seen"] == len(watched.seen["end"])  # type: ignore[arg-type]
+    assert result.items["seen"] == len(watched.seen["RunEnded"])  # type: ignore[arg-type]

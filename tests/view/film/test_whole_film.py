@@ -79,7 +79,7 @@ def test_picture_and_tree_are_in_step(filmed_run: RunDirectory) -> None:
 
 def test_the_source_is_the_record_and_may_be_cut_off(copy: RunDirectory) -> None:
     source = Source(copy)
-    assert (source.start["mission"], source.start.seed) == ("bring_one", 5)
+    assert (source.start.mission, source.start.seed) == ("bring_one", 5)
     assert (source.config.cell, source.nodes[0].path) == ("overhead", "tree")
     assert (source.result["status"], source.items) == ("SUCCESS", 6)
     lines = copy.journal.read_text().splitlines(keepends=True)
