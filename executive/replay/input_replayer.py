@@ -30,7 +30,8 @@ class InputReplayer:
         self._inputs = {name: deque(inputs) for name, inputs in log.inputs.items()}
         self._tick = 0
         self._reads: dict[str, int] = {}
-        self._last: dict[str, Any] = {}
+        # A run that was killed before it recorded its clock is resumed, too: its clock showed the steps.
+        self._last: dict[str, Any] = {"clock": 0.0}
         self.unanswered = ""
 
     def begin_step(self, tick: int) -> None:

@@ -121,6 +121,16 @@ def test_it_ends_as_if_nothing_had_happened(missions: Path, tmp_path: Path, name
     assert json.loads((path / "result.json").read_text()) == result
 
 
+@pytest.mark.parametrize("nth", [1, 2, 3, 10])
+def test_a_run_that_was_killed_in_its_first_control_step_starts_again(
+    missions: Path, tmp_path: Path, nth: int
+) -> None:
+    path = cut_off(load(missions, "sort_overhead"), tmp_path, 0, nth)
+    result = resumed(path)
+    assert (result["status"], result["audit"]["agrees"]) == ("SUCCESS", True)
+    assert redecided(path) == ""
+
+
 def test_the_world_of_a_scene_is_rebuilt(missions: Path, tmp_path: Path) -> None:
     loaded, scene = load(missions, "sort_overhead"), tmp_path / "scene.yaml"
     scene.write_text("scene: two objects\ntable: {objects: [2, 2]}\nunknown: {count: [1, 1], scale: 0.4}\n")
