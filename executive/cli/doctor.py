@@ -89,16 +89,13 @@ def examine() -> Iterator[Finding]:
 def check_system(version: tuple[int, ...] = sys.version_info[:3]) -> Iterator[Finding]:
     """Yield the version of Python, and the screen on which --gui opens a window."""
     python = f"{'.'.join(map(str, version))} on {platform.system()} {platform.machine()}"
-    if MIN_PYTHON <= version[:2] <= MAX_PYTHON:
-        yield Finding("ok", "python", python)
-    else:
-        fix = "use 3.10 or 3.11 (uv takes 3.11 by itself)"
-        yield Finding("problem", "python", f"{python} has no pybullet wheel", fix)
-    if name := os.environ.get("DISPLAY"):
-        yield Finding("ok", "display", f"DISPLAY is {name}, where --gui opens the simulator's window")
-    else:
-        fix = "run without --gui; the terminal, `--view` and the report also show a run"
-        yield Finding("note", "display", "DISPLAY is not set", fix)
+    is_supported = MIN_PYTHON <= version[:2] <= MAX_PYTHON
+    fix = "use 3.10 or 3.11 (uv takes 3.11 by itself)"
+    yield _choose(is_supported, "python", python, "problem", f"{python} has no pybullet wheel", fix)
+    name = os.environ.get("DISPLAY")
+    shown = f"DISPLAY is {name}, where --gui opens the simulator's window"
+    fix = "run without --gui; the terminal, `--view` and the report also show a run"
+    yield _choose(bool(name), "display", shown, "note", "DISPLAY is not set", fix)
 
 
 def check_packages() -> Iterator[Finding]:
@@ -112,33 +109,28 @@ def check_packages() -> Iterator[Finding]:
     for name in missing:
         yield Finding("problem", "packages", f"{name} is missing", "run `uv sync`")
     if not missing:
-        yield Finding(
-            "ok", "packages", f"{ITSELF} {installed(ITSELF)} and its {len(names)} required packages"
-        )
-    opencv = [f"{name} {installed(name)}" for name in sorted(set(packages_distributions().get("cv2", ())))]
-    if len(opencv) == 1:
-        yield Finding("ok", "opencv", f"{opencv[0]} is the only package that provides `cv2`")
-    elif opencv:
-        message = f"{len(opencv)} packages provide `cv2` and overwrite each other ({', '.join(opencv)})"
+        message = f"{ITSELF} {installed(ITSELF)} and its {len(names)} required packages"
+        yield Finding("ok", "packages", message)
+    if packages := sorted(set(packages_distributions().get("cv2", ()))):
+        opencv = ", ".join(f"{name} {installed(name)}" for name in packages)
+        fix = "run `uv sync --reinstall`, which removes all but opencv-python-headless"
         if installer(ITSELF) == "pip":
-            packages = " ".join(sorted(set(packages_distributions()["cv2"])))
-            fix = f"run `pip uninstall -y {packages}`, then `pip install opencv-python-headless`"
-        else:
-            fix = "run `uv sync --reinstall`, which removes all but opencv-python-headless"
-        yield Finding("problem", "opencv", message, fix)
+            fix = f"run `pip uninstall -y {' '.join(packages)}`, then `pip install opencv-python-headless`"
+        alone = f"{opencv} is the only package that provides `cv2`"
+        message = f"{len(packages)} packages provide `cv2` and overwrite each other ({opencv})"
+        yield _choose(len(packages) == 1, "opencv", alone, "problem", message, fix)
     for extra, purpose in EXTRAS.items():
         names = required(extra)
-        if missing := [name for name in names if not installed(name)]:
-            fix = f"to {purpose}, run `uv sync --extra {extra}`"
-            yield Finding("note", extra, f"not installed: {', '.join(missing)}", fix)
-        else:
-            yield Finding("ok", extra, ", ".join(f"{name} {installed(name)}" for name in names))
+        missing = [name for name in names if not installed(name)]
+        versions = ", ".join(f"{name} {installed(name)}" for name in names)
+        fix = f"to {purpose}, run `uv sync --extra {extra}`"
+        yield _choose(not missing, extra, versions, "note", f"not installed: {', '.join(missing)}", fix)
     if version := installed("av"):
         yield Finding("ok", "film", f"av {version} encodes videos; the program ffmpeg is not needed")
 
 
 def check_plugins() -> Iterator[Finding]:
-    """Load every installed skill, kind of cell and kind of detector, and yield how many there are."""
+    """Load every installed skill, kind of cell and kind of detector, and yield their numbers."""
     from executive.perception.detectors import registry
     from executive.plugins import CELL_KINDS, discover, project_here, registered
 
@@ -153,12 +145,9 @@ def check_plugins() -> Iterator[Finding]:
 def check_renderer() -> Iterator[Finding]:
     """Yield the time TinyRenderer needs for a frame, and whether PyBullet's EGL plugin draws."""
     time, problem = measure_frame_time("tiny")
-    if problem:
-        fix = "run `uv sync --reinstall-package pybullet`"
-        yield Finding("problem", "renderer", f"TinyRenderer draws nothing: {problem}", fix)
-    else:
-        message = f"TinyRenderer, on the CPU: {time:.0f} ms for 640x480 of the overhead cell"
-        yield Finding("ok", "renderer", message)
+    drawn = f"TinyRenderer, on the CPU: {time:.0f} ms for 640x480 of the overhead cell"
+    message, fix = f"TinyRenderer draws nothing: {problem}", "run `uv sync --reinstall-package pybullet`"
+    yield _choose(not problem, "renderer", drawn, "problem", message, fix)
     _, problem = measure_frame_time("egl")
     state = f"draws nothing: {problem}" if problem else "can be loaded and draws"
     status = "note" if problem else "ok"
@@ -170,16 +159,15 @@ def check_roboflow() -> Iterator[Finding]:
     from executive.perception.detectors.roboflow.key import VARIABLE, ApiKey
     from executive.perception.detectors.roboflow.options import HOSTED
 
-    if ApiKey(os.environ).is_set:
-        yield Finding("ok", "key", f"{VARIABLE} is set")
-    else:
-        yield Finding("note", "key", f"{VARIABLE} is not set", "set it for models that Roboflow hosts")
-    if is_reachable(HOSTED):
-        yield Finding("ok", "roboflow", f"{HOSTED} answers")
-    else:
-        message = f"{HOSTED} does not answer within {SERVER_TIMEOUT:.0f} s"
-        fix = "check the network; only models that Roboflow hosts need it"
-        yield Finding("note", "roboflow", message, fix)
+    fix, is_set = "set it for models that Roboflow hosts", ApiKey(os.environ).is_set
+    yield _choose(is_set, "key", f"{VARIABLE} is set", "note", f"{VARIABLE} is not set", fix)
+    message = f"{HOSTED} does not answer within {SERVER_TIMEOUT:.0f} s"
+    fix = "check the network; only models that Roboflow hosts need it"
+    yield _choose(is_reachable(HOSTED), "roboflow", f"{HOSTED} answers", "note", message, fix)
+
+
+def _choose(is_ok: bool, subject: str, good: str, status: str, bad: str, fix: str) -> Finding:
+    return Finding("ok", subject, good) if is_ok else Finding(status, subject, bad, fix)
 
 
 def measure_frame_time(renderer: str) -> tuple[float, str]:

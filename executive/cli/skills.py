@@ -8,7 +8,7 @@ import re
 import textwrap
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, cast, get_args
 
 import click
 
@@ -31,7 +31,7 @@ Facts = Mapping[str, Any]
 @json_option
 @click.pass_context
 def command(ctx: click.Context, name: str | None, conform: bool, as_json: bool) -> None:
-    """List the installed skills, or tell everything about the skill NAME.
+    """List the installed skills, or all declarations of the skill NAME.
 
     With --conform the exit code is 1 if a check fails, or cannot be run.
     """
@@ -50,75 +50,50 @@ def command(ctx: click.Context, name: str | None, conform: bool, as_json: bool) 
     known = [declared(key, skill) for key, skill in skills.items()]
     if as_json:
         print_json(known if name is None else known[0])
-    elif name is None:
-        click.echo("\n".join(_briefly(facts) for facts in known))
     else:
-        click.echo(_fully(known[0]))
+        click.echo("\n".join(map(_briefly, known)) if name is None else _fully(known[0]))
 
 
 def _conform(skills: Mapping[str, type[Skill]], as_json: bool) -> bool:
-    """Check skills, print what is found as soon as it is, and tell whether all is well."""
-    with stdout_kept_clean():
-        from executive.testing.conformance import conformance
-        from executive.view.figures.conformance import conformance_lines, conformance_total
-
+    """Check skills, print the results of each skill at once, and return True if all are ok."""
     verdicts: list[Verdict] = []
     for name, skill in skills.items():
         with stdout_kept_clean():
+            from executive.testing.conformance import conformance
+            from executive.view.figures.conformance import conformance_lines, conformance_total
+
             found = [check.run() for check in conformance(skill, name=name)]
         if not as_json:
             click.echo("\n".join(conformance_lines(found)))
         verdicts += found
-    if as_json:
-        print_json([asdict(verdict) for verdict in verdicts])
-    else:
-        click.echo(conformance_total(verdicts))
+    print_json([asdict(one) for one in verdicts]) if as_json else click.echo(conformance_total(verdicts))
     return all(verdict.status == "ok" for verdict in verdicts)
 
 
 def declared(name: str, skill: type[Skill]) -> Facts:
-    """Return everything that a skill declares, as plain JSON values."""
+    """Return the declarations of a skill as plain JSON values."""
+    from pydantic_core import to_json
+
     before, after = skill.tool_state
-    return {
+    facts = {
         "name": name,
         "doc": inspect.getdoc(skill) or "",
         "params": [_declared(param) for param in skill.params.values()],
         "ports": [_declared(port) for port in skill.ports.values()],
-        "reasons": list(skill.reasons),
-        "uses": list(skill.uses),
+        "reasons": skill.reasons,
+        "uses": skill.uses,
         "senses": skill.senses,
         "moves": skill.moves,
-        "tool": {
-            "before": before.value,
-            "after": after.value,
-            "left": {ending: state.value for ending, state in skill.tool_left.items()},
-        },
+        "tool": {"before": before, "after": after, "left": skill.tool_left},
     }
+    return cast(Facts, json.loads(to_json(facts, inf_nan_mode="strings", fallback=str)))
 
 
 def _declared(declared: Param | Port) -> dict[str, Any]:
-    """Return everything that a skill declares of a param or port."""
-    from executive.skill import Param
-
-    facts: dict[str, Any] = {"name": declared.name, "type": _type(declared.type)}
-    if isinstance(declared, Param):
-        facts["unit"] = declared.unit
-    else:
-        facts["direction"] = declared.direction.value
-    facts |= {"required": declared.required, "default": _default(declared)}
-    if isinstance(declared, Param):
-        choices = None if declared.choices is None else list(declared.choices)
-        facts |= {"min": declared.ge, "max": declared.le, "choices": choices}
-    return facts | {"refers": declared.refers, "doc": declared.doc}
-
-
-def _default(of: Param | Port) -> Any:
-    """Return a default as JSON can hold it, None where there is none."""
-    from pydantic_core import to_json
-
-    return (
-        None if of.default is ... else json.loads(to_json(of.default, inf_nan_mode="strings", fallback=str))
-    )
+    """Return the declaration of a param or port by the names of the attributes; bounds are `min` and `max`."""
+    facts = {**vars(declared), "type": _type(declared.type), "required": declared.required}
+    facts["default"] = None if declared.default is ... else declared.default
+    return {{"ge": "min", "le": "max"}.get(name, name): value for name, value in facts.items()}
 
 
 def _type(declared: Any) -> str:
@@ -140,14 +115,17 @@ def _briefly(facts: Facts) -> str:
 
 
 def _fully(facts: Facts) -> str:
-    """Return everything a mission's author needs to know about a skill."""
+    """Return all declarations of a skill for authors of missions."""
     lines = [facts["name"], "", facts["doc"], ""]
-    for title, way in (("reads", "in"), ("writes", "out")):
-        lines += [f"{title}:", *([_entry(port) for port in _ports(facts, way)] or ["  nothing"])]
-    lines += ["params:", *([_entry(param) for param in facts["params"]] or ["  none"])]
+    for title, entries, nothing in (
+        ("reads", _ports(facts, "in"), "nothing"),
+        ("writes", _ports(facts, "out"), "nothing"),
+        ("params", facts["params"], "none"),
+    ):
+        lines += [f"{title}:", *(map(_entry, entries) if entries else [f"  {nothing}"])]
     lines.append(f"may fail with: {', '.join(facts['reasons']) or 'nothing'}")
-    effects = ("senses" if facts["senses"] else "", "moves the arm" if facts["moves"] else "")
-    lines.append("; ".join(filter(None, (f"uses: {', '.join(facts['uses']) or 'nothing'}", *effects))))
+    effects = ("; senses" if facts["senses"] else "") + ("; moves the arm" if facts["moves"] else "")
+    lines.append(f"uses: {', '.join(facts['uses']) or 'nothing'}{effects}")
     tool = facts["tool"]
     left = "".join(f", {state} after {ending}" for ending, state in tool["left"].items())
     lines.append(f"tool: {tool['before']} before, {tool['after']} after{left}")
