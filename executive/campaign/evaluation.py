@@ -137,63 +137,58 @@ def measure(
 ) -> Evaluation:
     """Return an evaluation of a detector on `dataset`, or on scenes of its cell."""
     config = detector.cell
-    in_run = config is not None and dataset is None and not scenes.varied
-    with _images(detector, dataset, scenes, progress) as (samples, count):
+    run_config = None if dataset is not None or scenes.varied else config
+    with _images(detector, dataset, scenes, progress) as samples:
         asked = CellDetector(
             detector.configs,
             detector.name,
             base=detector.base,
-            camera=next(iter(config.cameras.values())) if config and in_run else None,
+            camera=next(iter(run_config.cameras.values())) if run_config else None,
             view=scenes.view,
             classes=tuple(config.objects) if config else None,
         )
-        with contextlib.closing(asked):
-            localizer = _localizer(config) if config and in_run else None
-            with progress(f"asking {detector.name}") as update:
-                counted = _report_progress(samples, count, update)
-                return evaluate(
-                    asked, counted, threshold=threshold, localizer=localizer, worst=worst_misses,
-                    table=config.table if config and in_run else None,
-                )  # fmt: skip
+        with contextlib.closing(asked), progress(f"asking {detector.name}") as update:
+            return evaluate(
+                asked, _report_progress(samples, update), threshold=threshold, worst=worst_misses,
+                localizer=run_config and _localizer(run_config), table=run_config and run_config.table,
+            )  # fmt: skip
 
 
 @contextlib.contextmanager
 def _images(
     detector: DetectorUnderTest, dataset: Path | None, scenes: SceneSettings, progress: Progress
-) -> Iterator[tuple[Iterator[LabelledImage], int]]:
-    """Provide the images for the measurement of a detector, and their number."""
+) -> Iterator[Samples | list[LabelledImage]]:
+    """Provide the images for the measurement of a detector."""
     config = detector.cell
     if dataset is not None or config is None:
         assert dataset is not None
-        samples = Samples(dataset)
-        yield iter(samples), len(samples)
-        return
-    if not scenes.varied:
+        yield Samples(dataset)
+    elif scenes.varied:
+        with tempfile.TemporaryDirectory() as folder:
+            with progress(f"rendering {config.cell}") as update:
+                generate(
+                    {config.cell: config}, Path(folder), images=scenes.images, seed=scenes.seed,
+                    layout="coco", workers=scenes.workers, valid=1.0, progress=update,
+                )  # fmt: skip
+            yield Samples(Path(folder))
+    else:
+        table = {"objects": (0, count_that_fits(config, MAX_OBJECTS))}
+        filled = config.model_copy(update={"table": config.table.model_copy(update=table)})
         with progress(f"rendering {config.cell}") as update:
-            table = {"objects": (0, count_that_fits(config, MAX_OBJECTS))}
-            filled = config.model_copy(update={"table": config.table.model_copy(update=table)})
             frames = run_frames(
                 filled, images=scenes.images, seed=scenes.seed, workers=scenes.workers, progress=update,
                 scene=load_scene(scenes.scene, config),
             )  # fmt: skip
-        yield iter(frames), scenes.images
-        return
-    with tempfile.TemporaryDirectory() as folder:
-        with progress(f"rendering {config.cell}") as update:
-            generate(
-                {config.cell: config}, Path(folder), images=scenes.images, seed=scenes.seed, layout="coco",
-                workers=scenes.workers, valid=1.0, progress=update,
-            )  # fmt: skip
-        yield iter(Samples(Path(folder))), scenes.images
+        yield frames
 
 
 def _report_progress(
-    samples: Iterator[LabelledImage], count: int, update_progress: Callable[[int, int], None]
+    samples: Samples | list[LabelledImage], update_progress: Callable[[int, int], None]
 ) -> Iterator[LabelledImage]:
     """Yield the images and report the progress after each one."""
     for done, sample in enumerate(samples, 1):
         yield sample
-        update_progress(done, count)
+        update_progress(done, len(samples))
 
 
 def _localizer(config: CellConfig) -> Localizer | None:

@@ -6,7 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from executive.cell.workcell import Workcell
-from executive.mission.load import LoadedMission
+from executive.errors import InputError
+from executive.mission.load import LoadedMission, load_mission
+from executive.plugins import cell_kind, discover
 from executive.skill import Skill
 
 
@@ -37,3 +39,23 @@ class Subject:
     def requests(self) -> list[str]:
         """Requests of the operator: each class in turn, as often as the maximum number of objects."""
         return [*self.loaded.routes] * self.loaded.cell_config.table.objects[1]
+
+
+def load_subject(mission: str, overrides: Mapping[str, str], oracle: bool, seed: int) -> Subject:
+    """Return a mission and its cell; with `oracle` a simulated cell that takes detections from the truth.
+
+    Raises:
+        InputError: The mission is missing or wrong, or an oracle is asked for and the cell is not simulated.
+    """
+    skills = discover()
+    loaded = load_mission(mission, skills, overrides, cell_kind)
+    kind = loaded.cell_config.kind
+    if not oracle:
+        return Subject(loaded, skills, None, kind, seed)
+    if kind != "sim":
+        raise InputError(
+            f"--oracle is for simulated cells, that of {loaded.mission.name} is of kind {kind}; leave it out"
+        )
+    from executive.testing.oracle import oracle_cell
+
+    return Subject(loaded, skills, oracle_cell(), "sim, detections from the truth", seed)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from executive.cli.options import json_option, overrides_option
-from executive.cli.output import print_json, stdout_kept_clean
+from executive.cli.streams import print_json, stdout_kept_clean
 
 if TYPE_CHECKING:
     from executive.mission.findings import Finding

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import click
 
 from executive.cli.options import json_option
-from executive.cli.output import print_json, stdout_kept_clean
+from executive.cli.streams import print_json, stdout_kept_clean
 from executive.errors import InputError
 from executive.processes import program
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import click
 
 from executive.cli import options
-from executive.cli.output import print_json, stdout_kept_clean
+from executive.cli.streams import print_json, stdout_kept_clean
 
 PICTURES = (".png", ".jpg", ".jpeg")
 """Kinds of files that the sheet of misses can be."""
@@ -58,30 +57,31 @@ PICTURES = (".png", ".jpg", ".jpeg")
 @click.option("--sheet", type=options.FILE, metavar="FILE.png", help="Picture of the worst misses to write.")
 @options.json_option
 def command(
-    cells: tuple[str, ...],
-    detector: str | None,
-    dataset: Path | None,
-    weights: Path | None,
-    labels: Path | None,
-    images: int,
-    seed: int,
-    threshold: float | None,
-    varied: bool,
-    view: str,
-    scene: Path | None,
-    overrides: dict[str, str],
-    out: Path | None,
-    workers: int,
-    sheet: Path | None,
+    cells: tuple[str, ...], detector: str | None, dataset: Path | None, weights: Path | None,
+    labels: Path | None, images: int, seed: int, threshold: float | None, varied: bool, view: str,
+    scene: Path | None, overrides: dict[str, str], out: Path | None, workers: int, sheet: Path | None,
     as_json: bool,
-) -> None:
+) -> None:  # fmt: skip
     """Measure a detector on fresh scenes of cells, or on labelled images.
 
     The detector is that of a cell with all settings of its section, or a model file (--weights), or with
     neither the one that ships with this project. The measurement of a cell's detector, as it is declared, is
     stored: runs take the error rates of the detector from it.
     """
-    _check(cells, detector, dataset, weights, labels, varied, view, scene, sheet, overrides, out)
+    unknown = next((key for key in overrides if not key.startswith("cell.")), "")
+    is_picture = sheet is None or sheet.suffix.lower() in PICTURES
+    options.refuse(
+        (detector and weights, "--detector is of a cell and --weights a model file; give one of them"),
+        (detector and dataset and not cells, f"--detector {detector} is of which cell? Name it with --cell"),
+        (labels and not weights, "--labels are those of a model file; name it with --weights"),
+        (dataset and varied, "--varied renders scenes, and --dataset brings images; give one of them"),
+        (dataset and scene, "--scene renders scenes, and --dataset brings images; give one of them"),
+        (varied and scene, f"--scene {scene} changes scenes of the cell; --varied draws them itself"),
+        (varied and view != "table", f"--view {view} is a part of a run's frame; leave out --varied"),
+        (out and len(cells) != 1, f"--out {out} is the file for one cell; name the cell with --cell"),
+        (unknown, f"--set {unknown} is no key of a cell; write cell.KEY.KEY=VALUE"),
+        (not is_picture, f'"{sheet}" is no picture; its name must end in {", ".join(PICTURES)}'),
+    )
     measured: dict[str, Any] = {}
     # Under other conditions than those of a run, a measurement says nothing about runs.
     as_declared = not (weights or varied or scene or threshold) and view == "table"
@@ -122,30 +122,3 @@ def command(
     if as_json:
         named_files = {"scene": scene and str(scene), "weights": weights and str(weights)}
         print_json({"seed": seed, "varied": varied, **named_files, "measured": measured})
-
-
-def _check(
-    cells: tuple[str, ...], detector: str | None, dataset: Path | None, weights: Path | None,
-    labels: Path | None, varied: bool, view: str, scene: Path | None, sheet: Path | None,
-    overrides: Mapping[str, str], out: Path | None,
-) -> None:  # fmt: skip
-    """Refuse options that contradict each other, before anything is rendered."""
-    if detector is not None and weights is not None:
-        raise click.UsageError("--detector is of a cell and --weights a model file; give one of them")
-    if detector is not None and not cells and dataset is not None:
-        raise click.UsageError(f"--detector {detector} is of which cell? Name it with --cell")
-    if labels is not None and weights is None:
-        raise click.UsageError("--labels are those of a model file; name it with --weights")
-    if dataset is not None and (varied or scene is not None):
-        option = "--varied" if varied else "--scene"
-        raise click.UsageError(f"{option} renders scenes, and --dataset brings images; give one of them")
-    if varied and scene is not None:
-        raise click.UsageError(f"--scene {scene} changes scenes of the cell; --varied draws them itself")
-    if varied and view != "table":
-        raise click.UsageError(f"--view {view} is a part of a run's frame; leave out --varied")
-    if out is not None and len(cells) != 1:
-        raise click.UsageError(f"--out {out} is the file for one cell; name the cell with --cell")
-    if unknown := [key for key in overrides if not key.startswith("cell.")]:
-        raise click.UsageError(f"--set {unknown[0]} is no key of a cell; write cell.KEY.KEY=VALUE")
-    if sheet is not None and sheet.suffix.lower() not in PICTURES:
-        raise click.UsageError(f'"{sheet}" is no picture; its name must end in {", ".join(PICTURES)}')

@@ -9,8 +9,7 @@ from typing import Any
 import click
 
 from executive.cli import options
-from executive.cli.output import print_json, stdout_kept_clean
-from executive.cli.subject import load_subject, oracle_option
+from executive.cli.streams import print_json, stdout_kept_clean
 
 
 def fault_numbers(text: str) -> tuple[int, ...]:
@@ -22,7 +21,7 @@ def fault_numbers(text: str) -> tuple[int, ...]:
 
 @click.command(name="faults")
 @options.MISSION
-@oracle_option
+@options.oracle_option
 @click.option("--pairs", type=options.COUNT, help="Instead, so many pairs of them, drawn by the seed.")
 @click.option(
     "--fault", "numbers", type=fault_numbers, metavar="N[+M]",
@@ -38,18 +37,9 @@ def fault_numbers(text: str) -> tuple[int, ...]:
 @options.json_option
 @click.pass_context
 def command(
-    ctx: click.Context,
-    mission: str,
-    oracle: bool,
-    pairs: int | None,
-    numbers: tuple[int, ...] | None,
-    listed: bool,
-    workers: int,
-    seed: int,
-    overrides: dict[str, str],
-    runs: Path,
-    as_json: bool,
-) -> None:
+    ctx: click.Context, mission: str, oracle: bool, pairs: int | None, numbers: tuple[int, ...] | None,
+    listed: bool, workers: int, seed: int, overrides: dict[str, str], runs: Path, as_json: bool,
+) -> None:  # fmt: skip
     """Let every single fault happen in MISSION, each in a run; exit code 1 if one was not dealt with.
 
     Every reason of every node, bugs in every skill, detectors, objects and the tool: what happens is made
@@ -63,6 +53,7 @@ def command(
     with stdout_kept_clean():
         from executive.campaign.faults.campaign import Campaign
         from executive.campaign.faults.trial import record
+        from executive.campaign.subject import load_subject
         from executive.cli.progress import bar, print_halting
         from executive.view.figures.fault import fault_text, trial_text
         from executive.view.figures.fault_trials import as_plain, trial_as_plain

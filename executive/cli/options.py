@@ -42,6 +42,21 @@ MAX_SEED = 2**32 - 1
 """Largest seed: a number of 32 bits, which every random number generator accepts."""
 MISSION = click.argument("mission", metavar="MISSION")
 
+
+def refuse(*conflicts: tuple[object, str]) -> None:
+    """Raise the first error whose condition is true.
+
+    Args:
+        conflicts: Condition and message of each error.
+
+    Raises:
+        UsageError: A condition is true.
+    """
+    for is_wrong, message in conflicts:
+        if is_wrong:
+            raise click.UsageError(message)
+
+
 overrides_option = click.option(
     "--set", "overrides", metavar="KEY=VALUE", multiple=True, callback=_by_key,
     help="Give a param another value, or with cell.KEY.KEY the cell; repeatable.",
@@ -56,3 +71,6 @@ scene_option = click.option(
     help="Change the simulated world without the executive's knowledge: light, table, objects, camera.",
 )  # fmt: skip
 workers_option = click.option("--workers", type=COUNT, default=2, help="Runs at a time.")
+oracle_option = click.option(
+    "--oracle", is_flag=True, help="Detections from the truth: a simulated sort then takes a second or two."
+)

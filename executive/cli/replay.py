@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from executive.cli.options import FILE, json_option, runs_option
-from executive.cli.output import print_json, stdout_kept_clean
+from executive.cli.streams import print_json, stdout_kept_clean
 
 
 @click.command(name="replay")

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from executive.cli.options import json_option, overrides_option, runs_option, scene_option, seed_option
-from executive.cli.output import print_json, stdout_kept_clean
-from executive.cli.streams import unescaped_stderr
+from executive.cli.streams import print_json, stdout_kept_clean, unescaped_stderr
 
 if TYPE_CHECKING:
     from executive.events import RunStarted

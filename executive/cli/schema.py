@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from executive.cli.output import print_json, stdout_kept_clean
+from executive.cli.streams import print_json, stdout_kept_clean
 
 
 @click.command(name="schema")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, cast, get_args
 import click
 
 from executive.cli.options import json_option
-from executive.cli.output import print_json, stdout_kept_clean
+from executive.cli.streams import print_json, stdout_kept_clean
 
 if TYPE_CHECKING:
     from executive.skill import Param, Port, Skill
@@ -90,7 +90,7 @@ def declared(name: str, skill: type[Skill]) -> Facts:
 
 
 def _declared(declared: Param | Port) -> dict[str, Any]:
-    """Return the declaration of a param or port by the names of the attributes; bounds are `min` and `max`."""
+    """Return the declaration of a param or port by its attributes; the bounds are `min` and `max`."""
     facts = {**vars(declared), "type": _type(declared.type), "required": declared.required}
     facts["default"] = None if declared.default is ... else declared.default
     return {{"ge": "min", "le": "max"}.get(name, name): value for name, value in facts.items()}

@@ -1,13 +1,17 @@
-"""Standard streams: tolerant of write errors, and safe from control characters."""
+"""Standard streams: tolerant of write errors, safe from control characters; stdout holds only the result."""
 
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import io
+import json
 import os
 import sys
 from collections.abc import Iterator
-from typing import TextIO, cast
+from typing import Any, TextIO, cast
+
+import click
 
 from executive.errors import escape_control_characters
 
@@ -114,3 +118,26 @@ def _open_closed_descriptors() -> None:
             os.fstat(number)
         except OSError:
             os.open(os.devnull, os.O_RDWR)
+
+
+@contextlib.contextmanager
+def stdout_kept_clean() -> Iterator[None]:
+    """Send the output of Python to stderr, and drop what C libraries print to stdout, as pybullet does."""
+    sys.stdout.flush()
+    kept = os.dup(1)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 1)
+        with contextlib.redirect_stdout(sys.stderr):
+            yield
+    finally:
+        # Without a flush, the C library would write its buffer to the real standard output later.
+        ctypes.CDLL(None).fflush(None)
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(nowhere)
+
+
+def print_json(value: Any) -> None:
+    """Write `value` as the one object or array on standard output."""
+    click.echo(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from executive.cli import options
-from executive.cli.output import print_json, stdout_kept_clean
+from executive.cli.streams import print_json, stdout_kept_clean
 
 
 def seed_range(text: str) -> range:
@@ -38,16 +38,9 @@ def seed_range(text: str) -> range:
 @options.json_option
 @click.pass_context
 def command(
-    ctx: click.Context,
-    mission: str,
-    seeds: range,
-    workers: int,
-    frames: bool,
-    overrides: dict[str, str],
-    scene: Path | None,
-    runs: Path,
-    as_json: bool,
-) -> None:
+    ctx: click.Context, mission: str, seeds: range, workers: int, frames: bool, overrides: dict[str, str],
+    scene: Path | None, runs: Path, as_json: bool,
+) -> None:  # fmt: skip
     """Run MISSION once for every seed; exit code 1 if any run did not succeed.
 
     Ctrl-C halts the runs under way and tells of those that were done; a second one ends at once.
@@ -81,55 +74,43 @@ def command(
 
 
 def _text(figures: dict[str, Any]) -> str:
+    """Return the figures of a sweep as lines of text."""
     from executive.view.terminal.summary import verdict
 
+    done, succeeded = figures["runs"], figures["succeeded"]
+    headline = f"{succeeded} of {done} runs succeeded"
+    if figures["cut_off"]:
+        headline = f"{done} of {figures['asked']} runs, cut off" + (
+            f"; {succeeded} of them succeeded" if done else ""
+        )
+    if not done:
+        return headline
     objects, robot, wall = figures["objects"], figures["robot_time_s"], figures["wall_time_s"]
     low, high = objects["interval_95"]
-    if not figures["runs"]:
-        return _headline(figures)
     lines = [
-        _headline(figures),
+        headline,
         f"{objects['right']} of {objects['total']} objects right: {objects['share']:.2%} "
         f"(95 % interval {low:.2%} to {high:.2%})",
         f"robot time {robot['median']:.1f} s (median; {robot['least']:.1f} to {robot['most']:.1f}), "
         f"wall time {wall['median']:.1f} s ({wall['least']:.1f} to {wall['most']:.1f})",
-        *_pace(figures),
-        f"ledger and audit disagree in {len(figures['disagreements'])} runs",
     ]
-    lines += [
-        f"  seed {entry['seed']}: the ledger says {_counts(entry['items'])}; "
-        f"the audit {_counts(entry['audit'])}; {entry['run']}"
-        for entry in figures["disagreements"]
-    ]
+    planning, pace = figures["planning"], figures["robot_time_per_object_s"]
+    if pace and planning["motions"]:
+        ahead = (
+            f"{planning['ahead'] / planning['motions']:.0%} of {planning['motions']} motions planned ahead"
+        )
+        waited = f"{planning['waited_s']:.1f} s waited for the others"
+        lines.append(f"robot time per object {pace:.2f} s; {ahead}, {waited}")
+    lines.append(f"ledger and audit disagree in {len(figures['disagreements'])} runs")
+    for entry in figures["disagreements"]:
+        items, audit = (
+            ", ".join(f"{name} {number}" for name, number in entry[key].items()) for key in ("items", "audit")
+        )
+        lines.append(f"  seed {entry['seed']}: the ledger says {items}; the audit {audit}; {entry['run']}")
     if figures["failures"]:
         lines.append(f"{len(figures['failures'])} runs did not succeed:")
-    # A run that took its process down, or found no place for its record, has no directory to be told.
-    lines += [
-        "; ".join(filter(None, [f"  seed {entry['seed']}: {verdict(entry)}", entry["run"]]))
-        for entry in figures["failures"]
-    ]
+    for entry in figures["failures"]:
+        # A run whose process broke, or that found no place for its record, has no directory.
+        where = entry["run"] and f"; {entry['run']}"
+        lines.append(f"  seed {entry['seed']}: {verdict(entry)}{where}")
     return "\n".join(lines)
-
-
-def _headline(figures: dict[str, Any]) -> str:
-    """Return how many runs succeeded, and whether there were to be more."""
-    done, succeeded = figures["runs"], figures["succeeded"]
-    if figures["cut_off"]:
-        cut = f"{done} of {figures['asked']} runs, cut off"
-        return f"{cut}; {succeeded} of them succeeded" if done else cut
-    return f"{succeeded} of {done} runs succeeded"
-
-
-def _pace(figures: dict[str, Any]) -> list[str]:
-    """Return a line about time per object and plans, if anything was sorted."""
-    planning, pace = figures["planning"], figures["robot_time_per_object_s"]
-    if not pace or not planning["motions"]:
-        return []
-    return [
-        f"robot time per object {pace:.2f} s; {planning['ahead'] / planning['motions']:.0%} of "
-        f"{planning['motions']} motions planned ahead, {planning['waited_s']:.1f} s waited for the others"
-    ]
-
-
-def _counts(counts: dict[str, int]) -> str:
-    return ", ".join(f"{name} {number}" for name, number in counts.items())

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from executive.cli.options import COUNT, FILE, FOLDER, seed_option
-from executive.cli.output import stdout_kept_clean
+from executive.cli.streams import stdout_kept_clean
 
 
 @click.command(name="train")

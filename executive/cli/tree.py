@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
-from executive.cli.options import MISSION, json_option, overrides_option
-from executive.cli.output import print_json, stdout_kept_clean
+from executive.cli.options import MISSION, json_option, overrides_option, refuse
+from executive.cli.streams import print_json, stdout_kept_clean
 
 if TYPE_CHECKING:
     from executive.cell.protocols import Cell
@@ -29,22 +29,15 @@ if TYPE_CHECKING:
 @click.option("--dot", "as_dot", is_flag=True, help="Print the tree as Graphviz text on stdout.")
 @json_option
 def command(
-    mission: str,
-    overrides: dict[str, str],
-    ports: bool,
-    reasons: bool,
-    fold: bool,
-    as_svg: bool,
-    as_dot: bool,
-    as_json: bool,
-) -> None:
+    mission: str, overrides: dict[str, str], ports: bool, reasons: bool, fold: bool, as_svg: bool,
+    as_dot: bool, as_json: bool,
+) -> None:  # fmt: skip
     """Print the tree of MISSION, subtrees in their places."""
     forms = [name for name, wanted in (("--svg", as_svg), ("--dot", as_dot), ("--json", as_json)) if wanted]
     extras = [name for name, wanted in (("--ports", ports), ("--reasons", reasons)) if wanted]
-    if len(forms) > 1:
-        raise click.UsageError(f"{' and '.join(forms)} exclude each other: standard output holds one of them")
-    if forms and extras:
-        raise click.UsageError(f"{forms[0]} holds ports and reasons anyway; leave out {' and '.join(extras)}")
+    alone = f"{' and '.join(forms)} exclude each other: standard output holds one of them"
+    enough = f"{''.join(forms)} holds ports and reasons anyway; leave out {' and '.join(extras)}"
+    refuse((len(forms) > 1, alone), (forms and extras, enough))
     with stdout_kept_clean():
         from pydantic_core import to_json
 

@@ -19,11 +19,10 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from executive.campaign.subject import Subject
+from executive.campaign.subject import Subject, load_subject
 from executive.cli.cells import load_cells
-from executive.cli.options import MISSION, json_option, overrides_option, seed_option
-from executive.cli.output import print_json, stdout_kept_clean
-from executive.cli.subject import load_subject, oracle_option
+from executive.cli.options import MISSION, json_option, oracle_option, overrides_option, seed_option
+from executive.cli.streams import print_json, stdout_kept_clean
 from executive.errors import ExecutiveError, InputError
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.result import disagreement

@@ -16,11 +16,10 @@ import pytest
 from events import at, item_changed
 from py_trees.common import Status
 
-from executive.campaign.subject import Subject
+from executive.campaign.subject import Subject, load_subject
 from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
 from executive.cells.fake.cell import FakeCell
-from executive.cli.subject import load_subject
 from executive.events import TimedEvent
 from executive.motion.braking import brake
 from executive.motion.limits import JointLimits

@@ -132,7 +132,7 @@ def test_quiet_shows_a_run_with_rejected_objects_and_one_that_the_audit_contradi
 def test_what_libraries_print_does_not_reach_standard_output():
     code = """
 import ctypes, os
-from executive.cli.output import print_json, stdout_kept_clean
+from executive.cli.streams import print_json, stdout_kept_clean
 libc = ctypes.CDLL(None)
 with stdout_kept_clean():
     os.write(1, b"unbuffered\\n")

@@ -18,7 +18,7 @@ import pytest
 from click.testing import CliRunner
 
 from executive.cli.main import main
-from executive.cli.output import stdout_kept_clean
+from executive.cli.streams import stdout_kept_clean
 from executive.mission.findings import CODES, Finding, MissionError
 from executive.mission.load import Kinds, load_mission
 from executive.plugins import cell_kind, discover

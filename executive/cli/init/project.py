@@ -52,11 +52,9 @@ def write_project(folder: Path, package: str) -> list[str]:
 
 def _require_empty(folder: Path) -> None:
     """Return if nothing can be overwritten in a folder, or beside what somebody keeps there."""
-    if not folder.exists():
-        return
-    if not folder.is_dir():
+    if folder.is_file():
         raise InputError(f'"{folder}" is a file; name a folder that is empty, or not there yet')
-    held = sorted(os.listdir(folder))
+    held = sorted(os.listdir(folder)) if folder.exists() else []
     if held:
         raise InputError(
             f'the folder "{folder}" is not empty: it holds {held[0]}'
