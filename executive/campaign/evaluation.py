@@ -150,7 +150,8 @@ def measure(
         with contextlib.closing(asked), progress(f"asking {detector.name}") as update:
             return evaluate(
                 asked, _report_progress(samples, update), threshold=threshold, worst=worst_misses,
-                localizer=run_config and _localizer(run_config), table=run_config and run_config.table,
+                localizer=_localizer(run_config) if run_config else None,
+                table=run_config.table if run_config else None,
             )  # fmt: skip
 
 
