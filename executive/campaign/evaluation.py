@@ -17,7 +17,7 @@ from executive.cells.sim.spawn import count_that_fits
 from executive.errors import InputError
 from executive.mission.findings import alternatives
 from executive.perception.detectors.registry import find_problems
-from executive.perception.localization.localizer import build_localizer
+from executive.perception.localization import build_localizer
 from executive.training.evaluation.asking import CellDetector
 from executive.training.evaluation.evaluate import MIN_CONFIDENCE, MODEL_NAME, evaluate, model_detector
 from executive.training.evaluation.figures import Evaluation

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from executive.cell.protocols import Cell
-from executive.cell.visuals import Scenery
+from executive.cell.visuals import Visuals
 from executive.cell.workcell import Accounts, Workcell
 
 
@@ -51,9 +51,9 @@ class CellWrapper:
         self.inner.advance()
         self.after()
 
-    def scenery(self) -> Scenery | None:
+    def visuals(self) -> Visuals | None:
         """Return the scene for viewers, or None if the cell has none."""
-        return self.inner.scenery()
+        return self.inner.visuals()
 
     def audit(self) -> Mapping[str, int] | None:
         """Return the true final counts of the objects, or None if they are unknown."""

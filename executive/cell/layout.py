@@ -1,20 +1,16 @@
-"""Parts of a cell file as skills use them: bins, object classes, and a cell without hardware."""
+"""Parts of a cell file as skills use them: bins and object classes, and sizes that follow from them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
 
 import numpy as np
 
 from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.config import BinConfig, CellConfig, ObjectConfig
-from executive.cell.ledger import Ledger
-from executive.cell.objects import ObjectClass, Target
-from executive.cell.protocols import Cell, Routes
+from executive.cell.objects import ObjectClass
 from executive.cell.workcell import KeyPath
 from executive.errors import Unreachable
-from executive.events import Emit, TargetSelected
 from executive.geometry import Array
 
 Triple = tuple[float, float, float]
@@ -94,32 +90,3 @@ def bins_of(config: CellConfig) -> dict[str, Bin]:
 def object_classes(config: CellConfig) -> dict[str, ObjectClass]:
     """Return the classes of a cell file by label, each of the default mass."""
     return {label: object_class(label, kind) for label, kind in config.objects.items()}
-
-
-def cell_without_hardware(config: CellConfig, routes: Routes, ledger: Ledger, emit: Emit) -> Cell:
-    """Return the cell of a cell file; every hardware part is None until the cell kind replaces it.
-
-    Each target that a skill selects is emitted as an event.
-    """
-    missing: Any = None
-
-    def emit_decision(target: Target, bin: str) -> None:
-        emit(TargetSelected(target.item, target.label, target.frame, bin))
-
-    return Cell(
-        clock=missing,
-        arm=missing,
-        tool=missing,
-        camera=missing,
-        detectors=dict.fromkeys(config.detectors, missing),
-        ledger=ledger,
-        operator=missing,
-        bins=bins_of(config),
-        classes=object_classes(config),
-        routes=routes,
-        localizer=missing,
-        safe_place=np.array(config.safe_place),
-        descent=config.motion.descent,
-        descent_speed=config.motion.descent_speed,
-        decided=emit_decision,
-    )

@@ -37,7 +37,7 @@ class Shape:
     file: str = ""
 
 
-class Scenery(Protocol):
+class Visuals(Protocol):
     """Everything that there is to be seen."""
 
     @property

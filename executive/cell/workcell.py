@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from executive.cell.protocols import Cell, LeastTimes, Operator, Routes
-from executive.cell.visuals import Scenery
+from executive.cell.visuals import Visuals
 from executive.events import Emit, ItemChanged
 
 PLACES = ("right", "wrong_bin", "left", "elsewhere", "fell_in_wrong_bin", "unseen")
@@ -69,7 +69,7 @@ class Workcell(Protocol):
     def advance(self) -> None:
         """Let one control step pass."""
 
-    def scenery(self) -> Scenery | None:
+    def visuals(self) -> Visuals | None:
         """Return the scene for viewers, or None if the cell has none."""
 
     def audit(self) -> Mapping[str, int] | None:

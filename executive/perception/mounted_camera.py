@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from executive.cell.config import CameraConfig
-from executive.cell.frame import Box
-from executive.geometry import Pose
+from executive.cell.frame import Box, Frame
+from executive.cell.protocols import Clock
+from executive.geometry import Array, Pose
 from executive.perception.camera_model import calibrated
 
 
@@ -17,6 +21,8 @@ class MountedCamera:
         name: Its name in the cell file.
         config: Its section of the cell file.
         flange: Returns the pose of the arm's flange, on which it may be mounted.
+        clock: The run's clock, which gives the capture time of a frame.
+        epoch: Returns the number of changes of the table.
 
     Attributes:
         name: Its name in the cell file.
@@ -24,8 +30,15 @@ class MountedCamera:
         matrix: Camera matrix `(3, 3)` [pixel].
     """
 
-    def __init__(self, name: str, config: CameraConfig, flange: Callable[[], Pose]) -> None:
-        self.name, self.config = name, config
+    def __init__(
+        self,
+        name: str,
+        config: CameraConfig,
+        flange: Callable[[], Pose],
+        clock: Clock,
+        epoch: Callable[[], int] = lambda: 0,
+    ) -> None:
+        self.name, self.config, self._clock, self._epoch = name, config, clock, epoch
         self.matrix, self._X_MC = calibrated(config)
         self._flange = flange
         self._frames = self._turn = 0
@@ -43,6 +56,31 @@ class MountedCamera:
     def area(self, view: str) -> Box:
         """Return the part of the image [pixel] that `view` (`table` or `full`) means."""
         return self.config.area(view)
+
+    def capture(self) -> Frame:
+        """Return a new frame."""
+        self._frames += 1
+        X_WC = self._pose()
+        image, depth = self._sense()
+        return Frame(
+            id=self._frames,
+            camera=self.name,
+            image=image,
+            depth=depth,
+            matrix=self.matrix,
+            X_WC=X_WC,
+            stamp=self._clock.now,
+            visible=self._find_visible(X_WC),
+            epoch=self._epoch(),
+        )
+
+    def _sense(self) -> tuple[NDArray[np.uint8], Array | None]:
+        """Return the image `(H, W, 3)` and the depth `(H, W)` [m] of the frame being taken."""
+        raise NotImplementedError
+
+    def _find_visible(self, X_WC: Pose) -> NDArray[np.bool_]:
+        """Return the mask `(H, W)` of the pixels in which the arm does not hide the scene."""
+        raise NotImplementedError
 
     def skip(self, frames: int, turns: int) -> None:
         """Go on as if so many frames had been taken and next poses been asked for."""

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.clock import StepClock
-from executive.cell.config import CellConfig
-from executive.cell.layout import bins_of, cell_without_hardware
-from executive.cell.protocols import Cell, Routes
+from executive.cell.protocols import Cell
 from executive.cell.proxy import Access, intercept
-from executive.cell.workcell import CellOptions, Workcell
+from executive.cell.workcell import Workcell
 from executive.errors import Stopped
-from executive.events import Emit
-from executive.ledger.tracker import ItemLedger
-from executive.perception.evidence import classes_distinct_by_touch
 from executive.replay.input_log import InputLog, Interruption
 from executive.replay.input_replayer import InputReplayer
 from executive.replay.recorded_cell import RECORDED_ROLES, InputFormat
@@ -127,42 +120,3 @@ class ReplayedCell(CellWrapper):
             return access.proceed()
         name, codec = InputFormat.of(access)
         return self._replayer.read(name, codec)
-
-
-class CellWithoutHardware:
-    """Bins, classes and a ledger of a cell file, for a replay; implements `Workcell`.
-
-    Args:
-        config: The cell file.
-        seed: Not used.
-        routes: Class label to the bins that are right for it.
-        emit: Takes the events of the ledger.
-        options: Not used.
-    """
-
-    def __init__(
-        self, config: CellConfig, *, seed: int, routes: Routes, emit: Emit, options: CellOptions
-    ) -> None:
-        del seed, options
-        self.accounts = ItemLedger(
-            config.ledger, config.table, bins_of(config), routes, emit, classes_distinct_by_touch(config)
-        )
-        self.cell = cell_without_hardware(config, routes, self.accounts, emit)
-        self.steps = 0
-
-    def log_to(self, path: Path) -> None:
-        """Keep no log."""
-
-    def advance(self) -> None:
-        """Let one control step pass."""
-        self.steps += 1
-
-    def scenery(self) -> None:
-        """Return None: there is nothing to show."""
-
-    def audit(self) -> Mapping[str, int] | None:
-        """Return None: the true counts are unknown."""
-        return None
-
-    def close(self) -> None:
-        """Release nothing."""

@@ -8,12 +8,13 @@ from pathlib import Path
 
 from executive.cell.protocols import Operator
 from executive.cell.workcell import CellOptions, ResumePoint, Workcell
+from executive.cells.without_hardware import CellWithoutHardware
 from executive.events import Observer, RequestGiven, RunStarted
 from executive.mission.build import TreeNode, build
 from executive.mission.load import LoadedMission
 from executive.plugins import cell_kind
 from executive.replay.input_log import InputLog, Interruption
-from executive.replay.replayed_cell import CellWithoutHardware, ReplayedCell
+from executive.replay.replayed_cell import ReplayedCell
 from executive.run.operator import ScriptedOperator, TerminalOperator
 from executive.run.planning_ahead import PlanningAhead
 from executive.run.resume import ResumedRun

@@ -8,10 +8,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from executive.cell.arm import Goal, Task
-from executive.cell.clock import STEP
+from executive.cell.clock import STEP, StepClock
 from executive.cell.config import CellConfig
 from executive.cells.sim.arm import SimArm
-from executive.cells.sim.clock import SimClock
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import World, held_part
 from executive.errors import Blocked, Unreachable
@@ -105,7 +104,9 @@ class _Execution:
     def __init__(self, cell: CellConfig, world: World, planner: Planner, seed: int) -> None:
         self._world = world
         self._tool = SuctionTool(world, cell.tool)
-        self._arm = SimArm(world, planner, cell, SimClock(world, STEP), lambda: self._tool.held_body)
+        self._arm = SimArm(
+            world, planner, cell, StepClock(lambda: world.steps * STEP), lambda: self._tool.held_body
+        )
         self._scenes = SceneGenerator(cell, planner, world, seed)
         self._margin = cell.motion.margin
         self._clearance_monitor = ClearanceMonitor(world, self._margin)

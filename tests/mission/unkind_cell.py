@@ -37,7 +37,7 @@ class UnkindCell(FakeCell):
         if self.world.held is not None and not self.arm.at_rest and self._happens(0.0005):
             self.has_dropped = True
             self._open()
-        if self.world.steps == self._longest:
+        if self.steps == self._longest:
             signal.raise_signal(signal.SIGINT)
 
     def _happens(self, share: float) -> bool:

@@ -199,7 +199,7 @@ def test_whatever_goes_wrong_its_story_can_be_told(breaks, slips, misses, gone, 
     run.fake.detector.answers = lambda look, true: "gone" if breaks.random() < gone else true
     run.slip(slips, vanish=breaks.random() < 0.5)
     if stop is not None:
-        run.at_every_step(lambda: run.run.control.stop() if run.fake.world.steps == stop else None)
+        run.at_every_step(lambda: run.run.control.stop() if run.fake.steps == stop else None)
     outcome = run.run.execute()
     story = run.story.tell(outcome, Path(), lambda: True)
     assert (story is None) == (outcome.status in ("SUCCESS", "INCOMPLETE"))

@@ -140,7 +140,7 @@ def test_an_object_that_slips_out_of_the_cup_every_time_is_given_up_in_the_end(m
         advance()
         if fake.world.held is slippery and fake.arm.tool_pose.position[2] > 0.12:
             fake.tool.open()
-        assert fake.world.steps < 60_000, "the mission tries for ever"
+        assert fake.steps < 60_000, "the mission tries for ever"
 
     fake.advance = slipping  # type: ignore[method-assign]
     outcome, items, audit = run.execute(), run.items(), run.audit()

@@ -67,7 +67,7 @@ def test_a_bug_comes_up_in_mid_work_and_the_skill_cleans_up(fake: FakeCell, targ
     broken = raising(Approach, ZeroDivisionError("in the model"), after=40)
     with pytest.raises(ZeroDivisionError, match="in the model"):
         run_skill(broken, fake, inputs={"target": target})
-    assert fake.world.steps >= 40
+    assert fake.steps >= 40
     assert fake.arm.commanded == ["start", "stop"]
 
 

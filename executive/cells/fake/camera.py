@@ -36,46 +36,31 @@ class FakeCamera(MountedCamera):
         name: str,
         config: CameraConfig,
         table: TableConfig,
-        world: FakeWorld,
-        *,
         flange: Callable[[], Pose],
+        clock: Clock,
         epoch: Callable[[], int],
     ) -> None:
-        super().__init__(name, config, flange)
+        super().__init__(name, config, flange, clock, epoch)
         self.sees: Callable[[], bool] = self._whole_table
         self.hides: list[Box] = []
         self.displaced = ""
         self._corners = np.array([(x, y, 0.0) for x in table.x for y in table.y])
-        self._world = world
-        self._epoch = epoch
 
     def sees_table(self) -> bool:
         """Tell what `sees` says."""
         return self.sees()
-
-    def capture(self) -> Frame:
-        """Return a blank frame with a true pose."""
-        self._frames += 1
-        size = self.config.height, self.config.width
-        return Frame(
-            id=self._frames,
-            camera=self.name,
-            image=np.zeros((*size, 3), dtype=np.uint8),
-            depth=None,
-            matrix=self.matrix,
-            X_WC=self._pose(),
-            stamp=self._world.now,
-            visible=self._visible(size),
-            epoch=self._epoch(),
-        )
 
     def displacement(self, frame: Frame) -> str:
         """Return the text of `displaced`."""
         del frame
         return self.displaced
 
-    def _visible(self, size: tuple[int, int]) -> NDArray[np.bool_]:
-        visible = np.ones(size, dtype=bool)
+    def _sense(self) -> tuple[NDArray[np.uint8], None]:
+        return np.zeros((self.config.height, self.config.width, 3), dtype=np.uint8), None
+
+    def _find_visible(self, X_WC: Pose) -> NDArray[np.bool_]:
+        del X_WC
+        visible = np.ones((self.config.height, self.config.width), dtype=bool)
         for left, top, right, bottom in self.hides:
             visible[int(top) : int(bottom), int(left) : int(right)] = False
         return visible

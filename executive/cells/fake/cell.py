@@ -10,28 +10,25 @@ from pathlib import Path
 import numpy as np
 
 from executive.cell.bins import BIN_THICKNESS
-from executive.cell.clock import StepClock
 from executive.cell.config import CellConfig
-from executive.cell.layout import bins_of, cell_without_hardware, object_classes
-from executive.cell.protocols import Cell, LeastTimes, Routes
+from executive.cell.protocols import LeastTimes, Routes
 from executive.cell.workcell import CellOptions, KeyPath
 from executive.cells.audit import FinalObject, audit_objects
 from executive.cells.fake.arm import FakeArm, FakeTool, out_of_reach
 from executive.cells.fake.camera import FakeCamera, FakeDetector
-from executive.cells.fake.command_log import FakeLog, read_state, restore
+from executive.cells.fake.command_log import FakeLog, restore
 from executive.cells.fake.least_times import FakeTimes
-from executive.cells.fake.visuals import FakeScenery
+from executive.cells.fake.visuals import FakeVisuals
 from executive.cells.fake.world import FakeObject, FakeWorld
-from executive.errors import InputError
+from executive.cells.without_hardware import CellWithoutHardware
+from executive.errors import Fault, InputError
 from executive.events import Emit, ignore
 from executive.geometry import Pose
-from executive.ledger.tracker import ItemLedger
 from executive.mission.parse.cell_file import load_cell
 from executive.mission.text.files import shipped_folder
 from executive.motion.arms import find_unsupported_arm
 from executive.perception.detectors.screening import screen_detectors
-from executive.perception.evidence import classes_distinct_by_touch
-from executive.perception.localization.localizer import build_localizer
+from executive.perception.localization import build_localizer
 
 ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
 """Where the classes of the shipped cells go."""
@@ -49,22 +46,22 @@ class SilentOperator:
         return self._requests.pop(0) if self._requests else None
 
 
-class FakeCell:
-    """A cell file brought to life without physics; implements `executive.cell.workcell.Workcell`.
+class FakeCell(CellWithoutHardware):
+    """The cell of a cell file without physics; implements `executive.cell.workcell.Workcell`.
 
-    Bins, classes, table, poses, camera, detectors and ledger are as the cell file says. The arm goes in
-    straight lines, table and bins are solid, the tool seals always, and every detector sees everything,
-    whatever its kind.
+    Bins, classes, table, poses, camera, detectors and ledger are as the cell file says. The arm moves in
+    straight lines, table and bins are solid, the tool always seals, and every detector, of whatever kind,
+    sees everything.
 
     Args:
         config: The cell file; by default `bare_table`.
         seed: Decides which objects lie where.
         routes: Class label to the bins that are right for it.
-        emit: Tells the run what happens.
-        options: How the run wants its cell; by default with an operator who wants nothing.
+        emit: Receives the events of the cell.
+        options: Options of the run; by default with an operator who asks for nothing.
 
     Attributes:
-        world, arm, tool, camera, detectors, ledger, routes: The parts, for a test to arrange and inspect.
+        world, arm, tool, camera, detectors, ledger: The parts, for a test to arrange and inspect.
         detector: The first detector.
 
     Raises:
@@ -84,27 +81,21 @@ class FakeCell:
         options = options or CellOptions(SilentOperator(), base=Path())
         if options.gui:
             raise InputError(f'cell {config.cell} is of kind "fake" and has no window; run it without --gui')
-        self._config = config
-        self.routes = dict(routes)
-        classes = object_classes(config)
-        self.world = FakeWorld(classes)
+        super().__init__(config, seed=seed, routes=routes, emit=emit, options=options)
+        classes, clock, bins = self.cell.classes, self.cell.clock, tuple(self.cell.bins.values())
+        self.ledger = self.accounts
+        self.world = FakeWorld(classes, bins=bins)
         scatter(self.world, config, seed)
-        clock = StepClock(lambda: self.world.now)
         self.arm = FakeArm(self.world, config, clock, emit)
         self.tool = FakeTool(self.world, lambda: self.arm.tool_pose.position)
-        bins = bins_of(config)
-        self.world.bins = tuple(bins.values())
-        self.ledger = ItemLedger(
-            config.ledger, config.table, bins, self.routes, emit, classes_distinct_by_touch(config)
-        )
         name, camera = next(iter(config.cameras.items()))
         X_TF = Pose.of((0.0, 0.0, -config.tool.length))
         self.camera = FakeCamera(
             name,
             camera,
             config.table,
-            self.world,
             flange=lambda: self.arm.tool_pose @ X_TF,
+            clock=clock,
             epoch=lambda: self.ledger.epoch,
         )
         self.detectors = {
@@ -114,18 +105,16 @@ class FakeCell:
         self.detector = next(iter(self.detectors.values()))
         self._log: FakeLog | None = None
         if options.resume is not None:
-            restore(read_state(options.resume.log), self.world, self.arm)
+            self.steps = restore(options.resume.log, self.world, self.arm)
             self.camera.skip(options.resume.frames, options.resume.turns)
             self.log_to(options.resume.log)
-        self._cell = replace(
-            cell_without_hardware(config, self.routes, self.ledger, emit),
-            clock=clock,
+        self.cell = replace(
+            self.cell,
             arm=self.arm,
             tool=self.tool,
             camera=self.camera,
             detectors=screen_detectors(self.detectors, classes),
-            operator=options.operator,
-            localizer=build_localizer("plane", classes, bins.values()),
+            localizer=build_localizer("plane", classes, bins),
         )
 
     @staticmethod
@@ -148,39 +137,28 @@ class FakeCell:
         """Return what things take at the very least in a cell like this."""
         return FakeTimes(config)
 
-    @property
-    def cell(self) -> Cell:
-        """What skills see."""
-        return self._cell
-
-    @property
-    def accounts(self) -> ItemLedger:
-        """The books of the cell's ledger."""
-        return self.ledger
-
-    @property
-    def steps(self) -> int:
-        """Control steps that its world has made since the run began."""
-        return self.world.steps
-
     def log_to(self, path: Path) -> None:
-        """Keep in a file, from now on, what the world is like."""
-        self._log = FakeLog(path, self.world, self.arm)
+        """Write the state of the world into a file, now and after every control step."""
+        self._log = FakeLog(path)
+        try:
+            self.note()
+        except Fault as fault:
+            raise InputError(str(fault)) from fault
 
     def note(self) -> None:
-        """Write into the log what the world is like now."""
+        """Write the present state of the world into the log."""
         if self._log is not None:
-            self._log.write(self.world, self.arm)
+            self._log.keep(self.steps, self.world, self.arm)
 
     def advance(self) -> None:
         """Let one control step pass."""
         self.arm.advance()
-        self.world.steps += 1
+        super().advance()
         self.note()
 
-    def scenery(self) -> FakeScenery:
+    def visuals(self) -> FakeVisuals:
         """Return what there is to be seen, for people only."""
-        return FakeScenery(self._config, self.world, lambda: self.arm.tool_pose)
+        return FakeVisuals(self.config, self.world, lambda: self.arm.tool_pose)
 
     def audit(self) -> dict[str, int]:
         """Return the true final counts of the objects; see `executive.cells.audit.audit_objects`."""
@@ -190,14 +168,14 @@ class FakeCell:
             for is_removed, group in ((False, world.objects), (True, world.removed))
             for one in group
         ]
-        return audit_objects(objects, self.ledger.records, self.routes, self._config.ledger.gate)
+        return audit_objects(objects, self.ledger.records, self.routes, self.config.ledger.gate)
 
     def _find_bin(self, one: FakeObject) -> str:
         """Return the name of the bin in which an object lies, or ""."""
         # An object on the wall of a bin falls into the bin, unless it is inside of another bin.
-        wall = BIN_THICKNESS + self._cell.classes[one.label].radius / 2
+        wall = BIN_THICKNESS + self.cell.classes[one.label].radius / 2
         for margin in (0.0, wall):
-            for name, bin in self._cell.bins.items():
+            for name, bin in self.cell.bins.items():
                 if bin.contains(one.position, margin):
                     return name
         return ""

@@ -1,9 +1,8 @@
-"""What is needed to rebuild a fake world as it is: its last state, for it has no physics to repeat."""
+"""Last state of a fake world, from which it can be rebuilt: it has no physics that must be repeated."""
 
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,73 +11,44 @@ import numpy as np
 
 from executive.cells.fake.arm import FakeArm
 from executive.cells.fake.world import FakeObject, FakeWorld
-from executive.errors import Fault, InputError, reason_of
+from executive.cells.log_file import LogFile
+from executive.errors import InputError
 from executive.geometry import Pose
 
 
-class FakeLog:
-    """Keeps the last state of a fake world in a file, written whole after every control step.
+class FakeLog(LogFile):
+    """Keeps the last state of a fake world in a file, written whole after every control step."""
 
-    Args:
-        path: The file.
-        world, arm: Their state is kept from now on.
-
-    Raises:
-        InputError: The file cannot be written.
-    """
-
-    def __init__(self, path: Path, world: FakeWorld, arm: FakeArm) -> None:
-        self._path = path
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, "the state of the world")
         self._length = 0
-        try:
-            self._file: int | None = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
-            self.write(world, arm)
-        except OSError as error:
-            raise InputError(f'cannot write "{path}": {reason_of(error)}') from error
-        except Fault as fault:
-            raise InputError(str(fault)) from fault
 
-    def write(self, world: FakeWorld, arm: FakeArm) -> None:
-        """Keep the state of this moment.
+    def keep(self, steps: int, world: FakeWorld, arm: FakeArm) -> None:
+        """Write the present state, after a number of control steps.
 
         Raises:
-            Fault: The disk does not take it. Later states are not kept, without another fault, so that the
-                arm can be brought to rest.
+            Fault: The disk does not accept the state.
         """
-        if self._file is None:
+        if not self.is_open:
             return
-        held = next((n for n, thing in enumerate(world.objects) if thing is world.held), None)
         state = {
-            "steps": world.steps,
-            "objects": [_plain(thing) for thing in world.objects],
-            "removed": [_plain(thing) for thing in world.removed],
-            "held": held,
-            "tool": [arm.tool_pose.rotation.tolist(), arm.tool_pose.position.tolist()],
+            "steps": steps,
+            "objects": [vars(thing) for thing in world.objects],
+            "removed": [vars(thing) for thing in world.removed],
+            "held": next((n for n, thing in enumerate(world.objects) if thing is world.held), None),
+            "tool": [arm.tool_pose.rotation, arm.tool_pose.position],
         }
-        text = json.dumps(state).encode()
-        # In one go, and never shorter than before: who reads it finds one state and then blanks.
+        text = json.dumps(state, default=np.ndarray.tolist).encode()
+        # In one go, and never shorter than before: a reader finds one state, followed by blanks.
         self._length = max(self._length, len(text))
-        try:
-            os.pwrite(self._file, text.ljust(self._length), 0)
-        except OSError as error:
-            self.close()
-            raise Fault(
-                f'the state of the world "{self._path}" cannot be written: {reason_of(error)}; '
-                "the run stops because it could not be taken up again"
-            ) from error
-
-    def close(self) -> None:
-        """Close the file; more calls do nothing."""
-        if self._file is not None:
-            file, self._file = self._file, None
-            os.close(file)
+        self.write(text.ljust(self._length), 0)
 
 
-def read_state(path: Path) -> Mapping[str, Any]:
-    """Return the state that a log holds.
+def restore(path: Path, world: FakeWorld, arm: FakeArm) -> int:
+    """Bring world and arm into the state in a log, the arm at rest, and return the number of control steps.
 
     Raises:
-        InputError: There is none.
+        InputError: The log contains no state.
     """
     try:
         state: Mapping[str, Any] = json.loads(path.read_bytes())
@@ -86,25 +56,12 @@ def read_state(path: Path) -> Mapping[str, Any]:
         raise InputError(
             f'the world cannot be rebuilt from "{path}": {error}; run the mission again from its start'
         ) from error
-    return state
-
-
-def restore(state: Mapping[str, Any], world: FakeWorld, arm: FakeArm) -> None:
-    """Bring world and arm into a state; the arm stands still in it."""
-    world.steps = state["steps"]
-    world.objects[:] = [_object(plain) for plain in state["objects"]]
-    world.removed[:] = [_object(plain) for plain in state["removed"]]
+    world.objects[:] = [_read_object(**one) for one in state["objects"]]
+    world.removed[:] = [_read_object(**one) for one in state["removed"]]
     world.held = None if state["held"] is None else world.objects[state["held"]]
-    rotation, position = state["tool"]
-    arm.put(Pose(np.array(rotation), np.array(position)))
+    arm.put(Pose(*map(np.array, state["tool"])))
+    return int(state["steps"])
 
 
-def _plain(thing: FakeObject) -> list[Any]:
-    return [thing.label, thing.position.tolist(), [place.tolist() for place in thing.stood], thing.fell]
-
-
-def _object(plain: list[Any]) -> FakeObject:
-    label, position, stood, fell = plain
-    thing = FakeObject(label, np.array(position))
-    thing.stood, thing.fell = [np.array(place) for place in stood], fell
-    return thing
+def _read_object(label: str, position: list[float], stood: list[list[float]], fell: bool) -> FakeObject:
+    return FakeObject(label, np.array(position), [np.array(place) for place in stood], fell)

@@ -20,8 +20,8 @@ MARGIN = 0.12
 """How far the table goes on beyond the workspace [m]."""
 
 
-class FakeScenery:
-    """Everything in a fake cell; implements `executive.cell.visuals.Scenery`.
+class FakeVisuals:
+    """Everything in a fake cell; implements `executive.cell.visuals.Visuals`.
 
     Args:
         config: The cell file.

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from executive.cell.bins import BIN_THICKNESS, Bin
-from executive.cell.clock import STEP
 from executive.cell.objects import ObjectClass
 from executive.errors import InputError
 from executive.geometry import Array
@@ -34,11 +33,8 @@ class FakeObject:
 
     label: str
     position: Array
-    stood: list[Array] = field(init=False)
+    stood: list[Array]
     fell: bool = False
-
-    def __post_init__(self) -> None:
-        self.stood = [self.position.copy()]
 
 
 @dataclass(eq=False)
@@ -51,7 +47,6 @@ class FakeWorld:
         removed: Those that somebody took away.
         bins: What objects may lie in.
         held: The object at the tool, or None.
-        steps: Control steps since the run began.
     """
 
     classes: Mapping[str, ObjectClass]
@@ -59,12 +54,6 @@ class FakeWorld:
     removed: list[FakeObject] = field(default_factory=list)
     bins: Collection[Bin] = ()
     held: FakeObject | None = None
-    steps: int = 0
-
-    @property
-    def now(self) -> float:
-        """Time since the run began [s]."""
-        return self.steps * STEP
 
     def put(self, label: str, x: float, y: float) -> FakeObject:
         """Stand an object on the table and return it.
@@ -82,7 +71,8 @@ class FakeWorld:
                 f'nothing of the class "{label}" can be put on the fake table. '
                 f"{alternatives(label, self.classes, 'The cell file has the classes')}"
             )
-        added = FakeObject(label, np.array([x, y, self.classes[label].height / 2]))
+        position = np.array([x, y, self.classes[label].height / 2])
+        added = FakeObject(label, position, [position.copy()])
         self.objects.append(added)
         return added
 

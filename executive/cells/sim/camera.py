@@ -177,36 +177,17 @@ class SimCamera(MountedCamera):
                 Frames carry the matrix and the pose of `config`.
             bins: The bins whose places in a frame show whether the camera is where `config` says.
         """
-        super().__init__(name, config, world.flange_pose)
+        super().__init__(name, config, world.flange_pose, clock, epoch)
         self._true = true or config
         self._world = world
-        self._clock = clock
         self._seed = seed
         self._shadow = shadow
-        self._epoch = epoch
         self._light = light
         self._bins = bins
 
     def sees_table(self) -> bool:
         """Tell whether the whole workspace is in view now, the arm not in front of it."""
         return self._shadow is None or self._shadow.sees_table(self.matrix, self._pose(), self._size)
-
-    def capture(self) -> Frame:
-        """Return a fresh frame of what the camera sees now."""
-        self._frames += 1
-        X_WC = self._pose()
-        image, depth = self._sense()
-        return Frame(
-            id=self._frames,
-            camera=self.name,
-            image=image,
-            depth=depth,
-            matrix=self.matrix,
-            X_WC=X_WC,
-            stamp=self._clock.now,
-            visible=self._visible(X_WC),
-            epoch=self._epoch(),
-        )
 
     def displacement(self, frame: Frame) -> str:
         """Return in words how far a frame shows the camera beside its declared pose; "" if it does not."""
@@ -229,7 +210,7 @@ class SimCamera(MountedCamera):
         rng = np.random.default_rng([self._seed, self._frames, DEPTH_STREAM])
         return image, sense(clean.depth, self.config.depth, rng)
 
-    def _visible(self, X_WC: Pose) -> Mask:
+    def _find_visible(self, X_WC: Pose) -> Mask:
         if self._shadow is None:
             return np.ones(self._size[::-1], np.bool_)
         return self._shadow.visible(self.matrix, X_WC, self._size)

@@ -6,7 +6,6 @@ same bits.
 
 from __future__ import annotations
 
-import os
 import struct
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from executive.errors import Fault, InputError, explained, reason_of
+from executive.cells.log_file import LogFile
+from executive.errors import Fault, InputError, explained
 from executive.geometry import Array
 from executive.motion.state import State
 from executive.motion.trajectory import Trajectory
@@ -54,55 +54,40 @@ class CommandLog:
     """
 
     def __init__(self, path: Path | None = None, joint_count: int = 0, *, again: bool = False) -> None:
-        self._path = path
-        self._file: int | None = None
+        self._file: LogFile | None = None
         if path is None:
             return
         header = MAGIC + f"{VERSION} joints {joint_count}\n".encode()
-        length = max((end for _, end in _commands(path)), default=len(header)) if again else 0
-        with explained(InputError, f'cannot write "{path}"'):
-            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
-            os.ftruncate(self._file, length)
-            if not again:
-                os.write(self._file, header)
+        self._length = max((end for _, end in _commands(path)), default=len(header)) if again else 0
+        self._file = LogFile(path, "the log of the world", self._length)
+        if not again:
+            try:
+                self._append(header)
+            except Fault as fault:
+                raise InputError(str(fault)) from fault
 
     def note(self, kind: int, *numbers: float) -> None:
         """Append a command."""
         if self._file is not None:
             body = f"{len(numbers)}d" if kind == JOINTS_TO else _BODIES[kind]
-            self._write(bytes([kind]) + struct.pack(f"<{body}", *numbers))
+            self._append(bytes([kind]) + struct.pack(f"<{body}", *numbers))
 
     def motion(self, motion: Trajectory) -> None:
         """Append that the arm begins to follow a motion: whoever comes later can brake on its path."""
         if self._file is not None:
             states = np.hstack(motion.samples)
             head = struct.pack(f"<{_BODIES[MOTION]}", motion.duration, motion.guarded, len(states))
-            self._write(bytes([MOTION]) + head + states.astype("<f8").tobytes())
+            self._append(bytes([MOTION]) + head + states.astype("<f8").tobytes())
 
     def close(self) -> None:
         """Close the file; more calls do nothing."""
         if self._file is not None:
-            os.close(self._file)
-            self._file = None
+            self._file.close()
 
-    def _write(self, data: bytes) -> None:
-        """Append all of `data`.
-
-        Raises:
-            Fault: The disk does not take it. What is done later is not kept, without another fault, so that
-                the arm can be brought to rest.
-        """
+    def _append(self, data: bytes) -> None:
         assert self._file is not None
-        try:
-            # Without a buffer: what was done before a kill is in the file.
-            while data:
-                data = data[os.write(self._file, data) :]
-        except OSError as error:
-            self.close()
-            raise Fault(
-                f'the log of the world "{self._path}" cannot be written: {reason_of(error)}; '
-                "the run stops because it could not be taken up again"
-            ) from error
+        self._file.write(data, self._length)
+        self._length += len(data)
 
 
 def is_log(path: Path) -> bool:

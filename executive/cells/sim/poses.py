@@ -8,13 +8,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from executive.cell.arm import Goal
-from executive.cell.clock import STEP
+from executive.cell.clock import StepClock
 from executive.cell.config import CellConfig
 from executive.cell.layout import places_out_of_reach
 from executive.cell.workcell import KeyPath
 from executive.cells.sim.arm import SimArm
 from executive.cells.sim.camera import camera_pose
-from executive.cells.sim.clock import SimClock
 from executive.cells.sim.collision import PathClearance
 from executive.cells.sim.view import ArmShadow
 from executive.cells.sim.world import World
@@ -70,7 +69,7 @@ def unfit_poses(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
 def _blind_poses(config: CellConfig, world: World) -> Iterator[tuple[KeyPath, str]]:
     """Yield the scan poses and the bins that keep a camera from seeing the whole workspace."""
     planner = build_planner(config)
-    shadow = ArmShadow(SimArm(world, planner, config, SimClock(world, STEP)), planner.kinematics, config)
+    shadow = ArmShadow(SimArm(world, planner, config, StepClock(lambda: 0.0)), planner.kinematics, config)
     for name, camera in config.cameras.items():
         matrix, _ = calibrated(camera)
         for index, pose in enumerate(camera.scan_poses):

@@ -28,13 +28,13 @@ class UnderWay:
         command: Joint positions of the last command before the last physics step `(n,)` [rad].
         motion: The motion it followed, or None.
         time: How far on that path it was [s].
-        idle: Physics steps that were none of the run.
+        steps: Number of control steps of the run.
     """
 
     command: Array
     motion: Trajectory | None
     time: float
-    idle: int
+    steps: int
 
 
 class Rebuilding:
@@ -52,7 +52,7 @@ class Rebuilding:
         self._command: Array = np.zeros(0)
         self._motion: Trajectory | None = None
         self._time = 0.0
-        self._idle = 0
+        self._steps = 0
         self._stepped: tuple[Array, float] | None = None
         """Command before the last physics step, and its time; None if no command has followed the step."""
 
@@ -66,14 +66,14 @@ class Rebuilding:
         command, time = self._command, self._time
         if self._stepped and self._motion is not None:
             command, time = self._stepped
-        return UnderWay(command, self._motion, time, self._idle)
+        return UnderWay(command, self._motion, time, self._steps)
 
     def do(self, command: Command) -> None:
         """Do the next command."""
         kind, numbers, _ = command
         world, tool = self._world, self._tool
         if kind in (log.STEP, log.IDLE):
-            self._idle += kind == log.IDLE
+            self._steps += kind == log.STEP
             self._stepped = None
             world.step()
             tool.advance()

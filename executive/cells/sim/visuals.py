@@ -21,8 +21,8 @@ _KINDS = {
 }
 
 
-class SimScenery:
-    """Everything in a world but the floor; implements `executive.cell.visuals.Scenery`.
+class SimVisuals:
+    """Everything in a world but the floor; implements `executive.cell.visuals.Visuals`.
 
     To ask where everything is takes about 0.3 ms.
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from executive.cell.detection import Answer, Detection
 from executive.cell.error_rates import ErrorRates
 from executive.cell.protocols import Clock, Request
-from executive.errors import DeadlinePassed
+from executive.errors import DeadlinePassed, Unavailable
 
 SLICE = 0.05
 """Longest time the caller is held at once while an answer is overdue [s]; a second Ctrl-C ends it."""
@@ -24,11 +24,13 @@ class ChangedRequest:
 
     Attributes:
         request: The request.
-        change: Returns what is read instead of its answer.
+        change: Returns the answer that is read instead.
+        detector: Name of the detector, with which the text of an error begins; "": the text is not changed.
     """
 
     request: Request
     change: Callable[[Answer], Answer]
+    detector: str = ""
 
     @property
     def ready(self) -> bool:
@@ -41,7 +43,13 @@ class ChangedRequest:
         Raises:
             Unavailable: The detector gave no usable answer.
         """
-        return self.change(self.request.result())
+        try:
+            answer = self.request.result()
+        except Unavailable as error:
+            if not self.detector:
+                raise
+            raise Unavailable(f"detector {self.detector}: {error}") from error
+        return self.change(answer)
 
 
 @dataclass(eq=False)

@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 
 from executive.cell.detection import Answer, Detection
 from executive.cell.frame import Frame
-from executive.cell.protocols import Detector, Request
+from executive.cell.protocols import Detector
 from executive.errors import Crowded, Unavailable
+from executive.perception.detectors.requests import ChangedRequest
 
 MIN_VISIBLE_SHARE = 0.7
 """Smallest visible share of a box that counts; the arm may hide the rest."""
@@ -65,41 +66,6 @@ def screen(answer: Answer, frame: Frame, view: str, labels: Collection[str]) -> 
 
 
 @dataclass(frozen=True, eq=False)
-class ScreenedRequest:
-    """A request whose answer is screened; implements `executive.cell.protocols.Request`.
-
-    Attributes:
-        request: The request to the detector.
-        detector: Its name.
-        frame, view, labels: See `screen`.
-    """
-
-    request: Request
-    detector: str
-    frame: Frame
-    view: str
-    labels: Collection[str]
-
-    @property
-    def ready(self) -> bool:
-        """True once the answer can be read."""
-        return self.request.ready
-
-    def result(self) -> Answer:
-        """Return the screened answer.
-
-        Raises:
-            Crowded: The detector found more boxes than there can be objects.
-            Unavailable: The detector gave no usable answer.
-        """
-        try:
-            answer = self.request.result()
-        except Unavailable as error:
-            raise Unavailable(f"detector {self.detector}: {error}") from error
-        return screen(answer, self.frame, self.view, self.labels)
-
-
-@dataclass(frozen=True, eq=False)
 class ScreenedDetector:
     """A detector whose answers are screened; implements `executive.cell.protocols.Detector`.
 
@@ -113,9 +79,10 @@ class ScreenedDetector:
     name: str
     labels: Collection[str]
 
-    def request(self, frame: Frame, view: str) -> ScreenedRequest:
+    def request(self, frame: Frame, view: str) -> ChangedRequest:
         """Start to search `frame`: the `table` part or the `full` image."""
-        return ScreenedRequest(self.detector.request(frame, view), self.name, frame, view, self.labels)
+        request = self.detector.request(frame, view)
+        return ChangedRequest(request, lambda answer: screen(answer, frame, view, self.labels), self.name)
 
 
 def screen_detectors(detectors: Mapping[str, Detector], labels: Collection[str]) -> dict[str, Detector]:

@@ -17,7 +17,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from executive.cell.frame import Frame, FrameTaken
-from executive.cell.visuals import Scenery
+from executive.cell.visuals import Visuals
 from executive.errors import InputError
 from executive.events import FrameSearched, TimedEvent
 from executive.mission.outline import outline
@@ -74,7 +74,7 @@ class LivePage:
             )  # fmt: skip
         self._queue: queue.SimpleQueue[News | None] = queue.SimpleQueue()
         self._run: Run | None = None
-        self._scenery: Scenery | None = None
+        self._visuals: Visuals | None = None
         self._gone = False
         self._watched = 0
         self._due = 0.0
@@ -99,10 +99,10 @@ class LivePage:
         mission = run.mission
         self._run = run
         with self._harmless():
-            self._scenery = run.workcell.scenery()
+            self._visuals = run.workcell.visuals()
         # A line in every node for what became of it so far.
         blank = {node.path: Note("", ("",)) for node in nodes}
-        shapes = tuple(self._scenery.shapes) if self._scenery is not None else ()
+        shapes = tuple(self._visuals.shapes) if self._visuals is not None else ()
         self._tell(tree=svg(nodes, mission, blank), shapes=shapes)
         run.control.between_ticks(self._look_around)
         self._look_around()
@@ -156,8 +156,8 @@ class LivePage:
             if self._run.control.paused != self._paused:
                 self._paused = not self._paused
                 self._tell(paused=self._paused)
-            if self._watched and self._keeps_up and self._scenery is not None:
-                self._tell(**poses(self._run.now, self._scenery.poses()))
+            if self._watched and self._keeps_up and self._visuals is not None:
+                self._tell(**poses(self._run.now, self._visuals.poses()))
 
     @property
     def _keeps_up(self) -> bool:

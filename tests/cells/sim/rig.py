@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections import deque
 
 from executive.cell.arm import Goal, Task
-from executive.cell.clock import STEP
+from executive.cell.clock import STEP, StepClock
 from executive.cell.config import CellConfig
 from executive.cells.sim.arm import SimArm
-from executive.cells.sim.clock import SimClock
 from executive.cells.sim.collision import PathClearance
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import World
@@ -33,7 +32,7 @@ class Rig:
         self.world = World(config, visuals=False)
         self.clearance = PathClearance(config)
         self.planner = build_planner(config, self.clearance.check)
-        self.clock = SimClock(self.world, STEP)
+        self.clock = StepClock(lambda: self.world.steps * STEP)
         self.events: list[Event] = []
         self.tool = SuctionTool(self.world, config.tool)
         self.arm = SimArm(

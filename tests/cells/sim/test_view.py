@@ -6,11 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from executive.cell.clock import STEP
+from executive.cell.clock import StepClock
 from executive.cell.config import CellConfig
 from executive.cells.sim.arm import SimArm
 from executive.cells.sim.camera import camera_pose
-from executive.cells.sim.clock import SimClock
 from executive.cells.sim.view import ArmShadow
 from executive.cells.sim.world import World
 from executive.motion.arms import build_planner
@@ -21,7 +20,7 @@ Build = Callable[[CellConfig], World]
 
 def test_what_the_tool_holds_hides_what_lies_under_it(build: Build, overhead: CellConfig) -> None:
     world, planner, holds = build(overhead), build_planner(overhead), False
-    arm = SimArm(world, planner, overhead, SimClock(world, STEP))
+    arm = SimArm(world, planner, overhead, StepClock(lambda: 0.0))
     shadow = ArmShadow(arm, planner.kinematics, overhead, lambda: holds)
     camera = overhead.cameras["overhead"]
     matrix, X_WC = calibrated(camera)[0], camera_pose(world, camera)

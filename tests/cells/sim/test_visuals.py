@@ -9,7 +9,7 @@ import pytest
 
 from executive.cell.config import CellConfig
 from executive.cells.sim.spawn import spawn
-from executive.cells.sim.visuals import SimScenery
+from executive.cells.sim.visuals import SimVisuals
 from executive.cells.sim.world import World
 
 
@@ -22,21 +22,21 @@ def world(overhead: CellConfig):
 
 
 def test_the_arm_is_where_its_joints_put_it(world: World) -> None:
-    scenery = SimScenery(world)
-    before = scenery.poses()
+    visuals = SimVisuals(world)
+    before = visuals.poses()
     assert np.allclose(before["link 8"].position, world.flange_pose().position, atol=1e-6)
     for body in world.bodies:
         assert before[f"object {body}"].position[:2] == pytest.approx(
             world.object_pose(body).position[:2], abs=1e-6
         )
     world.set_arm(np.radians([20, 40, 10, -70, 5, 60, 15]))
-    after = scenery.poses()
+    after = visuals.poses()
     assert np.allclose(after["link 8"].position, world.flange_pose().position, atol=1e-6)
     assert not np.allclose(before["link 4"].position, after["link 4"].position, atol=0.01)
 
 
 def test_shapes_have_the_sizes_of_the_cell(world: World, overhead: CellConfig) -> None:
-    shapes = SimScenery(world).shapes
+    shapes = SimVisuals(world).shapes
     walls = [shape for shape in shapes if shape.kind == "box"]
     assert len(walls) == 5 * len(overhead.bins)
     red = next(shape for shape in walls if np.allclose(shape.colour, overhead.bins["red_bin"].colour))

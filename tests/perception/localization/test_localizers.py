@@ -14,7 +14,7 @@ from executive.cell.frame import Frame
 from executive.cell.objects import ObjectClass
 from executive.errors import NoDepth
 from executive.perception.camera_model import camera_matrix, looking_at, project
-from executive.perception.localization.localizer import build_localizer
+from executive.perception.localization import build_localizer
 
 SIDE = 0.05
 CLASSES = {"cube": ObjectClass("cube", SIDE, 0.0354)}

@@ -13,12 +13,15 @@ from executive.cell.frame import Frame
 from executive.cell.objects import ObjectClass
 from executive.errors import NoDepth
 from executive.geometry import Array
-from executive.perception.camera_model import intersect_plane
+from executive.perception.camera_model import intersect_plane, pixel_ray
+from executive.perception.depth_image import measure_top
 from executive.perception.evidence import describe_wrong_size, describe_wrong_top
-from executive.perception.localization.heights import Cast, height_by_depth, height_by_ray, height_on_table
 
 HeightMethod = Callable[[Detection, Frame, ObjectClass], float]
 """Returns the height of the centre of a detected object [m]; raises NoDepth if it cannot be found."""
+
+Cast = Callable[[Array, Array], Array | None]
+"""Ray test: takes origin `(3,)` [m] and direction `(3,)`; returns the first point hit `(3,)` [m], or None."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,5 +109,38 @@ def build_localizer(
     """
     if method == "ray":
         assert cast is not None, "the method `ray` needs a simulator"
-        return CellLocalizer(partial(height_by_ray, cast), classes, bins)
-    return CellLocalizer(height_by_depth if method == "depth" else height_on_table, classes, bins)
+        return CellLocalizer(partial(_height_by_ray, cast), classes, bins)
+    return CellLocalizer(_height_by_depth if method == "depth" else _height_on_table, classes, bins)
+
+
+def _height_on_table(detection: Detection, frame: Frame, kind: ObjectClass) -> float:
+    """Return half the height of the class [m]: the object stands on the table."""
+    del detection, frame
+    return kind.height / 2
+
+
+def _height_by_depth(detection: Detection, frame: Frame, kind: ObjectClass) -> float:
+    """Return the height of the centre [m] below the top that the depth image shows.
+
+    The object may lie on another one.
+
+    Raises:
+        NoDepth: The frame has no depth image, or too little depth in the box.
+    """
+    return measure_top(detection, frame) - kind.height / 2
+
+
+def _height_by_ray(cast: Cast, detection: Detection, frame: Frame, kind: ObjectClass) -> float:
+    """Return the height of the centre [m] below the point that a ray of the simulator hits.
+
+    Hardware has no such ray. The simulator casts it at the call and not at capture: an object may have moved
+    since.
+
+    Raises:
+        NoDepth: The ray hits nothing.
+    """
+    hit = cast(frame.X_WC.position, pixel_ray(frame.matrix, frame.X_WC, detection.centre))
+    if hit is None:
+        column, row = detection.centre
+        raise NoDepth(f"the ray through pixel ({column:.0f}, {row:.0f}) of frame {frame.id} hits nothing")
+    return float(hit[2]) - kind.height / 2

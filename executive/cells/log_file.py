@@ -1,0 +1,57 @@
+"""File from which the world of an interrupted run can be rebuilt."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from executive.errors import Fault, InputError, explained, reason_of
+
+
+class LogFile:
+    """A file that is written without a buffer: data written before a kill is in the file.
+
+    Args:
+        path: The file.
+        subject: Name of the content, for the text of a fault.
+        length: Length after which an existing file is cut off [byte]; None: nowhere.
+
+    Raises:
+        InputError: The file cannot be opened.
+    """
+
+    def __init__(self, path: Path, subject: str, length: int | None = None) -> None:
+        self._path, self._subject = path, subject
+        with explained(InputError, f'cannot write "{path}"'):
+            self._file: int | None = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+            if length is not None:
+                os.ftruncate(self._file, length)
+
+    @property
+    def is_open(self) -> bool:
+        """True until the file is closed, or until a write fails."""
+        return self._file is not None
+
+    def write(self, data: bytes, position: int) -> None:
+        """Write all data at a position [byte]; do nothing if the file is closed.
+
+        Raises:
+            Fault: The disk does not accept the data. Later data is not written, without another fault, so
+                that the arm can be brought to rest.
+        """
+        try:
+            while data and self._file is not None:
+                count = os.pwrite(self._file, data, position)
+                data, position = data[count:], position + count
+        except OSError as error:
+            self.close()
+            raise Fault(
+                f'{self._subject} "{self._path}" cannot be written: {reason_of(error)}; '
+                "the run stops because it could not be resumed"
+            ) from error
+
+    def close(self) -> None:
+        """Close the file; more calls do nothing."""
+        if self._file is not None:
+            file, self._file = self._file, None
+            os.close(file)

@@ -1,0 +1,90 @@
+"""Cell of a cell file without hardware: base of the kinds of cells, and the cell for a replay."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from executive.cell.clock import STEP, StepClock
+from executive.cell.config import CellConfig
+from executive.cell.layout import bins_of, object_classes
+from executive.cell.objects import Target
+from executive.cell.protocols import Cell, Routes
+from executive.cell.visuals import Visuals
+from executive.cell.workcell import CellOptions
+from executive.events import Emit, TargetSelected
+from executive.ledger.tracker import ItemLedger
+from executive.perception.evidence import classes_distinct_by_touch
+
+
+class CellWithoutHardware:
+    """Clock, bins, classes and ledger of a cell file; implements `executive.cell.workcell.Workcell`.
+
+    Arm, tool, camera, detectors and localizer of `cell` are None until a subclass adds them.
+
+    Args:
+        config: The cell file.
+        seed: Not used.
+        routes: Class label to the bins that are right for it.
+        emit: Receives the events of the cell.
+        options: Options of the run.
+
+    Attributes:
+        config: The cell file.
+        routes: Class label to the bins that are right for it.
+        accounts: The ledger.
+        cell: The cell that skills see.
+        steps: Number of control steps since the run began.
+    """
+
+    def __init__(
+        self, config: CellConfig, *, seed: int, routes: Routes, emit: Emit, options: CellOptions
+    ) -> None:
+        del seed
+        self.config, self.routes, self.steps = config, dict(routes), 0
+        self.accounts = ItemLedger(
+            config.ledger, config.table, bins_of(config), self.routes, emit, classes_distinct_by_touch(config)
+        )
+        missing: Any = None
+
+        def emit_decision(target: Target, bin: str) -> None:
+            emit(TargetSelected(target.item, target.label, target.frame, bin))
+
+        self.cell = Cell(
+            clock=StepClock(lambda: self.steps * STEP),
+            arm=missing,
+            tool=missing,
+            camera=missing,
+            detectors=dict.fromkeys(config.detectors, missing),
+            ledger=self.accounts,
+            operator=options.operator,
+            bins=bins_of(config),
+            classes=object_classes(config),
+            routes=self.routes,
+            localizer=missing,
+            safe_place=np.array(config.safe_place),
+            descent=config.motion.descent,
+            descent_speed=config.motion.descent_speed,
+            decided=emit_decision,
+        )
+
+    def log_to(self, path: Path) -> None:
+        """Keep no log."""
+
+    def advance(self) -> None:
+        """Let one control step pass."""
+        self.steps += 1
+
+    def visuals(self) -> Visuals | None:
+        """Return None: there is nothing to show."""
+        return None
+
+    def audit(self) -> Mapping[str, int] | None:
+        """Return None: the true counts are unknown."""
+        return None
+
+    def close(self) -> None:
+        """Release nothing."""

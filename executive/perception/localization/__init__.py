@@ -1,1 +1,0 @@
-"""From a detection to a point in the world: by known height, by depth image, by the simulator's ray."""
