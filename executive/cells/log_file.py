@@ -47,7 +47,7 @@ class LogFile:
             self.close()
             raise Fault(
                 f'{self._subject} "{self._path}" cannot be written: {reason_of(error)}; '
-                "the run stops because it could not be resumed"
+                "the run stops because it could not be taken up again"
             ) from error
 
     def close(self) -> None:
