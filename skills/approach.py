@@ -67,20 +67,20 @@ class Approach(Skill):
         height, highest = float(cell.arm.tool_pose.position[2]), goal.position[2] + goal.guarded
         expected = f"expected at {(highest - cell.descent) * 1000:.0f} mm"
         if not tool.touching:
-            cell.ledger.missed(item, found_table=_proves_absence(goal, self.target, kind))
+            cell.ledger.record_miss(item, found_table=_proves_absence(goal, self.target, kind))
             felt = f"no contact down to {height * 1000:.0f} mm"
             raise self.failed("no_contact", f"{felt}, {item} was {expected}")
         if height > highest + EARLY_CONTACT_MARGIN:
-            cell.ledger.bumped()
+            cell.ledger.invalidate_positions()
             met = f"the tool met something at {height * 1000:.0f} mm"
             raise self.failed("blocked", f"{met}, on its way to {item}, which was {expected}")
         doubt = describe_wrong_height(self.target.label, height, cell.classes)
         near_top = height >= lowest_contact(kind, middle, self.overtravel)
         beside_top = near_top and may_miss_top(self.target.label, height, cell.classes)
-        if not cell.ledger.touched(item, doubt, beside_top=beside_top):
+        if not cell.ledger.record_touch(item, doubt, beside_top=beside_top):
             raise self.failed("contradicted", f"{item} may be no {self.target.label}: {doubt}")
         if doubt and not near_top:
-            cell.ledger.missed(item)
+            cell.ledger.record_miss(item)
             raise self.failed("no_contact", f"the top of {item} was {expected}; {doubt}")
 
 

@@ -35,7 +35,7 @@ class Grasp(Skill):
             if not sealed:
                 cell.tool.open()
         if not sealed:
-            cell.ledger.missed(self.target.item)
+            cell.ledger.record_miss(self.target.item)
             raise self.failed("missed", f"no seal on {self.target.item} {self.settle:.2f} s after contact")
-        cell.ledger.held(self.target.item)
+        cell.ledger.record_grasp(self.target.item)
         self.held = self.target.item

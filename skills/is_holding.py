@@ -25,12 +25,12 @@ class IsHolding(Skill):
 
     def run(self, cell: Cell) -> None:
         """Ask once."""
-        believed = cell.ledger.in_tool()
+        believed = cell.ledger.find_held_item()
         if cell.tool.holding and believed is not None:
             self.held = believed
             return
         cell.tool.open()
         if believed is not None:
-            cell.ledger.dropped(believed)
+            cell.ledger.record_drop(believed)
             raise self.failed("empty", f"the sensor feels no seal; {believed} was dropped")
         raise self.failed("empty", "the sensor feels no seal")

@@ -36,7 +36,7 @@ class PutDown(Skill):
     def run(self, cell: Cell) -> Steps:
         """Carry it there, come down, let go."""
         goal = aside(cell, self.held, self.drop)
-        height = cell.classes[cell.ledger.label(self.held)].height
+        height = cell.classes[cell.ledger.get_label(self.held)].height
         lying = float(cell.safe_place[2]) + height
         try:
             yield from carry(self, cell, self.held, goal, "the safe place")
@@ -46,4 +46,6 @@ class PutDown(Skill):
                 raise
         x, y, _ = cell.arm.tool_pose.position
         place = np.array((x, y, lying - height / 2))
-        yield from let_go(self, cell, self.held, self.settle, lambda: cell.ledger.returned(self.held, place))
+        yield from let_go(
+            self, cell, self.held, self.settle, lambda: cell.ledger.record_put_down(self.held, place)
+        )

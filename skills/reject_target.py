@@ -22,7 +22,7 @@ class RejectTarget(Skill):
 
     def run(self, cell: Cell) -> None:
         """Tell the ledger."""
-        failures = cell.ledger.attempts(self.item)
+        failures = cell.ledger.count_attempts(self.item)
         if failures < self.after:
             return
-        cell.ledger.rejected(self.item, f"{self.why} ({failures} failed attempts)" if failures else self.why)
+        cell.ledger.reject(self.item, f"{self.why} ({failures} failed attempts)" if failures else self.why)

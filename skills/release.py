@@ -29,8 +29,8 @@ class Release(Skill):
     def run(self, cell: Cell) -> Steps:
         """Switch the vacuum off and ask the sensor."""
         item, bin = self.held, self.bin
-        if cell.ledger.in_tool() == item:
-            yield from let_go(self, cell, item, self.settle, lambda: cell.ledger.placed(item, bin))
+        if cell.ledger.find_held_item() == item:
+            yield from let_go(self, cell, item, self.settle, lambda: cell.ledger.record_placement(item, bin))
         elif cell.ledger.is_open(item):
             raise self.failed("dropped", f"{item} is not in the tool any more")
         # Else it was let go already, when this was taken away and then begun anew.

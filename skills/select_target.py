@@ -42,12 +42,12 @@ class SelectTarget(Skill):
         if self.prefer == "surest":
             best = min(candidates, key=lambda t: (-t.confidence, t.item))
         self.target, self.item = best, best.item
-        bins = cell.routes[cell.ledger.label(best.item)]
+        bins = cell.routes[cell.ledger.get_label(best.item)]
         self.bin = min(bins, key=lambda bin: slots_taken(cell, bin))
         cell.decided(best, self.bin)
 
     def _is_sought(self, cell: Cell, item: Item) -> bool:
-        label = cell.ledger.label(item)
+        label = cell.ledger.get_label(item)
         return (
             label in cell.routes
             and (self.same is None or item == self.same)
@@ -56,12 +56,12 @@ class SelectTarget(Skill):
 
     def _none(self, cell: Cell) -> SkillFailed:
         """Return why there is nothing to choose."""
-        doubtful = [item for item in cell.ledger.in_doubt() if self._is_sought(cell, item)]
+        doubtful = [item for item in cell.ledger.find_uncertain_items() if self._is_sought(cell, item)]
         if doubtful:
             names = ", ".join(doubtful)
             return self.failed("doubtful", f"not enough looks agree on {names} yet; look again")
         sought = self.same or self.wanted or "object to sort"
-        if self.same is None and cell.ledger.believes_empty(self.wanted):
+        if self.same is None and cell.ledger.is_table_empty(self.wanted):
             left = f"no {sought} is left on the table but what was rejected"
             message = "; ".join(filter(None, (left, describe_unknown(cell.ledger.unknown))))
             return self.failed("no_candidate", message)

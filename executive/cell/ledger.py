@@ -12,52 +12,68 @@ from executive.geometry import Array
 
 
 class Ledger(Protocol):
-    """Who is who on the table: the only place where identity, freshness and fate are decided."""
+    """Items of a run: the only part that decides identity, freshness and final state of an object."""
 
     @property
     def epoch(self) -> int:
-        """How often the table has been changed by the robot so far."""
+        """Number of changes of the table by the robot."""
 
-    def is_current(self, frame: Frame) -> bool:
-        """Tell whether nothing has put the whole table in doubt since the frame was taken."""
+    @property
+    def unknown(self) -> Mapping[str, int]:
+        """Largest number of boxes in one look for each label that the cell does not know."""
 
     def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:
-        """Update all items with one search of a frame, and return the `targets` that are known now.
+        """Update all items with one search of a frame, and return all targets (`find_targets`).
 
-        Targets of earlier frames are included, unless something has disturbed them since.
+        Objects in bins are no targets. Detections at positions that the robot changed after the capture do
+        not count, and neither does a second search of the same frame.
 
         Args:
             detections: The frame, the searched area, and the detector's error rates.
             observations: Its detections, localized.
         """
 
-    def targets(self) -> Sequence[Target]:
-        """Return one target per open item on the table whose place is known now."""
+    def find_targets(self) -> Sequence[Target]:
+        """Return one target per open item on the table whose position is known now."""
+
+    def find_objects_on_table(self) -> Sequence[Target]:
+        """Return all items that lie on the table with a probability of at least 0.5."""
+
+    def find_uncertain_items(self) -> Sequence[Item]:
+        """Return the open items in the workspace that a further look may confirm or show to be gone."""
+
+    def find_held_item(self) -> Item | None:
+        """Return the item in the tool, or None."""
+
+    def is_current(self, frame: Frame) -> bool:
+        """Return True if no change after the capture of a frame may have moved all objects."""
 
     def is_fresh(self, target: Target) -> bool:
-        """Tell whether nothing the robot did since has put the target's position in doubt."""
+        """Return True if no change after the last detection of a target may have moved it."""
 
     def is_open(self, item: Item) -> bool:
-        """Tell whether the item still waits to be sorted: neither placed, rejected, held nor lost."""
+        """Return True if an item is still to be sorted: not placed, rejected, held or lost."""
 
     def is_sure(self, item: Item) -> bool:
-        """Tell whether enough looks agree that the item exists, of which class it is, and where."""
+        """Return True if the existence, class and position of an item are certain enough to pick it."""
 
-    def in_doubt(self) -> Sequence[Item]:
-        """Return the open items in the workspace that a further look may make sure, or show to be gone."""
-
-    def believes_empty(self, label: str | None = None) -> bool:
-        """Return True if it is as good as certain that nothing with a route is left where one can look.
+    def is_table_empty(self, label: str | None = None) -> bool:
+        """Return True if no object with a route is left on the visible table, with the required probability.
 
         Args:
             label: Only objects of this class count; None: those of all classes.
         """
 
-    @property
-    def unknown(self) -> Mapping[str, int]:
-        """Largest number of boxes in one look for each label that the cell does not know."""
+    def get_label(self, item: Item) -> str:
+        """Return the most probable class of an item."""
 
-    def touched(self, item: Item, contradiction: str = "", *, beside_top: bool = False) -> bool:
+    def count_attempts(self, item: Item) -> int:
+        """Return the number of failed attempts to pick an item."""
+
+    def count_in(self, bin: str) -> int:
+        """Return the number of objects in a bin, which is the index of its next free slot."""
+
+    def record_touch(self, item: Item, contradiction: str = "", *, beside_top: bool = False) -> bool:
         """Record that the tool touched an item, and return True if it may be of its class.
 
         Args:
@@ -66,46 +82,31 @@ class Ledger(Protocol):
             beside_top: True if the touch may have missed the top of the object.
         """
 
-    def missed(self, item: Item, *, found_table: bool = False) -> None:
-        """Record a failed attempt to pick an item; the positions of all objects are in doubt now.
+    def record_miss(self, item: Item, *, found_table: bool = False) -> None:
+        """Record a failed attempt to pick an item; all positions are in doubt now.
 
         Args:
             item: The item.
-            found_table: True if the tool went down almost to the table at the item's place without a contact.
+            found_table: True if the tool descended almost to the table there without a contact.
         """
 
-    def held(self, item: Item) -> None:
-        """Record that the tool holds the item; its neighbours may have moved."""
+    def record_grasp(self, item: Item) -> None:
+        """Record that the tool holds an item; its neighbours may have been moved."""
 
-    def dropped(self, item: Item, landing: Array | None = None) -> None:
-        """Record that the tool lost the item on the way; the whole table is in doubt now.
+    def record_drop(self, item: Item, landing: Array | None = None) -> None:
+        """Record that the tool lost an item on the way; all positions are in doubt now.
 
-        `landing` `(3,)` [m] is where it must have come down, None where nobody can tell.
+        `landing` `(3,)` [m] is the predicted position of the item, None if it is unknown.
         """
 
-    def placed(self, item: Item, bin: str) -> None:
-        """Record that the item was let go in a bin."""
+    def record_placement(self, item: Item, bin: str) -> None:
+        """Record that an item was released in a bin."""
 
-    def returned(self, item: Item, position: Array) -> None:
-        """Record that the item was put back on the table, its middle at `position` `(3,)` [m]."""
+    def record_put_down(self, item: Item, position: Array) -> None:
+        """Record that an item was put back on the table, with its centre at `position` `(3,)` [m]."""
 
-    def rejected(self, item: Item, why: str) -> None:
-        """Record that the item is given up; it is reported and not tried again."""
+    def reject(self, item: Item, why: str) -> None:
+        """Reject an item: it is reported and not tried again."""
 
-    def label(self, item: Item) -> str:
-        """Return the class the item is believed to be of."""
-
-    def attempts(self, item: Item) -> int:
-        """Return how many grasps of the item have failed."""
-
-    def objects_in(self, bin: str) -> int:
-        """Return how many objects were let go in `bin` so far: the number of its next free slot."""
-
-    def standing(self) -> Sequence[Target]:
-        """Return where everything is that is believed to stand on the table, to be sorted or not."""
-
-    def bumped(self) -> None:
-        """Record that the arm ran into something: the whole table is in doubt now."""
-
-    def in_tool(self) -> Item | None:
-        """Return the item that the tool is believed to hold, or None."""
+    def invalidate_positions(self) -> None:
+        """Record that any object on the table may have been moved."""

@@ -54,7 +54,7 @@ def audit_objects(
         reach: Largest distance between the first position of an item and a position of its object [m].
     """
     counts = dict.fromkeys(PLACES, 0)
-    first_positions = [record.first for record in records if record.state is not State.PHANTOM]
+    first_positions = [record.first_position for record in records if record.state is not State.PHANTOM]
     for one in objects:
         seen = any(
             float(np.linalg.norm((first - position)[:2])) <= reach

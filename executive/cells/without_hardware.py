@@ -16,7 +16,7 @@ from executive.cell.protocols import Cell, Routes
 from executive.cell.visuals import Visuals
 from executive.cell.workcell import CellOptions
 from executive.events import Emit, TargetSelected
-from executive.ledger.tracker import ItemLedger
+from executive.ledger.tracker import Tracker
 from executive.perception.evidence import classes_distinct_by_touch
 
 
@@ -45,7 +45,7 @@ class CellWithoutHardware:
     ) -> None:
         del seed
         self.config, self.routes, self.steps = config, dict(routes), 0
-        self.accounts = ItemLedger(
+        self.accounts = Tracker(
             config.ledger, config.table, bins_of(config), self.routes, emit, classes_distinct_by_touch(config)
         )
         missing: Any = None

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 
 from executive.cell.detection import Detections
-from executive.ledger.item import NOTHING, ON_TABLE, UNSURE, Record, State
+from executive.ledger.item import LYING, REASON_NOT_FOUND, REASON_UNCERTAIN, Record, State
 
 MIN_EMPTY_PROBES = 3
 """Number of times that the tool must find nothing but the table at an item's place to prove it a phantom."""
@@ -61,14 +61,15 @@ def find_final_state(
         completed: True if the behaviour tree succeeded.
         touched_any: True if the tool has touched any item at the height of its class.
     """
+    belief = record.belief
     if record.state is State.HELD:
         return State.REJECTED, "still in the tool when the run ended"
-    if record.state not in ON_TABLE:
+    if record.state not in (*LYING, State.DROPPED):
         return None
-    if record.state is State.SEEN and not record.looks and record.overlooked == 1.0:
-        return State.REJECTED, UNSURE
-    if record.probability < 0.5:
-        return State.PHANTOM, NOTHING
+    if record.state is State.SEEN and not belief.looks and belief.miss_probability == 1.0:
+        return State.REJECTED, REASON_UNCERTAIN
+    if belief.probability < 0.5:
+        return State.PHANTOM, REASON_NOT_FOUND
     if record.empty_probes >= MIN_EMPTY_PROBES and touched_any and not record.had_contact:
         return State.PHANTOM, f"the tool found only the table at its place, {record.empty_probes} times"
     if record.state is State.DROPPED or gone:
@@ -91,14 +92,16 @@ def find_lost_elsewhere(records: Collection[Record], dropped: Collection[Record]
     """
     lost = [record for record in records if record.state is State.LOST and record not in dropped]
     appeared = [
-        record for record in records if record.appeared and record.exists and record.state in FINAL_STATES
+        record
+        for record in records
+        if record.has_appeared and record.belief.is_proved and record.state in FINAL_STATES
     ]
     found = []
     for old in lost:
-        same = [new for new in appeared if new.label == old.label and new.since > old.stamp]
-        if same:
-            old.state, old.why = State.PHANTOM, f"it is {same[0].item}"
-            appeared.remove(same[0])
+        same = (new for new in appeared if new.label == old.label and new.first_stamp > old.stamp)
+        if new := next(same, None):
+            old.set_state(State.PHANTOM, f"it is {new.item}")
+            appeared.remove(new)
             found.append(old)
     return found
 
@@ -110,7 +113,7 @@ def forget_rejected(records: Iterable[Record]) -> list[Record]:
     """
     left = [record for record in records if record.state in (State.REJECTED, State.SKIPPED)]
     for record in left:
-        record.state, record.why = State.PHANTOM, "the run was resumed, and it is sought anew"
+        record.set_state(State.PHANTOM, "the run was resumed, and looks search for it again")
     return left
 
 

@@ -1,10 +1,10 @@
-"""What lies in bins: nothing to pick, and where a dropped item may be found again."""
+"""Items in bins: number of objects, and dropped items that a bin may contain."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,97 +12,114 @@ import numpy as np
 from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.config import LedgerConfig
 from executive.cell.detection import Detections, Observation
-from executive.cell.objects import Item
+from executive.cell.error_rates import ErrorRates
 from executive.cell.protocols import Routes
 from executive.geometry import Array
+from executive.ledger.association import MAX_STANDARD_DEVIATIONS
 from executive.ledger.item import Record, State
-from executive.ledger.update import SURE
 
-WALL = 0.035
-"""How far from a bin's wall the middle of something has to come down to be in it for sure [m]: its radius."""
-FELL = math.log(0.95 / 0.05)
-"""Log odds that something is in a bin that it fell into by all one knows of its fall."""
-CORNERS = np.array([(0, 0, 0), (1, 1, 0), (1, -1, 0), (-1, 1, 0), (-1, -1, 0)])
-"""Places on a bin's floor that a look has to search, in halves of its length and width."""
+WALL_MARGIN = 0.035
+"""Smallest distance from the walls at which a landing centre of an object is in the bin for certain [m]."""
+LOG_ODDS_FELL_IN_BIN = math.log(0.95 / 0.05)
+"""Prior log odds that a dropped item lies in the bin over which it was predicted to land."""
+BIN_AREA_SHARE = 0.04
+"""Share of the searched area in which a false detection is assigned to a given bin."""
+FLOOR_POINTS = np.array([(0, 0, 0), (1, 1, 0), (1, -1, 0), (-1, 1, 0), (-1, -1, 0)])
+"""Points of a bin's floor that a look must show, in halves of its length and width."""
 
 
 @dataclass(frozen=True, eq=False)
 class Bins:
-    """Tells what lies in which bin, by the items that were let go there.
+    """Bins of the cell, and the bins that are right for each class.
 
     Attributes:
-        config: When what is believed.
+        config: Limits of the cell file.
         bins: By name.
         routes: Class label to the bins that are right for it.
-        records: All items by name, as they are at any time.
     """
 
     config: LedgerConfig
     bins: Mapping[str, Bin]
     routes: Routes
-    records: Mapping[Item, Record]
 
-    def objects_in(self, bin: str) -> int:
-        """Return how many objects were let go in `bin` so far, or must have fallen into it."""
-        return sum(bin in (record.bin, self.believed(record)) for record in self.records.values())
+    def count_in(self, bin: str, records: Iterable[Record]) -> int:
+        """Return the number of items that were released in a bin or are believed to have fallen into it."""
+        return sum(bin in (record.bin, find_believed_bin(record)) for record in records)
 
-    def at(self, observation: Observation, bias: float) -> str | None:
-        """Return the bin in which an observed object lies, None if there is none.
+    def find_bin(self, one: Observation, bias: float, records: Collection[Record]) -> str | None:
+        """Return the bin in which an observed object lies, or None.
 
-        An object just beside a bin counts as in it, if something was let go there.
+        The measurement error counts if the bin has content. `bias` is the systematic error [m].
         """
-        error = math.hypot(observation.std, bias)
+        error = MAX_STANDARD_DEVIATIONS * math.hypot(one.std, bias)
         for name, bin in self.bins.items():
-            if bin.contains(observation.position, SURE * error if self.objects_in(name) else 0.0):
+            if bin.contains(one.position, error if self.count_in(name, records) else 0.0):
                 return name
         return None
 
-    def let_fall(self, record: Record, landing: Array | None) -> None:
-        """Note where something fell that the tool lost; None: nobody knows."""
-        record.fallen.clear()
+    def predict(self, record: Record, landing: Array | None) -> None:
+        """Set the prior log odds that a dropped item lies in a bin.
+
+        `landing` `(3,)` [m] is the predicted position, or None if it is unknown.
+        """
+        record.bin_log_odds.clear()
         for bin in self.routes.get(record.label, ()):
-            if landing is not None and self.bins[bin].contains(landing, -WALL):
-                record.fallen[bin] = FELL
+            if landing is not None and self.bins[bin].contains(landing, -WALL_MARGIN):
+                record.bin_log_odds[bin] = LOG_ODDS_FELL_IN_BIN
 
-    def believed(self, record: Record) -> str | None:
-        """Return the bin that a dropped item must have fallen into, or None where that is not sure enough."""
-        if record.state is not State.DROPPED:
-            return None
-        return next((bin for bin, odds in record.fallen.items() if odds >= FELL), None)
+    def find_dropped(
+        self,
+        look: Detections,
+        content: Iterable[tuple[Observation, str]],
+        records: Collection[Record],
+    ) -> list[Record]:
+        """Set dropped items that a look shows in a bin of their class to PLACED, and return these items.
 
-    def fallen(
-        self, look: Detections, inside: Iterable[tuple[Observation, str | None]]
-    ) -> Iterator[tuple[Record, str]]:
-        """Yield the dropped items that a look finds in a bin that is right for them, and that bin.
-
-        More objects of a class in one of its bins than were let go there can only be ones that fell, once
-        it is as good as certain that the detector did not invent them.
+        If a bin shows more objects of a class than were released in it, the others must have fallen into it.
 
         Args:
-            look: A look at everything the camera sees.
-            inside: Each confident observation and the bin in which it lies, or None.
+            look: A look at the whole image.
+            content: Confident observations in bins, each with its bin.
+            records: All items.
         """
-        # What leans on a wall from inside may have its middle over it.
+        # The centre of an object that leans on a wall from the inside may lie over the wall.
         shown = Counter(
-            (observation.detection.label, bin)
-            for observation, bin in inside
-            if bin is not None and self.bins[bin].contains(observation.position, BIN_THICKNESS)
+            (one.detection.label, bin)
+            for one, bin in content
+            if self.bins[bin].contains(one.position, BIN_THICKNESS)
         )
-        for record in self.records.values():
-            if record.state is not State.DROPPED:
-                continue
-            label = record.label
-            for bin in self.routes.get(label, ()):
-                there = sum(r.bin == bin and r.label == label for r in self.records.values())
-                more = shown[label, bin] > there
-                if more or self._is_searched(bin, look):
-                    record.fell(bin, more, look.error_rates)
-                if record.fallen[bin] >= -math.log(self.config.overlooked):
-                    yield record, bin
+        found = []
+        for record in (record for record in records if record.state is State.DROPPED):
+            for bin in self.routes.get(record.label, ()):
+                known = sum(other.bin == bin and other.label == record.label for other in records)
+                is_shown = shown[record.label, bin] > known
+                if is_shown or self._is_searched(bin, look):
+                    update_bin_log_odds(record, bin, look.error_rates, is_shown=is_shown)
+                if record.bin_log_odds[bin] >= -math.log(self.config.overlooked):
+                    record.bin = bin
+                    record.set_state(State.PLACED, "")
+                    found.append(record)
                     break
+        return found
 
     def _is_searched(self, name: str, look: Detections) -> bool:
-        """Tell whether a look shows the whole floor of a bin."""
+        """Return True if a look shows the whole floor of a bin."""
         bin = self.bins[name]
-        reach = np.append(bin.size[:2] / 2 - WALL, 0.0)
-        return bool(look.is_searched(bin.position + reach * CORNERS).all())
+        half_size = np.append(bin.size[:2] / 2 - WALL_MARGIN, 0.0)
+        return bool(look.is_searched(bin.position + half_size * FLOOR_POINTS).all())
+
+
+def find_believed_bin(record: Record) -> str | None:
+    """Return the bin that contains a dropped item with a probability of at least 95 %, or None."""
+    if record.state is not State.DROPPED:
+        return None
+    return next((bin for bin, odds in record.bin_log_odds.items() if odds >= LOG_ODDS_FELL_IN_BIN), None)
+
+
+def update_bin_log_odds(record: Record, bin: str, rates: ErrorRates, *, is_shown: bool) -> None:
+    """Update the log odds that a dropped item lies in a bin with a look; they never fall below 0.
+
+    `is_shown` is True if the look showed an object that was not released in the bin.
+    """
+    ratio = (1.0 - rates.misses) / (rates.invented * BIN_AREA_SHARE) if is_shown else rates.misses
+    record.bin_log_odds[bin] = max(0.0, record.bin_log_odds[bin] + math.log(ratio))

@@ -7,7 +7,8 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from executive.cell.config import LedgerConfig
-from executive.ledger.item import LIKELY, UNSURE, Record, State
+from executive.ledger.association import MIN_PROBABILITY
+from executive.ledger.item import REASON_UNCERTAIN, Record, State
 
 MIN_P_VALUE, REJECTION_P_VALUE = 0.01, 0.001
 """Limits of the p-value of a binomial test of the number of looks with another class: the smallest to sort an
@@ -24,8 +25,8 @@ MAX_REPEATS = 2
 """Number of repeated answers from one pose after which further looks from there add hardly any evidence."""
 MAX_CLASS_ERROR_FOR_TOUCH = 0.2
 """Probability of a wrong class up to which an item is touched, if a touch decides its class."""
-MAX_UNSURE_LOOKS = 10
-"""Number of unsure looks since the last sure one after which an uncertain item is rejected."""
+MAX_UNCERTAIN_LOOKS = 10
+"""Number of looks with low-confidence detections of an item only after which it is rejected."""
 
 
 @dataclass(frozen=True)
@@ -46,44 +47,43 @@ class Certainty:
         After a failed grasp, the position must be known more precisely. If looks from one pose cannot prove
         the class, but a touch can, the item is certain enough to be touched.
         """
-        limit = self.config.misjudged
-        if record.repeats >= MAX_REPEATS and record.label in self.distinct_by_touch:
+        belief, limit = record.belief, self.config.misjudged
+        if belief.repeats >= MAX_REPEATS and record.label in self.distinct_by_touch:
             limit = MAX_CLASS_ERROR_FOR_TOUCH
-        standard_error = math.hypot(record.spread, record.bias)
+        max_error = self.config.aim * (RETRY_STANDARD_ERROR_FACTOR if record.attempts else 1.0)
         return (
-            record.probability >= LIKELY
-            and record.contradictions <= record.looks
-            and record.overlooked >= MIN_MISS_PROBABILITY
-            and record.misjudged <= limit
-            and record.p_value >= MIN_P_VALUE
-            and standard_error <= self.config.aim * (RETRY_STANDARD_ERROR_FACTOR if record.attempts else 1.0)
+            belief.probability >= MIN_PROBABILITY
+            and record.contradictions <= belief.looks
+            and belief.miss_probability >= MIN_MISS_PROBABILITY
+            and belief.class_error <= limit
+            and belief.p_value >= MIN_P_VALUE
+            and math.hypot(record.std, record.bias) <= max_error
         )
 
-    def reject_if_uncertain(self, record: Record, *, settled: bool) -> None:
+    def reject_if_uncertain(self, record: Record, *, is_settled: bool) -> None:
         """Reject an item if looks cannot prove its class, disagree about it, or remain unsure of the item.
 
         Args:
             record: The item.
-            settled: True if nothing has disturbed its place since it was seen.
+            is_settled: True if nothing may have moved the item since its last detection.
         """
-        known = settled and self.is_sure(record)
-        if known:
-            record.glimpses = 0
+        belief = record.belief
+        is_known = is_settled and self.is_sure(record)
+        if is_known:
+            belief.uncertain_looks = 0
         if record.state is not State.SEEN:
             return
-        if record.looks >= MIN_LOOKS_TO_REJECT and record.p_value < REJECTION_P_VALUE:
-            votes = ", ".join(f"{count} {label}" for label, count in record.tally.most_common())
-            record.state, record.why = State.REJECTED, f"its class is in doubt: {votes}"
+        if belief.looks >= MIN_LOOKS_TO_REJECT and belief.p_value < REJECTION_P_VALUE:
+            counts = ", ".join(f"{count} {label}" for label, count in belief.counts.most_common())
+            record.set_state(State.REJECTED, f"its class is in doubt: {counts}")
         elif self._cannot_prove_class(record):
-            chance = f"leave a chance of {record.misjudged:.1%} that it is no {record.label}"
-            why = (
-                f"{record.looks} looks from one pose {chance}; at most {self.config.misjudged:.1%} is allowed"
-            )
-            record.state, record.why = State.REJECTED, why
-        elif not known and (record.glimpses >= MAX_UNSURE_LOOKS or _is_contradicted(record)):
-            record.state = State.REJECTED
-            record.why = f"{UNSURE}: {record.contradiction}" if record.contradiction else UNSURE
-            record.existence = max(record.existence, 0.0)
+            chance = f"leave a chance of {belief.class_error:.1%} that it is no {record.label}"
+            limit = f"at most {self.config.misjudged:.1%} is allowed"
+            record.set_state(State.REJECTED, f"{belief.looks} looks from one pose {chance}; {limit}")
+        elif not is_known and (belief.uncertain_looks >= MAX_UNCERTAIN_LOOKS or _is_contradicted(record)):
+            details = f": {record.contradiction}" if record.contradiction else ""
+            record.set_state(State.REJECTED, REASON_UNCERTAIN + details)
+            belief.log_odds = max(belief.log_odds, 0.0)
 
     def count_low_touch(self, record: Record) -> bool:
         """Count a touch that is too low for the class; return True if it may have missed the top.
@@ -91,18 +91,19 @@ class Certainty:
         That may happen once, and only to an item whose class the looks prove without a touch.
         """
         record.low_touches += 1
-        return record.low_touches == 1 and record.misjudged <= self.config.misjudged
+        return record.low_touches == 1 and record.belief.class_error <= self.config.misjudged
 
     def _cannot_prove_class(self, record: Record) -> bool:
         """Return True if all looks came from one viewpoint, and neither they nor a touch prove its class."""
+        belief = record.belief
         return (
-            record.misjudged > self.config.misjudged
-            and record.repeats >= MAX_REPEATS
-            and len(record.answers) == 1
+            belief.class_error > self.config.misjudged
+            and belief.repeats >= MAX_REPEATS
+            and len(belief.answers) == 1
             and record.label not in self.distinct_by_touch
         )
 
 
 def _is_contradicted(record: Record) -> bool:
     """Return True if enough looks contradict the class of an item, and more contradict than support it."""
-    return record.contradictions >= MIN_CONTRADICTIONS_TO_REJECT and record.contradictions > record.looks
+    return record.contradictions >= max(MIN_CONTRADICTIONS_TO_REJECT, record.belief.looks + 1)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from executive.cell.config import TableConfig
 from executive.cell.detection import Detections
 from executive.geometry import Array
-from executive.ledger.independence import repeat_probability, viewpoint_of
+from executive.ledger.belief import repeat_probability, viewpoint_of
 
 PITCH = 0.02
 """Pitch of the grid of points on the table [m]; smaller than the smallest object."""
@@ -54,11 +54,10 @@ class Coverage:
         self._points = np.array([(x, y, POINT_HEIGHT) for x in xs for y in ys])
         self._low, self._high = np.array([left, low]), np.array([right, high])
         self._workspace = self._within(self._points, 0.0)
-        self._prior = np.where(self._within(self._points, EDGE_MARGIN), PRIOR_INSIDE, 1.0)
-        self._overlooked = np.where(self._within(self._points, EDGE_MARGIN), 1.0, PRIOR_OUTSIDE)
-        self._after_change = np.where(
-            self._within(self._points, EDGE_MARGIN), 1.0, PRIOR_OUTSIDE_AFTER_CHANGE
-        )
+        inside = self._within(self._points, EDGE_MARGIN)
+        self._prior = np.where(inside, PRIOR_INSIDE, 1.0)
+        self._overlooked = np.where(inside, 1.0, PRIOR_OUTSIDE)
+        self._after_change = np.where(inside, 1.0, PRIOR_OUTSIDE_AFTER_CHANGE)
         self._change_epochs = np.zeros(len(self._points), dtype=int)
         self._searched_from: dict[str, NDArray[np.bool_]] = {}
         self._full_looks = 0
@@ -100,7 +99,7 @@ class Coverage:
         nearest = int(np.argmin(distances))
         return float(self._overlooked[nearest]) if distances[nearest] <= PITCH else PRIOR_OUTSIDE
 
-    def in_workspace(self, position: Array) -> bool:
+    def is_in_workspace(self, position: Array) -> bool:
         """Return True if `position` `(3,)` [m] is at most `EDGE_MARGIN` outside the workspace."""
         return bool(self._within(position[None], EDGE_MARGIN)[0])
 
@@ -113,18 +112,18 @@ class Coverage:
         """
         if not self._full_looks:
             return 1.0
-        return float((self._prior * self._overlooked)[self._in_sight].max())
+        return float((self._prior * self._overlooked)[self._visible_points].max())
 
-    def in_sight(self, position: Array) -> bool:
+    def is_in_sight(self, position: Array) -> bool:
         """Return True if `position` `(3,)` [m] and all grid points around it can be seen.
 
         At the edge of the area hidden by the arm, a point may be visible while a place beside it never is.
         """
         around = np.hypot(*(self._points - position)[:, :2].T) <= PITCH
-        return bool(around.any() and self._in_sight[around].all())
+        return bool(around.any() and self._visible_points[around].all())
 
     @property
-    def _in_sight(self) -> NDArray[np.bool_]:
+    def _visible_points(self) -> NDArray[np.bool_]:
         return self._workspace | (self._last_shown > self._full_looks - RECENT_FULL_LOOKS)
 
     def _within(self, points: Array, margin: float) -> NDArray[np.bool_]:

@@ -9,31 +9,17 @@ from executive.cell.plain import rounded
 from executive.events import DetectedObject, FrameSearched
 
 
-def frame_searched(detections: Detections, observations: Sequence[Observation]) -> FrameSearched:
-    """Return the event of a look.
-
-    Args:
-        detections: Detections in one frame.
-        observations: These detections, localized.
-    """
+def describe_look(detections: Detections, observations: Sequence[Observation]) -> FrameSearched:
+    """Return the event of a look; `observations` are its localized detections."""
     frame = detections.frame
     return FrameSearched(
-        frame.id,
-        frame.camera,
-        detections.detector,
-        detections.view,
-        [_detected_object(one) for one in observations if one.confident],
-        [_detected_object(one) for one in observations if not one.confident],
+        frame.id, frame.camera, detections.detector, detections.view,
+        [_describe(one) for one in observations if one.confident],
+        [_describe(one) for one in observations if not one.confident],
         [detection.label for detection in detections.unknown],
-    )
+    )  # fmt: skip
 
 
-def _detected_object(observation: Observation) -> DetectedObject:
-    detection = observation.detection
-    return DetectedObject(
-        detection.label,
-        round(detection.confidence, 4),
-        rounded(detection.box, 2),
-        rounded(observation.position, 4),
-        observation.contradiction,
-    )
+def _describe(one: Observation) -> DetectedObject:
+    confidence, box = round(one.detection.confidence, 4), rounded(one.detection.box, 2)
+    return DetectedObject(one.detection.label, confidence, box, rounded(one.position, 4), one.contradiction)

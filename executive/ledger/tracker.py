@@ -1,8 +1,9 @@
-"""The ledger: who is who on the table, what may have moved, and what became of everything."""
+"""Tracker of all items: records of looks and robot actions, and the questions of skills about items."""
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
@@ -22,20 +23,29 @@ from executive.ledger.accounts import (
     find_final_state,
     find_lost_elsewhere,
     forget_rejected,
-)
-from executive.ledger.bins import Bins
+)  # fmt: skip
+from executive.ledger.bins import Bins, find_believed_bin
 from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage
-from executive.ledger.item import LYING, OPEN, Record, State
-from executive.ledger.look_event import frame_searched
-from executive.ledger.staleness import Freshness
-from executive.ledger.update import Looks
+from executive.ledger.item import LYING, Record, State
+from executive.ledger.look_event import describe_look
+from executive.ledger.staleness import Staleness
+from executive.ledger.update import Update
 
 
-class ItemLedger:
-    """Follows every object from its first look to its fate; implements `executive.cell.protocols.Ledger`.
+class Tracker:
+    """Tracks each object from its first look to its final state; implements `executive.cell.ledger.Ledger`.
 
-    Every change is emitted as an `item` event, so that the record can be rebuilt from the journal.
+    The tracker owns the records of the items and emits each change of an item as an event. The methods of the
+    protocol are documented there.
+
+    Args:
+        config: Limits of the cell file.
+        table: Declares the workspace.
+        bins: Bins by name.
+        routes: Class label to the bins that are right for it.
+        emit: Takes the events.
+        distinct_by_touch: Classes whose height distinguishes them from all others.
 
     Attributes:
         unknown, doubts: See `Remarks`.
@@ -50,265 +60,249 @@ class ItemLedger:
         emit: Emit,
         distinct_by_touch: Collection[str] = (),
     ) -> None:
-        self._config = config
+        self._config, self._routes, self._emit = config, routes, emit
         self._certainty = Certainty(config, distinct_by_touch)
-        self._routes = routes
-        self._emit = emit
+        self._bins = Bins(config, bins, routes)
+        self._coverage, self._staleness = Coverage(table), Staleness()
         self._records: dict[Item, Record] = {}
-        self._in_bins = Bins(config, bins, routes, self._records)
-        self._freshness = Freshness()
-        self._coverage = Coverage(table)
-        self._looks = Looks(config, self._coverage, self._freshness)
+        self._names: Counter[str] = Counter()
         self._frame = 0
         self._remarks = Remarks()
         self.unknown, self.doubts = self._remarks.unknown, self._remarks.doubts
 
     @property
     def records(self) -> Sequence[Record]:
-        """Everything known, in the order of first sight."""
+        """All items, in the order of the first detection."""
         return list(self._records.values())
 
     @property
     def epoch(self) -> int:
-        """How often the table has been changed by the robot so far."""
-        return self._freshness.epoch
-
-    def is_current(self, frame: Frame) -> bool:
-        """Tell whether nothing has put the whole table in doubt since the frame was taken."""
-        return self._freshness.anywhere_holds(frame.epoch)
+        """Number of changes of the table by the robot."""
+        return self._staleness.epoch
 
     def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:
-        """Record a look and return the `targets` that are known now.
-
-        What lies in a bin is no target. A detection where the robot has changed the table since the frame
-        was taken shows what is no longer there, and counts for nothing. The same frame a second time is no
-        second look.
-        """
+        """Update all items with one search of a frame, and return the targets."""
         frame = detections.frame
         self._remarks.add(detections)
         if frame.id != self._frame:
             self._frame = frame.id
-            self._take(detections, observations)
+            self._update(detections, observations)
         self._emit(FrameTaken(frame))
-        self._emit(frame_searched(detections, observations))
-        return self.targets()
+        self._emit(describe_look(detections, observations))
+        return self.find_targets()
 
-    def targets(self) -> Sequence[Target]:
-        """Return one target per item that is open and whose place is known now."""
+    def find_targets(self) -> Sequence[Target]:
+        """Return one target per open item on the table whose position is known now."""
         return [
             record.target
-            for record in self._records.values()
-            if record.state is State.SEEN and self._looks.settled(record)
+            for record in self.records
+            if record.state is State.SEEN and self._staleness.is_settled(record)
         ]
 
-    def is_fresh(self, target: Target) -> bool:
-        """Tell whether nothing the robot did since has put the target's position in doubt."""
-        return self._freshness.holds(target.position, target.epoch)
+    def find_objects_on_table(self) -> Sequence[Target]:
+        """Return all items that lie on the table with a probability of at least 0.5."""
+        return [
+            record.target
+            for record in self.records
+            if record.state in LYING and record.belief.probability >= 0.5 and not self._is_gone(record)
+        ]
 
-    def is_open(self, item: Item) -> bool:
-        """Tell whether the item still waits to be sorted."""
-        record = self._record(item)
-        return record.state in OPEN and not record.why
-
-    def is_sure(self, item: Item) -> bool:
-        """Tell whether there is enough evidence that the item exists, of which class it is, and where."""
-        return self._certainty.is_sure(self._record(item))
-
-    def in_doubt(self) -> Sequence[Item]:
-        """Return the open items in the workspace that a further look may make sure, or show to be gone."""
+    def find_uncertain_items(self) -> Sequence[Item]:
+        """Return the open items in the workspace that need a further look."""
         return [
             record.item
-            for record in self._records.values()
+            for record in self.records
             if self._may_wait(record)
-            and self._coverage.in_workspace(record.position)
-            and not self._is_known(record)
+            and self._coverage.is_in_workspace(record.position)
+            and not (self._certainty.is_sure(record) and self._staleness.is_settled(record))
         ]
 
-    def believes_empty(self, label: str | None = None) -> bool:
-        """Return True if it is as good as certain that nothing with a route is left where one can look.
+    def find_held_item(self) -> Item | None:
+        """Return the item in the tool, or None."""
+        return next((record.item for record in self.records if record.state is State.HELD), None)
 
-        Args:
-            label: Only objects of this class count; None: those of all classes.
-        """
-        waiting = any(
-            # Before any look is sure, its class is a guess.
-            ((record.label in self._routes and label in (None, record.label)) or not record.votes)
+    def is_current(self, frame: Frame) -> bool:
+        """Return True if no change after the capture of a frame may have moved all objects."""
+        return self._staleness.is_table_unchanged(frame.epoch)
+
+    def is_fresh(self, target: Target) -> bool:
+        """Return True if no change after the last detection of a target may have moved it."""
+        return self._staleness.is_unchanged(target.position, target.epoch)
+
+    def is_open(self, item: Item) -> bool:
+        """Return True if an item is still to be sorted."""
+        record = self._find(item)
+        return record.state in (State.SEEN, State.DROPPED) and not record.why
+
+    def is_sure(self, item: Item) -> bool:
+        """Return True if the existence, class and position of an item are certain enough."""
+        return self._certainty.is_sure(self._find(item))
+
+    def is_table_empty(self, label: str | None = None) -> bool:
+        """Return True if no object with a route is left on the visible table."""
+        return self._coverage.max_object_probability <= self._config.overlooked and not any(
+            # The class of an item without a confident detection is a guess.
+            ((record.label in self._routes and label in (None, record.label)) or not record.belief.looks)
             and self._may_wait(record)
-            and self._coverage.in_sight(record.position)
-            for record in self._records.values()
+            and self._coverage.is_in_sight(record.position)
+            for record in self.records
         )
-        return not waiting and self._coverage.max_object_probability <= self._config.overlooked
 
-    def touched(self, item: Item, contradiction: str = "", *, beside_top: bool = False) -> bool:
-        """Record a touch, which proves that an item exists; return True if it may be of its class.
+    def get_label(self, item: Item) -> str:
+        """Return the most probable class of an item."""
+        return self._find(item).label
 
-        `contradiction` and `beside_top` are as in `executive.cell.protocols.Ledger`. An item that was touched
-        at the height of its class before may have fallen since: then no height contradicts its class.
+    def count_attempts(self, item: Item) -> int:
+        """Return the number of failed attempts to pick an item."""
+        return self._find(item).attempts
+
+    def count_in(self, bin: str) -> int:
+        """Return the number of objects in a bin."""
+        return self._bins.count_in(bin, self.records)
+
+    def record_touch(self, item: Item, contradiction: str = "", *, beside_top: bool = False) -> bool:
+        """Record a touch, which proves that an item exists, and return True if it may be of its class.
+
+        An item that was touched at the height of its class before may have fallen over since: then no height
+        contradicts its class.
         """
-        record = self._record(item)
-        record.exists, record.had_contact, record.empty_probes = True, True, 0
+        record = self._find(item)
+        record.belief.is_proved, record.had_contact, record.empty_probes = True, True, 0
         if not contradiction:
-            record.touched, record.low_touches = record.label, 0
-        elif record.touched != record.label and not (beside_top and self._certainty.count_low_touch(record)):
+            record.touched_label, record.low_touches = record.label, 0
+        elif record.touched_label != record.label:
+            if beside_top and self._certainty.count_low_touch(record):
+                return True
             record.contradiction = contradiction
-            self._disturb(record.position, self._config.neighbourhood)
+            self._invalidate(record.position, self._config.neighbourhood)
             self._emit(record.summary)
             return False
         return True
 
-    def missed(self, item: Item, *, found_table: bool = False) -> None:
-        """Record a failed attempt: the cup may have pushed anything, so all is in doubt."""
-        record = self._record(item)
+    def record_miss(self, item: Item, *, found_table: bool = False) -> None:
+        """Record a failed attempt to pick an item; all positions are in doubt now."""
+        record = self._find(item)
         record.attempts += 1
         record.empty_probes += found_table
-        self._disturb(record.position, math.inf)
+        self.invalidate_positions()
         self._emit(record.summary)
 
-    def held(self, item: Item) -> None:
-        """Record that the tool holds the item; its neighbours may have moved.
+    def record_grasp(self, item: Item) -> None:
+        """Record that the tool holds an item; its neighbours may have been moved.
 
         Raises:
-            Fault: It holds another already, and no skill has said that this one left it.
+            Fault: The tool holds another item, and no skill has recorded the end of that grasp.
         """
-        if (other := self.in_tool()) not in (None, item):
+        if (other := self.find_held_item()) not in (None, item):
             raise Fault(
-                f"the tool cannot hold {item}: it holds {other}; the skill that ended this must say so to "
-                "the ledger, by placed, dropped or returned"
+                f"the tool cannot hold {item}: it holds {other}; the skill that released {other} must call "
+                "record_placement, record_drop or record_put_down of the ledger"
             )
-        record = self._change(item, State.HELD)
-        record.exists = True
-        self._disturb(record.position, self._config.neighbourhood)
+        record = self._find(item)
+        self._change(record, State.HELD)
+        record.belief.is_proved = True
+        self._invalidate(record.position, self._config.neighbourhood)
 
-    def dropped(self, item: Item, landing: Array | None = None) -> None:
-        """Record that the tool lost the item on the way; the whole table is in doubt now.
-
-        It is sought everywhere; `landing` `(3,)` [m] is where it must have come down, if one knows.
-        """
-        record = self._change(item, State.DROPPED)
-        self._in_bins.let_fall(record, landing)
+    def record_drop(self, item: Item, landing: Array | None = None) -> None:
+        """Record that the tool lost an item on the way; all positions are in doubt now."""
+        record = self._find(item)
+        self._change(record, State.DROPPED)
+        self._bins.predict(record, landing)
         record.attempts += 1
         record.epoch = self.epoch
-        self._disturb(record.position, math.inf)
+        self.invalidate_positions()
 
-    def placed(self, item: Item, bin: str) -> None:
-        """Record that the item was let go in a bin."""
-        record = self._record(item)
-        record.bin, record.why = bin, "" if record.state is State.HELD else record.why
-        self._change(item, State.PLACED)
+    def record_placement(self, item: Item, bin: str) -> None:
+        """Record that an item was released in a bin."""
+        record = self._find(item)
+        if record.state is State.HELD:
+            record.why = ""
+        record.bin = bin
+        self._change(record, State.PLACED)
 
-    def returned(self, item: Item, position: Array) -> None:
-        """Record that the item was put back on the table at a place `(3,)` [m]; a look has to confirm it."""
-        record = self._record(item)
-        record.locate(position, self._config.gate, settled=False)
+    def record_put_down(self, item: Item, position: Array) -> None:
+        """Record that an item was put back on the table at `position` `(3,)` [m]; a look must confirm it."""
+        record = self._find(item)
+        record.locate(position, self._config.gate, is_settled=False)
         record.epoch = self.epoch
-        self._change(item, State.REJECTED if record.why else State.SEEN)
-        self._disturb(record.position, math.inf)
+        self._change(record, State.REJECTED if record.why else State.SEEN)
+        self.invalidate_positions()
 
-    def rejected(self, item: Item, why: str) -> None:
-        """Record that the item is given up; it is reported and not tried again.
+    def reject(self, item: Item, why: str) -> None:
+        """Reject an item: it is reported and not tried again.
 
         A held item stays HELD until it is released; looks continue to search for a dropped item.
         """
-        record = self._record(item)
+        record = self._find(item)
         record.why = f"{why}: {record.contradiction}" if record.contradiction else why
-        self._change(item, record.state if record.state in (State.HELD, State.DROPPED) else State.REJECTED)
+        self._change(record, record.state if record.state in (State.HELD, State.DROPPED) else State.REJECTED)
 
-    def label(self, item: Item) -> str:
-        """Return the class the item is believed to be of."""
-        return self._record(item).label
-
-    def attempts(self, item: Item) -> int:
-        """Return how many grasps of the item have failed."""
-        return self._record(item).attempts
-
-    def objects_in(self, bin: str) -> int:
-        """Return how many objects were let go in `bin` so far: the number of its next free slot."""
-        return self._in_bins.objects_in(bin)
-
-    def standing(self) -> Sequence[Target]:
-        """Return where everything is that is believed to stand on the table, to be sorted or not."""
-        return [
-            record.target
-            for record in self._records.values()
-            if record.state in LYING and record.probability >= 0.5 and not self._is_gone(record)
-        ]
-
-    def bumped(self) -> None:
-        """Record that the arm ran into something: the whole table is in doubt now."""
-        self._disturb(np.zeros(3), math.inf)
-
-    def in_tool(self) -> Item | None:
-        """Return the item that the tool is believed to hold, or None."""
-        return next((r.item for r in self._records.values() if r.state is State.HELD), None)
+    def invalidate_positions(self) -> None:
+        """Record that any object on the table may have been moved."""
+        self._invalidate(np.zeros(3), math.inf)
 
     def close(self, *, completed: bool) -> None:
         """Decide the final state of each item; `completed` is True if the tree succeeded."""
-        touched_any = any(record.touched for record in self._records.values())
-        dropped = [record for record in self._records.values() if record.state is State.DROPPED]
-        for record in self._records.values():
-            if bin := self._in_bins.believed(record):
-                record.why = "it fell there"
-                self.placed(record.item, bin)
+        touched_any = any(record.touched_label for record in self.records)
+        dropped = [record for record in self.records if record.state is State.DROPPED]
+        for record in self.records:
             final = find_final_state(
                 record, gone=self._is_gone(record), sure=self._certainty.is_sure(record),
                 routed=record.label in self._routes, completed=completed, touched_any=touched_any,
             )  # fmt: skip
+            if bin := find_believed_bin(record):
+                record.bin, final = bin, (State.PLACED, "it fell there")
             if final is not None:
                 record.why = final[1]
-                self._change(record.item, final[0])
-        for record in find_lost_elsewhere(self._records.values(), dropped):
+                self._change(record, final[0])
+        for record in find_lost_elsewhere(self.records, dropped):
             self._emit(record.summary)
 
     def reopen(self) -> None:
-        """Forget the items that were left on the table; the next look enters those that still lie there."""
-        for record in forget_rejected(self._records.values()):
+        """Forget the items that were left on the table; the next look adds those that still lie there."""
+        for record in forget_rejected(self.records):
             self._emit(record.summary)
 
     def balance(self) -> dict[str, int]:
         """Return the counts `seen, placed, rejected, skipped, lost, phantom`."""
-        return count_states(self._records.values())
+        return count_states(self.records)
 
     def summaries(self) -> Sequence[ItemChanged]:
-        """Return the present state of each item, in the order of first sight."""
-        return [record.summary for record in self._records.values()]
+        """Return the present state of each item, in the order of the first detection."""
+        return [record.summary for record in self.records]
 
-    def _take(self, detections: Detections, observations: Sequence[Observation]) -> None:
+    def _update(self, detections: Detections, observations: Sequence[Observation]) -> None:
+        """Associate, update, reject; an object in a bin is no target, but it may be a dropped item."""
         bias = detections.error_rates.bias
-        inside = [(one, self._in_bins.at(one, bias)) for one in observations]
-        on_table = [one for one, bin in inside if bin is None]
-        for record in self._looks.take(self._records, detections, on_table):
-            self._certainty.reject_if_uncertain(record, settled=self._looks.settled(record))
+        in_bins = {one: self._bins.find_bin(one, bias, self.records) for one in observations}
+        update = Update(self._config, self._records, self._names, self._coverage, self._staleness, detections)
+        for record in update.apply([one for one, bin in in_bins.items() if bin is None]):
+            self._certainty.reject_if_uncertain(record, is_settled=self._staleness.is_settled(record))
             self._emit(record.summary)
         if detections.view == "full":
-            confident = [(one, bin) for one, bin in inside if one.confident]
-            for record, bin in self._in_bins.fallen(detections, confident):
-                record.why = ""
-                self.placed(record.item, bin)
+            content = [(one, bin) for one, bin in in_bins.items() if bin is not None and one.confident]
+            for record in self._bins.find_dropped(detections, content, self.records):
+                self._emit(record.summary)
 
     def _may_wait(self, record: Record) -> bool:
-        """Tell whether an item may be an object that lies on the table to be sorted."""
-        likely = record.probability > self._config.overlooked
-        return record.state is State.SEEN and likely and not self._is_gone(record)
-
-    def _is_known(self, record: Record) -> bool:
-        return self._certainty.is_sure(record) and self._looks.settled(record)
+        """Return True if an item may be an object that lies on the table and is to be sorted."""
+        is_possible = record.belief.probability > self._config.overlooked
+        return record.state is State.SEEN and is_possible and not self._is_gone(record)
 
     def _is_gone(self, record: Record) -> bool:
-        return record.overlooked <= self._config.overlooked
+        return record.belief.miss_probability <= self._config.overlooked
 
-    def _record(self, item: Item) -> Record:
+    def _find(self, item: Item) -> Record:
         try:
             return self._records[item]
         except KeyError:
             known = ", ".join(self._records) or "none"
             raise Fault(f'the ledger knows no item "{item}"; it knows: {known}') from None
 
-    def _change(self, item: Item, state: State) -> Record:
-        record = self._record(item)
+    def _change(self, record: Record, state: State) -> None:
         record.state = state
         self._emit(record.summary)
-        return record
 
-    def _disturb(self, centre: Array, radius: float) -> None:
-        self._freshness.disturb(np.asarray(centre, dtype=float), radius)
+    def _invalidate(self, centre: Array, radius: float) -> None:
+        self._staleness.record_change(centre, radius)
         self._coverage.reset_near(centre, radius, self.epoch)

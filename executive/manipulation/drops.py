@@ -21,10 +21,12 @@ def slipped(cell: Cell, item: Item) -> bool:
     """
     if cell.tool.holding:
         return False
-    if cell.ledger.in_tool() == item:
-        velocity, height = cell.arm.tool_velocity, cell.classes[cell.ledger.label(item)].height
+    if cell.ledger.find_held_item() == item:
+        velocity, height = cell.arm.tool_velocity, cell.classes[cell.ledger.get_label(item)].height
         calm = float(np.linalg.norm(velocity)) <= CALM
-        cell.ledger.dropped(item, landing(cell.arm.tool_pose.position, velocity, height) if calm else None)
+        cell.ledger.record_drop(
+            item, landing(cell.arm.tool_pose.position, velocity, height) if calm else None
+        )
     return True
 
 

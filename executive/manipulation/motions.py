@@ -67,7 +67,7 @@ def follow(skill: Skill, cell: Cell, motion: Motion, until: Callable[[], bool] =
         arm.stop()
     yield from settle(arm)
     if arm.met is not None:
-        cell.ledger.bumped()
+        cell.ledger.invalidate_positions()
         raise skill.failed("blocked", arm.met)
 
 
@@ -122,11 +122,11 @@ def let_go(skill: Skill, cell: Cell, item: Item, wait: float, told: Callable[[],
 
 def heeding(cell: Cell) -> Task:
     """Return the task of going somewhere with whatever the tool holds."""
-    held = cell.ledger.in_tool()
+    held = cell.ledger.find_held_item()
     return Task(around=around(cell)) if held is None else carrying(cell, held)
 
 
 def carrying(cell: Cell, item: Item) -> Task:
     """Return the task of carrying `item`, which the tool holds."""
-    kind = cell.classes[cell.ledger.label(item)]
+    kind = cell.classes[cell.ledger.get_label(item)]
     return Task(Load(kind, cell.tool.bears), around(cell, item))

@@ -21,7 +21,7 @@ def around(cell: Cell, but: Item | None = None) -> tuple[Obstacle, ...]:
     That is what the ledger believes on the table, and what lies in the bins (`slots_taken`).
     """
     return (
-        *(obstacle_of(cell, target) for target in cell.ledger.standing() if target.item != but),
+        *(obstacle_of(cell, target) for target in cell.ledger.find_objects_on_table() if target.item != but),
         *_filled(cell, but),
     )
 
@@ -40,9 +40,9 @@ def slots_taken(cell: Cell, bin: str, but: Item | None = None) -> int:
 
     What the tool carries into the bin counts, so that a plan made meanwhile still holds when it was let go.
     """
-    held = cell.ledger.in_tool()
+    held = cell.ledger.find_held_item()
     coming = held not in (None, but) and cell.bins[bin].contains(cell.arm.destination)
-    return cell.ledger.objects_in(bin) + coming
+    return cell.ledger.count_in(bin) + coming
 
 
 def obstacle_of(cell: Cell, target: Target) -> Obstacle:

@@ -56,7 +56,7 @@ def approach(
         target.position,
         cell.descent,
         cell.descent_speed,
-        attempt=cell.ledger.attempts(target.item),
+        attempt=cell.ledger.count_attempts(target.item),
         overtravel=overtravel,
         spacing=spacing,
     )
@@ -117,14 +117,14 @@ def nearest_first(cell: Cell, targets: Sequence[Target]) -> list[Target]:
         if ledger.is_open(target.item)
         and ledger.is_fresh(target)
         and ledger.is_sure(target.item)
-        and ledger.label(target.item) in cell.routes
+        and ledger.get_label(target.item) in cell.routes
     ]
     return sorted(possible, key=lambda t: (float(np.linalg.norm(t.position[:2] - here)), t.item))
 
 
 def into(cell: Cell, bin: str, item: Item, drop: float = DROP) -> Goal:
     """Return the goal of a transit: over the next free slot of a bin, `drop` [m] above what is there."""
-    height = cell.classes[cell.ledger.label(item)].height
+    height = cell.classes[cell.ledger.get_label(item)].height
     return over(cell.bins[bin], slots_taken(cell, bin, item), height, tallest(cell), drop)
 
 
@@ -149,7 +149,7 @@ def aside(cell: Cell, item: Item, drop: float) -> Goal:
     A place is free where nothing is believed to stand and no bin is; if none is far and wide, it is the safe
     place itself.
     """
-    kind = cell.classes[cell.ledger.label(item)]
+    kind = cell.classes[cell.ledger.get_label(item)]
     apart = 2 * kind.radius + SIDE_BY_SIDE
     x, y, floor = (float(value) for value in cell.safe_place)
     steps = [step * apart for step in range(-ROWS, ROWS + 1)]

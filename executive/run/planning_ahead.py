@@ -36,7 +36,9 @@ class PlanningAhead:
         if isinstance(event, TargetSelected):
             item, bin = event.item, event.bin
             # A skill may choose an item or a bin that the cell does not know; then no motion can be planned.
-            known = bin in self._cell.bins and item in {target.item for target in self._cell.ledger.targets()}
+            known = bin in self._cell.bins and item in {
+                target.item for target in self._cell.ledger.find_targets()
+            }
             self._selected = (item, bin) if known else None
         elif isinstance(event, ToolCommanded):
             self._is_closing = event.action == "close"
@@ -46,18 +48,18 @@ class PlanningAhead:
     def step(self) -> None:
         """Plan ahead if this control step showed which motion comes next; called after each tick."""
         cell = self._cell
-        if self._is_closing and self._selected and cell.ledger.in_tool() is None and cell.tool.holding:
+        if self._is_closing and self._selected and cell.ledger.find_held_item() is None and cell.tool.holding:
             self._is_closing = False
             item, bin = self._selected
             cell.arm.plan_ahead(into(cell, bin, item), carrying(cell, item))
         elif self._approach_is_outdated and self._is_delivering():
             self._approach_is_outdated = False
-            for target in nearest_first(cell, cell.ledger.targets())[:1]:
+            for target in nearest_first(cell, cell.ledger.find_targets())[:1]:
                 cell.arm.plan_ahead(*approach(cell, target))
 
     def _is_delivering(self) -> bool:
         """Return True if the present motion takes a held item over a bin: the next approach starts there."""
-        if self._cell.ledger.in_tool() is None:
+        if self._cell.ledger.find_held_item() is None:
             return False
         end = self._cell.arm.destination
         return any(bin.contains(end) for bin in self._cell.bins.values())

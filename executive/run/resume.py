@@ -137,12 +137,12 @@ def reconcile(cell: Cell, last_action: str) -> None:
         cell: The cell, with its arm at rest.
         last_action: Last action of the tool, `open` or `close`; "" if there was none.
     """
-    believed, holding = cell.ledger.in_tool(), cell.tool.holding
+    believed, holding = cell.ledger.find_held_item(), cell.tool.holding
     if believed is None and holding:
         # The interruption came after the seal and before the lift: the ledger does not know of the grasp.
         cell.tool.open()
     elif believed is not None and not holding and last_action == "close":
         cell.tool.open()
-        cell.ledger.dropped(believed)
+        cell.ledger.record_drop(believed)
     # After `open`, the restarted skill records where it released the item.
-    cell.ledger.bumped()
+    cell.ledger.invalidate_positions()

@@ -167,12 +167,12 @@ class Run:
         """Note the item that the tool holds: `something` if the ledger knows no such item."""
         cell = self._context.cell
         if cell.tool.holding:
-            self._held_item = cell.ledger.in_tool() or "something"
+            self._held_item = cell.ledger.find_held_item() or "something"
 
     def _ask_ledger(self) -> None:
         """Note whether the table is believed to be empty."""
         ledger = self._context.cell.ledger
-        self._is_empty = ledger.believes_empty() and not ledger.unknown
+        self._is_empty = ledger.is_table_empty() and not ledger.unknown
 
     def _outcome(self, ending: Ending) -> RunEnded:
         if ending.status == "SUCCESS":

@@ -15,8 +15,9 @@ from executive.replay.recorded_cell import COMMANDS
 
 _ROLES = ("arm", "tool", "camera", "detector", "ledger", "operator")
 _NOTED = COMMANDS | {
-    "camera.capture", "camera.next_pose", "operator.ask", "ledger.observe", "ledger.touched", "ledger.missed",
-    "ledger.held", "ledger.dropped", "ledger.placed", "ledger.returned", "ledger.rejected", "ledger.bumped",
+    "camera.capture", "camera.next_pose", "operator.ask", "ledger.observe", "ledger.record_touch",
+    "ledger.record_miss", "ledger.record_grasp", "ledger.record_drop", "ledger.record_placement",
+    "ledger.record_put_down", "ledger.reject", "ledger.invalidate_positions",
 }  # fmt: skip
 
 
@@ -24,8 +25,8 @@ def written_down(cell: Cell, commands: list[str]) -> Cell:
     """Return the cell with every command to one of its parts noted in `commands`, in order.
 
     A command is its part, its name and those of its arguments that have a short text: `arm.plan home`,
-    `arm.plan (0.5, 0.0, 0.035)`, `tool.close`, `embedded.request table`, `ledger.held cube-1`. Questions are
-    no commands.
+    `arm.plan (0.5, 0.0, 0.035)`, `tool.close`, `embedded.request table`, `ledger.reject cube-1`.
+    Questions are no commands.
     """
 
     def note(command: str, *arguments: Any) -> None:

@@ -13,7 +13,7 @@ from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
 from executive.cell.objects import Target
 from executive.events import Event
-from executive.ledger.tracker import ItemLedger
+from executive.ledger.tracker import Tracker
 from tests.camera_poses import looking_down
 
 EYE = ErrorRates(threshold=0.5, misses=0.03, confused=0.004, invented=0.02, jitter=1.0)
@@ -50,7 +50,7 @@ class Bench:
             "pink_bin": Bin("pink_bin", np.array([0.2, 0.44, 0]), size, slots),
             "grey_bin": Bin("grey_bin", np.array([-0.2, 0.44, 0]), size, slots),
         }
-        self.ledger = ItemLedger(
+        self.ledger = Tracker(
             self.config,
             TableConfig(),
             bins,
@@ -103,13 +103,13 @@ class Bench:
 
     def drop(self, item: str, landing: np.ndarray | None = None) -> None:
         """Have the tool pick an item and lose it on the way."""
-        self.ledger.held(item)
-        self.ledger.dropped(item, landing)
+        self.ledger.record_grasp(item)
+        self.ledger.record_drop(item, landing)
 
     def place(self, item: str, bin: str = "red_bin") -> None:
         """Have the tool pick an item and let it go in a bin."""
-        self.ledger.held(item)
-        self.ledger.placed(item, bin)
+        self.ledger.record_grasp(item)
+        self.ledger.record_placement(item, bin)
 
     def states(self) -> dict[str, tuple[str, str]]:
         """State of each item, and where it was placed or why it is in that state."""

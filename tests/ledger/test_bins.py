@@ -37,7 +37,7 @@ def test_what_came_down_in_its_bin_is_there_though_no_look_shows_it(
         bench.look()
     assert bench.end() == {"cube-1": final}
     assert bench.ledger.summaries()[0].why == ("it fell there" if final[0] == "placed" else final[1])
-    assert bench.ledger.attempts("cube-1") == 1
+    assert bench.ledger.count_attempts("cube-1") == 1
 
 
 def test_dropped_again_elsewhere_it_is_not_sought_where_it_fell_first(bench: Bench) -> None:
@@ -55,11 +55,11 @@ def test_what_must_have_fallen_into_a_bin_takes_a_place_there_until_a_look_shows
 ) -> None:
     bench.look(CUBE)
     bench.drop("cube-1", OVER)
-    assert bench.ledger.objects_in("red_bin") == 1
+    assert bench.ledger.count_in("red_bin") == 1
     bench.look(view="full")
-    assert (bench.ledger.objects_in("red_bin"), bench.states()["cube-1"][0]) == (0, "dropped")
+    assert (bench.ledger.count_in("red_bin"), bench.states()["cube-1"][0]) == (0, "dropped")
     bench.look(IN_RED, view="full")
-    assert bench.ledger.objects_in("red_bin") == 1
+    assert bench.ledger.count_in("red_bin") == 1
     (row,) = bench.ledger.summaries()
     assert (row.state, row.bin, row.why) == ("placed", "red_bin", "")
 
@@ -81,7 +81,7 @@ def test_what_was_given_up_is_found_in_its_bin_all_the_same(bench: Bench) -> Non
     bench.look(CUBE)
     bench.drop("cube-1")
     assert bench.ledger.is_open("cube-1")
-    bench.ledger.rejected("cube-1", "12 attempts failed")
+    bench.ledger.reject("cube-1", "12 attempts failed")
     assert not bench.ledger.is_open("cube-1")
     bench.look(IN_RED, view="full")
     assert bench.states() == {"cube-1": ("placed", "red_bin")}
@@ -92,7 +92,7 @@ def test_given_up_and_found_on_the_table_it_stays_given_up_and_never_found_it_is
     for one in (bench, other):
         one.look(CUBE)
         one.drop("cube-1")
-        one.ledger.rejected("cube-1", "12 attempts failed")
+        one.ledger.reject("cube-1", "12 attempts failed")
     assert bench.look(("cube", 0.55, 0.1)) == []
     assert bench.states() == {"cube-1": ("rejected", "12 attempts failed")}
     assert bench.ledger.summaries()[0].position == [0.55, 0.1, 0.025]
@@ -112,7 +112,7 @@ def test_an_item_dropped_is_recognized_after_further_changes(bench: Bench) -> No
     bench.look(CUBE, ("cube", 0.60, 0.1))
     bench.drop("cube-1")
     bench.look(("cube", 0.60, 0.1), ("duck", 0.45, 0.15))
-    bench.ledger.missed("cube-2")
+    bench.ledger.record_miss("cube-2")
     found = bench.look(("cube", 0.60, 0.1), ("cube", 0.45, -0.15), ("duck", 0.45, 0.15))
     assert {t.item for t in found} == {"cube-1", "cube-2", "duck-1"}
 

@@ -84,7 +84,7 @@ def test_a_change_brings_the_doubt_back_whatever_a_frame_from_before_shows(cover
 def test_the_workspace_reaches_as_far_as_half_an_object_over_its_edge(
     coverage: Coverage, place: tuple[float, float], inside: bool
 ) -> None:
-    assert coverage.in_workspace(np.array([*place, 0.03])) is inside
+    assert coverage.is_in_workspace(np.array([*place, 0.03])) is inside
 
 
 def test_a_place_beside_the_workspace_that_no_pose_shows_any_more_is_not_waited_for(
@@ -108,12 +108,12 @@ def test_a_place_beside_the_workspace_that_no_pose_shows_any_more_is_not_waited_
 )
 def test_a_place_counts_if_all_places_around_it_do(coverage: Coverage, y: float, counts: bool) -> None:
     coverage.update(look(hidden=slice(0, 174)))
-    assert coverage.in_sight(np.array([0.53, y, 0.025])) is counts
+    assert coverage.is_in_sight(np.array([0.53, y, 0.025])) is counts
 
 
 def test_a_place_beyond_the_table_or_near_something_unsure_does_not_count(coverage: Coverage) -> None:
     coverage.update(look(), [MIDDLE])
-    assert not coverage.in_sight(np.array([0.53, 2.0, 0.025]))
+    assert not coverage.is_in_sight(np.array([0.53, 2.0, 0.025]))
     assert coverage.find_miss_probability(np.array([0.53, 2.0, 0.025])) == PRIOR_OUTSIDE
     missed = [coverage.find_miss_probability(np.add(MIDDLE, (x, 0, 0))) for x in (0.0, 0.04)]
     assert missed == [1.0, pytest.approx(0.2)]

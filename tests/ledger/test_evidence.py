@@ -10,106 +10,112 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from executive.cell.error_rates import ErrorRates
+from executive.ledger.association import max_distance
+from executive.ledger.belief import Belief
+from executive.ledger.bins import update_bin_log_odds
 from executive.ledger.item import Record
-from executive.ledger.update import reach
 
 GOOD = ErrorRates(threshold=0.5, misses=0.02, confused=0.0025, invented=0.02, jitter=0.7)
 BAD = ErrorRates(threshold=0.5, misses=0.2, confused=0.1, invented=0.5, jitter=5.0)
 HERE = np.array([0.5, 0.0, 0.025])
 
 
-def record(existence: float = 0.0) -> Record:
-    return Record("cube-1", "cube", HERE, existence)
+def belief(log_odds: float = 0.0) -> Belief:
+    return Belief("cube", log_odds)
+
+
+def record() -> Record:
+    return Record("cube-1", belief(), HERE, 0, 0.0, False)
 
 
 def test_one_vote_of_a_good_detector_is_enough_for_a_class_and_three_of_a_bad_one() -> None:
-    one = record()
-    one.vote("cube", GOOD)
-    assert one.misjudged == pytest.approx(0.0025, rel=0.01)
-    other = record()
+    one = belief()
+    one.add_detection("cube", GOOD)
+    assert one.class_error == pytest.approx(0.0025, rel=0.01)
+    other = belief()
     doubts = []
     for _ in range(3):
-        other.vote("cube", BAD)
-        doubts.append(other.misjudged)
+        other.add_detection("cube", BAD)
+        doubts.append(other.class_error)
     assert doubts == [pytest.approx(0.1), pytest.approx(1 / 82), pytest.approx(1 / 730)]
 
 
 def test_votes_against_each_other_leave_nothing_certain() -> None:
-    mixed = record()
+    mixed = belief()
     for label in ("cube", "duck"):
-        mixed.vote(label, BAD)
+        mixed.add_detection(label, BAD)
     assert mixed.label == "cube", "the first in the alphabet"
-    assert mixed.misjudged == pytest.approx((1 + 1 / 9) / (2 + 1 / 9))
+    assert mixed.class_error == pytest.approx((1 + 1 / 9) / (2 + 1 / 9))
     assert mixed.p_value == pytest.approx(0.19), "1 of 2 wrong at 10 %"
 
 
 def test_what_looks_say_of_existence_adds_up() -> None:
-    seen = record(-1.0)
-    seen.vote("cube", GOOD)
-    assert seen.existence == -1.0, "the first look is in the prior"
-    seen.vote("cube", GOOD)
-    assert seen.existence == pytest.approx(-1.0 + math.log(0.98 / (0.02 * 0.02)))
-    assert (seen.exists, seen.looks) == (False, 2)
-    seen.vote("cube", GOOD)
-    assert (seen.exists, seen.probability) == (True, 1.0)
-    beside = record(3.0)
-    beside.vote("cube", GOOD, alone=False)
-    beside.vote("cube", GOOD, alone=False)
-    assert beside.existence == pytest.approx(math.log(0.1)), "it may as well be a known item"
+    seen = belief(-1.0)
+    seen.add_detection("cube", GOOD)
+    assert seen.log_odds == -1.0, "the first look is in the prior"
+    seen.add_detection("cube", GOOD)
+    assert seen.log_odds == pytest.approx(-1.0 + math.log(0.98 / (0.02 * 0.02)))
+    assert (seen.is_proved, seen.looks) == (False, 2)
+    seen.add_detection("cube", GOOD)
+    assert (seen.is_proved, seen.probability) == (True, 1.0)
+    beside = belief(3.0)
+    beside.add_detection("cube", GOOD, is_ambiguous=True)
+    beside.add_detection("cube", GOOD, is_ambiguous=True)
+    assert beside.log_odds == pytest.approx(math.log(0.1)), "it may as well be a known item"
     assert beside.probability == pytest.approx(0.1 / 1.1)
 
 
 def test_looks_into_a_bin_add_up_from_nothing() -> None:
     fallen = record()
-    fallen.fell("red_bin", False, GOOD)
-    assert fallen.fallen == {"red_bin": 0.0}
-    fallen.fell("red_bin", True, GOOD)
-    assert fallen.fallen == {"red_bin": pytest.approx(math.log(0.98 / (0.02 * 0.04)))}
+    update_bin_log_odds(fallen, "red_bin", GOOD, is_shown=False)
+    assert fallen.bin_log_odds == {"red_bin": 0.0}
+    update_bin_log_odds(fallen, "red_bin", GOOD, is_shown=True)
+    assert fallen.bin_log_odds == {"red_bin": pytest.approx(math.log(0.98 / (0.02 * 0.04)))}
 
 
 @given(st.lists(st.sampled_from(["cube", "duck", "sphere"]), min_size=1, max_size=12))
 def test_the_chance_of_a_wrong_class_is_one_and_the_label_is_the_likeliest(votes: list[str]) -> None:
-    item = record()
+    item = belief()
     for label in votes:
-        item.vote(label, BAD)
-    assert 0.0 < item.misjudged < 1.0
+        item.add_detection(label, BAD)
+    assert 0.0 < item.class_error < 1.0
     assert votes.count(item.label) == max(votes.count(label) for label in votes)
 
 
 @given(st.floats(-5, 5), st.integers(0, 200))
 def test_an_item_that_is_searched_in_vain_becomes_ever_less_likely(existence: float, looks: int) -> None:
-    item = record(existence)
+    item = belief(existence)
     before = item.probability
     for _ in range(looks):
-        item.miss(BAD)
+        item.add_miss(BAD)
     assert item.probability <= before
-    assert item.overlooked == pytest.approx(0.2**looks, abs=1e-12)
+    assert item.miss_probability == pytest.approx(0.2**looks, abs=1e-12)
 
 
 def test_what_the_tool_has_met_exists_however_often_it_is_overlooked() -> None:
-    item = record()
-    item.exists = True
+    item = belief()
+    item.is_proved = True
     for _ in range(50):
-        item.miss(BAD)
+        item.add_miss(BAD)
     assert item.probability == 1.0
 
 
 def test_looks_that_agree_sharpen_a_place_and_a_push_starts_anew() -> None:
     item = record()
     for offset in (-0.01, 0.01, -0.01, 0.01):
-        item.locate(HERE + np.array([offset, 0, 0]), 0.013, settled=True)
+        item.locate(HERE + np.array([offset, 0, 0]), 0.013, is_settled=True)
     assert item.position == pytest.approx(HERE)
-    assert item.spread == pytest.approx(0.013 / 2)
-    item.locate(HERE + np.array([0.05, 0, 0]), 0.013, settled=False)
+    assert item.std == pytest.approx(0.013 / 2)
+    item.locate(HERE + np.array([0.05, 0, 0]), 0.013, is_settled=False)
     assert item.position[0] == pytest.approx(0.55)
-    assert item.spread == 0.013
-    assert item.first == pytest.approx(HERE), "where it was before it was moved"
+    assert item.std == 0.013
+    assert item.first_position == pytest.approx(HERE), "where it was before it was moved"
 
 
 def test_measurements_count_by_how_good_they_are() -> None:
     item = record()
-    item.locate(HERE, 0.001, settled=True)
-    item.locate(HERE + np.array([0.011, 0, 0]), 0.0031623, settled=True)
+    item.locate(HERE, 0.001, is_settled=True)
+    item.locate(HERE + np.array([0.011, 0, 0]), 0.0031623, is_settled=True)
     assert item.position[0] - HERE[0] == pytest.approx(0.001, rel=0.02)
 
 
@@ -119,5 +125,5 @@ def test_measurements_count_by_how_good_they_are() -> None:
 )
 def test_the_gate_is_as_wide_as_the_measurements_scatter(spread: float, new: float, allowed: float) -> None:
     item = record()
-    item.spread = spread
-    assert reach(item, new, 0.025) == pytest.approx(allowed)
+    item.std = spread
+    assert max_distance(item, new, 0.025) == pytest.approx(allowed)

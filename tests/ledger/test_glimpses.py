@@ -6,7 +6,7 @@ import pytest
 from ledger_bench import Bench
 
 from executive.events import FrameSearched, ItemChanged
-from executive.ledger.certainty import MAX_UNSURE_LOOKS
+from executive.ledger.certainty import MAX_UNCERTAIN_LOOKS
 
 THERE = ("cube", 0.5, 0.0)
 UNSURE = ("rejected", "no look is sure of it")
@@ -16,7 +16,7 @@ PHANTOM = ("phantom", "more looks missed it than saw it")
 def test_what_is_only_glimpsed_is_an_item_in_doubt(bench: Bench) -> None:
     assert [target.item for target in bench.look(unsure=[THERE])] == ["cube-1"]
     assert (bench.ledger.summaries()[0].looks, bench.ledger.is_sure("cube-1")) == (0, False)
-    assert bench.ledger.in_doubt() == ["cube-1"]
+    assert bench.ledger.find_uncertain_items() == ["cube-1"]
     look = next(event for event in bench.events if isinstance(event, FrameSearched))
     assert (look.found, [one.label for one in look.unsure]) == ([], ["cube"])
 
@@ -25,7 +25,7 @@ def test_what_is_only_glimpsed_is_an_item_in_doubt(bench: Bench) -> None:
 def test_a_table_with_something_in_doubt_is_not_believed_to_be_empty(bench: Bench, unsure: list) -> None:
     for _ in range(6):
         bench.look(view="full", unsure=unsure)
-    assert bench.ledger.believes_empty() is not bool(unsure)
+    assert bench.ledger.is_table_empty() is not bool(unsure)
 
 
 @pytest.mark.parametrize(
@@ -34,10 +34,10 @@ def test_a_table_with_something_in_doubt_is_not_believed_to_be_empty(bench: Benc
         (1, 2, False, PHANTOM),
         (1, 1, True, PHANTOM),
         (1, 0, True, UNSURE),
-        (MAX_UNSURE_LOOKS - 1, 0, False, ("seen", "")),
-        (MAX_UNSURE_LOOKS, 0, False, UNSURE),
-        (MAX_UNSURE_LOOKS, 0, True, UNSURE),
-        (MAX_UNSURE_LOOKS, 3, True, PHANTOM),
+        (MAX_UNCERTAIN_LOOKS - 1, 0, False, ("seen", "")),
+        (MAX_UNCERTAIN_LOOKS, 0, False, UNSURE),
+        (MAX_UNCERTAIN_LOOKS, 0, True, UNSURE),
+        (MAX_UNCERTAIN_LOOKS, 3, True, PHANTOM),
     ],
 )
 def test_what_no_look_is_sure_of_is_given_up_and_what_looks_miss_was_nothing(
@@ -48,11 +48,11 @@ def test_what_no_look_is_sure_of_is_given_up_and_what_looks_miss_was_nothing(
     for _ in range(misses):
         bench.look()
     assert (bench.end() if ended else bench.states()) == {"cube-1": final}
-    assert bench.ledger.in_doubt() == (["cube-1"] if final[0] == "seen" else [])
+    assert bench.ledger.find_uncertain_items() == (["cube-1"] if final[0] == "seen" else [])
 
 
 def test_given_up_too_early_it_is_open_again_when_a_look_is_sure(bench: Bench) -> None:
-    for _ in range(MAX_UNSURE_LOOKS):
+    for _ in range(MAX_UNCERTAIN_LOOKS):
         bench.look(unsure=[THERE])
     bench.look(THERE)
     assert bench.states() == {"cube-1": ("seen", "")}
@@ -72,25 +72,27 @@ def test_a_sure_look_makes_an_item_of_a_glimpse_as_good_as_any(bench: Bench) -> 
     for one in (bench, bench, other, other):
         one.look(THERE)
     mine, others = bench.ledger.records[0], other.ledger.records[0]
-    assert (mine.item, mine.label, mine.misjudged) == ("duck-1", "cube", others.misjudged)
-    assert mine.existence == pytest.approx(others.existence, abs=2.0)
+    assert (mine.item, mine.label, mine.belief.class_error) == ("duck-1", "cube", others.belief.class_error)
+    assert mine.belief.log_odds == pytest.approx(others.belief.log_odds, abs=2.0)
     assert bench.ledger.is_sure("duck-1")
 
 
 def test_a_look_that_is_unsure_of_a_known_item_does_not_miss_it(bench: Bench) -> None:
     bench.look(THERE, unsure=[("duck", 0.51, 0.01)])
-    assert (len(bench.ledger.summaries()), bench.ledger.records[0].glimpses) == (1, 0), "a second, weaker box"
+    assert (len(bench.ledger.summaries()), bench.ledger.records[0].belief.uncertain_looks) == (1, 0), (
+        "a second, weaker box"
+    )
     for _ in range(5):
         bench.look(unsure=[("duck", 0.51, 0.0)])
     record = bench.ledger.records[0]
-    assert (record.overlooked, record.label, record.glimpses) == (1.0, "cube", 0)
+    assert (record.belief.miss_probability, record.label, record.belief.uncertain_looks) == (1.0, "cube", 0)
     assert bench.end() == {"cube-1": ("skipped", "the mission was completed without it")}
 
 
 def test_given_up_after_a_failed_grasp_it_stays_so(bench: Bench) -> None:
     bench.look(THERE)
-    bench.ledger.missed("cube-1")
-    for _ in range(MAX_UNSURE_LOOKS):
+    bench.ledger.record_miss("cube-1")
+    for _ in range(MAX_UNCERTAIN_LOOKS):
         bench.look(unsure=[THERE])
     bench.look(THERE)
     assert bench.states() == {"cube-1": UNSURE}
@@ -99,10 +101,10 @@ def test_given_up_after_a_failed_grasp_it_stays_so(bench: Bench) -> None:
 def test_a_known_item_that_waits_its_turn_is_not_given_up_for_glimpses(bench: Bench) -> None:
     for _ in range(3):
         bench.look(THERE, ("cube", 0.55, 0.0))
-    for _ in range(MAX_UNSURE_LOOKS + 5):
+    for _ in range(MAX_UNCERTAIN_LOOKS + 5):
         bench.look(("cube", 0.55, 0.0), unsure=[THERE])
     assert bench.ledger.is_sure("cube-1")
-    bench.ledger.held("cube-2")  # its neighbour
+    bench.ledger.record_grasp("cube-2")  # its neighbour
     bench.look(unsure=[THERE])
     assert bench.states()["cube-1"] == ("seen", "")
 
@@ -115,8 +117,8 @@ def test_what_is_gone_is_not_what_a_look_is_unsure_of_later(bench: Bench) -> Non
     bench.drop("cube-2")
     for _ in range(3):
         bench.look(view="full", unsure=[THERE])
-    assert "cube-3" in bench.ledger.in_doubt()
-    assert not bench.ledger.believes_empty()
+    assert "cube-3" in bench.ledger.find_uncertain_items()
+    assert not bench.ledger.is_table_empty()
 
 
 def test_a_new_item_that_proves_to_be_one_that_fell_is_reported_as_none(bench: Bench) -> None:

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 from ledger_bench import EYE, Bench
 
+from executive.ledger.belief import repeat_probability
 from executive.ledger.certainty import Certainty
-from executive.ledger.independence import repeat_probability
 
 DOUBTFUL = replace(EYE, confused=0.05, repeated=0.8)
 CUBE = ("cube", 0.5, 0.0)
@@ -28,7 +28,7 @@ def test_the_same_answer_from_the_same_pose_proves_a_class_only_a_little_more(be
     chances = []
     for _ in range(3):
         bench.look(CUBE, by=DOUBTFUL)
-        chances.append(record_of(bench).misjudged)
+        chances.append(record_of(bench).belief.class_error)
     # The odds 19 grow by (0.8 + 0.2 * 0.95) / (0.8 + 0.2 * 0.05) with each further look.
     ratio = 0.99 / 0.81
     assert [1 / chance - 1 for chance in chances] == pytest.approx([19, 19 * ratio, 19 * ratio**2])
@@ -54,15 +54,15 @@ def test_another_detector_at_the_same_pose_is_second_evidence(bench):
     bench.look(CUBE, by=DOUBTFUL)
     bench.look(CUBE, by=DOUBTFUL, detector="other")
     record = record_of(bench)
-    assert 1 / record.misjudged - 1 == pytest.approx(19**2)
+    assert 1 / record.belief.class_error - 1 == pytest.approx(19**2)
 
 
 def test_an_item_that_was_moved_is_looked_at_as_if_for_the_first_time(bench):
     bench.look(CUBE, by=DOUBTFUL)
-    bench.ledger.bumped()
+    bench.ledger.invalidate_positions()
     bench.look(CUBE, by=DOUBTFUL)
     record = record_of(bench)
-    assert (record.repeats, 1 / record.misjudged - 1) == (0, pytest.approx(19**2))
+    assert (record.belief.repeats, 1 / record.belief.class_error - 1) == (0, pytest.approx(19**2))
 
 
 def test_a_place_searched_again_from_the_same_pose_is_hardly_emptier():
@@ -79,4 +79,4 @@ def test_the_systematic_error_of_a_position_does_not_shrink_with_the_number_of_l
     for _ in range(5):
         bench.look(CUBE, by=replace(EYE, bias=0.006))
     record = record_of(bench)
-    assert (record.spread < 0.002, certainty.is_sure(record)) == (True, False)
+    assert (record.std < 0.002, certainty.is_sure(record)) == (True, False)

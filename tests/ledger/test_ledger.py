@@ -35,52 +35,55 @@ def test_the_class_is_evidence_and_not_identity(bench: Bench) -> None:
     bench.look(CUBE)
     target = bench.look(("duck", 0.5, 0.0))[0]
     assert (target.item, target.label) == ("cube-1", "cube"), "two votes against one"
-    bench.ledger.missed("cube-1")
+    bench.ledger.record_miss("cube-1")
     assert names(bench.look(("duck", 0.505, 0.0))) == ["cube-1"]
 
 
-@pytest.mark.parametrize(("event", "far_is_fresh"), [("held", True), ("missed", False), ("bumped", False)])
+@pytest.mark.parametrize(
+    ("event", "far_is_fresh"),
+    [("record_grasp", True), ("record_miss", False), ("invalidate_positions", False)],
+)
 def test_what_the_robot_does_puts_places_in_doubt(bench: Bench, event: str, far_is_fresh: bool) -> None:
     near, far = bench.look(CUBE, FAR)
     assert bench.ledger.is_fresh(near)
-    getattr(bench.ledger, event)(*(() if event == "bumped" else ("cube-1",)))
+    getattr(bench.ledger, event)(*(() if event == "invalidate_positions" else ("cube-1",)))
     assert not bench.ledger.is_fresh(near)
     assert bench.ledger.is_fresh(far) is far_is_fresh
-    assert bench.ledger.attempts("cube-1") == (event == "missed")
+    assert bench.ledger.count_attempts("cube-1") == (event == "record_miss")
 
 
 def test_a_pick_puts_in_doubt_what_is_nearer_than_seven_centimetres(bench: Bench) -> None:
     _, near, far = bench.look(CUBE, ("cube", 0.569, 0.0), ("cube", 0.5, 0.071))
-    bench.ledger.held("cube-1")
+    bench.ledger.record_grasp("cube-1")
     assert [bench.ledger.is_fresh(target) for target in (near, far)] == [False, True]
 
 
 def test_an_object_pushed_away_by_a_missed_grasp_is_still_the_same_item(bench: Bench) -> None:
     bench.look(CUBE, ("duck", 0.6, 0.1))
-    bench.ledger.missed("cube-1")
+    bench.ledger.record_miss("cube-1")
     assert names(bench.look(("cube", 0.60, -0.1), ("duck", 0.6, 0.1))) == ["cube-1", "duck-1"]
     assert list(bench.states()) == ["cube-1", "duck-1"]
 
 
 def test_an_empty_table_needs_looks_that_agree_since_the_last_change(bench: Bench) -> None:
     bench.look(CUBE)
-    bench.ledger.held("cube-1")
+    bench.ledger.record_grasp("cube-1")
     for _ in range(3):
         bench.look(view="full", epoch=0)  # frames from before the change say nothing
     bench.look(view="full")
-    assert not bench.ledger.believes_empty()
-    bench.ledger.placed("cube-1", "red_bin")
+    assert not bench.ledger.is_table_empty()
+    bench.ledger.record_placement("cube-1", "red_bin")
     bench.frames -= 1
     bench.look(view="full")
-    assert not bench.ledger.believes_empty(), "the same frame is no second look"
+    assert not bench.ledger.is_table_empty(), "the same frame is no second look"
     bench.look(view="full")
-    assert bench.ledger.believes_empty()
+    assert bench.ledger.is_table_empty()
 
 
 def test_objects_that_the_mission_has_no_route_for_are_nothing_left_to_sort(bench: Bench) -> None:
     for _ in range(2):
         bench.look(("duck", 0.50, 0.0), view="full")
-    assert bench.ledger.believes_empty()
+    assert bench.ledger.is_table_empty()
     assert bench.end() == {"duck-1": ("skipped", "the mission has no route for it")}
 
 
@@ -98,14 +101,14 @@ def test_an_item_is_skipped_only_if_the_mission_was_completed_without_an_attempt
     for _ in range(2):
         bench.look(CUBE)
     for _ in range(attempts):
-        bench.ledger.missed("cube-1")
+        bench.ledger.record_miss("cube-1")
     assert bench.end(completed=completed) == {"cube-1": final}
 
 
 def test_an_item_that_was_still_in_doubt_or_contradicted_is_not_skipped(bench: Bench) -> None:
     bench.look(CUBE, FAR)
     bench.look(("duck", 0.5, 0.0), FAR)  # a contradiction about the class of the first
-    bench.ledger.touched("cube-2", "it was touched 60 mm above the table, and a cube is 50 mm high")
+    bench.ledger.record_touch("cube-2", "it was touched 60 mm above the table, and a cube is 50 mm high")
     assert {state for state, _ in bench.end().values()} == {"rejected"}
 
 
@@ -117,8 +120,8 @@ def test_labels_that_the_cell_does_not_know_are_counted_by_the_look_with_most_of
 
 def test_a_rejection_after_a_contradiction_contains_it(bench: Bench) -> None:
     bench.look(CUBE)
-    bench.ledger.touched("cube-1", "it was touched 60 mm above the table, and a cube is 50 mm high")
-    bench.ledger.rejected("cube-1", "could not be picked")
+    bench.ledger.record_touch("cube-1", "it was touched 60 mm above the table, and a cube is 50 mm high")
+    bench.ledger.reject("cube-1", "could not be picked")
     ((_, why),) = bench.end().values()
     assert why == "could not be picked: it was touched 60 mm above the table, and a cube is 50 mm high"
 
@@ -126,13 +129,15 @@ def test_a_rejection_after_a_contradiction_contains_it(bench: Bench) -> None:
 def test_a_touch_may_miss_the_top_of_an_object_once(bench: Bench) -> None:
     bench.look(CUBE)
     doubt = "it was touched 40 mm above the table, and a cube is 50 mm high"
-    assert [bench.ledger.touched("cube-1", doubt, beside_top=True) for _ in range(2)] == [True, False]
+    assert [bench.ledger.record_touch("cube-1", doubt, beside_top=True) for _ in range(2)] == [True, False]
 
 
 def test_after_a_touch_at_its_height_an_object_may_lie_on_its_side(bench: Bench) -> None:
     bench.look(CUBE)
     doubt = "it was touched 40 mm above the table, and a cube is 50 mm high"
-    answers = [bench.ledger.touched("cube-1", text, beside_top=True) for text in (doubt, "", doubt, doubt)]
+    answers = [
+        bench.ledger.record_touch("cube-1", text, beside_top=True) for text in (doubt, "", doubt, doubt)
+    ]
     assert answers == [True] * 4
 
 
@@ -145,7 +150,7 @@ def test_three_looks_that_contradict_the_class_of_an_item_reject_it(bench: Bench
 
 def test_a_frame_from_before_a_pick_brings_nothing_back(bench: Bench) -> None:
     bench.look(CUBE, FAR)
-    bench.ledger.held("cube-1")
+    bench.ledger.record_grasp("cube-1")
     assert names(bench.look(CUBE, FAR, epoch=0)) == ["cube-2"]
     assert bench.ledger.balance()["seen"] == 2
 
@@ -166,7 +171,7 @@ def test_what_looks_agree_on_decides_what_becomes_of_an_item(
     for _ in range(looks):
         bench.look(CUBE)
     if rejected:
-        bench.ledger.rejected("cube-1", "slippery")
+        bench.ledger.reject("cube-1", "slippery")
     for _ in range(misses):
         bench.look(view="full")
     assert bench.end() == {"cube-1": final}
@@ -176,19 +181,19 @@ def test_what_looks_agree_on_decides_what_becomes_of_an_item(
 
 def test_an_item_that_is_given_up_in_the_tool_stays_there_until_it_is_released(bench: Bench) -> None:
     bench.look(CUBE)
-    bench.ledger.held("cube-1")
-    bench.ledger.rejected("cube-1", "slippery")
-    assert bench.ledger.in_tool() == "cube-1"
-    bench.ledger.placed("cube-1", "red_bin")
+    bench.ledger.record_grasp("cube-1")
+    bench.ledger.reject("cube-1", "slippery")
+    assert bench.ledger.find_held_item() == "cube-1"
+    bench.ledger.record_placement("cube-1", "red_bin")
     (row,) = bench.ledger.summaries()
     assert (row.state, row.bin, row.why) == ("placed", "red_bin", "")
 
 
 def test_an_item_that_is_given_up_in_the_tool_and_put_back_is_rejected(bench: Bench) -> None:
     bench.look(CUBE)
-    bench.ledger.held("cube-1")
-    bench.ledger.rejected("cube-1", "slippery")
-    bench.ledger.returned("cube-1", np.array([0.5, 0.0, 0.025]))
+    bench.ledger.record_grasp("cube-1")
+    bench.ledger.reject("cube-1", "slippery")
+    bench.ledger.record_put_down("cube-1", np.array([0.5, 0.0, 0.025]))
     assert bench.end() == {"cube-1": ("rejected", "slippery")}
 
 
@@ -196,7 +201,7 @@ def test_every_change_is_reported_and_the_accounts_balance(bench: Bench) -> None
     for _ in range(2):
         bench.look(CUBE, ("cube", 0.6, 0.1), ("duck", 0.45, -0.2))
     bench.place("cube-1")
-    bench.ledger.rejected("duck-1", "slippery")
+    bench.ledger.reject("duck-1", "slippery")
     bench.look(view="full")
     assert bench.end() == {
         "cube-1": ("placed", "red_bin"),
@@ -216,22 +221,22 @@ def test_every_change_is_reported_and_the_accounts_balance(bench: Bench) -> None
 
 def test_an_item_nobody_entered_is_a_fault(bench: Bench) -> None:
     with pytest.raises(Fault, match='the ledger knows no item "cube-9"; it knows: none'):
-        bench.ledger.held("cube-9")
+        bench.ledger.record_grasp("cube-9")
     bench.look(CUBE)
     with pytest.raises(Fault, match='the ledger knows no item "cube-9"; it knows: cube-1'):
-        bench.ledger.label("cube-9")
+        bench.ledger.get_label("cube-9")
 
 
 def test_the_tool_holds_one_item_at_a_time(bench: Bench) -> None:
     bench.look(CUBE, ("duck", 0.6, 0.1))
-    assert bench.ledger.in_tool() is None
-    bench.ledger.held("cube-1")
-    bench.ledger.held("cube-1")
+    assert bench.ledger.find_held_item() is None
+    bench.ledger.record_grasp("cube-1")
+    bench.ledger.record_grasp("cube-1")
     with pytest.raises(Fault, match="the tool cannot hold duck-1: it holds cube-1; the skill"):
-        bench.ledger.held("duck-1")
-    bench.ledger.dropped("cube-1")
-    bench.ledger.held("duck-1")
-    assert bench.ledger.in_tool() == "duck-1"
+        bench.ledger.record_grasp("duck-1")
+    bench.ledger.record_drop("cube-1")
+    bench.ledger.record_grasp("duck-1")
+    assert bench.ledger.find_held_item() == "duck-1"
     assert bench.end()["duck-1"] == ("rejected", "still in the tool when the run ended")
 
 
@@ -248,7 +253,7 @@ def test_one_slip_about_the_class_costs_some_looks_and_no_more(bench: Bench) -> 
     for _ in range(6):
         bench.look(CUBE)
         sure.append(bench.ledger.is_sure("duck-1"))
-    assert bench.ledger.label("duck-1") == "cube"
+    assert bench.ledger.get_label("duck-1") == "cube"
     assert sure == [False, True, True, True, True, True]
 
 
@@ -269,26 +274,26 @@ def test_a_misread_object_is_nobody_who_is_missed_before_its_class_is_sure(bench
 def test_what_is_believed_on_the_table_stands_there_given_up_or_not(bench: Bench) -> None:
     for _ in range(2):
         bench.look(CUBE, ("cube", 0.60, 0.1), ("duck", 0.6, -0.1))
-    bench.ledger.rejected("cube-2", "slippery")
-    assert names(bench.ledger.standing()) == ["cube-1", "cube-2", "duck-1"]
-    assert bench.ledger.standing()[2].position[:2] == pytest.approx([0.6, -0.1])
-    for change in (bench.ledger.held, bench.ledger.dropped):
+    bench.ledger.reject("cube-2", "slippery")
+    assert names(bench.ledger.find_objects_on_table()) == ["cube-1", "cube-2", "duck-1"]
+    assert bench.ledger.find_objects_on_table()[2].position[:2] == pytest.approx([0.6, -0.1])
+    for change in (bench.ledger.record_grasp, bench.ledger.record_drop):
         change("cube-1")
-        assert names(bench.ledger.standing()) == ["cube-2", "duck-1"]
+        assert names(bench.ledger.find_objects_on_table()) == ["cube-2", "duck-1"]
     bench.look(("cube", 0.45, 0.1), ("cube", 0.60, 0.1))
-    assert "cube-1" in names(bench.ledger.standing())
-    bench.ledger.placed("cube-1", "red_bin")
-    assert "cube-1" not in names(bench.ledger.standing())
+    assert "cube-1" in names(bench.ledger.find_objects_on_table())
+    bench.ledger.record_placement("cube-1", "red_bin")
+    assert "cube-1" not in names(bench.ledger.find_objects_on_table())
 
 
 def test_what_is_put_down_stands_there_and_waits_for_a_look(bench: Bench) -> None:
     bench.look(CUBE)
-    bench.ledger.held("cube-1")
-    bench.ledger.returned("cube-1", np.array((0.6, 0.2, 0.025)))
-    (target,) = bench.ledger.standing()
+    bench.ledger.record_grasp("cube-1")
+    bench.ledger.record_put_down("cube-1", np.array((0.6, 0.2, 0.025)))
+    (target,) = bench.ledger.find_objects_on_table()
     assert (target.item, target.position.tolist()) == ("cube-1", [0.6, 0.2, 0.025])
     assert not bench.ledger.is_fresh(target)
-    assert bench.ledger.in_doubt() == ["cube-1"]
+    assert bench.ledger.find_uncertain_items() == ["cube-1"]
     assert names(bench.look(("cube", 0.603, 0.198))) == ["cube-1"]
     assert bench.end() == {"cube-1": LEFT}
 
@@ -297,31 +302,31 @@ def test_what_is_likelier_an_invention_or_gone_stands_nowhere(bench: Bench) -> N
     wild = ErrorRates(threshold=0.5, misses=0.5, confused=0.004, invented=3.0, jitter=1.0)
     bench.look(CUBE, by=wild)
     bench.look(by=wild)
-    assert bench.ledger.standing() == []
+    assert bench.ledger.find_objects_on_table() == []
     for _ in range(2):
         bench.look(("duck", 0.60, 0.1))
-    assert names(bench.ledger.standing()) == ["duck-1"]
+    assert names(bench.ledger.find_objects_on_table()) == ["duck-1"]
     bench.look()
-    assert names(bench.ledger.standing()) == ["duck-1"], "one look may have missed it"
+    assert names(bench.ledger.find_objects_on_table()) == ["duck-1"], "one look may have missed it"
     bench.look()
-    assert bench.ledger.standing() == []
+    assert bench.ledger.find_objects_on_table() == []
 
 
 def test_what_only_just_shows_is_not_looked_for_for_ever_but_the_workspace_is(
     bench: Bench,
 ) -> None:
     bench.look(("cube", 0.53, 0.345), view="full")
-    bench.ledger.bumped()
+    bench.ledger.invalidate_positions()
     # The nearest point that stands for the table shows beside the arm, but not what lies a little farther.
     for _ in range(12):
         bench.look(view="full", hidden=slice(0, 174))
-    assert bench.ledger.believes_empty()
+    assert bench.ledger.is_table_empty()
     other = Bench()
     other.look(("cube", 0.53, 0.235))
-    other.ledger.bumped()
+    other.ledger.invalidate_positions()
     for _ in range(12):
         other.look(view="full", hidden=slice(0, 230))
-    assert other.ledger.in_doubt() == ["cube-1"]
+    assert other.ledger.find_uncertain_items() == ["cube-1"]
 
 
 @pytest.mark.parametrize(
@@ -354,7 +359,7 @@ def test_what_lies_where_something_was_invented_before_the_table_changed_is_new(
     for _ in range(4):
         bench.look(("cube", 0.6, 0.1))
     bench.look(("cube", 0.6, 0.1), ("duck", 0.5, 0.0))
-    assert bench.ledger.records[1].probability < 0.5, "nothing was there in four looks"
+    assert bench.ledger.records[1].belief.probability < 0.5, "nothing was there in four looks"
     bench.drop("cube-1")
     for _ in range(3):
         bench.look(("cube", 0.5, 0.02))
@@ -376,11 +381,11 @@ def test_an_item_is_a_phantom_if_the_tool_found_only_the_table_there_three_times
 ) -> None:
     for number in range(probes):
         bench.look(("cube", 0.5 + (moved if number == probes - 1 else 0.0), 0.0), FAR)
-        bench.ledger.missed("cube-1", found_table=True)
+        bench.ledger.record_miss("cube-1", found_table=True)
     bench.look(("cube", 0.5 + moved, 0.0), FAR)
     if touches_other:
-        bench.ledger.touched("cube-2")
-    bench.ledger.rejected("cube-1", "could not be picked")
+        bench.ledger.record_touch("cube-2")
+    bench.ledger.reject("cube-1", "could not be picked")
     assert bench.end()["cube-1"] == final
 
 
@@ -390,25 +395,25 @@ def test_an_item_that_was_touched_exists_although_the_tool_finds_only_the_table_
 ) -> None:
     for _ in range(3):
         bench.look(CUBE, FAR)
-    bench.ledger.touched("cube-2")
+    bench.ledger.record_touch("cube-2")
     bench.look(CUBE, FAR)
-    assert bench.ledger.touched("cube-1", contradiction, beside_top=True)
+    assert bench.ledger.record_touch("cube-1", contradiction, beside_top=True)
     for _ in range(3):
-        bench.ledger.missed("cube-1", found_table=True)
+        bench.ledger.record_miss("cube-1", found_table=True)
         bench.look(CUBE)
-    bench.ledger.rejected("cube-1", "could not be picked")
+    bench.ledger.reject("cube-1", "could not be picked")
     assert bench.end()["cube-1"] == ("rejected", "could not be picked")
 
 
 def test_a_phantom_that_the_tool_tried_to_pick_may_turn_up_elsewhere(bench: Bench) -> None:
     bench.look(CUBE)
-    bench.ledger.missed("cube-1")
+    bench.ledger.record_miss("cube-1")
     for _ in range(4):
         bench.look()
     assert bench.states() == {"cube-1": PHANTOM}
     for _ in range(2):
         bench.look(("cube", 0.55, 0.05))
-    assert (bench.states()["cube-1"], bench.ledger.attempts("cube-1")) == (("seen", ""), 1)
+    assert (bench.states()["cube-1"], bench.ledger.count_attempts("cube-1")) == (("seen", ""), 1)
 
 
 def put_away(bench: Bench, *still_there: Thing) -> None:
@@ -433,7 +438,7 @@ def test_an_item_that_appeared_while_the_tool_held_another_does_not_explain_its_
     for _ in range(2):
         bench.look(CUBE, view="full")
     put_away(bench, CUBE)
-    bench.ledger.held("cube-1")
+    bench.ledger.record_grasp("cube-1")
     put_away(bench, FAR)
     bench.drop("cube-1")
     bench.place("cube-2")

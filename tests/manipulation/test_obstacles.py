@@ -41,7 +41,7 @@ def test_what_is_to_be_touched_is_named_as_it_stands_there(fake: FakeCell, targe
 
 
 def test_a_rejected_item_stands_there_still(fake: FakeCell, targets: list[Target]) -> None:
-    fake.ledger.rejected("duck-1", "slippery")
+    fake.ledger.reject("duck-1", "slippery")
     assert "duck-1" in names(fake)
 
 

@@ -51,7 +51,7 @@ class UnkindCell(FakeCell):
 
     def _open_or_not(self) -> None:
         # A grasp that is taken back lets go for sure: no skill looks whether it did.
-        if self.ledger.in_tool() is None or not self._happens(0.05):
+        if self.ledger.find_held_item() is None or not self._happens(0.05):
             self._open()
 
     def _answer(self, look: int, true: Sequence[Detection]) -> Sequence[Detection] | str:

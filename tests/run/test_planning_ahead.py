@@ -180,7 +180,7 @@ def test_what_cannot_be_picked_is_not_planned(bench: Bench, planned: list[Goal])
     bench.fake.world.put("sphere", 0.6, 0.2)
     bench.fake.world.put("duck", 0.55, 0.0)
     targets = bench.look()
-    bench.fake.ledger.rejected("sphere-1", "slippery")
+    bench.fake.ledger.reject("sphere-1", "slippery")
     bench.carry(targets[:1])
     assert len(planned) == 1, "the duck stands so near that the pick may have moved it"
 
@@ -204,7 +204,7 @@ def test_nothing_is_planned_without_a_planner(bench: Bench) -> None:
     planner, bench.context.planner = bench.context.planner, None
     bench.context.plan_ahead()
     bench.context.planner = planner
-    bench.fake.ledger.held("cube-1")
+    bench.fake.ledger.record_grasp("cube-1")
     bench.run(Transit(held="cube-1", bin="red_bin"))
     assert bench.ahead == [False, False]
 

@@ -36,10 +36,10 @@ def test_tool_and_ledger_agree_afterwards(
     if sealed:
         fake.tool.close()
     if known:
-        fake.ledger.held(item)
+        fake.ledger.record_grasp(item)
     reconcile(fake.cell, intent)
     (row,) = fake.ledger.summaries()
-    assert (fake.tool.holding, fake.ledger.in_tool() == item, row.state) == left
+    assert (fake.tool.holding, fake.ledger.find_held_item() == item, row.state) == left
     assert row.attempts == (row.state == "dropped")
 
 

@@ -37,7 +37,7 @@ def test_a_probe_far_beside_the_middle_proves_nothing(
     fake.world.objects.clear()
     for offset, empty_probes in ((0.02, 0), (0.0025, 1)):
         for _ in range(3):
-            fake.ledger.missed(target.item)
+            fake.ledger.record_miss(target.item)
         run_skill(Approach(target=replace(target, epoch=fake.ledger.epoch), offset=offset), fake)
         assert fake.ledger.records[1].empty_probes == empty_probes
 
@@ -58,8 +58,8 @@ def test_a_touch_that_only_the_fourth_attempt_can_make_is_no_touch_of_the_target
     if is_touched:
         run_skill(Approach(target=target), fake)
     for _ in range(3):
-        fake.ledger.missed(target.item)
+        fake.ledger.record_miss(target.item)
     thing.position[2] = -0.005
     result = run_skill(Approach(target=replace(target, epoch=fake.ledger.epoch)), fake)
     assert (result.reason, result.message[: len(message)]) == (reason, message)
-    assert fake.ledger.attempts(target.item) == (4 if is_touched else 3)
+    assert fake.ledger.count_attempts(target.item) == (4 if is_touched else 3)

@@ -21,4 +21,4 @@ def test_what_should_be_in_the_tool_and_is_not_was_dropped(fake: FakeCell, held:
     fake.tool.open()
     assert run_skill(IsHolding(), fake).message == f"the sensor feels no seal; {held} was dropped"
     ledger = fake.ledger
-    assert (ledger.in_tool(), ledger.is_open(held), ledger.attempts(held)) == (None, True, 1)
+    assert (ledger.find_held_item(), ledger.is_open(held), ledger.count_attempts(held)) == (None, True, 1)

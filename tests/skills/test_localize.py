@@ -28,7 +28,7 @@ def test_a_frame_from_before_a_missed_grasp_is_stale(fake: FakeCell, look) -> No
     fake.world.put("cube", 0.5, 0.0)
     look()
     old = run_skill(Detect(), fake).outputs["detections"]
-    fake.ledger.missed("cube-1")
+    fake.ledger.record_miss("cube-1")
     result = run_skill(Localize(detections=old), fake)
     assert (result.reason, result.message) == ("stale", "frame 2 shows the table before change 1; look again")
 
@@ -38,7 +38,7 @@ def test_a_frame_stays_good_after_a_pick_elsewhere(fake: FakeCell, look) -> None
     fake.world.put("duck", 0.6, 0.2)
     look()
     old = run_skill(Detect(), fake).outputs["detections"]
-    fake.ledger.held("cube-1")
+    fake.ledger.record_grasp("cube-1")
     assert run_skill(Localize(detections=old), fake).status == "SUCCESS"
 
 
@@ -92,7 +92,11 @@ def unsure(fake: FakeCell):
 def test_what_the_detector_is_unsure_of_is_an_item_in_doubt_where_it_seems_to_be(fake: FakeCell) -> None:
     run_skill(Localize(detections=unsure(fake)), fake)
     (row,) = fake.ledger.summaries()
-    assert (row.item, row.position, fake.ledger.in_doubt()) == ("cube-1", [0.5, 0.0, 0.025], ["cube-1"])
+    assert (row.item, row.position, fake.ledger.find_uncertain_items()) == (
+        "cube-1",
+        [0.5, 0.0, 0.025],
+        ["cube-1"],
+    )
 
 
 def test_a_box_in_doubt_without_a_place_is_not_passed_over(

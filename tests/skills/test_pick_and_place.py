@@ -70,11 +70,11 @@ def test_an_approach_that_meets_something_else_says_what(
     change(fake)
     result = run_skill(Approach(target=target), fake)
     assert (result.reason, result.message) == (reason, message)
-    assert (fake.ledger.attempts("cube-1"), fake.ledger.is_fresh(target)) == (attempts, is_fresh)
+    assert (fake.ledger.count_attempts("cube-1"), fake.ledger.is_fresh(target)) == (attempts, is_fresh)
 
 
 def test_it_does_not_go_where_something_may_have_moved_since(fake: FakeCell, target: Target) -> None:
-    fake.ledger.bumped()
+    fake.ledger.invalidate_positions()
     result = run_skill(Approach(target=target), fake)
     assert (result.status, result.reason, fake.arm.commanded) == ("FAILURE", "stale", [])
     assert result.message == (
@@ -87,7 +87,7 @@ def test_every_further_attempt_comes_down_elsewhere(fake: FakeCell, target: Targ
     for _ in range(4):
         run_skill(Approach(target=look()[0]), fake)
         places.append(fake.arm.tool_pose.position[:2].copy())
-        fake.ledger.missed("cube-1")
+        fake.ledger.record_miss("cube-1")
     assert all(np.linalg.norm(a - b) > 0.002 for a, b in combinations(places, 2))
 
 
@@ -112,10 +112,10 @@ def test_what_the_tool_still_touches_from_before_is_no_contact_with_the_target(
 
 def test_what_fell_before_it_was_let_go_is_not_placed(fake: FakeCell, held: str) -> None:
     fake.tool.open()
-    fake.ledger.dropped(held)
+    fake.ledger.record_drop(held)
     result = run_skill(Release(held=held, bin="red_bin"), fake)
     assert (result.reason, result.message) == ("dropped", f"{held} is not in the tool any more")
-    assert fake.ledger.objects_in("red_bin") == 0
+    assert fake.ledger.count_in("red_bin") == 0
 
 
 def test_grasp_holds_and_the_ledger_knows(fake: FakeCell, held: str) -> None:
@@ -145,7 +145,7 @@ def test_items_hang_over_one_slot_after_the_other_and_are_placed(
     assert run_skill(Transit(held=held, bin="red_bin"), fake).status == "SUCCESS"
     assert fake.arm.tool_pose.position == pytest.approx([*slots[0], 0.065])
     assert run_skill(Release(held=held, bin="red_bin"), fake).outputs == {"placed": "cube-1"}
-    assert (fake.ledger.balance()["placed"], fake.ledger.objects_in("red_bin")) == (1, 1)
+    assert (fake.ledger.balance()["placed"], fake.ledger.count_in("red_bin")) == (1, 1)
     fake.world.put("cube", 0.5, 0.1)
     carry(fake, at_hand.pick(fake, look()[0]))
     assert np.allclose(fake.arm.tool_pose.position[:2], slots[1])
@@ -173,14 +173,14 @@ def test_what_does_not_come_off_is_stuck_and_not_placed(
     result = run_skill(Release(held=held, bin="red_bin", settle=0.2), fake)
     assert (result.reason, result.message) == ("stuck", "cube-1 hangs on the tool 0.20 s after release")
     assert result.ticks == pytest.approx(0.2 * 240, abs=1)
-    assert (fake.ledger.in_tool(), fake.ledger.balance()["placed"]) == (held, 0)
+    assert (fake.ledger.find_held_item(), fake.ledger.balance()["placed"]) == (held, 0)
 
 
 def test_an_item_is_given_up_with_its_reason_after_the_failures_the_mission_grants(
     fake: FakeCell, target: Target
 ) -> None:
     for failures, is_open in ((1, True), (2, False)):
-        fake.ledger.missed("cube-1")
+        fake.ledger.record_miss("cube-1")
         run_skill(RejectTarget(item="cube-1", after=2), fake)
         assert fake.ledger.is_open("cube-1") is is_open, failures
     assert fake.ledger.summaries()[0].why == "could not be picked (2 failed attempts)"
@@ -197,11 +197,11 @@ def test_move_to_scan_goes_to_the_cameras_first_pose_only_if_the_table_is_out_of
 def test_taken_away_while_it_lets_go_it_has_placed_what_fell(fake: FakeCell, held: str) -> None:
     result = run_skill(Release(held=held, bin="red_bin"), fake, halt_at=3)
     assert (result.status, fake.tool.holding) == ("HALTED", False)
-    assert (fake.ledger.in_tool(), fake.ledger.objects_in("red_bin")) == (None, 1)
+    assert (fake.ledger.find_held_item(), fake.ledger.count_in("red_bin")) == (None, 1)
     # Started again it has nothing more to do.
     again = run_skill(Release(held=held, bin="red_bin"), fake)
     assert (again.status, again.outputs, again.ticks) == ("SUCCESS", {"placed": held}, 0)
-    assert fake.ledger.objects_in("red_bin") == 1
+    assert fake.ledger.count_in("red_bin") == 1
 
 
 def test_taken_away_while_it_puts_down_it_has_returned_what_lies_there(fake: FakeCell, held: str) -> None:
@@ -211,7 +211,7 @@ def test_taken_away_while_it_puts_down_it_has_returned_what_lies_there(fake: Fak
         fake.advance()
     steps.close()
     (row,) = fake.ledger.summaries()
-    assert (fake.ledger.in_tool(), row.state) == (None, "seen")
+    assert (fake.ledger.find_held_item(), row.state) == (None, "seen")
     assert row.position[:2] == list(fake.cell.safe_place[:2])
 
 

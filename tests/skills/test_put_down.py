@@ -30,7 +30,7 @@ def lost(fake: FakeCell, held: str, when: Callable[[], bool]) -> SkillFailed:
 def test_it_is_let_go_on_the_safe_place_where_the_next_look_finds_it(fake: FakeCell, held: str, look) -> None:
     assert run_skill(PutDown(held=held), fake).status == "SUCCESS"
     assert fake.arm.tool_pose.position == pytest.approx([*fake.cell.safe_place[:2], 0.055])
-    assert (fake.tool.holding, fake.ledger.in_tool()) == (False, None)
+    assert (fake.tool.holding, fake.ledger.find_held_item()) == (False, None)
     assert [target.item for target in look("full")] == [held]
 
 
@@ -43,7 +43,7 @@ def test_what_falls_on_the_way_is_dropped_where_the_arm_stops(fake: FakeCell, he
     assert fake.arm.at_rest
     assert fake.arm.tool_pose.position[1] == pytest.approx(-0.1, abs=0.01)
     ledger = fake.ledger
-    assert (ledger.in_tool(), ledger.attempts(held), ledger.is_open(held)) == (None, 1, True)
+    assert (ledger.find_held_item(), ledger.count_attempts(held), ledger.is_open(held)) == (None, 1, True)
 
 
 def test_what_is_torn_off_by_running_into_something_is_dropped(fake: FakeCell, held: str) -> None:
@@ -51,7 +51,7 @@ def test_what_is_torn_off_by_running_into_something_is_dropped(fake: FakeCell, h
     failure = lost(fake, held, lambda: fake.arm.met is not None)
     assert failure.reason == "dropped"
     assert failure.message.startswith("the seal on cube-1 broke on the way to the safe place, near (")
-    assert fake.ledger.in_tool() is None
+    assert fake.ledger.find_held_item() is None
 
 
 def test_what_falls_while_the_way_is_planned_is_dropped_though_there_is_none(
@@ -60,21 +60,21 @@ def test_what_falls_while_the_way_is_planned_is_dropped_though_there_is_none(
     nowhere(Unreachable("too far"))
     assert run_skill(PutDown(held=held), fake).reason == "unreachable"
     assert lost(fake, held, lambda: True).reason == "dropped"
-    assert fake.ledger.in_tool() is None
+    assert fake.ledger.find_held_item() is None
 
 
 def test_a_run_into_something_keeps_what_it_holds(fake: FakeCell, held: str) -> None:
     fake.arm.runs_into = "the held cube ran into a hand"
     result = run_skill(PutDown(held=held), fake)
     assert (result.reason, result.message) == ("blocked", "the held cube ran into a hand")
-    assert (fake.tool.holding, fake.ledger.in_tool()) == (True, held)
+    assert (fake.tool.holding, fake.ledger.find_held_item()) == (True, held)
 
 
 def test_what_does_not_come_off_is_stuck(fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fake.tool, "open", lambda: None)
     result = run_skill(PutDown(held=held), fake)
     assert (result.reason, result.message) == ("stuck", "cube-1 hangs on the tool 0.10 s after release")
-    assert fake.ledger.in_tool() == held
+    assert fake.ledger.find_held_item() == held
 
 
 def test_the_check_knows_that_the_tool_is_empty_after_a_drop_alone() -> None:
@@ -97,7 +97,7 @@ def test_what_cannot_be_carried_away_and_was_not_lifted_is_left_where_it_stood(
 ) -> None:
     nowhere(Blocked("bolt-2 is too near"))
     result = run_skill(PutDown(held=held), fake)
-    assert (result.status, fake.tool.holding, fake.ledger.in_tool()) == ("SUCCESS", False, None)
+    assert (result.status, fake.tool.holding, fake.ledger.find_held_item()) == ("SUCCESS", False, None)
     (row,) = fake.ledger.summaries()
     assert (row.state, row.position[:2]) == ("seen", [0.5, 0.0])
 

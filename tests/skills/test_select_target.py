@@ -41,16 +41,16 @@ def test_of_several_bins_the_one_with_the_fewest_objects_is_next_the_first_among
     chosen = []
     for target in look():
         chosen.append(select(fake, [target]).outputs["bin"])
-        fake.ledger.placed(target.item, chosen[-1])
+        fake.ledger.record_placement(target.item, chosen[-1])
     assert chosen == ["blue_bin", "red_bin", "blue_bin"]
 
 
 def test_neither_a_rejected_item_nor_a_neighbour_of_a_picked_one_is_taken(fake: FakeCell, look) -> None:
     put(fake, cube=(0.50, 0.0), duck=(0.55, 0.0), sphere=(0.60, 0.2))
     targets = look()
-    fake.ledger.held("cube-1")
+    fake.ledger.record_grasp("cube-1")
     assert select(fake, targets).outputs["item"] == "sphere-1"
-    fake.ledger.rejected("sphere-1", "slippery")
+    fake.ledger.reject("sphere-1", "slippery")
     assert select(fake, targets).reason == "doubtful", "the duck may have been moved"
 
 
@@ -87,5 +87,5 @@ def test_a_class_can_be_gone_while_others_are_left(fake: FakeCell, look) -> None
 def test_a_table_with_only_rejected_items_ends_the_work(fake: FakeCell, look) -> None:
     put(fake, cube=(0.6, 0.2))
     look()
-    fake.ledger.rejected("cube-1", "slippery")
+    fake.ledger.reject("cube-1", "slippery")
     assert select(fake, look("full")).reason == "no_candidate"

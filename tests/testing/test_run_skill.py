@@ -130,16 +130,16 @@ def test_what_a_look_commands_is_told_in_words(fake: FakeCell, target: Target) -
 def test_what_a_pick_commands_is_told_in_words(fake: FakeCell, target: Target) -> None:
     approach = run_skill(Approach, fake, inputs={"target": target})
     assert approach.commanded == [
-        "arm.plan (0.5, 0.0, 0.035)", "arm.start", "arm.stop", "ledger.touched cube-1",
+        "arm.plan (0.5, 0.0, 0.035)", "arm.start", "arm.stop", "ledger.record_touch cube-1",
     ]  # fmt: skip
     grasp = run_skill(Grasp, fake, inputs={"target": target})
     slot = fake.cell.bins["red_bin"].slots[0]
     over = f"({slot[0]:g}, {slot[1]:g}, 0.065)"
-    assert grasp.commanded == ["tool.close", "ledger.held cube-1"]
+    assert grasp.commanded == ["tool.close", "ledger.record_grasp cube-1"]
     transit = run_skill(Transit, fake, inputs={"held": "cube-1", "bin": "red_bin"})
     assert transit.commanded == [f"arm.plan {over}", "arm.start", "arm.stop"]
     release = run_skill(Release, fake, inputs={"held": "cube-1", "bin": "red_bin"})
-    assert release.commanded == ["tool.open", "ledger.placed cube-1 red_bin"]
+    assert release.commanded == ["tool.open", "ledger.record_placement cube-1 red_bin"]
 
 
 def test_a_named_pose_and_a_question_to_the_operator_are_told_too(fake: FakeCell) -> None:

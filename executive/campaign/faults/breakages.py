@@ -46,7 +46,7 @@ def _failing(skill: type[Skill], reason: str) -> type[Skill]:
             if cell.tool.holding:
                 yield from skill.run(self, cell) or ()
                 return
-            if (item := cell.ledger.in_tool()) is not None:
+            if (item := cell.ledger.find_held_item()) is not None:
                 slipped(cell, item)
         raise self.failed(reason, WANTED)
 

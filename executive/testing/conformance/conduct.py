@@ -194,7 +194,7 @@ def _tool_fault(runs: SkillRuns, rehearsal: Rehearsal) -> str:
     if rehearsal.holds and not rehearsal.is_known:
         return (
             f"{rehearsal.end}, and the tool holds an object that the ledger does not know of. "
-            "Tell it by cell.ledger.held, or open the tool in finally."
+            "Tell it by cell.ledger.record_grasp, or open the tool in finally."
         )
     return ""
 

@@ -96,7 +96,7 @@ class Rehearsal:
         except Stuck as stuck:
             self.status, self.message = "STUCK", str(stuck)
         self.changed = [name for name in values if not is_same(values[name], before[name])]
-        self.holds, self.is_known = fake.tool.holding, fake.ledger.in_tool() is not None
+        self.holds, self.is_known = fake.tool.holding, fake.ledger.find_held_item() is not None
         self.at_rest = fake.arm.at_rest
 
     @property

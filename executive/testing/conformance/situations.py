@@ -138,7 +138,7 @@ def _on_stage(kind: Any, refers: str, stage: Stage) -> Any:
 def _named(refers: str, stage: Stage) -> str | None:
     """Return the name of something on the stage, or None."""
     fake = stage.cell
-    label = fake.ledger.label(stage.item)
+    label = fake.ledger.get_label(stage.item)
     names = {
         "item": stage.item,
         "class": label,

@@ -55,8 +55,8 @@ def set_up(skill: type[Skill], *, holding: bool) -> Stage:
         fake.arm.put(tool_down(top, 0.0))
     if holding:
         fake.tool.close()
-        fake.ledger.touched(item)
-        fake.ledger.held(item)
+        fake.ledger.record_touch(item)
+        fake.ledger.record_grasp(item)
         detections, targets = look(fake)
         if skill.tool_state[0] is not HOLDING:
             item = targets[0].item

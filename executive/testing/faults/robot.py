@@ -131,7 +131,7 @@ def _block_arm(now: Occasion, what: str, share: float) -> bool:
 
 def _bump_table(now: Occasion) -> bool:
     now.tell()
-    now.scene.cell.ledger.bumped()
+    now.scene.cell.ledger.invalidate_positions()
     return True
 
 

@@ -250,7 +250,7 @@ class HoldsOnWhenHalted(GraspTarget):
         if not cell.tool.holding:
             cell.tool.open()
             raise self.failed("missed", "no seal")
-        cell.ledger.held(self.target.item)
+        cell.ledger.record_grasp(self.target.item)
 
 
 class RunsOnWhenHalted(Push):

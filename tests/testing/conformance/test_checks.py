@@ -128,7 +128,7 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
     ]),
     ("tool_left_as_declared", faulty.GraspsInSecret, [
         f"{EMPTY} it succeeded, and the tool holds an object that the ledger does not know of. "
-        "Tell it by cell.ledger.held, or open the tool in finally.",
+        "Tell it by cell.ledger.record_grasp, or open the tool in finally.",
     ]),
     ("tool_left_as_declared", faulty.HoldsOnWhenHalted, [
         f"{EMPTY} it was halted at tick 1, and the tool holds something. It should be empty: as before, for "

@@ -91,8 +91,8 @@ def test_the_tool_holds_what_the_skill_needs(needs: Any, held: list[bool]) -> No
     for situation in found:
         stage, _ = begin(skill, situation, leave_as_is)
         assert stage.cell.tool.holding is situation.holding
-        assert (stage.cell.ledger.in_tool() is not None) is situation.holding
-        assert (stage.item == stage.cell.ledger.in_tool()) is (needs is HOLDING)
+        assert (stage.cell.ledger.find_held_item() is not None) is situation.holding
+        assert (stage.item == stage.cell.ledger.find_held_item()) is (needs is HOLDING)
 
 
 def test_a_skill_without_arm_finds_the_cup_on_its_target() -> None:

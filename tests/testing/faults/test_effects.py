@@ -286,10 +286,10 @@ def test_the_object_of_a_node_is_what_the_ledger_takes_for_its_item() -> None:
         cell.inner.world.objects[1].position[0] += near
         if state != "seen":
             cell.inner.world.held = cell.inner.world.objects[1]
-            cell.cell.ledger.touched(item)
-            cell.cell.ledger.held(item)
+            cell.cell.ledger.record_touch(item)
+            cell.cell.ledger.record_grasp(item)
         if state == "placed":
-            cell.cell.ledger.placed(item, "blue_bin")
+            cell.cell.ledger.record_placement(item, "blue_bin")
         node(cell, item)
         return [thing.label for thing in cell.inner.world.objects]
 
