@@ -1,1 +1,1 @@
-"""The skills this project ships, one class per file."""
+"""Skills of this project, one class per file."""

@@ -1,4 +1,4 @@
-"""Bring the cup onto a target."""
+"""Approach of a target until the tool touches it."""
 
 from __future__ import annotations
 
@@ -34,10 +34,8 @@ class Approach(Skill):
     the class otherwise.
     """
 
-    target: In[Target] = port(doc="where to go")
-    overtravel: Metres = param(
-        OVERTRAVEL, ge=0, le=0.03, doc="how far below the surface to search for contact"
-    )
+    target: In[Target] = port(doc="the target to touch")
+    overtravel: Metres = param(OVERTRAVEL, ge=0, le=0.03, doc="depth of the search below the surface")
     offset: Metres = param(SPACING, ge=0, le=0.02, doc="spacing of the spiral of further attempts")
     reasons: ClassVar = ("stale", "unreachable", "blocked", "contradicted", "no_contact")
     uses: ClassVar = ("arm", "tool")
@@ -55,7 +53,7 @@ class Approach(Skill):
         item, tool = self.target.item, cell.tool
         if not cell.ledger.is_fresh(self.target):
             seen = f"{item} was seen at {self.target.stamp:.2f} s"
-            raise self.failed("stale", f"{seen}, and what happened since may have moved it; look again")
+            raise self.failed("stale", f"{seen}, and the robot may have moved it since; look again")
 
         def ask() -> tuple[Goal, Task]:
             return approach(cell, self.target, self.overtravel, self.offset)

@@ -1,4 +1,4 @@
-"""Ask the operator which class to pick."""
+"""Request of the operator for a class."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from executive.skill import Out, Skill, port
 
 
 class AwaitRequest(Skill):
-    """Know which class the operator wants next; the run's clock stands still until they say it."""
+    """Ask the operator which class to pick next; the clock of the run stops until the operator answers."""
 
-    wanted: Out[str] = port(refers="class", doc="the class asked for")
+    wanted: Out[str] = port(refers="class", doc="the requested class")
     reasons: ClassVar = ("rescan", "quit")
     senses: ClassVar = True
 

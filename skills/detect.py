@@ -17,26 +17,22 @@ class Detect(Skill):
 
     Succeeds with all detections that are not in doubt. A detection is in doubt if it is below the detector's
     threshold or if its second class is more than half as likely. An empty list is a result, not a failure.
-    The area hidden by the arm counts neither as empty nor as occupied.
+    If all detections on the table are in doubt, the skill fails with `unsure`, or passes without detections.
+    If the arm hides part of the workspace, the skill fails with `hidden`, or passes and searches the rest:
+    the hidden area counts neither as empty nor as occupied.
     A look with more than 60 boxes fails with `crowded`, whatever their confidence.
     Fails with `camera_moved` if the image shows the bins away from their expected positions.
     """
 
     detections: Out[Detections] = port(doc="the detections and their frame")
-    detector: str = param("", refers="detector", doc="which detector of the cell; empty: the first")
+    detector: str = param("", refers="detector", doc="a detector of the cell; empty: the first")
     view: str = param(
-        "table", choices=("table", "full"), doc="`table`: the workspace; `full`: everything the camera sees"
+        "table", choices=("table", "full"), doc="`table`: the workspace; `full`: the whole image"
     )
     doubtful: str = param(
-        "fail",
-        choices=("fail", "pass"),
-        doc="if all detections on the table are in doubt: `fail` with `unsure`, or `pass` with no detections",
+        "fail", choices=("fail", "pass"), doc="result if all detections on the table are in doubt"
     )
-    hidden: str = param(
-        "fail",
-        choices=("fail", "pass"),
-        doc="if the arm hides part of the workspace: `fail` with `hidden`, or `pass` and search the rest",
-    )
+    hidden: str = param("fail", choices=("fail", "pass"), doc="result if the arm hides part of the workspace")
     reasons: ClassVar = ("unsure", "hidden", "unavailable", "crowded", "camera_moved")
     uses: ClassVar = ("camera",)
     senses: ClassVar = True

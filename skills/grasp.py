@@ -1,4 +1,4 @@
-"""Seal the tool to what it touches."""
+"""Grasp of the object that the tool touches."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from executive.skill import EMPTY, HOLDING, In, Out, Seconds, Skill, param, port
 
 
 class Grasp(Skill):
-    """Close the tool on the target and prove that it holds.
+    """Close the tool on the target and verify that it holds.
 
-    Succeeds when the tool's sensor still reports a seal after `settle`.
+    Succeeds if the tool's sensor reports a seal after `settle`.
     """
 
-    target: In[Target] = port(doc="what the tool touches")
+    target: In[Target] = port(doc="the target that the tool touches")
     held: Out[Item] = port(refers="item", doc="the item in the tool")
     settle: Seconds = param(0.10, ge=0, le=2, doc="time allowed for the grip to settle")
     reasons: ClassVar = ("missed",)
@@ -24,14 +24,14 @@ class Grasp(Skill):
     waits: ClassVar = "settle"
 
     def run(self, cell: Cell) -> Steps:
-        """Switch the vacuum on and ask the sensor."""
+        """Close the tool, wait, and read the sensor."""
         cell.tool.close()
         sealed = False
         try:
             yield from cell.clock.sleep(self.settle)
             sealed = cell.tool.holding
         finally:
-            # Whoever takes the skill away would otherwise leave in the tool what nobody knows of.
+            # A halted skill must not leave an object in the tool that the ledger does not know.
             if not sealed:
                 cell.tool.open()
         if not sealed:

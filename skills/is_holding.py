@@ -1,4 +1,4 @@
-"""Ask the tool's sensor."""
+"""Question whether the tool holds an item."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from executive.skill import ANY, EMPTY, HOLDING, Out, Skill, port
 
 
 class IsHolding(Skill):
-    """Know whether the tool holds something, and what.
+    """Check by the tool's sensor whether the tool holds an item.
 
-    The sensor decides, whatever was believed before: an item that should be in the tool and is not has been
-    dropped. After a timeout or a failure in mid-carry this tells which way to go on.
+    If the ledger has an item in the tool and the sensor feels none, the item is recorded as dropped. After a
+    timeout or a failure during a transit, the result decides how the mission continues.
     """
 
     held: Out[Item] = port(refers="item", doc="the item in the tool")
@@ -24,7 +24,7 @@ class IsHolding(Skill):
     tool_left: ClassVar = {"empty": EMPTY}
 
     def run(self, cell: Cell) -> None:
-        """Ask once."""
+        """Compare the sensor with the ledger."""
         believed = cell.ledger.find_held_item()
         if cell.tool.holding and believed is not None:
             self.held = believed

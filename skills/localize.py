@@ -12,12 +12,12 @@ from executive.skill import In, Out, Skill, port
 
 
 class Localize(Skill):
-    """Find the position of every detected object, and the item that it is.
+    """Find the position and the item of every detected object.
 
     Uses the camera pose stored with the frame, so the camera may have moved since. The ledger assigns each
-    detection to an item. A detection is in doubt if its box has not the size of its class. If
-    the frame has a depth image, a detection is also in doubt if the height of its top fits neither an
-    object of its class on the table nor one on another object.
+    detection to an item. A detection is in doubt if the size of its box does not fit its class. If the frame
+    has a depth image, a detection is also in doubt if the height of its top fits neither an object of its
+    class on the table nor such an object on another object.
     """
 
     detections: In[Detections] = port(doc="the detections and their frame")

@@ -1,4 +1,4 @@
-"""Bring the arm into a pose, mostly for a look."""
+"""Motion to a pose of the cell, mostly for a look."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from executive.skill import Skill, param
 class MoveToScan(Skill):
     """Bring the arm to rest in a pose of the cell, for a look or out of the way.
 
-    With `auto` it stays where it is if the camera sees the whole workspace already. What is in view after a
-    motion is not asked; that the scan poses of a simulated cell show the whole workspace, `executive check`
-    makes sure.
+    With `auto`, the arm does not move if the camera sees the whole workspace already. The skill does not
+    check the view after the motion: `executive check` verifies that the scan poses of a simulated cell show
+    the whole workspace.
     """
 
     pose: str = param(
@@ -28,7 +28,7 @@ class MoveToScan(Skill):
     moves: ClassVar = True
 
     def run(self, cell: Cell) -> Steps:
-        """Go to the pose."""
+        """Select the pose and move to it."""
         yield from settle(cell.arm)
         if self.pose == "auto" and cell.camera.sees_table():
             return

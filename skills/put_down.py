@@ -1,4 +1,4 @@
-"""Leave what the tool holds at a safe free place."""
+"""Return of the held item to a free place on the table."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from executive.manipulation.motions import carry, let_go
 from executive.manipulation.tool_goals import aside
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, SkillFailed, param, port
 
-LIFTED = 0.003
-"""How high above the table something hangs that was lifted from it [m]."""
+MIN_LIFT_HEIGHT = 0.003
+"""Height of the item's underside above the table from which the item counts as lifted [m]."""
 
 
 class PutDown(Skill):
-    """Put the held item down on the cell's safe place, or beside what stands there, where a look finds it.
+    """Put the held item down at the safe place of the cell, or at the free place nearest to it.
 
-    What was not lifted from the table yet, and whose way is blocked, is left where it is.
-    The tool's sensor is watched all the way.
+    An item that was not lifted yet is released at its position if the motion is blocked. The tool's sensor is
+    read during the whole motion.
     """
 
     held: In[Item] = port(refers="item", doc="the item in the tool")
     drop: Metres = param(0.005, ge=0, le=0.05, doc="height of the item's underside above the table")
-    settle: Seconds = param(0.10, ge=0, le=2, doc="time given to the vacuum to vanish")
+    settle: Seconds = param(0.10, ge=0, le=2, doc="time allowed for the vacuum to vanish")
     reasons: ClassVar = ("unreachable", "blocked", "dropped", "stuck")
     uses: ClassVar = ("arm", "tool")
     moves: ClassVar = True
@@ -34,15 +34,15 @@ class PutDown(Skill):
     waits: ClassVar = "settle"
 
     def run(self, cell: Cell) -> Steps:
-        """Carry it there, come down, let go."""
+        """Carry the item to the place, lower it, release it."""
         goal = aside(cell, self.held, self.drop)
         height = cell.classes[cell.ledger.get_label(self.held)].height
         lying = float(cell.safe_place[2]) + height
         try:
             yield from carry(self, cell, self.held, goal, "the safe place")
         except SkillFailed as failure:
-            # What was not lifted yet stands where it stood, as well as anywhere.
-            if failure.reason != "blocked" or cell.arm.tool_pose.position[2] > lying + LIFTED:
+            # An item that was not lifted stands at its old position, which is as good as another one.
+            if failure.reason != "blocked" or cell.arm.tool_pose.position[2] > lying + MIN_LIFT_HEIGHT:
                 raise
         x, y, _ = cell.arm.tool_pose.position
         place = np.array((x, y, lying - height / 2))

@@ -1,4 +1,4 @@
-"""Give an item up."""
+"""Rejection of an item."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from executive.skill import In, Skill, param, port
 class RejectTarget(Skill):
     """Mark the item as rejected: it is reported, left where it is, and not tried again.
 
-    With `after`, only once its grasps have failed that often; until then this does nothing and succeeds.
+    With `after`, the skill succeeds without an effect until that many grasps have failed.
     """
 
-    item: In[Item] = port(refers="item", doc="the item to give up")
-    why: str = param("could not be picked", doc="what the report says about it")
-    after: int = param(0, ge=0, doc="failed attempts from which it is given up")
+    item: In[Item] = port(refers="item", doc="the item to reject")
+    why: str = param("could not be picked", doc="reason in the report")
+    after: int = param(0, ge=0, doc="number of failed attempts from which the item is rejected")
     reasons: ClassVar = ()
 
     def run(self, cell: Cell) -> None:
-        """Tell the ledger."""
+        """Reject the item in the ledger."""
         failures = cell.ledger.count_attempts(self.item)
         if failures < self.after:
             return

@@ -1,4 +1,4 @@
-"""Let go of what the tool holds."""
+"""Release of the held item in a bin."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from executive.skill import ANY, EMPTY, HOLDING, In, Out, Seconds, Skill, param,
 
 
 class Release(Skill):
-    """Let the held item fall into its bin and prove that the tool is empty.
+    """Release the held item in its bin and verify that the tool is empty.
 
-    What fell before it was to be let go, while nobody watched the tool, is dropped and not placed.
+    An item that fell before its release is dropped and not placed.
     """
 
     held: In[Item] = port(refers="item", doc="the item in the tool")
-    bin: In[str] = port(refers="bin", doc="where it is let go")
+    bin: In[str] = port(refers="bin", doc="the bin under the tool")
     placed: Out[Item] = port(refers="item", doc="the item in the bin")
-    settle: Seconds = param(0.10, ge=0, le=2, doc="time given to the vacuum to vanish")
+    settle: Seconds = param(0.10, ge=0, le=2, doc="time allowed for the vacuum to vanish")
     reasons: ClassVar = ("stuck", "dropped")
     uses: ClassVar = ("tool",)
     tool_state: ClassVar = (HOLDING, EMPTY)
@@ -27,11 +27,11 @@ class Release(Skill):
     waits: ClassVar = "settle"
 
     def run(self, cell: Cell) -> Steps:
-        """Switch the vacuum off and ask the sensor."""
+        """Open the tool, wait, and read the sensor."""
         item, bin = self.held, self.bin
         if cell.ledger.find_held_item() == item:
             yield from let_go(self, cell, item, self.settle, lambda: cell.ledger.record_placement(item, bin))
         elif cell.ledger.is_open(item):
             raise self.failed("dropped", f"{item} is not in the tool any more")
-        # Else it was let go already, when this was taken away and then begun anew.
+        # Otherwise the item was released already, before a halt and a new start of this skill.
         self.placed = item

@@ -1,4 +1,4 @@
-"""Choose what to pick next."""
+"""Selection of the next target."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ from executive.skill import In, Out, Skill, SkillFailed, param, port
 
 
 class SelectTarget(Skill):
-    """Know which target to pick next and where it belongs.
+    """Select the next target to pick, and its bin.
 
-    Passes over targets that are rejected, done, of a class without a route, put in doubt by what the
-    robot did since they were seen, or seen by too few looks for as good as the detector is. While the arm
-    moves, the choice is the one that it would be when it stands still again.
+    A target is no candidate if its item is not open, its class has no route, the robot may have moved it
+    since its last detection, or too few looks agree for the error rates of the detector. While the arm moves,
+    its destination counts as its position.
     """
 
-    targets: In[list[Target]] = port(doc="where things are, as far as is known")
+    targets: In[list[Target]] = port(doc="the known targets")
     same: In[Item | None] = port(default=None, refers="item", doc="only this item")
     wanted: In[str | None] = port(default=None, refers="class", doc="only this class")
     target: Out[Target] = port(doc="the chosen target")
-    item: Out[Item] = port(refers="item", doc="the item it is bound to")
-    bin: Out[str] = port(refers="bin", doc="the one of its class's bins with the fewest objects")
+    item: Out[Item] = port(refers="item", doc="the item of the target")
+    bin: Out[str] = port(refers="bin", doc="the bin with the fewest objects among those of its class")
     prefer: str = param(
         "nearest", choices=("nearest", "surest"), doc="`nearest` to the tool, or the `surest` detection"
     )
     reasons: ClassVar = ("no_candidate", "unseen", "doubtful")
 
     def run(self, cell: Cell) -> None:
-        """Filter, order, take the first."""
+        """Take the first candidate in the preferred order."""
         candidates = [
             target for target in nearest_first(cell, self.targets) if self._is_sought(cell, target.item)
         ]
         if not candidates:
-            raise self._none(cell)
+            raise self._explain_none(cell)
         best = candidates[0]
         if self.prefer == "surest":
             best = min(candidates, key=lambda t: (-t.confidence, t.item))
@@ -54,8 +54,8 @@ class SelectTarget(Skill):
             and (self.wanted is None or label == self.wanted)
         )
 
-    def _none(self, cell: Cell) -> SkillFailed:
-        """Return why there is nothing to choose."""
+    def _explain_none(self, cell: Cell) -> SkillFailed:
+        """Return the failure that states why there is no candidate."""
         doubtful = [item for item in cell.ledger.find_uncertain_items() if self._is_sought(cell, item)]
         if doubtful:
             names = ", ".join(doubtful)

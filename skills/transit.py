@@ -1,4 +1,4 @@
-"""Carry what the tool holds into a bin."""
+"""Transport of the held item into a bin."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Skill, param, port
 
 
 class Transit(Skill):
-    """Hang the held item over a free slot of a bin, just above its floor or the layer of objects there.
+    """Carry the held item to a free slot of a bin, just above the floor or the layer of objects there.
 
-    One motion: up from where it lies, across above every wall, and down inside, as gently as the
-    seal needs for a safety factor of two. The tool's sensor is watched all the way.
+    One motion: up, across above all walls, and down into the bin, with accelerations that the seal withstands
+    with a safety factor of two. The tool's sensor is read during the whole motion.
     """
 
     held: In[Item] = port(refers="item", doc="the item in the tool")
-    bin: In[str] = port(refers="bin", doc="where to")
+    bin: In[str] = port(refers="bin", doc="the bin to carry it to")
     drop: Metres = param(
         DROP,
         ge=0.005,
@@ -35,10 +35,10 @@ class Transit(Skill):
 
     @classmethod
     def shortest(cls, least: LeastTimes, given: Mapping[str, Any]) -> float:
-        """Return the time of the shortest carry from the workspace to the bin, if it is known which [s]."""
+        """Return the time of the shortest transit from the workspace to the bin, if it is known [s]."""
         return least.carry(given.get("bin"))
 
     def run(self, cell: Cell) -> Steps:
-        """Plan the whole way, then follow it as long as the seal holds."""
+        """Plan the motion, then follow it while the seal holds."""
         goal = into(cell, self.bin, self.held, self.drop)
         yield from carry(self, cell, self.held, goal, self.bin)

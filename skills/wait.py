@@ -1,4 +1,4 @@
-"""Let time pass."""
+"""Pause of a fixed duration."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from executive.skill import Seconds, Skill, param
 class Wait(Skill):
     """Do nothing until `seconds` have passed on the run's clock."""
 
-    seconds: Seconds = param(ge=0, le=3600, doc="how long")
+    seconds: Seconds = param(ge=0, le=3600, doc="duration")
     reasons: ClassVar = ()
     waits: ClassVar = "seconds"
 

@@ -1,1 +1,1 @@
-"""Who is who on the table: identity, freshness and fate of every object."""
+"""Identity, position and final state of every object on the table."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 
-from executive.cell.detection import Detections
+from executive.ledger.certainty import Certainty
 from executive.ledger.item import LYING, REASON_NOT_FOUND, REASON_UNCERTAIN, Record, State
 
 MIN_EMPTY_PROBES = 3
@@ -14,29 +14,8 @@ FINAL_STATES = (State.PLACED, State.REJECTED, State.SKIPPED, State.LOST)
 """Final states of an object; each item that was no phantom has one of them."""
 
 
-class Remarks:
-    """Warnings about the detections of a run, for its final report.
-
-    Attributes:
-        unknown: For each label that is not in the cell file, the largest number of its boxes in a look.
-        doubts: Reasons why error rates of detectors were assumed and not measured, in the order of the looks.
-    """
-
-    def __init__(self) -> None:
-        self.unknown: Counter[str] = Counter()
-        self.doubts: list[str] = []
-
-    def add(self, look: Detections) -> None:
-        """Update both attributes with the detections of one look."""
-        self.unknown |= Counter(detection.label for detection in look.unknown)
-        doubt = look.error_rates.doubt
-        # The numbers after the colon differ from frame to frame; the first text is kept.
-        if doubt and not any(known.startswith(doubt.partition(":")[0]) for known in self.doubts):
-            self.doubts.append(doubt)
-
-
 def find_final_state(
-    record: Record, *, gone: bool, sure: bool, routed: bool, completed: bool, touched_any: bool
+    record: Record, certainty: Certainty, *, has_route: bool, completed: bool, touched_any: bool
 ) -> tuple[State, str] | None:
     """Return the final state of an item and its reason, or None if the item has its final state already.
 
@@ -55,9 +34,8 @@ def find_final_state(
 
     Args:
         record: The item.
-        gone: True if its place was searched without a detection.
-        sure: True if enough looks agree on its existence, class and position.
-        routed: True if the mission has a bin for its class.
+        certainty: Rules by which an item is certain.
+        has_route: True if the mission has a bin for its class.
         completed: True if the behaviour tree succeeded.
         touched_any: True if the tool has touched any item at the height of its class.
     """
@@ -72,13 +50,13 @@ def find_final_state(
         return State.PHANTOM, REASON_NOT_FOUND
     if record.empty_probes >= MIN_EMPTY_PROBES and touched_any and not record.had_contact:
         return State.PHANTOM, f"the tool found only the table at its place, {record.empty_probes} times"
-    if record.state is State.DROPPED or gone:
+    if record.state is State.DROPPED or certainty.is_gone(record):
         return State.LOST, "known to exist, not found again"
     if record.state is State.REJECTED:
         return None
-    if not routed:
+    if not has_route:
         return State.SKIPPED, "the mission has no route for it"
-    if completed and sure and not (record.attempts or record.contradiction):
+    if completed and certainty.is_sure(record) and not (record.attempts or record.contradiction):
         return State.SKIPPED, "the mission was completed without it"
     return State.REJECTED, "the run ended before its turn"
 

@@ -90,16 +90,11 @@ def find_moved(
 
 def find_duplicate(record: Record, records: Iterable[Record], gate: float) -> Record | None:
     """Return the first other item on the table that is too near to be another object, or None."""
-    return next(
-        (
-            other
-            for other in records
-            if record.state is other.state is State.SEEN
-            and other is not record
-            and other.distance_to(record.position) < gate
-        ),
-        None,
-    )
+    for other in records:
+        is_near = other is not record and other.distance_to(record.position) < gate
+        if is_near and record.state is other.state is State.SEEN:
+            return other
+    return None
 
 
 def _may_have_become(old: Record, new: Record, staleness: Staleness, config: LedgerConfig) -> bool:

@@ -68,10 +68,7 @@ class Bins:
                 record.bin_log_odds[bin] = LOG_ODDS_FELL_IN_BIN
 
     def find_dropped(
-        self,
-        look: Detections,
-        content: Iterable[tuple[Observation, str]],
-        records: Collection[Record],
+        self, look: Detections, content: Mapping[Observation, str | None], records: Collection[Record]
     ) -> list[Record]:
         """Set dropped items that a look shows in a bin of their class to PLACED, and return these items.
 
@@ -79,14 +76,14 @@ class Bins:
 
         Args:
             look: A look at the whole image.
-            content: Confident observations in bins, each with its bin.
+            content: Bin of each observation, or None.
             records: All items.
         """
         # The centre of an object that leans on a wall from the inside may lie over the wall.
         shown = Counter(
             (one.detection.label, bin)
-            for one, bin in content
-            if self.bins[bin].contains(one.position, BIN_THICKNESS)
+            for one, bin in content.items()
+            if one.confident and bin and self.bins[bin].contains(one.position, BIN_THICKNESS)
         )
         found = []
         for record in (record for record in records if record.state is State.DROPPED):

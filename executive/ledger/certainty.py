@@ -60,6 +60,15 @@ class Certainty:
             and math.hypot(record.std, record.bias) <= max_error
         )
 
+    def is_possible(self, record: Record) -> bool:
+        """Return True if an item may be an object that lies on the table and is to be sorted."""
+        may_exist = record.belief.probability > self.config.overlooked
+        return record.state is State.SEEN and may_exist and not self.is_gone(record)
+
+    def is_gone(self, record: Record) -> bool:
+        """Return True if looks have found the position of an item empty."""
+        return record.belief.miss_probability <= self.config.overlooked
+
     def reject_if_uncertain(self, record: Record, *, is_settled: bool) -> None:
         """Reject an item if looks cannot prove its class, disagree about it, or remain unsure of the item.
 

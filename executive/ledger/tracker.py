@@ -18,7 +18,6 @@ from executive.errors import Fault
 from executive.events import Emit, ItemChanged
 from executive.geometry import Array
 from executive.ledger.accounts import (
-    Remarks,
     count_states,
     find_final_state,
     find_lost_elsewhere,
@@ -48,7 +47,8 @@ class Tracker:
         distinct_by_touch: Classes whose height distinguishes them from all others.
 
     Attributes:
-        unknown, doubts: See `Remarks`.
+        unknown: For each label that is not in the cell file, the largest number of its boxes in a look.
+        doubts: Reasons why error rates of detectors were assumed and not measured, in the order of the looks.
     """
 
     def __init__(
@@ -67,8 +67,8 @@ class Tracker:
         self._records: dict[Item, Record] = {}
         self._names: Counter[str] = Counter()
         self._frame = 0
-        self._remarks = Remarks()
-        self.unknown, self.doubts = self._remarks.unknown, self._remarks.doubts
+        self.unknown: Counter[str] = Counter()
+        self.doubts: list[str] = []
 
     @property
     def records(self) -> Sequence[Record]:
@@ -83,7 +83,11 @@ class Tracker:
     def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:
         """Update all items with one search of a frame, and return the targets."""
         frame = detections.frame
-        self._remarks.add(detections)
+        self.unknown |= Counter(detection.label for detection in detections.unknown)
+        # The numbers after the colon differ from frame to frame; the first text is kept.
+        kind = detections.error_rates.doubt.partition(":")[0]
+        if kind and not any(doubt.startswith(kind) for doubt in self.doubts):
+            self.doubts.append(detections.error_rates.doubt)
         if frame.id != self._frame:
             self._frame = frame.id
             self._update(detections, observations)
@@ -104,7 +108,9 @@ class Tracker:
         return [
             record.target
             for record in self.records
-            if record.state in LYING and record.belief.probability >= 0.5 and not self._is_gone(record)
+            if record.state in LYING
+            and record.belief.probability >= 0.5
+            and not self._certainty.is_gone(record)
         ]
 
     def find_uncertain_items(self) -> Sequence[Item]:
@@ -112,7 +118,7 @@ class Tracker:
         return [
             record.item
             for record in self.records
-            if self._may_wait(record)
+            if self._certainty.is_possible(record)
             and self._coverage.is_in_workspace(record.position)
             and not (self._certainty.is_sure(record) and self._staleness.is_settled(record))
         ]
@@ -143,7 +149,7 @@ class Tracker:
         return self._coverage.max_object_probability <= self._config.overlooked and not any(
             # The class of an item without a confident detection is a guess.
             ((record.label in self._routes and label in (None, record.label)) or not record.belief.looks)
-            and self._may_wait(record)
+            and self._certainty.is_possible(record)
             and self._coverage.is_in_sight(record.position)
             for record in self.records
         )
@@ -247,8 +253,8 @@ class Tracker:
         dropped = [record for record in self.records if record.state is State.DROPPED]
         for record in self.records:
             final = find_final_state(
-                record, gone=self._is_gone(record), sure=self._certainty.is_sure(record),
-                routed=record.label in self._routes, completed=completed, touched_any=touched_any,
+                record, self._certainty, has_route=record.label in self._routes, completed=completed,
+                touched_any=touched_any,
             )  # fmt: skip
             if bin := find_believed_bin(record):
                 record.bin, final = bin, (State.PLACED, "it fell there")
@@ -280,17 +286,8 @@ class Tracker:
             self._certainty.reject_if_uncertain(record, is_settled=self._staleness.is_settled(record))
             self._emit(record.summary)
         if detections.view == "full":
-            content = [(one, bin) for one, bin in in_bins.items() if bin is not None and one.confident]
-            for record in self._bins.find_dropped(detections, content, self.records):
+            for record in self._bins.find_dropped(detections, in_bins, self.records):
                 self._emit(record.summary)
-
-    def _may_wait(self, record: Record) -> bool:
-        """Return True if an item may be an object that lies on the table and is to be sorted."""
-        is_possible = record.belief.probability > self._config.overlooked
-        return record.state is State.SEEN and is_possible and not self._is_gone(record)
-
-    def _is_gone(self, record: Record) -> bool:
-        return record.belief.miss_probability <= self._config.overlooked
 
     def _find(self, item: Item) -> Record:
         try:

@@ -59,7 +59,7 @@ class Update:
         # Further looks at a rejected item bring no further information.
         self.coverage.update(self.look, [one.position for one in uncertain if one.state is State.SEEN])
         moved = self._recognize_moved(seen)
-        duplicates = [one for one in map(self._remove_duplicate, seen) if one is not None]
+        duplicates = self._remove_duplicates(seen)
         return list(dict.fromkeys([*seen, *uncertain, *phantoms, *moved, *duplicates]))
 
     def _update_seen(self, known: Sequence[Record], observations: Sequence[Observation]) -> list[Record]:
@@ -146,16 +146,18 @@ class Update:
                 duplicates.append(new)
         return duplicates
 
-    def _remove_duplicate(self, record: Record) -> Record | None:
-        """Make the less certain one of two items at one position a phantom, and return it."""
-        other = find_duplicate(record, self.records.values(), self.config.gate)
-        if other is None:
-            return None
-        less, more = sorted(
-            (record, other), key=lambda r: (r.belief.is_proved, self.staleness.is_settled(r), r.belief.looks)
-        )
-        less.set_state(State.PHANTOM, f"it is {more.item}")
-        return less
+    def _remove_duplicates(self, seen: Sequence[Record]) -> list[Record]:
+        """Make the less certain one of two items at one position a phantom, and return the phantoms."""
+        duplicates = []
+        for record in seen:
+            if other := find_duplicate(record, self.records.values(), self.config.gate):
+                less, more = sorted((record, other), key=self._rank)
+                less.set_state(State.PHANTOM, f"it is {more.item}")
+                duplicates.append(less)
+        return duplicates
+
+    def _rank(self, record: Record) -> tuple[bool, bool, int]:
+        return record.belief.is_proved, self.staleness.is_settled(record), record.belief.looks
 
     def _add(self, one: Observation, odds: float) -> Record:
         """Add a new item with the prior odds that it exists."""

@@ -13,7 +13,7 @@ UNSURE = ("rejected", "no look is sure of it")
 PHANTOM = ("phantom", "more looks missed it than saw it")
 
 
-def test_what_is_only_glimpsed_is_an_item_in_doubt(bench: Bench) -> None:
+def test_an_object_with_uncertain_detections_only_is_an_item_in_doubt(bench: Bench) -> None:
     assert [target.item for target in bench.look(unsure=[THERE])] == ["cube-1"]
     assert (bench.ledger.summaries()[0].looks, bench.ledger.is_sure("cube-1")) == (0, False)
     assert bench.ledger.find_uncertain_items() == ["cube-1"]
@@ -29,7 +29,7 @@ def test_a_table_with_something_in_doubt_is_not_believed_to_be_empty(bench: Benc
 
 
 @pytest.mark.parametrize(
-    ("glimpses", "misses", "ended", "final"),
+    ("uncertain", "misses", "ended", "final"),
     [
         (1, 2, False, PHANTOM),
         (1, 1, True, PHANTOM),
@@ -41,9 +41,9 @@ def test_a_table_with_something_in_doubt_is_not_believed_to_be_empty(bench: Benc
     ],
 )
 def test_what_no_look_is_sure_of_is_given_up_and_what_looks_miss_was_nothing(
-    bench: Bench, glimpses: int, misses: int, ended: bool, final: tuple[str, str]
+    bench: Bench, uncertain: int, misses: int, ended: bool, final: tuple[str, str]
 ) -> None:
-    for _ in range(glimpses):
+    for _ in range(uncertain):
         bench.look(unsure=[THERE])
     for _ in range(misses):
         bench.look()
@@ -58,7 +58,9 @@ def test_given_up_too_early_it_is_open_again_when_a_look_is_sure(bench: Bench) -
     assert bench.states() == {"cube-1": ("seen", "")}
 
 
-def test_a_glimpse_where_nothing_can_have_been_overlooked_or_in_a_bin_is_nothing(bench: Bench) -> None:
+def test_an_uncertain_detection_where_nothing_can_have_been_overlooked_or_in_a_bin_is_nothing(
+    bench: Bench,
+) -> None:
     bench.look(view="full", unsure=[("cube", 0.2, -0.44)])
     for _ in range(3):
         bench.look()
@@ -66,7 +68,7 @@ def test_a_glimpse_where_nothing_can_have_been_overlooked_or_in_a_bin_is_nothing
     assert bench.ledger.summaries() == []
 
 
-def test_a_sure_look_makes_an_item_of_a_glimpse_as_good_as_any(bench: Bench) -> None:
+def test_a_sure_look_makes_an_item_of_an_uncertain_detection_as_good_as_any(bench: Bench) -> None:
     other = Bench()
     bench.look(unsure=[("duck", 0.5, 0.0)])
     for one in (bench, bench, other, other):
@@ -98,7 +100,7 @@ def test_given_up_after_a_failed_grasp_it_stays_so(bench: Bench) -> None:
     assert bench.states() == {"cube-1": UNSURE}
 
 
-def test_a_known_item_that_waits_its_turn_is_not_given_up_for_glimpses(bench: Bench) -> None:
+def test_a_known_item_that_waits_its_turn_is_not_rejected_for_uncertain_looks(bench: Bench) -> None:
     for _ in range(3):
         bench.look(THERE, ("cube", 0.55, 0.0))
     for _ in range(MAX_UNCERTAIN_LOOKS + 5):

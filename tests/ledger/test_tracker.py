@@ -1,4 +1,4 @@
-"""Items on the table: identity, freshness, doubt, and the accounts at the end of a run."""
+"""Items on the table: identity, staleness, doubt, and the accounts at the end of a run."""
 
 from __future__ import annotations
 
