@@ -14,18 +14,18 @@ from executive.cell.config.section import Distance, Length, Name, Section, Vecto
 
 
 class LedgerConfig(Section):
-    """When the ledger believes what."""
+    """Limits of the ledger."""
 
     gate: Length = 0.025
-    """Largest distance between a detection and the item it is bound to [m]."""
+    """Largest distance between a precise detection and the item that it shows [m]."""
     neighbourhood: Distance = 0.07
     """Radius around a picked item in which others may have been moved [m]."""
     overlooked: float = Field(0.001, ge=1e-9, lt=1)
-    """Chance of an overlooked object up to which a place is believed empty."""
+    """Largest probability of an overlooked object at a position that counts as empty."""
     misjudged: float = Field(0.005, ge=1e-9, lt=1)
-    """Chance of a wrong class up to which an item is sorted."""
+    """Largest probability of a wrong class with which an item is sorted."""
     aim: Length = 0.005
-    """Standard error of an item's place up to which it is approached [m]; two thirds after a failed grasp."""
+    """Largest standard error of the position of an item to approach [m]; two thirds after a failed grasp."""
 
 
 class CellConfig(Section):
