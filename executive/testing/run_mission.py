@@ -19,7 +19,6 @@ from executive.record.result import agrees
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
 from executive.skill import Skill
-from executive.testing.bounded_cell import BoundedCell
 from executive.testing.faults.disturbed_cell import DisturbedCell, disturbed
 from executive.testing.faults.script import Disturbance
 from executive.tree.skill_leaf import SkillNode
@@ -101,7 +100,7 @@ def run_mission(
     loaded = load_mission(mission, skills, set)
     events: list[TimedEvent] = []
 
-    def arranged(*args: Any, **options: Any) -> BoundedCell:
+    def arranged(*args: Any, **options: Any) -> Workcell:
         workcell = kind(*args, **options)
         try:
             if arrange is not None:
@@ -109,11 +108,10 @@ def run_mission(
         except BaseException:
             workcell.close()
             raise
-        return BoundedCell(workcell, longest)
+        return workcell
 
-    options = RunOptions(
-        seed, requests, kind=disturbed(arranged, disturbances), substitutes=substitutes or {}
-    )
+    make_cell = disturbed(arranged, disturbances, longest=longest)
+    options = RunOptions(seed, requests, kind=make_cell, substitutes=substitutes or {})
     run = assemble(loaded, skills, options, [events.append, *observers])
     workcell = run.workcell
     assert isinstance(workcell, DisturbedCell)

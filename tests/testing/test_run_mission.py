@@ -14,8 +14,7 @@ from executive.events import RunEnded, RunStarted, TimedEvent
 from executive.mission.load import load_mission
 from executive.plugins import discover
 from executive.run.assembly import RunOptions, assemble
-from executive.testing.bounded_cell import BoundedCell
-from executive.testing.faults import after, detector_dead, during, seal_fails
+from executive.testing.faults import DisturbedCell, after, detector_dead, during, seal_fails
 from executive.testing.run_mission import run_mission
 from executive.testing.substitutes import endless
 from skills.detect import Detect
@@ -97,7 +96,7 @@ def test_a_mission_that_never_ends_ends_as_a_fault(look: Path) -> None:
 
 
 def test_a_cell_whose_time_is_over_says_so_once_so_that_the_arm_can_be_braked() -> None:
-    cell = BoundedCell(FakeCell(), longest=0.01)
+    cell = DisturbedCell(FakeCell(), [], longest=0.01)
     cell.advance()
     cell.advance()
     with pytest.raises(Fault, match=r"the mission is not done after 0\.01 s on its clock"):

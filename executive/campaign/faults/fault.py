@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from executive.cell.protocols import Cell, Steps
+from executive.manipulation.drops import slipped
+from executive.skill import EMPTY, Skill
 from executive.testing.faults.script import Disturbance
+from executive.testing.substitutes import in_place_of, raising, raising_when_halted
 
 When = Literal["first", "middle", "late", "lasting"]
 """Time of a fault in a run: the first activation, the middle, near the end, or repeatedly."""
+INJECTED_FAILURE = "as the campaign wants it"
+"""Message of a skill that fails without a cause in the cell."""
 
 
 class InjectedError(Exception):
@@ -75,3 +82,39 @@ class Fault:
     def __str__(self) -> str:
         """Return a description of the fault."""
         return f"{self.about} {self.what}, {self.when}: {self.means}"
+
+
+def broken_skills(breakages: Iterable[Breakage], skills: Mapping[str, type[Skill]]) -> dict[str, type[Skill]]:
+    """Return the substitute of each misbehaving skill; `skills` are the skills of the nodes by path."""
+    found: dict[str, type[Skill]] = {}
+    for breakage in breakages:
+        skill = found.get(breakage.node, skills[breakage.node])
+        error = InjectedError("a bug that the campaign put in")
+        if breakage.how == "fails":
+            broken = _failing(skill, breakage.reason)
+        elif breakage.how == "raises":
+            broken = raising(skill, error, after=breakage.after)
+        else:
+            broken = raising_when_halted(skill, error)
+        found[breakage.node] = in_place_of(skill, "Broken", broken.run, breakage.starts or None)
+    return found
+
+
+def _failing(skill: type[Skill], reason: str) -> type[Skill]:
+    """Return the skill that fails at its start; if this leaves the tool empty, its object has fallen.
+
+    If the tool sticks besides, the object cannot fall: then the skill does its work.
+    """
+    empties = skill.tool_left.get(reason) is EMPTY
+
+    def body(self: Skill, cell: Cell) -> Steps:
+        if empties:
+            cell.tool.open()
+            if cell.tool.holding:
+                yield from skill.run(self, cell) or ()
+                return
+            if (item := cell.ledger.find_held_item()) is not None:
+                slipped(cell, item)
+        raise self.failed(reason, INJECTED_FAILURE)
+
+    return in_place_of(skill, "Failing", body)

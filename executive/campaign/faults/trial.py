@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from executive.campaign.faults import judgement
-from executive.campaign.faults.breakages import WANTED, broken_skills
-from executive.campaign.faults.fault import Breakage, Fault, InjectedError
+from executive.campaign.faults.fault import (
+    INJECTED_FAILURE,
+    Fault,
+    InjectedError,
+    broken_skills,
+)
 from executive.campaign.faults.listing import skill_nodes
 from executive.campaign.faults.rehearsal import Activations, Rehearsal
 from executive.campaign.halt_checks import check_journal, check_rest, check_tool
@@ -23,7 +27,6 @@ from executive.plugins import cell_kind
 from executive.record.recorded_run import Recording, new_directory
 from executive.record.recorder import Recorder
 from executive.run.assembly import RunOptions, assemble
-from executive.testing.bounded_cell import BoundedCell
 from executive.testing.faults import DisturbedCell, disturbed
 from executive.view.figures.fault_trials import Trial
 from executive.view.report.page import leave_report
@@ -53,11 +56,7 @@ def record(subject: Subject, rehearsal: Rehearsal, faults: Numbered, runs: Path)
         recording = Recording(trying.run, loaded, subject.skills, directory, Recorder(directory), ())
         result = recording.execute(subject.seed, began)
         leave_report(result)
-        outcome = RunEnded(
-            result["status"], result["reason"], result["message"], result["node"], result["empty"],
-            result["holds"], result["ticks"], result["robot_time_s"],
-        )  # fmt: skip
-        return trying.judged(outcome), directory.path
+        return trying.judged(trying.outcome), directory.path
 
 
 def empty_trial(faults: Numbered) -> Trial:
@@ -81,13 +80,18 @@ class _Trying:
         self.options = RunOptions(
             subject.seed,
             subject.requests,
-            kind=disturbed(self._kind, happenings),
+            kind=disturbed(self._kind, happenings, longest=rehearsal.longest),
             substitutes=broken_skills(self._breakages, own),
         )
         self.run = assemble(subject.loaded, subject.skills, self.options, [self._see, self._activations])
         workcell = self.run.workcell
         assert isinstance(workcell, DisturbedCell)
         self.run.observe(workcell.hear)
+
+    @property
+    def outcome(self) -> RunEnded:
+        """Recorded end of the run."""
+        return next(one.event for one in reversed(self._events) if isinstance(one.event, RunEnded))
 
     def judged(self, outcome: RunEnded) -> Trial:
         """Return what came of the run, which is over."""
@@ -126,23 +130,21 @@ class _Trying:
 
     def _kind(self, *args: Any, **options: Any) -> Workcell:
         kind = self._subject.kind or cell_kind(self._subject.loaded.cell_config.kind)
-        bounded = BoundedCell(kind(*args, **options), self._rehearsal.longest)
-        return CellWrapper(bounded, after=self._stop_if_due)
+        return CellWrapper(kind(*args, **options), after=self._stop_if_due)
 
     def _see(self, timed: TimedEvent) -> None:
         if not isinstance(timed.event, InputRead):
             self._events.append(timed)
 
     def _stop_if_due(self) -> None:
-        """Wish a stop where a skill is to be halted."""
-        if any(self._due(breakage) for breakage in self._breakages if breakage.how == "raises when halted"):
-            self._stopped = True
-            self.run.control.stop()
-
-    def _due(self, breakage: Breakage) -> bool:
-        began = self._activations.began.get(breakage.node)
-        is_meant = self._activations.counts[breakage.node] in breakage.starts
-        return began is not None and is_meant and self.run.tick >= began + breakage.after
+        """Stop the run when a skill is to be halted."""
+        for breakage in self._breakages:
+            began = self._activations.began.get(breakage.node)
+            is_meant = self._activations.counts[breakage.node] in breakage.starts
+            is_due = began is not None and self.run.tick >= began + breakage.after
+            if breakage.how == "raises when halted" and is_meant and is_due:
+                self._stopped = True
+                self.run.control.stop()
 
     def _hidden(self) -> judgement.Hidden:
         workcell = self.run.workcell
@@ -150,25 +152,20 @@ class _Trying:
         return judgement.out_of_sight(workcell.hand.things, workcell.cell.bins.values(), self._events)
 
     def _happened(self, fault: Fault) -> bool:
-        """Tell whether a fault found its occasion."""
+        """Return True if a fault was injected."""
         names = {happening.what.name for happening in fault.happenings}
-        injected = (one.event for one in self._events if isinstance(one.event, FaultInjected))
-        if any(event.name in names for event in injected):
+        if any(isinstance(one.event, FaultInjected) and one.event.name in names for one in self._events):
             return True
         return bool(fault.breakages) and self._raised(fault)
 
     def _raised(self, fault: Fault) -> bool:
-        """Tell whether a node failed as it was to; True for a fault that is about none."""
+        """Return True if the node of a fault ended as the fault wants it; True for a fault without a node."""
+        ends = [one.event for one in self._events if isinstance(one.event, NodeEnded)]
+        mine = [end for end in ends if end.node == fault.about]
         if fault.ends_run:
-            name = InjectedError.__name__
-            return any(name in event.message for event in self._ends(fault, "INVALID"))
-        if not fault.reason:
-            return True
-        failures = [event for event in self._ends(fault, "FAILURE") if event.reason == fault.what]
-        return any(not fault.breakages or event.message == WANTED for event in failures)
-
-    def _ends(self, fault: Fault, status: str) -> Iterator[NodeEnded]:
-        for one in self._events:
-            event = one.event
-            if isinstance(event, NodeEnded) and (event.node, event.status) == (fault.about, status):
-                yield event
+            return any(end.status == "INVALID" and InjectedError.__name__ in end.message for end in mine)
+        failures = [end for end in mine if (end.status, end.reason) == ("FAILURE", fault.what)]
+        messages = [end.message for end in failures]
+        return not fault.reason or any(
+            not fault.breakages or message == INJECTED_FAILURE for message in messages
+        )

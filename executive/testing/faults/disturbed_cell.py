@@ -1,41 +1,48 @@
-"""A work cell in which a fault script happens."""
+"""Work cell into which the faults of a script are injected."""
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.protocols import Cell
 from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import Workcell
-from executive.errors import InputError
-from executive.events import Emit, TimedEvent, ignore
+from executive.errors import Fault, InputError
+from executive.events import Emit, NodeEnded, NodeStarted, TimedEvent, ignore
+from executive.testing.faults.effect import Effect, Occasion
 from executive.testing.faults.hand import Hand, hand_of
 from executive.testing.faults.scene import Scene
-from executive.testing.faults.schedule import Schedule
-from executive.testing.faults.script import Disturbance, DuringNode
+from executive.testing.faults.script import Disturbance, DuringNode, DuringTime
 
-_DISTURBED = frozenset(
+TIME_TOLERANCE = 1e-9
+"""Rounding allowed when two times on the clock are compared [s]."""
+_ROLES = ("arm", "tool", "camera", "detector", "localizer", "operator")
+_ANSWERS = frozenset(
     {
         "arm.plan", "tool.close", "tool.open", "camera.sees_table", "camera.capture", "detector.request",
         "localizer.localize", "operator.ask",
     }
 )  # fmt: skip
-"""Accesses that go through the schedule; the method of an effect has the name of the member."""
+"""Accesses whose answers effects can change."""
 
 
 class DisturbedCell(CellWrapper):
-    """A work cell to which things happen, physically; implements `Workcell`.
+    """A work cell with injected faults; implements `Workcell`.
 
-    Whoever runs a mission in it lets it `hear` the run's events: it knows by them which node runs. Whenever
-    it does something to the cell, it emits a `disturbance`.
+    The cell must `hear` the events of its run, which tell it the running nodes. For each fault it emits a
+    `FaultInjected`.
 
     Args:
-        inner: The cell as it would be.
-        disturbances: What happens to it, and when.
-        emit: Tells the run what happens.
-        hand: Returns what reaches into a cell's world.
+        inner: The cell without faults.
+        disturbances: The faults and their times.
+        emit: Emits events of the run.
+        hand: Returns the access to the world of a cell.
+        longest: Time on the run's clock after which the run ends as a fault [s].
     """
 
     def __init__(
@@ -44,78 +51,118 @@ class DisturbedCell(CellWrapper):
         disturbances: Sequence[Disturbance],
         emit: Emit = ignore,
         hand: Callable[[Workcell], Hand] = hand_of,
+        longest: float = math.inf,
     ) -> None:
         super().__init__(inner)
-        self._disturbances = tuple(disturbances)
         self._scene = Scene(inner, hand, emit)
-        self._schedule = Schedule(self._disturbances, self._scene)
-        self._cell = self._between_skills_and(inner.cell)
+        self._longest = longest
+        self._by_node = [(one.what, one.when) for one in disturbances if isinstance(one.when, DuringNode)]
+        self._to_come = [(one.what, one.when) for one in disturbances if isinstance(one.when, DuringTime)]
+        self._activations: Counter[int] = Counter()
+        self._occasions: list[Occasion] = []
+        self._cell = intercept(inner.cell, self._answer, _ROLES)
 
     @property
     def cell(self) -> Cell:
-        """What skills see."""
+        """The cell that skills see."""
         return self._cell
 
     @property
     def hand(self) -> Hand:
-        """What reaches into its world."""
+        """Access to the world of the cell."""
         return self._scene.hand
 
     def hear(self, timed: TimedEvent) -> None:
-        """Observe the run that drives this cell."""
-        self._schedule.hear(timed)
+        """Begin and end the faults of a node: an observer of the run that drives this cell."""
+        match timed.event:
+            case NodeStarted(node, _, item):
+                for number, (effect, when) in enumerate(self._by_node):
+                    if when.fits(node):
+                        self._activations[number] += 1
+                        if when.chosen(self._activations[number]):
+                            self._begin(effect, node, item)
+            case NodeEnded(node):
+                self._end(lambda occasion: occasion.node == node)
 
     def require_nodes(self, paths: Sequence[str]) -> None:
-        """Return if every disturbance that waits for a node may find one among these `paths`.
+        """Check that every fault of a node fits one of these `paths`.
 
         Raises:
-            InputError: One fits none of them.
+            InputError: A fault fits no path.
         """
-        for one in self._disturbances:
-            if isinstance(one.when, DuringNode) and not any(map(one.when.fits, paths)):
+        for effect, when in self._by_node:
+            if not any(map(when.fits, paths)):
                 raise InputError(
-                    f'{one.what.name} waits for a node that is called "{one.when.pattern}"; '
+                    f'{effect.name} waits for a node that is called "{when.pattern}"; '
                     f"there are: {', '.join(paths)}"
                 )
 
     def advance(self) -> None:
-        """Let one control step pass, and what is due happen."""
+        """Let one control step pass, and inject the faults that are due.
+
+        Raises:
+            Fault: The run has lasted too long; raised once, so that the arm can brake afterwards.
+        """
         self.inner.advance()
-        self._schedule.step()
+        self._step()
+        if self._scene.now > self._longest:
+            longest, self._longest = self._longest, math.inf
+            raise Fault(f"the mission is not done after {longest:g} s on its clock")
 
-    def _between_skills_and(self, cell: Cell) -> Cell:
-        """Return the cell with everything that can be disturbed going through the schedule."""
+    def _step(self) -> None:
+        """Begin and end the faults of a time, and let the lasting ones act."""
+        now = self._scene.now + TIME_TOLERANCE
+        due = [(effect, when) for effect, when in self._to_come if when.start <= now]
+        self._to_come = [(effect, when) for effect, when in self._to_come if when.start > now]
+        for effect, when in due:
+            self._begin(effect, until=when.end)
+        self._end(lambda occasion: occasion.until <= now)
+        for occasion in self._occasions:
+            occasion.act()
 
-        def ask(access: Access) -> Any:
-            if access.name in _DISTURBED:
-                return self._schedule.through(access.member, access.proceed)
-            answer = access.proceed()
-            if access.name == "arm.start":
-                self._scene.started(*access.all_arguments)
-            elif access.name == "arm.stop":
-                self._scene.stopped()
-            return answer
+    def _begin(self, effect: Effect, node: str = "", item: str = "", until: float = math.inf) -> None:
+        self._occasions.append(Occasion(effect, self._scene, node, item, until))
+        self._occasions[-1].act()
 
-        return intercept(cell, ask, ("arm", "tool", "camera", "detector", "localizer", "operator"))
+    def _end(self, ends: Callable[[Occasion], bool]) -> None:
+        for occasion in [one for one in self._occasions if ends(one)]:
+            occasion.over = True
+            self._occasions.remove(occasion)
+
+    def _answer(self, access: Access) -> Any:
+        """Return the answer of the cell, changed by all lasting effects."""
+        proceed = access.proceed
+        if access.name in _ANSWERS:
+            self._step()
+            for occasion in self._occasions:
+                if answer := occasion.effect.answers.get(access.member):
+                    proceed = partial(answer, proceed, occasion, *occasion.effect.arguments)
+        result = proceed()
+        if access.name == "arm.start":
+            self._scene.motion = self._scene.now, access.all_arguments[0]
+        elif access.name == "arm.stop":
+            self._scene.motion = None
+        return result
 
 
 def disturbed(
     kind: Callable[..., Workcell],
     disturbances: Sequence[Disturbance],
     hand: Callable[[Workcell], Hand] = hand_of,
+    longest: float = math.inf,
 ) -> Callable[..., DisturbedCell]:
     """Return a kind of cell, for `RunOptions.kind`: another kind, with a fault script.
 
-    The run must be observed by its cell: `run.observe(run.workcell.hear)`, or `run.record(...)` where it
-    plays an earlier one first.
+    The run must be observed by its cell: `run.observe(run.workcell.hear)`.
 
     Args:
         kind: The other kind.
         disturbances: The script.
-        hand: Returns what reaches into the world of a cell of that kind.
+        hand: Returns the access to the world of a cell of that kind.
+        longest: Time on the run's clock after which the run ends as a fault [s].
     """
 
     def make(*args: Any, emit: Emit = ignore, **options: Any) -> DisturbedCell:
-        return DisturbedCell(kind(*args, emit=emit, **options), disturbances, emit, hand)
+        return DisturbedCell(kind(*args, emit=emit, **options), disturbances, emit, hand, longest)
 
     return make

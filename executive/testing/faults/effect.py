@@ -57,6 +57,11 @@ class Occasion:
     over: bool = False
     _told: float = -math.inf
 
+    def act(self) -> None:
+        """Let the effect act, unless it is done."""
+        if self.effect.act is not None and not self.done:
+            self.done = self.effect.act(self, *self.effect.arguments)
+
     def tell(self, thing: Thing | None = None) -> None:
         """Emit the fault, and the object that it concerns; at most one event per control step."""
         if self._told == self.scene.now:

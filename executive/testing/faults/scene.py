@@ -1,4 +1,4 @@
-"""What a disturbance sees of a run, and what it does there."""
+"""Scene of a fault: the cell, its world and the motion of the arm."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from executive.geometry import Array
 from executive.testing.faults.hand import Hand, Thing
 
 NEAR = 0.05
-"""How far from where the ledger believes an item an object may lie and be that item [m]."""
+"""Distance from the believed position of an item up to which an object counts as that item [m]."""
 
 Which = int | Literal["node", "nearest"]
-"""An object: its number, from 1; the `nearest` to the tool on the table; or what the `node` is about.
+"""An object: its number, from 1; the one on the table that is `nearest` to the tool; or that of the `node`.
 
-What the node is about is what the ledger takes for its item; a node that is about none means the nearest.
+The object of the node is the one that the ledger takes for its item; without an item, it is the nearest.
 """
 
 
@@ -30,25 +30,26 @@ class Scene:
     """A cell and its world, as they are now.
 
     Args:
-        workcell: The cell, undisturbed.
-        hand: Returns what reaches into it.
-        emit: Tells the run what happens.
+        workcell: The cell without faults.
+        hand: Returns the access to the world of the cell.
+        emit: Emits events of the run.
 
     Attributes:
-        cell: What skills would see, were there no disturbances.
-        emit: Tells the run what happens.
+        cell: The cell that skills would see without faults.
+        emit: Emits events of the run.
+        motion: Time at which the arm began its motion [s], and the motion; None if it was stopped.
     """
 
     def __init__(self, workcell: Workcell, hand: Callable[[Workcell], Hand], emit: Emit) -> None:
         self._workcell = workcell
         self._hand_of = hand
-        self._motion: tuple[float, Motion] | None = None
+        self.motion: tuple[float, Motion] | None = None
         self.cell: Cell = workcell.cell
         self.emit = emit
 
     @cached_property
     def hand(self) -> Hand:
-        """What reaches into the world; looked for when it is needed first."""
+        """Access to the world, made at its first use."""
         return self._hand_of(self._workcell)
 
     @property
@@ -58,53 +59,35 @@ class Scene:
 
     @property
     def progress(self) -> float:
-        """How much of its motion the arm has behind it, 0 to 1; 0 while it follows none."""
-        if self._motion is None:
+        """Share of its motion that the arm has behind it, 0 to 1; 0 while it follows none."""
+        if self.motion is None or self.motion[1].duration == 0.0:
             return 0.0
-        began, motion = self._motion
-        if motion.duration == 0.0:
-            return 0.0
-        share = (self.now - began) / motion.duration
+        share = (self.now - self.motion[0]) / self.motion[1].duration
         return share if share <= 1.0 else 0.0
 
-    def started(self, motion: Motion) -> None:
-        """Note that the arm begins to follow a motion."""
-        self._motion = self.now, motion
-
-    def stopped(self) -> None:
-        """Note that the arm was told to brake."""
-        self._motion = None
-
     def find(self, which: Which, item: Item) -> Thing | None:
-        """Return an object, or None where there is no such one now; `item` is what the node is about."""
+        """Return an object, or None if there is none now; `item` is the item of the node."""
         if isinstance(which, int):
             return next(iter(self.hand.things[which - 1 : which]), None)
-        return self._taken_for(item) if which == "node" and item else self._nearest()
-
-    def _taken_for(self, item: Item) -> Thing | None:
+        if which == "nearest" or not item:
+            return self._closest(self.cell.arm.tool_pose.position, np.inf)
         known = next((one for one in self._workcell.accounts.summaries() if one.item == item), None)
         if known is None or known.state == "placed":
             return None
-        if known.state == "held":
-            return self.hand.held
-        return self._closest(np.array(known.position), NEAR)
-
-    def _nearest(self) -> Thing | None:
-        return self._closest(self.cell.arm.tool_pose.position, np.inf)
+        return self.hand.held if known.state == "held" else self._closest(np.array(known.position), NEAR)
 
     def _closest(self, position: Array, reach: float) -> Thing | None:
-        """Return the object on the table that is closest to a place `(3,)` [m] seen from above."""
+        """Return the object on the table whose horizontal distance from `position` `(3,)` [m] is smallest."""
 
         def distance(thing: Thing) -> float:
             return float(np.linalg.norm((thing.position - position)[:2]))
 
-        held = self.hand.held
-        there = [thing for thing in self.hand.things if not self._in_bin(thing) and not _same(thing, held)]
-        return min((thing for thing in there if distance(thing) <= reach), key=distance, default=None)
-
-    def _in_bin(self, thing: Thing) -> bool:
-        return any(bin.contains(thing.position) for bin in self.cell.bins.values())
-
-
-def _same(thing: Thing, other: Thing | None) -> bool:
-    return other is not None and thing.body == other.body
+        held, bins = self.hand.held, self.cell.bins.values()
+        there = [
+            thing
+            for thing in self.hand.things
+            if not any(bin.contains(thing.position) for bin in bins)
+            and (held is None or thing.body != held.body)
+            and distance(thing) <= reach
+        ]
+        return min(there, key=distance, default=None)

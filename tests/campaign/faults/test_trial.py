@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from executive.campaign.faults.breakages import broken_skills
 from executive.campaign.faults.campaign import Campaign
-from executive.campaign.faults.fault import Breakage
+from executive.campaign.faults.fault import Breakage, broken_skills
 from executive.campaign.faults.trial import record, try_out
 from executive.cells.fake.cell import FakeCell
 from executive.events import FaultInjected, ItemChanged, NodeEnded, RunEnded

@@ -197,10 +197,10 @@ def test_a_seal_breaks_over_a_wrong_bin() -> None:
     cell.advance()
     hold(cell)
     cell.fake.world.held.position[:2] = cell.cell.bins["red_bin"].slots[0][:2]
-    cell._schedule.step()
+    cell._step()
     assert cell.fake.tool.holding, "the red bin is right for a cube"
     cell.fake.world.held.position[:2] = cell.cell.bins["blue_bin"].slots[0][:2]
-    cell._schedule.step()
+    cell._step()
     assert not cell.fake.tool.holding
 
 
@@ -300,7 +300,7 @@ def test_the_object_of_a_node_is_what_the_ledger_takes_for_its_item() -> None:
 def test_an_object_that_is_moved_is_out_of_the_tool_and_at_rest_elsewhere() -> None:
     cell: Any = cell_with(effects.object_moved((0.1, -0.05), 3))
     hold(cell, "duck")
-    cell._schedule.step()
+    cell._step()
     duck = cell.fake.world.objects[2]
     assert duck.position[:2] == pytest.approx([0.55, 0.15])
     assert not cell.fake.tool.holding
