@@ -5,20 +5,26 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from executive.cli.options import json_option, overrides_option, runs_option, scene_option, seed_option
+from executive.cli.options import (
+    json_option,
+    overrides_option,
+    refuse,
+    runs_option,
+    scene_option,
+    seed_option,
+)
 from executive.cli.streams import print_json, stdout_kept_clean, unescaped_stderr
 
 if TYPE_CHECKING:
     from executive.events import RunStarted
     from executive.record.recorded_run import RecordOptions
     from executive.run.assembly import RunOptions
-    from executive.skill import Skill
     from executive.view.live.page import LivePage
     from executive.view.terminal.lines import Lines
     from executive.view.terminal.screen import Terminal
@@ -45,31 +51,29 @@ if TYPE_CHECKING:
 )
 @click.pass_context
 def command(
-    ctx: click.Context,
-    mission: str | None,
-    resume: str | None,
-    seed: int,
-    overrides: dict[str, str],
-    scene: Path | None,
-    runs: Path,
-    as_json: bool,
-    quiet: bool,
-    live: bool,
-    paused: bool,
-    gui: bool,
-    realtime: bool,
-    requests: tuple[str, ...],
-) -> None:
+    ctx: click.Context, mission: str | None, resume: str | None, seed: int, overrides: dict[str, str],
+    scene: Path | None, runs: Path, as_json: bool, quiet: bool, live: bool, paused: bool, gui: bool,
+    realtime: bool, requests: tuple[str, ...],
+) -> None:  # fmt: skip
     """Run MISSION (a file or the name of a shipped mission) and record it."""
-    _require_sense(ctx, mission, resume)
+    sources = map(ctx.get_parameter_source, ("mission", "seed", "overrides", "requests", "scene"))
+    has_source = any(source is not click.core.ParameterSource.DEFAULT for source in sources)
     typing = sys.stdin is not None and sys.stdin.isatty()
-    if paused and not live and (quiet or not typing):
-        raise click.UsageError("nobody could let it go on: --paused needs --view or a terminal to type in")
-    if gui and not os.environ.get("DISPLAY"):
-        # The simulator would end the process with a line of its own.
-        raise click.UsageError("--gui needs a display, and DISPLAY names none; leave it out")
+    is_stuck = paused and not live and (quiet or not typing)
+    refuse(
+        (mission is None and resume is None, "name a MISSION, or a run to take up again with --resume RUN"),
+        (
+            resume is not None and has_source,
+            "--resume takes mission, seed, params, requests and scene from the run: leave them out here",
+        ),
+        (is_stuck, "nobody could let it go on: --paused needs --view or a terminal to type in"),
+        # The simulator would end the process with a message of its own.
+        (
+            gui and not os.environ.get("DISPLAY"),
+            "--gui needs a display, and DISPLAY names none; leave it out",
+        ),
+    )
     with stdout_kept_clean():
-        from executive.plugins import discover
         from executive.record.guarded_view import GuardedView
         from executive.record.recorded_run import RecordOptions
         from executive.record.result import disagreement, exit_code
@@ -78,7 +82,6 @@ def command(
         from executive.view.report.page import leave_report
         from executive.view.terminal.summary import repeat_command, story_lines, summary, verdict
 
-        skills = discover()
         shown = None if quiet else _view()
         with _page(live) as page:
             views = [GuardedView(view) for view in (shown, page) if view is not None]
@@ -89,10 +92,10 @@ def command(
             )  # fmt: skip
             if mission is None:
                 assert resume is not None
-                result, start = _resume(resume, runs, skills, options, record)
+                result, start = _resume(resume, options, runs, record)
                 origin = start.file, start.seed, start.overrides
             else:
-                result = _start(mission, skills, overrides, options, runs, record)
+                result = _start(mission, overrides, options, runs, record)
                 origin = mission, seed, overrides
             # What was asked for by a person is asked for again.
             asked_for, used_scene = requests or result["requests"], RunDirectory(Path(result["run"])).scene
@@ -115,36 +118,18 @@ def command(
     ctx.exit(exit_code(result))
 
 
-def _require_sense(ctx: click.Context, mission: str | None, resume: str | None) -> None:
-    """Refuse options that say nothing, or two things at once."""
-    if mission is None and resume is None:
-        raise click.UsageError("name a MISSION, or a run to take up again with --resume RUN")
-    if resume is None:
-        return
-    sources = map(ctx.get_parameter_source, ("mission", "seed", "overrides", "requests", "scene"))
-    if any(source is not click.core.ParameterSource.DEFAULT for source in sources):
-        raise click.UsageError(
-            "--resume takes mission, seed, params, requests and scene from the run: leave them out here"
-        )
-
-
 def _start(
-    mission: str,
-    skills: Mapping[str, type[Skill]],
-    overrides: dict[str, str],
-    options: RunOptions,
-    runs: Path,
-    record: RecordOptions,
+    mission: str, overrides: dict[str, str], options: RunOptions, runs: Path, record: RecordOptions
 ) -> dict[str, Any]:
     """Run a mission from its start and return the result."""
     from executive.mission.load import load_mission
-    from executive.plugins import cell_kind
+    from executive.plugins import cell_kind, discover
     from executive.record.recorded_run import record_run
 
+    skills = discover()
     loaded = load_mission(mission, skills, overrides, cell_kind)
-    if record.views:
-        for warning in loaded.warnings:
-            click.echo(str(warning), err=True)
+    for warning in loaded.warnings if record.views else ():
+        click.echo(str(warning), err=True)
     if options.scene is not None:
         from executive.cells.sim.scene_file import load_scene
 
@@ -154,15 +139,16 @@ def _start(
 
 
 def _resume(
-    name: str, runs: Path, skills: Mapping[str, type[Skill]], options: RunOptions, record: RecordOptions
+    name: str, options: RunOptions, runs: Path, record: RecordOptions
 ) -> tuple[dict[str, Any], RunStarted]:
     """Resume a run; return its result and its start."""
+    from executive.plugins import discover
     from executive.record.find_run import find_run
     from executive.record.journal import read_journal, start_of
     from executive.record.resumed_run import resume_run
 
     path = find_run(name, runs)
-    result = resume_run(path, skills, options, record)
+    result = resume_run(path, discover(), options, record)
     return result, start_of(read_journal(path / "journal.jsonl"), path, "run the mission anew")
 
 
