@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 
 from executive.campaign.evaluation import DetectorUnderTest
@@ -72,10 +71,9 @@ def _as_measurement(
             for label, row in table.items()
             if label != NOTHING
         },
-        counts={str(n): _as_error_counts(errors) for n, errors in sorted(evaluation.by_count.items())},
+        counts={
+            str(count): ErrorCounts(**{name: errors.get(name, 0) for name in ErrorCounts.model_fields})
+            for count, errors in sorted(evaluation.by_count.items())
+        },
         frames=evaluation.frames,
     )
-
-
-def _as_error_counts(errors: Mapping[str, int]) -> ErrorCounts:
-    return ErrorCounts(**{name: errors.get(name, 0) for name in ErrorCounts.model_fields})

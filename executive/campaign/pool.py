@@ -8,9 +8,8 @@ import os
 import signal
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
-from types import FrameType
 from typing import TypeVar
 
 from executive.processes import Workers, kill_workers
@@ -51,9 +50,9 @@ def do_all(
     to_do = deque(enumerate(jobs))
     results: dict[int, R] = {}
     running: dict[Future[R], int] = {}
-    pool, torn, halted = Workers(workers), False, False
+    pool, torn, halted, wished = Workers(workers), False, False, threading.Event()
     try:
-        with _wishes() as wished:
+        with handle_signals(SIGNALS, lambda *_: wished.set()):
             while running or (to_do and not halted):
                 # No job waits in the pool, from which it could not be removed.
                 while to_do and len(running) < workers and not (torn or halted or wished.is_set()):
@@ -98,16 +97,3 @@ def _halt_runs() -> None:
         assert process.pid is not None
         with contextlib.suppress(ProcessLookupError):
             os.kill(process.pid, signal.SIGINT)
-
-
-@contextlib.contextmanager
-def _wishes() -> Iterator[threading.Event]:
-    """Replace the signal handlers by one that sets the event."""
-    wished = threading.Event()
-
-    def wish(number: int, frame: FrameType | None) -> None:
-        del number, frame
-        wished.set()
-
-    with handle_signals(SIGNALS, wish):
-        yield wished

@@ -115,7 +115,7 @@ def command(
                 path = store_evaluation(tested, result, out, command=repeat, seconds=seconds)
                 click.echo(f"stored in {path}", err=True)
         if sheet is not None:
-            from executive.training.evaluation.sheet import write_sheet
+            from executive.training.evaluation.misses import write_sheet
 
             write_sheet(sheet, worst.kept, ", ".join(measured))
             click.echo(f"the {len(worst.kept)} worst in {sheet}", err=True)

@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.campaign.statistics import spread, wilson
-from executive.campaign.sweep import Job, run_job, summarize, sweep
+from executive.campaign.sweep import Job, run_job, spread, summarize, sweep, wilson
 from executive.errors import InputError
 
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
-from executive.campaign.faults.branches import branches
 from executive.campaign.faults.fault import Fault
 from executive.campaign.faults.listing import list_faults
 from executive.campaign.faults.rehearsal import rehearse
@@ -15,7 +14,10 @@ from executive.campaign.faults.trial import Numbered, empty_trial, try_out
 from executive.campaign.pool import do_all
 from executive.campaign.subject import Subject
 from executive.errors import InputError
-from executive.view.figures.fault_trials import FaultFigures, Trial
+from executive.mission.model import nodes
+from executive.mission.model.nodes import Node
+from executive.mission.source import Mark
+from executive.view.figures.fault_trials import Branch, FaultFigures, Trial
 
 DEEPEST = 4
 """Most faults in a run whose last one needs the others to happen at all."""
@@ -154,3 +156,40 @@ def _broken(faults: Numbered, error: BaseException) -> Trial:
     """Return the trial of a run that left none."""
     problem = f"the run broke: {type(error).__name__}: {error}"
     return replace(empty_trial(faults), status="FAULT", problems=(problem,))
+
+
+def branches(tree: Node, trials: Iterable[Trial]) -> tuple[Branch, ...]:
+    """Return every such way in the order of the tree, and how many of the trials entered each.
+
+    One that stands in a subtree which is used twice is one way with two nodes.
+    """
+    ran = [trial.entered for trial in trials]
+    found: dict[tuple[str, int, int, str], list[str]] = {}
+    for mark, what, node in _ways(tree):
+        found.setdefault((mark.source.path, mark.line, mark.col, what), []).append(_path(node))
+    return tuple(
+        Branch(f"{file}:{line}", what, tuple(paths), sum(not entered.isdisjoint(paths) for entered in ran))
+        for (file, line, _, what), paths in found.items()
+    )
+
+
+def _ways(tree: Node) -> Iterator[tuple[Mark, str, Node]]:
+    for node in tree.walk():
+        if isinstance(node, nodes.TryNode):
+            for catch in node.catches:
+                on = ", ".join(map(str, catch.on))
+                yield catch.do.mark, f"catch on {on}", catch.do
+            if node.finish is not None:
+                yield node.finish.mark, "finally", node.finish
+        elif isinstance(node, nodes.RetryNode) and node.recover is not None:
+            yield node.recover.mark, "recover", node.recover
+        elif isinstance(node, nodes.FallbackNode):
+            for number, choice in enumerate(node.choices[1:], 2):
+                yield choice.mark, f"choice {number}", choice
+
+
+def _path(node: Node) -> str:
+    """Return the path of the node that is built for one: a subtree without a label is what it consists of."""
+    while isinstance(node, nodes.UseNode) and not node.label and node.body is not None:
+        node = node.body
+    return node.path

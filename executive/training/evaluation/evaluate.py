@@ -21,8 +21,7 @@ from executive.training.evaluation.asking import CellDetector
 from executive.training.evaluation.figures import Evaluation, Spread
 from executive.training.evaluation.matching import Match, is_ignored, match
 from executive.training.evaluation.misses import WorstMisses
-from executive.training.evaluation.repeats import RepeatedErrors
-from executive.training.evaluation.tally import Tally
+from executive.training.evaluation.tally import RepeatedErrors, Tally
 from executive.training.labelled_image import LabelledImage
 from executive.training.samples import Samples
 

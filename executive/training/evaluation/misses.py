@@ -1,16 +1,41 @@
-"""Worst mistakes of a detector, for a picture of them."""
+"""Worst mistakes of a detector, and a picture of them."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from executive.cell.detection import Detection
 from executive.cell.frame import Box
+from executive.errors import InputError
 from executive.training.evaluation.matching import Match
 from executive.training.labelled_image import LabelledImage
+
+COLUMNS = 6
+"""Mistakes side by side."""
+TILE, CAPTION, GAP, HEAD = 240, 40, 10, 34
+"""Side of a picture, height of the words below it, space around both, height of the head [pixel]."""
+SURROUNDINGS = 2.2
+"""Side of the part of the image around a mistake, in sides of the mistake's box."""
+MIN_SIDE = 40.0
+"""Smallest side of that part [pixel of the image]: a smaller one shows no surroundings."""
+THICKNESS = 2
+"""Thickness of the lines [pixel]."""
+LEGEND = "boxes: found, corners: true"
+
+GROUND, INK, FAINT = (32, 38, 43), (255, 255, 255), (169, 180, 188)
+"""Colours behind the text, of the text, and of text that matters less, RGB."""
+TRUE, FOUND, RIM = "#56B4E9", "#E69F00", "#000000"
+"""Colours of true boxes, of found ones, and of the rim that sets both off from any image."""
+
+Picture = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,3 +104,77 @@ def misses(matches: Sequence[Match], sample: LabelledImage) -> Iterator[Miss]:
         left, top, right, bottom = one.box
         around = min(box[0], left), min(box[1], top), max(box[2], right), max(box[3], bottom)
         yield Miss(severity, text, around, sample, found)
+
+
+def draw_sheet(misses: Sequence[Miss], title: str) -> Picture:
+    """Return the picture, `(H, W, 3)` RGB.
+
+    Args:
+        misses: Mistakes, in the order shown.
+        title: Name of the measurement, for the head.
+    """
+    columns = min(COLUMNS, max(len(misses), 3))
+    rows = max(math.ceil(len(misses) / columns), 1)
+    width, height = GAP + columns * (TILE + GAP), HEAD + rows * (TILE + CAPTION + GAP)
+    sheet = np.full((height, width, 3), GROUND, np.uint8)
+    legend = width - GAP - _width(LEGEND)
+    _write(sheet, LEGEND, (legend, 21), FAINT)
+    _write(sheet, title if misses else f"{title}: no mistakes", (GAP, 21), INK, legend - 2 * GAP)
+    for number, miss in enumerate(misses):
+        row, column = divmod(number, columns)
+        left, top = GAP + column * (TILE + GAP), HEAD + row * (TILE + CAPTION + GAP)
+        sheet[top : top + TILE, left : left + TILE] = _picture(miss)
+        _write(sheet, f"{number + 1}. {miss.text}", (left, top + TILE + 15), INK)
+        _write(sheet, miss.sample.file, (left, top + TILE + 32), FAINT)
+    return sheet
+
+
+def write_sheet(path: Path, misses: Sequence[Miss], title: str) -> None:
+    """Write the picture to a file; the file's ending decides on the format.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if not cv2.imwrite(str(path), draw_sheet(misses, title)[..., ::-1]):
+        raise InputError(
+            f"the picture {path} could not be written; is the disk full or the folder read-only?"
+        )
+
+
+def _picture(miss: Miss) -> Picture:
+    """Return the mistake and its surroundings, `(TILE, TILE, 3)` RGB, with the true and the found boxes."""
+    import supervision as sv
+
+    left, top, right, bottom = miss.box
+    side = max(SURROUNDINGS * max(right - left, bottom - top), MIN_SIDE)
+    corner = np.array([left + right - side, top + bottom - side]) / 2
+    zoom = TILE / side
+    # Pixel i covers [i, i + 1), OpenCV has its centre at i.
+    shift = zoom * (0.5 - corner) - 0.5
+    matrix = np.array([[zoom, 0.0, shift[0]], [0.0, zoom, shift[1]]])
+    image = miss.sample.image[..., ::-1]  # The annotators draw on BGR.
+    tile = cv2.warpAffine(image, matrix, (TILE, TILE), flags=cv2.INTER_CUBIC, borderValue=GROUND[::-1])
+    found = [detection.box for detection in miss.found]
+    kinds: Any = ((sv.BoxAnnotator, found, FOUND), (sv.BoxCornerAnnotator, miss.sample.boxes, TRUE))
+    for annotator, boxes, colour in kinds:
+        zoomed = ((np.array(boxes).reshape(-1, 2, 2) - corner) * zoom).reshape(-1, 4)
+        shown = sv.Detections(zoomed, class_id=np.zeros(len(boxes), int))
+        for line, thickness in ((RIM, 2 * THICKNESS), (colour, THICKNESS)):
+            tile = annotator(sv.Color.from_hex(line), thickness).annotate(tile, shown)
+    return np.asarray(tile[..., ::-1], dtype=np.uint8)
+
+
+def _write(
+    picture: Picture, text: str, place: tuple[int, int], colour: tuple[int, int, int], room: int = TILE
+) -> None:
+    """Write a text, cut at its end where the room [pixel] ends."""
+    shown = text
+    while _width(shown) > room and len(text) > 1:
+        text = text[:-1]
+        shown = f"{text}..."
+    cv2.putText(picture, shown, place, cv2.FONT_HERSHEY_SIMPLEX, 0.42, colour, 1, cv2.LINE_AA)
+
+
+def _width(text: str) -> int:
+    return int(cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.42, 1)[0][0])

@@ -12,8 +12,7 @@ from typing import Any
 
 import pytest
 
-from executive.campaign.faults.branches import branches
-from executive.campaign.faults.campaign import Campaign
+from executive.campaign.faults.campaign import Campaign, branches
 from executive.campaign.subject import Subject
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError

@@ -240,7 +240,7 @@ def test_a_problem_is_raised_with_the_rule_and_without_a_stage_nothing_succeeds(
 
 
 def test_a_tick_that_does_not_come_back_is_broken_off_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("executive.testing.conformance.patience.STUCK_TIMEOUT", 0.3)
+    monkeypatch.setattr("executive.testing.conformance.rehearsal.STUCK_TIMEOUT", 0.3)
     answered = signal.getsignal(signal.SIGALRM)
     checks = {check.name: check for check in conformance(faulty.LoopsWithoutYield)}
     problem = (

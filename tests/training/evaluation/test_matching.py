@@ -11,8 +11,7 @@ import pytest
 from executive.cell.detection import Detection
 from executive.errors import InputError
 from executive.training.evaluation.matching import is_ignored, match
-from executive.training.evaluation.misses import WorstMisses, misses
-from executive.training.evaluation.sheet import FOUND, TRUE, draw_sheet, write_sheet
+from executive.training.evaluation.misses import FOUND, TRUE, WorstMisses, draw_sheet, misses, write_sheet
 
 
 def matches(sample, *found):
