@@ -19,7 +19,13 @@ from executive.mission.findings import alternatives
 from executive.perception.detectors.registry import find_problems
 from executive.perception.localization import build_localizer
 from executive.training.evaluation.asking import CellDetector
-from executive.training.evaluation.evaluate import MIN_CONFIDENCE, MODEL_NAME, evaluate, model_detector
+from executive.training.evaluation.evaluate import (
+    MIN_CONFIDENCE,
+    MODEL_NAME,
+    evaluate,
+    label_file,
+    model_detector,
+)
 from executive.training.evaluation.figures import Evaluation
 from executive.training.evaluation.misses import WorstMisses
 from executive.training.labelled_image import LabelledImage
@@ -94,7 +100,7 @@ def list_detectors(
     """
     alone: dict[str, DetectorConfig] = {}
     if weights is not None:
-        alone = {MODEL_NAME: model_detector(weights, labels or _labels_beside(weights))}
+        alone = {MODEL_NAME: model_detector(weights, labels or label_file(weights))}
     elif not cells:
         alone = {"embedded": DetectorConfig(kind="embedded", floor=MIN_CONFIDENCE)}
     if not cells:
@@ -198,9 +204,3 @@ def _localizer(config: CellConfig) -> Localizer | None:
         return None
     classes = {label: object_class(label, kind) for label, kind in config.objects.items()}
     return build_localizer(config.localization, classes)
-
-
-def _labels_beside(weights: Path) -> Path:
-    """Return the label file of a model: `NAME.labels.txt` if it exists, else `labels.txt`."""
-    own = weights.with_name(f"{weights.stem}.labels.txt")
-    return own if own.is_file() else weights.with_name("labels.txt")

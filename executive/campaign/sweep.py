@@ -18,7 +18,16 @@ Result = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Job:
-    """One run to do: a mission with one seed, in the world of a scene file if there is one."""
+    """One run of a mission.
+
+    Attributes:
+        mission: File or shipped name.
+        seed: Random seed.
+        overrides: Params of the mission and keys of the cell with other values, as given with `--set`.
+        runs: Folder of the run directories.
+        frames: True if the run saves the pictures behind its decisions.
+        scene: Scene file, or None.
+    """
 
     mission: str
     seed: int
@@ -29,37 +38,25 @@ class Job:
 
 
 def sweep(
-    mission: str,
-    seeds: Sequence[int],
+    jobs: Sequence[Job],
     *,
-    overrides: Mapping[str, str],
-    runs: Path,
     workers: int = 2,
-    frames: bool = False,
-    scene: Path | None = None,
     progress: Callable[[int, int], None] | None = None,
     halting: Callable[[], None] | None = None,
     work: Callable[[Job], Result] | None = None,
 ) -> list[Result]:
-    """Run `mission` once for every seed and return the results in the order of the seeds.
+    """Do all jobs and return the results in the order of the jobs.
 
     A run that breaks its process is a result too, with status `FAULT`. After Ctrl-C or SIGTERM no further
-    run begins, those under way halt or end, and the results so far are returned.
+    run begins, running ones halt or end, and the results so far are returned.
 
     Args:
-        mission: File or shipped name.
-        seeds: One run each.
-        overrides: Params of the mission and keys of the cell with other values, as given with `--set`.
-        runs: Folder of the run directories.
-        workers: How many processes run at a time.
-        frames: Whether the runs save the pictures behind their decisions; a failing seed can be
-            repeated with them, so a sweep does without.
-        scene: Scene file of all runs, or None.
-        progress: Told how many runs of how many are done.
-        halting: Told that somebody wished to halt, as soon as they do.
-        work: What does one job, in a process of its own.
+        jobs: The runs.
+        workers: Number of processes.
+        progress: Called with the number of finished runs and of all runs.
+        halting: Called as soon as the user wants to halt.
+        work: Does one job, in a process of its own; None: `run_job`.
     """
-    jobs = [Job(mission, seed, dict(overrides), runs, frames, scene) for seed in seeds]
     results = do_all(jobs, work or run_job, _broken, workers=workers, progress=progress, halting=halting)
     return [result for result in results if result is not None]
 

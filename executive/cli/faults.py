@@ -55,8 +55,7 @@ def command(
         from executive.campaign.faults.trial import record
         from executive.campaign.subject import load_subject
         from executive.cli.progress import bar, print_halting
-        from executive.view.figures.fault import fault_text, trial_text
-        from executive.view.figures.fault_trials import as_plain, trial_as_plain
+        from executive.view.figures.fault import as_plain, fault_text, trial_as_plain, trial_text
 
         subject = load_subject(mission, overrides, oracle, seed)
         with bar("tried", quiet=as_json or listed or numbers is not None) as progress:

@@ -46,7 +46,7 @@ def command(
     Ctrl-C halts the runs under way and tells of those that were done; a second one ends at once.
     """
     with stdout_kept_clean():
-        from executive.campaign.sweep import summarize, sweep
+        from executive.campaign.sweep import Job, summarize, sweep
         from executive.cli.progress import bar, print_halting
         from executive.mission.load import load_mission
         from executive.plugins import cell_kind, discover
@@ -60,10 +60,8 @@ def command(
             load_scene(scene, loaded.cell_config)
         check_place(runs)
         with bar(mission) as progress:
-            results = sweep(
-                mission, seeds, overrides=overrides, runs=runs, workers=workers, frames=frames, scene=scene,
-                progress=progress, halting=print_halting,
-            )  # fmt: skip
+            jobs = [Job(mission, seed, overrides, runs, frames, scene) for seed in seeds]
+            results = sweep(jobs, workers=workers, progress=progress, halting=print_halting)
         figures = summarize(results, len(seeds))
         click.echo(_text(figures), err=True)
     if as_json:

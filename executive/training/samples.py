@@ -73,15 +73,19 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     return np.ascontiguousarray(image[..., ::-1], dtype=np.uint8)
 
 
+def splits_of(dataset: Path) -> list[Path]:
+    """Return the folders of a data set with labelled images."""
+    return [dataset / name for name in SPLITS if is_split(dataset / name)]
+
+
 def _split(folder: Path) -> Path:
-    """Return the folder in which the labelled images of a data set are, or of a split of one.
+    """Return the folder if it holds labelled images, else the first of its splits.
 
     Raises:
-        InputError: There is none.
+        InputError: There are no labelled images.
     """
-    for split in (folder, *(folder / name for name in SPLITS)):
-        if is_split(split):
-            return split
+    if splits := [folder] if is_split(folder) else splits_of(folder):
+        return splits[0]
     raise InputError(
         f"{folder} holds no labelled images: {COCO_FILE_NAME} (COCO) or images/ and labels/ (YOLO) were "
         f"looked for there and in {', '.join(SPLITS)}; make some with `executive dataset`"

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from executive.errors import InputError
 from executive.perception.detectors.onnx_model import read_labels
-from executive.training.annotations import is_split, read_annotations
-from executive.training.evaluation.evaluate import evaluate_folder
+from executive.training.annotations import read_annotations
+from executive.training.evaluation.evaluate import evaluate_folder, label_file
 from executive.training.model_card import ModelCard, read_epochs
-from executive.training.samples import SPLITS
+from executive.training.samples import splits_of
 
 ReportEpoch = Callable[[int, dict[str, float]], None]
 """Called after each epoch with its number, from 1, and its metrics by name."""
@@ -110,10 +110,8 @@ def learning_rate(start: Path | None, labels: list[str]) -> float:
     """
     if start is None:
         return LEARNING_RATE
-    files = (start.with_suffix(".labels.txt"), start.with_name("labels.txt"))
-    found = next((file for file in files if file.is_file()), None)
-    has_same_classes = found is not None and list(read_labels(found)) == labels
-    return FINE_TUNING_RATE if has_same_classes else LEARNING_RATE
+    file = label_file(start)
+    return FINE_TUNING_RATE if file.is_file() and list(read_labels(file)) == labels else LEARNING_RATE
 
 
 def _check(dataset: Path, start: Path | None) -> None:
@@ -126,9 +124,8 @@ def _check(dataset: Path, start: Path | None) -> None:
             f"{dataset} is not a data set: it needs train/_annotations.coco.json and "
             "valid/_annotations.coco.json (COCO), or data.yaml (YOLO); a Roboflow export has one of them"
         )
-    for split in (dataset / name for name in SPLITS):
-        if is_split(split):
-            read_annotations(split)
+    for split in splits_of(dataset):
+        read_annotations(split)
 
 
 def _validation(dataset: Path) -> Path:

@@ -29,7 +29,8 @@ def result(seed: int, status: str = "SUCCESS", right: int = 4, left: int = 0, **
 
 def swept(seeds: range, work, **options) -> list:
     """Sweep without a mission: `work` says what comes of it."""
-    return sweep("sort", seeds, overrides={"a": "1"}, runs=Path("runs"), work=work, **options)
+    jobs = [Job("sort", seed, {"a": "1"}, Path("runs"), False) for seed in seeds]
+    return sweep(jobs, work=work, **options)
 
 
 def work(job: Job) -> dict:

@@ -17,7 +17,7 @@ from executive.errors import InputError
 from executive.mission.model import nodes
 from executive.mission.model.nodes import Node
 from executive.mission.source import Mark
-from executive.view.figures.fault_trials import Branch, FaultFigures, Trial
+from executive.view.figures.fault import Branch, FaultFigures, Trial
 
 DEEPEST = 4
 """Most faults in a run whose last one needs the others to happen at all."""

@@ -28,7 +28,7 @@ from executive.record.recorded_run import Recording, new_directory
 from executive.record.recorder import Recorder
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.faults import DisturbedCell, disturbed
-from executive.view.figures.fault_trials import Trial
+from executive.view.figures.fault import Trial
 from executive.view.report.page import leave_report
 
 Numbered = Mapping[int, Fault]

@@ -107,6 +107,12 @@ def _match(answer: Answer, sample: LabelledImage, min_confidence: float) -> list
     return match([one for one in found if not is_ignored(one, sample)], sample)
 
 
+def label_file(model: Path) -> Path:
+    """Return the label file of a model `NAME.onnx`: `NAME.labels.txt` if it exists, else `labels.txt`."""
+    own = model.with_suffix(".labels.txt")
+    return own if own.is_file() else model.with_name("labels.txt")
+
+
 def model_detector(model: Path, labels: Path) -> DetectorConfig:
     """Return the section of a cell file for an exported RF-DETR.
 

@@ -15,7 +15,7 @@ from executive.events import FaultInjected, ItemChanged, NodeEnded, RunEnded
 from executive.plugins import discover
 from executive.record.journal import read_journal
 from executive.testing.run_mission import run_mission
-from executive.view.figures.fault_trials import Trial
+from executive.view.figures.fault import Trial
 
 
 def number_of(campaign: Campaign, name: str, what: str, when: str = "first", *, behind: bool = False) -> int:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from executive.view.figures.fault import fault_text, trial_text
-from executive.view.figures.fault_trials import Branch, FaultFigures, Trial, as_plain
+from executive.view.figures.fault import Branch, FaultFigures, Trial, as_plain, fault_text, trial_text
 
 MISSED = Trial(
     (1,), ("tree/Grasp missed, first: nothing seals",), "Grasp", "sort.yaml:7", "missed", "first",
