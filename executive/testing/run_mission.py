@@ -19,8 +19,8 @@ from executive.record.result import agrees
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
 from executive.skill import Skill
-from executive.testing.faults.disturbed_cell import DisturbedCell, disturbed
-from executive.testing.faults.script import Disturbance
+from executive.testing.faults.faulty_cell import FaultyCell, with_faults
+from executive.testing.faults.script import ScheduledFault
 from executive.tree.skill_leaf import SkillNode
 
 LONGEST = 600.0
@@ -59,7 +59,7 @@ class MissionResult(RunEnded):
         failures = (event for event in ended if event.skill and event.status == "FAILURE")
         return [event.reason for event in failures if fnmatchcase(event.node, pattern)]
 
-    def disturbances(self) -> list[FaultInjected]:
+    def faults(self) -> list[FaultInjected]:
         """Return the injected faults, in order."""
         return [one.event for one in self.events if isinstance(one.event, FaultInjected)]
 
@@ -72,7 +72,7 @@ def run_mission(
     set: Mapping[str, str] | None = None,
     requests: Sequence[str] = (),
     substitutes: Mapping[str, type[Skill]] | None = None,
-    disturbances: Sequence[Disturbance] = (),
+    faults: Sequence[ScheduledFault] = (),
     arrange: Callable[[Any], object] | None = None,
     observers: Sequence[Observer] = (),
     longest: float = LONGEST,
@@ -86,7 +86,7 @@ def run_mission(
         set: Other values for params by name, and for the cell as `cell.<key>.<key>`.
         requests: What the operator asks for, in turn.
         substitutes: What runs instead of a node's skill, by a pattern of the node's path.
-        disturbances: What happens to the cell, and when.
+        faults: What happens to the cell, and when.
         arrange: Gets the cell before the run, to put things on its table.
         observers: Told of every event.
         longest: Time on the run's clock after which the run ends as a fault [s].
@@ -110,11 +110,11 @@ def run_mission(
             raise
         return workcell
 
-    make_cell = disturbed(arranged, disturbances, longest=longest)
+    make_cell = with_faults(arranged, faults, longest=longest)
     options = RunOptions(seed, requests, kind=make_cell, substitutes=substitutes or {})
     run = assemble(loaded, skills, options, [events.append, *observers])
     workcell = run.workcell
-    assert isinstance(workcell, DisturbedCell)
+    assert isinstance(workcell, FaultyCell)
     try:
         workcell.require_nodes([getattr(node, "path", node.name) for node in run.root.iterate()])
         _require_fitting_substitutes(run, skills)

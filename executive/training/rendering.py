@@ -111,19 +111,14 @@ def _in_blocks(
 
 
 def _draw(
-    cells: Sequence[CellConfig],
-    seed: int,
-    numbers: range,
-    *,
-    randomized: bool = True,
-    scene: SceneConfig = DECLARED_SCENE,
+    cells: Sequence[CellConfig], seed: int, numbers: range, scene: SceneConfig | None = None
 ) -> Iterator[tuple[int, str, Sample]]:
-    """Yield number, camera and sample of scenes of the cells, which take turns."""
+    """Yield number, camera and sample of scenes of the cells, which take turns; varied without `scene`."""
     cv2.setNumThreads(1)
     cameras = [next(iter(cell.cameras)) for cell in cells]
     with contextlib.ExitStack() as stack:
         renderers = [
-            SceneRenderer(cell, camera, randomized=randomized, scene=scene)
+            SceneRenderer(cell, camera, randomized=scene is None, scene=scene or DECLARED_SCENE)
             for cell, camera in zip(cells, cameras, strict=True)
         ]
         for renderer in renderers:
@@ -150,7 +145,7 @@ def _take_frames(
     config: CellConfig, scene: SceneConfig, seed: int, numbers: range
 ) -> dict[int, LabelledImage]:
     """Take the frames of these numbers; runs in a process of its own."""
-    drawn = _draw([config], seed, numbers, randomized=False, scene=scene)
+    drawn = _draw([config], seed, numbers, scene)
     return {
         number: as_labelled_frame(sample, camera, f"{camera}_{number:06d}")
         for number, camera, sample in drawn

@@ -16,7 +16,7 @@ MAX_TOTAL_WAIT = 70.0
 
 
 def test_the_waits_of_a_look_grow_and_outlast_a_restart() -> None:
-    result = run_mission("sort_overhead", disturbances=[after(0.0, detector_dead())])
+    result = run_mission("sort_overhead", faults=[after(0.0, detector_dead())])
     assert (result.status, result.reason) == ("FAILURE", "Detect.unavailable")
     asked = [one.clock for one in result.events if isinstance(one.event, FaultInjected)]
     waits = np.diff(asked)
@@ -29,7 +29,7 @@ def test_the_waits_of_a_look_grow_and_outlast_a_restart() -> None:
 @pytest.mark.parametrize("duration", [15.0, LONGEST_RESTART])
 def test_a_sort_outlasts_the_restart_of_a_server(start: float, duration: float) -> None:
     restart = between(start, start + duration, detector_dead())
-    result = run_mission("sort_overhead", seed=1, disturbances=[restart])
+    result = run_mission("sort_overhead", seed=1, faults=[restart])
     assert (result.status, result.message) == ("SUCCESS", "")
     assert result.audit is not None
     assert result.agrees

@@ -85,7 +85,7 @@ def test_the_first_decision_of_an_edited_mission_that_differs_is_told(missions: 
 def test_a_mission_that_gives_up_sooner_says_where(missions: Path) -> None:
     file, skills = missions / "sort_overhead.yaml", discover()
     four_times = [during("*/Grasp", seal_fails(), nth=(1, 2, 3, 4))]
-    log = InputLog.of(run_mission(file, seed=3, disturbances=four_times).events)
+    log = InputLog.of(run_mission(file, seed=3, faults=four_times).events)
     assert compare(load_mission(file, skills), skills, log, 3).same
     done = compare(load_mission(file, skills, {"attempts": "2"}), skills, log, 3, edited=True)
     assert done.replayed.event.node == "RejectTarget"

@@ -14,7 +14,7 @@ from executive.events import RunEnded, RunStarted, TimedEvent
 from executive.mission.load import load_mission
 from executive.plugins import discover
 from executive.run.assembly import RunOptions, assemble
-from executive.testing.faults import DisturbedCell, after, detector_dead, during, seal_fails
+from executive.testing.faults import FaultyCell, after, detector_dead, during, seal_fails
 from executive.testing.run_mission import run_mission
 from executive.testing.substitutes import endless
 from skills.detect import Detect
@@ -45,7 +45,7 @@ def test_a_shipped_mission_runs_by_its_name_on_the_fake_cell() -> None:
     assert result.items["placed"] == len(result.cell.world.objects) >= 3
     assert (type(result.events[0].event), type(result.events[-1].event)) == (RunStarted, RunEnded)
     assert result.robot_time == result.events[-1].clock > 5.0
-    assert (result.agrees, result.disturbances()) == (True, [])
+    assert (result.agrees, result.faults()) == (True, [])
 
 
 def test_a_mission_file_runs_with_other_values(look: Path) -> None:
@@ -65,14 +65,14 @@ def test_the_cell_is_arranged_before_the_run(look: Path) -> None:
 
 
 def test_what_was_entered_and_what_failed_is_told_in_order() -> None:
-    result = run_mission("sort_overhead", disturbances=[during("*/Grasp", seal_fails(), nth=1)])
+    result = run_mission("sort_overhead", faults=[during("*/Grasp", seal_fails(), nth=1)])
     assert len(result.entered("*/Grasp")) == result.items["placed"] + 1
     assert (result.entered("tree/look*")[0], result.reasons()[0]) == ("tree/look/try", "missed")
     assert (result.reasons("*/Grasp"), result.reasons("*/Approach")) == (["missed"], [])
 
 
 def test_a_failure_that_only_passes_through_a_control_node_is_none_of_its_own(look: Path) -> None:
-    result = run_mission(look, disturbances=[after(0.0, detector_dead())])
+    result = run_mission(look, faults=[after(0.0, detector_dead())])
     assert (result.status, result.reason) == ("FAILURE", "Detect.unavailable")
     assert result.reasons() == ["unavailable"]
 
@@ -96,7 +96,7 @@ def test_a_mission_that_never_ends_ends_as_a_fault(look: Path) -> None:
 
 
 def test_a_cell_whose_time_is_over_says_so_once_so_that_the_arm_can_be_braked() -> None:
-    cell = DisturbedCell(FakeCell(), [], longest=0.01)
+    cell = FaultyCell(FakeCell(), [], longest=0.01)
     cell.advance()
     cell.advance()
     with pytest.raises(Fault, match=r"the mission is not done after 0\.01 s on its clock"):
@@ -108,7 +108,7 @@ def test_a_cell_whose_time_is_over_says_so_once_so_that_the_arm_can_be_braked() 
 def test_patterns_that_fit_no_node_are_refused(look: Path) -> None:
     sentence = 'seal_fails waits for a node that is called "*/Grasp"; there are: tree/Wait, tree/Detect, '
     with pytest.raises(InputError, match=sentence.replace("*", r"\*")):
-        run_mission(look, disturbances=[during("*/Grasp", seal_fails())])
+        run_mission(look, faults=[during("*/Grasp", seal_fails())])
     with pytest.raises(InputError, match='no node is called "Wait"; there are: tree/Wait, tree/Detect'):
         run_mission(look, substitutes={"Wait": endless(Wait)})
     with pytest.raises(InputError, match="tree/Detect runs Detect, and EndlessWait is none; give its subst"):
@@ -132,5 +132,5 @@ def test_the_cell_is_closed_whatever_happens(look: Path) -> None:
     with pytest.raises(ValueError, match="the test is wrong"):
         run_mission(look, Cell, arrange=broken)
     with pytest.raises(InputError):
-        run_mission(look, Cell, disturbances=[during("nowhere", seal_fails())])
+        run_mission(look, Cell, faults=[during("nowhere", seal_fails())])
     assert closed == ["closed"] * 3

@@ -9,7 +9,7 @@ from typing import Literal
 from executive.cell.protocols import Cell, Steps
 from executive.manipulation.drops import slipped
 from executive.skill import EMPTY, Skill
-from executive.testing.faults.script import Disturbance
+from executive.testing.faults.script import ScheduledFault
 from executive.testing.substitutes import in_place_of, raising, raising_when_halted
 
 When = Literal["first", "middle", "late", "lasting"]
@@ -23,7 +23,7 @@ class InjectedError(Exception):
 
 
 @dataclass(frozen=True)
-class Breakage:
+class SkillFault:
     """A skill that misbehaves without a cause in the cell.
 
     Attributes:
@@ -52,8 +52,8 @@ class Fault:
         what: Reason with which the node must fail, or a description of the fault.
         when: Time of the fault in the run.
         means: Description of the cause.
-        happenings: Disturbances of the cell that cause the fault.
-        breakages: Misbehaviour of skills that causes the fault.
+        cell_faults: Faults of the cell that cause the fault.
+        skill_faults: Misbehaviour of skills that causes the fault.
         reason: True if `what` is a reason of the node.
         leads_to: Reason with which skills fail because of a fault of a part; "" if there is none.
         behind: True if the node runs only after another fault.
@@ -67,8 +67,8 @@ class Fault:
     what: str
     when: When
     means: str
-    happenings: tuple[Disturbance, ...] = ()
-    breakages: tuple[Breakage, ...] = ()
+    cell_faults: tuple[ScheduledFault, ...] = ()
+    skill_faults: tuple[SkillFault, ...] = ()
     reason: bool = False
     leads_to: str = ""
     behind: bool = False
@@ -77,26 +77,28 @@ class Fault:
     @property
     def ends_run(self) -> bool:
         """True if the run ends with the status FAULT, as after any bug."""
-        return any(breakage.how != "fails" for breakage in self.breakages)
+        return any(skill_fault.how != "fails" for skill_fault in self.skill_faults)
 
     def __str__(self) -> str:
         """Return a description of the fault."""
         return f"{self.about} {self.what}, {self.when}: {self.means}"
 
 
-def broken_skills(breakages: Iterable[Breakage], skills: Mapping[str, type[Skill]]) -> dict[str, type[Skill]]:
+def broken_skills(
+    skill_faults: Iterable[SkillFault], skills: Mapping[str, type[Skill]]
+) -> dict[str, type[Skill]]:
     """Return the substitute of each misbehaving skill; `skills` are the skills of the nodes by path."""
     found: dict[str, type[Skill]] = {}
-    for breakage in breakages:
-        skill = found.get(breakage.node, skills[breakage.node])
+    for skill_fault in skill_faults:
+        skill = found.get(skill_fault.node, skills[skill_fault.node])
         error = InjectedError("a bug that the campaign put in")
-        if breakage.how == "fails":
-            broken = _failing(skill, breakage.reason)
-        elif breakage.how == "raises":
-            broken = raising(skill, error, after=breakage.after)
+        if skill_fault.how == "fails":
+            broken = _failing(skill, skill_fault.reason)
+        elif skill_fault.how == "raises":
+            broken = raising(skill, error, after=skill_fault.after)
         else:
             broken = raising_when_halted(skill, error)
-        found[breakage.node] = in_place_of(skill, "Broken", broken.run, breakage.starts or None)
+        found[skill_fault.node] = in_place_of(skill, "Broken", broken.run, skill_fault.starts or None)
     return found
 
 

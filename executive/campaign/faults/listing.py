@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from executive.campaign.faults.fault import Breakage, Fault, When
+from executive.campaign.faults.fault import Fault, SkillFault, When
 from executive.campaign.faults.rehearsal import Rehearsal
 from executive.campaign.subject import Subject
 from executive.cell.config import TableConfig
@@ -14,7 +14,7 @@ from executive.mission.model import nodes
 from executive.skill import HOLDING, Direction, Skill
 from executive.testing import faults as effects
 from executive.testing.faults.effect import Effect
-from executive.testing.faults.script import Disturbance, after, between, during
+from executive.testing.faults.script import ScheduledFault, after, between, during
 
 SHORT, LONG = 0.5, 5.0
 """Time for which a detector is slow, hangs or is dead [s]; the longer one is the deadline of requests."""
@@ -112,11 +112,11 @@ class _Listing:
             cause = self._causes.get(reason)
             for when, nth in starts:
                 base = self._fault(node, reason, when, reason=True)
-                breakage = Breakage(node.path, "fails", reason, nth or LASTING)
-                failure = replace(base, means="the skill says so", breakages=(breakage,))
+                skill_fault = SkillFault(node.path, "fails", reason, nth or LASTING)
+                failure = replace(base, means="the skill says so", skill_faults=(skill_fault,))
                 if cause is not None and cause.can(skill):
-                    happening = during(node.path, cause.effect, nth=nth or (() if cause.lasts else LASTING))
-                    yield replace(base, means=cause.means, happenings=(happening,))
+                    cell_fault = during(node.path, cause.effect, nth=nth or (() if cause.lasts else LASTING))
+                    yield replace(base, means=cause.means, cell_faults=(cell_fault,))
                     failure = replace(failure, instead_of=-1)
                 yield failure
 
@@ -125,15 +125,15 @@ class _Listing:
         ticks = self._rehearsal.activations.get(node.path, ())
         start, longest = max(enumerate(ticks, 1), key=lambda one: one[1], default=(1, 0))
         half = longest // 2
-        first = Breakage(node.path, "raises", starts=(1,))
-        yield self._fault(node, "raises", "first", means="its code raises 0 ticks on", breakages=(first,))
+        first = SkillFault(node.path, "raises", starts=(1,))
+        yield self._fault(node, "raises", "first", means="its code raises 0 ticks on", skill_faults=(first,))
         if longest >= 2:
             later, means = replace(first, starts=(start,), after=half), f"its code raises {half} ticks on"
-            yield self._fault(node, "raises", "middle", means=means, breakages=(later,))
+            yield self._fault(node, "raises", "middle", means=means, skill_faults=(later,))
         if longest >= 2 or not ticks:
-            halted = Breakage(node.path, "raises when halted", starts=(start,), after=half)
+            halted = SkillFault(node.path, "raises when halted", starts=(start,), after=half)
             means = f"its code raises when it is halted {half} ticks on"
-            yield self._fault(node, "halted", "middle", means=means, breakages=(halted,))
+            yield self._fault(node, "halted", "middle", means=means, skill_faults=(halted,))
 
     def detector(self) -> Iterator[Fault]:
         """Yield detectors that are slow, hang, are unsure or dead, from the start and from half-way on."""
@@ -146,9 +146,9 @@ class _Listing:
                     found.append((f"{word} for {time:g} s", between(start, start + time, effect)))
             found.append(("hangs for ever", after(start, effects.detector_given_up(LONG))))
             found += [("dead for ever", after(start, dead)), ("unsure for ever", after(start, unsure))]
-            for what, happening in found:
+            for what, cell_fault in found:
                 leads_to = "unsure" if what.startswith("unsure") else "unavailable"
-                yield replace(_other("detector", what, when, happening), leads_to=leads_to)
+                yield replace(_other("detector", what, when, cell_fault), leads_to=leads_to)
 
     def objects(self) -> Iterator[Fault]:
         """Yield objects taken away and bumped aside, on the table and while the arm approaches them."""
@@ -165,8 +165,8 @@ class _Listing:
                 taken = effects.object_removed("node", share)
                 bumped = effects.object_bumped(x, y, "node", share)
                 for what, effect in (("target taken", taken), ("target bumped", bumped)):
-                    happening = during(node.path, effect, nth=nth)
-                    yield self._fault(node, what, when, means=f"at {share:g}", happenings=(happening,))
+                    cell_fault = during(node.path, effect, nth=nth)
+                    yield self._fault(node, what, when, means=f"at {share:g}", cell_faults=(cell_fault,))
 
     def tool(self) -> Iterator[Fault]:
         """Yield seals that break during a carry, and seals that fail."""
@@ -175,10 +175,10 @@ class _Listing:
             if not (skill.moves and skill.tool_state[0] is HOLDING and self._runs(node)):
                 continue
             for when, share in CARRIES:
-                happening = during(node.path, effects.seal_breaks(share), nth=1)
-                yield self._fault(node, "lets go", when, means=f"at {share:g}", happenings=(happening,))
+                cell_fault = during(node.path, effects.seal_breaks(share), nth=1)
+                yield self._fault(node, "lets go", when, means=f"at {share:g}", cell_faults=(cell_fault,))
             over, what = during(node.path, effects.seal_breaks_over_wrong_bin()), "lets go over another bin"
-            yield self._fault(node, what, "lasting", means="every time", happenings=(over,))
+            yield self._fault(node, what, "lasting", means="every time", cell_faults=(over,))
         half = self._rehearsal.robot_time / 2
         for time in (SHORT, LONG):
             fails = between(half, half + time, effects.seal_fails())
@@ -201,9 +201,9 @@ def skill_nodes(subject: Subject) -> list[nodes.SkillNode]:
     return [node for node in subject.loaded.tree.walk() if isinstance(node, nodes.SkillNode)]
 
 
-def _other(about: str, what: str, when: When, happening: Disturbance) -> Fault:
-    start = getattr(happening.when, "start", 0.0)
-    return Fault(about, about, "", what, when, f"from {start:.2f} s on", happenings=(happening,))
+def _other(about: str, what: str, when: When, cell_fault: ScheduledFault) -> Fault:
+    start = getattr(cell_fault.when, "start", 0.0)
+    return Fault(about, about, "", what, when, f"from {start:.2f} s on", cell_faults=(cell_fault,))
 
 
 def _goes_to_target(skill: type[Skill]) -> bool:

@@ -27,7 +27,7 @@ from executive.plugins import cell_kind
 from executive.record.recorded_run import Recording, new_directory
 from executive.record.recorder import Recorder
 from executive.run.assembly import RunOptions, assemble
-from executive.testing.faults import DisturbedCell, disturbed
+from executive.testing.faults import FaultyCell, with_faults
 from executive.view.figures.fault import Trial
 from executive.view.report.page import leave_report
 
@@ -72,20 +72,20 @@ class _Trying:
     def __init__(self, subject: Subject, rehearsal: Rehearsal, faults: Numbered) -> None:
         self._subject, self._rehearsal, self._faults = subject, rehearsal, faults
         self._events: list[TimedEvent] = []
-        self._breakages = [breakage for fault in faults.values() for breakage in fault.breakages]
+        self._breakages = [skill_fault for fault in faults.values() for skill_fault in fault.skill_faults]
         self._activations = Activations()
         self._stopped = False
-        happenings = [happening for fault in faults.values() for happening in fault.happenings]
+        cell_faults = [cell_fault for fault in faults.values() for cell_fault in fault.cell_faults]
         own = {node.path: subject.skills[node.skill] for node in skill_nodes(subject)}
         self.options = RunOptions(
             subject.seed,
             subject.requests,
-            kind=disturbed(self._kind, happenings, longest=rehearsal.longest),
+            kind=with_faults(self._kind, cell_faults, longest=rehearsal.longest),
             substitutes=broken_skills(self._breakages, own),
         )
         self.run = assemble(subject.loaded, subject.skills, self.options, [self._see, self._activations])
         workcell = self.run.workcell
-        assert isinstance(workcell, DisturbedCell)
+        assert isinstance(workcell, FaultyCell)
         self.run.observe(workcell.hear)
 
     @property
@@ -138,25 +138,25 @@ class _Trying:
 
     def _stop_if_due(self) -> None:
         """Stop the run when a skill is to be halted."""
-        for breakage in self._breakages:
-            began = self._activations.began.get(breakage.node)
-            is_meant = self._activations.counts[breakage.node] in breakage.starts
-            is_due = began is not None and self.run.tick >= began + breakage.after
-            if breakage.how == "raises when halted" and is_meant and is_due:
+        for skill_fault in self._breakages:
+            began = self._activations.began.get(skill_fault.node)
+            is_meant = self._activations.counts[skill_fault.node] in skill_fault.starts
+            is_due = began is not None and self.run.tick >= began + skill_fault.after
+            if skill_fault.how == "raises when halted" and is_meant and is_due:
                 self._stopped = True
                 self.run.control.stop()
 
     def _hidden(self) -> judgement.Hidden:
         workcell = self.run.workcell
-        assert isinstance(workcell, DisturbedCell)
+        assert isinstance(workcell, FaultyCell)
         return judgement.out_of_sight(workcell.hand.things, workcell.cell.bins.values(), self._events)
 
     def _happened(self, fault: Fault) -> bool:
         """Return True if a fault was injected."""
-        names = {happening.what.name for happening in fault.happenings}
+        names = {cell_fault.what.name for cell_fault in fault.cell_faults}
         if any(isinstance(one.event, FaultInjected) and one.event.name in names for one in self._events):
             return True
-        return bool(fault.breakages) and self._raised(fault)
+        return bool(fault.skill_faults) and self._raised(fault)
 
     def _raised(self, fault: Fault) -> bool:
         """Return True if the node of a fault ended as the fault wants it; True for a fault without a node."""
@@ -167,5 +167,5 @@ class _Trying:
         failures = [end for end in mine if (end.status, end.reason) == ("FAILURE", fault.what)]
         messages = [end.message for end in failures]
         return not fault.reason or any(
-            not fault.breakages or message == INJECTED_FAILURE for message in messages
+            not fault.skill_faults or message == INJECTED_FAILURE for message in messages
         )

@@ -19,7 +19,7 @@ MAX_OBJECTS = 10
 
 
 @dataclass(frozen=True)
-class SkillFault:
+class NamedFault:
     """A fault of the cell in a run of a skill.
 
     Attributes:
@@ -39,14 +39,14 @@ class SkillFault:
     tick: int = 0
 
 
-def faults_of(skill: type[Skill], ticks: int, *, holding: bool) -> Iterator[SkillFault]:
+def faults_of(skill: type[Skill], ticks: int, *, holding: bool) -> Iterator[NamedFault]:
     """Yield the faults for a skill that takes `ticks` control steps without a fault."""
     for fault in _FAULTS:
         if (not fault.uses or fault.uses in skill.uses) and holding >= fault.holding:
             yield fault
     if "tool" in skill.uses:
         for tick in sorted({round(ticks * part / SEAL_BREAKS) for part in range(SEAL_BREAKS + 1)}):
-            yield SkillFault(f"while the seal breaks at tick {tick}", faults.seal_breaks(None), tick=tick)
+            yield NamedFault(f"while the seal breaks at tick {tick}", faults.seal_breaks(None), tick=tick)
 
 
 def _move_arm(now: Occasion) -> bool:
@@ -57,19 +57,19 @@ def _move_arm(now: Occasion) -> bool:
 
 
 _FAULTS = (
-    SkillFault("while nothing seals", faults.seal_fails(), "tool"),
-    SkillFault("while what the tool holds does not come off", faults.tool_sticks(), "tool", holding=True),
-    SkillFault("while everything on the table is gone", faults.object_removed("nearest"), times=MAX_OBJECTS),
-    SkillFault("while the table has changed since the look", faults.table_bumped()),
-    SkillFault("while the arm runs into something", faults.arm_runs_into(), "arm"),
-    SkillFault("while the arm still moves at the start", Effect("arm_moves", _move_arm), "arm"),
-    SkillFault("while no plan reaches the goal", faults.no_way(), "arm"),
-    SkillFault("while every way is blocked", faults.no_way(is_blocked=True), "arm"),
-    SkillFault("while the arm hides the table", faults.workspace_hidden()),
-    SkillFault("while no depth is seen", faults.no_depth()),
-    SkillFault("while no detector answers", faults.detector_dead()),
-    SkillFault("while the detectors see nothing", faults.detector_blind()),
-    SkillFault("while the detectors are unsure", faults.detector_unsure()),
-    SkillFault("while the operator quits", faults.operator_quits()),
-    SkillFault("while the operator wants a fresh look", faults.operator_asks_rescan()),
+    NamedFault("while nothing seals", faults.seal_fails(), "tool"),
+    NamedFault("while what the tool holds does not come off", faults.tool_sticks(), "tool", holding=True),
+    NamedFault("while everything on the table is gone", faults.object_removed("nearest"), times=MAX_OBJECTS),
+    NamedFault("while the table has changed since the look", faults.table_bumped()),
+    NamedFault("while the arm runs into something", faults.arm_runs_into(), "arm"),
+    NamedFault("while the arm still moves at the start", Effect("arm_moves", _move_arm), "arm"),
+    NamedFault("while no plan reaches the goal", faults.no_way(), "arm"),
+    NamedFault("while every way is blocked", faults.no_way(is_blocked=True), "arm"),
+    NamedFault("while the arm hides the table", faults.workspace_hidden()),
+    NamedFault("while no depth is seen", faults.no_depth()),
+    NamedFault("while no detector answers", faults.detector_dead()),
+    NamedFault("while the detectors see nothing", faults.detector_blind()),
+    NamedFault("while the detectors are unsure", faults.detector_unsure()),
+    NamedFault("while the operator quits", faults.operator_quits()),
+    NamedFault("while the operator wants a fresh look", faults.operator_asks_rescan()),
 )

@@ -20,10 +20,10 @@ from executive.cell.proxy import Access, intercept
 from executive.errors import Fault
 from executive.events import NodeStarted, TimedEvent
 from executive.skill import Skill, SkillFailed
-from executive.testing.conformance.faults import SkillFault
+from executive.testing.conformance.faults import NamedFault
 from executive.testing.conformance.situations import Arrange, Situation, begin
 from executive.testing.conformance.source import place_in
-from executive.testing.faults import DisturbedCell, during
+from executive.testing.faults import FaultyCell, during
 from executive.tree.skill_run import SkillRun
 
 MAX_TIME = 60.0
@@ -83,14 +83,14 @@ class Rehearsal:
         skill: type[Skill],
         situation: Situation,
         arrange: Arrange,
-        fault: SkillFault | None = None,
+        fault: NamedFault | None = None,
         halt_at: int | None = None,
     ) -> None:
         stage, values = begin(skill, situation, arrange)
         fake = stage.cell
         before = values if halt_at else copy.deepcopy(values, {id(fake): fake})
         script = [during("*", fault.effect)] * fault.times if fault else []
-        cell = DisturbedCell(fake, script)
+        cell = FaultyCell(fake, script)
         self.where = f"{situation.name} {fault.name}" if fault else situation.name
         self.reason = self.message = ""
         self.ticks, self._skill, self._halt_at = 0, skill, halt_at
@@ -128,7 +128,7 @@ class Rehearsal:
             self.calls.append(Call(self.ticks, access.name, access.all_arguments))
         return access.proceed()
 
-    def _act(self, values: Mapping[str, Any], cell: DisturbedCell, watched: Cell, disturbed_at: int) -> str:
+    def _act(self, values: Mapping[str, Any], cell: FaultyCell, watched: Cell, fault_tick: int) -> str:
         """Run the skill and return its status at the end."""
         skill = self._skill
         run: SkillRun | None = None
@@ -137,7 +137,7 @@ class Rehearsal:
                 if run is not None and self.ticks == self._halt_at:
                     run.halt()
                     return "HALTED"
-                if self.ticks == disturbed_at:
+                if self.ticks == fault_tick:
                     cell.hear(TimedEvent(0, 0.0, NodeStarted("skill")))
                 began = perf_counter()
                 run = run or SkillRun(skill(**values), watched)

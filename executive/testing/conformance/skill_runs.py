@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from executive.skill import Skill
-from executive.testing.conformance.faults import SkillFault, faults_of
+from executive.testing.conformance.faults import NamedFault, faults_of
 from executive.testing.conformance.rehearsal import Rehearsal
 from executive.testing.conformance.situations import Arrange, NotTried, Situation, situations
 
@@ -66,7 +66,7 @@ class SkillRuns:
         ]
 
     def _run(
-        self, situation: Situation, fault: SkillFault | None = None, halt_at: int | None = None
+        self, situation: Situation, fault: NamedFault | None = None, halt_at: int | None = None
     ) -> Rehearsal:
         """Run the skill once.
 

@@ -42,7 +42,7 @@ def overlook(answer: Answer) -> Answer:
     return replace(answer, found=(), doubtful=(), unknown=())
 
 
-def detector_disturbed(
+def faulty_detector(
     name: str, change: Change | None = None, delay: float = 0.0, until: float = 0.0
 ) -> Effect:
     """The detector answers late, wrongly, or not at all.
@@ -58,7 +58,7 @@ def detector_disturbed(
 
 def detector_dead() -> Effect:
     """Requests are not answered: `Detect` is `unavailable`."""
-    return detector_disturbed("detector_dead", refuse)
+    return faulty_detector("detector_dead", refuse)
 
 
 def detector_hangs(until: float = math.inf) -> Effect:
@@ -67,7 +67,7 @@ def detector_hangs(until: float = math.inf) -> Effect:
     Args:
         until: Time on the run's clock at which they are answered in any case [s].
     """
-    return detector_disturbed("detector_hangs", until=until)
+    return faulty_detector("detector_hangs", until=until)
 
 
 def detector_given_up(deadline: float) -> Effect:
@@ -76,7 +76,7 @@ def detector_given_up(deadline: float) -> Effect:
     Args:
         deadline: Time by which that is later than an answer would be [s].
     """
-    return detector_disturbed("detector_hangs", refuse, delay=deadline)
+    return faulty_detector("detector_hangs", refuse, delay=deadline)
 
 
 def detector_slow(by: float) -> Effect:
@@ -90,22 +90,22 @@ def detector_slow(by: float) -> Effect:
     """
     if by < 0:
         raise InputError(f"a slow detector answers later, not by {by:g} s")
-    return detector_disturbed("detector_slow", delay=by)
+    return faulty_detector("detector_slow", delay=by)
 
 
 def detector_unsure() -> Effect:
     """Everything is seen with less confidence than counts: `Detect` is `unsure`."""
-    return detector_disturbed("detector_unsure", doubt)
+    return faulty_detector("detector_unsure", doubt)
 
 
 def detector_blind() -> Effect:
     """Nothing is seen: `Detect` succeeds with an empty list."""
-    return detector_disturbed("detector_blind", overlook)
+    return faulty_detector("detector_blind", overlook)
 
 
 @dataclass
-class DisturbedRequest:
-    """A request to a disturbed detector; implements `Request`."""
+class FaultyRequest:
+    """A request to a faulty detector; implements `Request`."""
 
     asked: Request
     now: Occasion
@@ -124,7 +124,7 @@ class DisturbedRequest:
         return time >= self._due - TIME_TOLERANCE and not does_hang
 
     def result(self) -> Answer:
-        """Return the disturbed answer, or raise Unavailable."""
+        """Return the changed answer, or raise Unavailable."""
         answer = self.asked.result()
         return answer if self.change is None else self.change(answer)
 
@@ -132,5 +132,5 @@ class DisturbedRequest:
 def _request(
     proceed: Callable[[], Request], now: Occasion, change: Change | None, delay: float, until: float
 ) -> Request:
-    now.tell()
-    return DisturbedRequest(proceed(), now, change, delay, until)
+    now.record()
+    return FaultyRequest(proceed(), now, change, delay, until)

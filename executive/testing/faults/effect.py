@@ -62,7 +62,7 @@ class Occasion:
         if self.effect.act is not None and not self.done:
             self.done = self.effect.act(self, *self.effect.arguments)
 
-    def tell(self, thing: Thing | None = None) -> None:
+    def record(self, thing: Thing | None = None) -> None:
         """Emit the fault, and the object that it concerns; at most one event per control step."""
         if self._told == self.scene.now:
             return
@@ -73,7 +73,7 @@ class Occasion:
 
 
 def checked_share(share: float | None) -> float:
-    """Return the share of its motion after which the arm is disturbed; 0 for None: at once, at rest too.
+    """Return the share of its motion after which a fault happens; 0 for None: at once, at rest too.
 
     Raises:
         InputError: It is not more than 0 and less than 1.

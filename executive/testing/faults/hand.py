@@ -119,7 +119,7 @@ def hand_of(workcell: Workcell) -> Hand:
     if isinstance(inner, SimCell):
         return SimHand(inner)
     raise InputError(
-        f"nobody knows how to reach into a {type(inner).__name__}; give `disturbed` a `hand` that does"
+        f"nobody knows how to reach into a {type(inner).__name__}; give `with_faults` a `hand` that does"
     )
 
 

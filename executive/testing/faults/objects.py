@@ -88,7 +88,7 @@ def _find(now: Occasion, which: Which, share: float) -> Thing | None:
 def _remove(now: Occasion, which: Which, share: float) -> bool:
     if (thing := _find(now, which, share)) is None:
         return False
-    now.tell(thing)
+    now.record(thing)
     now.scene.hand.remove(thing)
     return True
 
@@ -96,7 +96,7 @@ def _remove(now: Occasion, which: Which, share: float) -> bool:
 def _move(now: Occasion, which: Which, share: float, by: tuple[float, float]) -> bool:
     if (thing := _find(now, which, share)) is None:
         return False
-    now.tell(thing)
+    now.record(thing)
     now.scene.hand.move(thing, by)
     return True
 
@@ -132,4 +132,4 @@ def _refuse(proceed: Callable[[], None], now: Occasion, number: int) -> None:
     if thing is None or math.dist(thing.position[:2], here[:2]) > MAX_TOOL_OFFSET:
         proceed()
     else:
-        now.tell(thing)
+        now.record(thing)

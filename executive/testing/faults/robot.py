@@ -91,7 +91,7 @@ def operator_asks_rescan() -> Effect:
 def _answer(proceed: Callable[[], object], now: Occasion, answer: object) -> object:
     """Return an answer without the cell."""
     del proceed
-    now.tell()
+    now.record()
     return answer
 
 
@@ -99,14 +99,14 @@ def _keep_object(proceed: Callable[[], None], now: Occasion) -> None:
     if (held := now.scene.hand.held) is None:
         proceed()
     else:
-        now.tell(held)
+        now.record(held)
 
 
 def _break_seal(now: Occasion, share: float) -> bool:
     held = now.scene.hand.held
     if held is None or now.scene.progress < share:
         return False
-    now.tell(held)
+    now.record(held)
     now.scene.hand.part()
     return True
 
@@ -124,13 +124,13 @@ def _break_seal_over_wrong_bin(now: Occasion) -> bool:
 def _block_arm(now: Occasion, what: str, share: float) -> bool:
     if now.scene.progress < share:
         return False
-    now.tell()
+    now.record()
     now.scene.hand.stand_in_the_way(f"the arm ran into {what}")
     return True
 
 
 def _bump_table(now: Occasion) -> bool:
-    now.tell()
+    now.record()
     now.scene.cell.ledger.invalidate_positions()
     return True
 
@@ -138,14 +138,14 @@ def _bump_table(now: Occasion) -> bool:
 def _hide(proceed: Callable[[], Frame], now: Occasion, answer: object) -> Frame:
     """Return a frame that shows the arm alone."""
     del answer
-    now.tell()
+    now.record()
     frame = proceed()
     return replace(frame, visible=np.zeros_like(frame.visible))
 
 
 def _lose_depth(proceed: Callable[[], Any], now: Occasion) -> Any:
     del proceed
-    now.tell()
+    now.record()
     raise NoDepth("the frame has no depth there, as the test wants it")
 
 
@@ -169,5 +169,5 @@ class PlanInVain:
 
 
 def _plan_in_vain(proceed: Callable[[], Planning], now: Occasion, is_blocked: bool) -> Planning:
-    now.tell()
+    now.record()
     return PlanInVain(proceed(), is_blocked)

@@ -49,15 +49,15 @@ class DuringTime:
 
 
 @dataclass(frozen=True)
-class Disturbance:
+class ScheduledFault:
     """Something that happens to a cell, and when."""
 
     what: Effect
     when: DuringNode | DuringTime
 
 
-def during(pattern: str, what: Effect, *, nth: int | Collection[int] = ()) -> Disturbance:
-    """Return a disturbance that lasts as long as a node runs.
+def during(pattern: str, what: Effect, *, nth: int | Collection[int] = ()) -> ScheduledFault:
+    """Return a fault that lasts as long as a node runs.
 
     Args:
         pattern: Of the node's path: `*/Grasp`.
@@ -70,11 +70,11 @@ def during(pattern: str, what: Effect, *, nth: int | Collection[int] = ()) -> Di
     numbers = (nth,) if isinstance(nth, int) else tuple(nth)
     if any(number < 1 for number in numbers):
         raise InputError(f"activations are counted from 1, and nth is {nth}")
-    return Disturbance(what, DuringNode(pattern, numbers))
+    return ScheduledFault(what, DuringNode(pattern, numbers))
 
 
-def with_probability(probability: float, pattern: str, what: Effect, *, seed: int) -> Disturbance:
-    """Return a disturbance that lasts as long as a node runs, in some of its activations.
+def with_probability(probability: float, pattern: str, what: Effect, *, seed: int) -> ScheduledFault:
+    """Return a fault that lasts as long as a node runs, in some of its activations.
 
     Args:
         probability: Chance of every activation, 0 to 1.
@@ -87,22 +87,20 @@ def with_probability(probability: float, pattern: str, what: Effect, *, seed: in
     """
     if not 0.0 <= probability <= 1.0:
         raise InputError(f"a probability is 0 to 1, not {probability:g}")
-    return Disturbance(what, DuringNode(pattern, probability=probability, seed=seed))
+    return ScheduledFault(what, DuringNode(pattern, probability=probability, seed=seed))
 
 
-def between(start: float, end: float, what: Effect) -> Disturbance:
-    """Return a disturbance that lasts from one time on the run's clock until another [s].
+def between(start: float, end: float, what: Effect) -> ScheduledFault:
+    """Return a fault that lasts from one time on the run's clock until another [s].
 
     Raises:
         InputError: It would end before it begins.
     """
     if not 0.0 <= start < end:
-        raise InputError(
-            f"a disturbance lasts from some time until a later one, not from {start:g} s to {end:g} s"
-        )
-    return Disturbance(what, DuringTime(start, end))
+        raise InputError(f"a fault lasts from some time until a later one, not from {start:g} s to {end:g} s")
+    return ScheduledFault(what, DuringTime(start, end))
 
 
-def after(start: float, what: Effect) -> Disturbance:
-    """Return a disturbance that lasts from a time on the run's clock [s] until the end."""
+def after(start: float, what: Effect) -> ScheduledFault:
+    """Return a fault that lasts from a time on the run's clock [s] until the end."""
     return between(start, math.inf, what)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from events import at, frame_searched, item_changed
 
-from executive.campaign.faults.fault import Breakage, Fault
+from executive.campaign.faults.fault import Fault, SkillFault
 from executive.campaign.faults.judgement import (
     Hidden,
     check_books,
@@ -24,7 +24,9 @@ from executive.events import FaultInjected, RunEnded
 from executive.mission.flow.endings import Ending
 from executive.testing.faults.hand import Thing
 
-BUG = Fault("tree/Grasp", "Grasp", "", "raises", "first", "", breakages=(Breakage("tree/Grasp", "raises"),))
+BUG = Fault(
+    "tree/Grasp", "Grasp", "", "raises", "first", "", skill_faults=(SkillFault("tree/Grasp", "raises"),)
+)
 MISS = Fault("tree/Grasp", "Grasp", "", "missed", "first", "", reason=True)
 ENDINGS = (Ending("Grasp", "missed", "tree/Grasp", "a.yaml", 3),)
 ITEMS = {"seen": 3, "placed": 2, "rejected": 1, "skipped": 0, "lost": 0, "phantom": 0}

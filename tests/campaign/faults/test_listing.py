@@ -55,8 +55,8 @@ def test_a_reason_is_brought_about_in_the_cell_and_else_said_by_the_skill(campai
             physical = campaign.faults[fault.instead_of - 1]
             assert fault.instead_of == number - 1
             assert (physical.about, physical.what, physical.when) == (fault.about, fault.what, fault.when)
-            assert physical.happenings
-            assert fault.breakages
+            assert physical.cell_faults
+            assert fault.skill_faults
     of = {fault.what: fault for fault in campaign.faults if fault.reason and not fault.instead_of}
     assert (of["missed"].means, of["doubtful"].means) == ("nothing seals", "the skill says so")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from executive.campaign.faults.campaign import Campaign
-from executive.campaign.faults.fault import Breakage, broken_skills
+from executive.campaign.faults.fault import SkillFault, broken_skills
 from executive.campaign.faults.trial import record, try_out
 from executive.cells.fake.cell import FakeCell
 from executive.events import FaultInjected, ItemChanged, NodeEnded, RunEnded
@@ -101,7 +101,7 @@ def test_what_cannot_happen_there_found_no_occasion(campaign: Campaign) -> None:
 def test_a_run_that_never_ends_is_ended_and_found(campaign: Campaign) -> None:
     number = number_of(campaign, "SelectTarget", "unseen", "lasting")
     fault = campaign.fault(number)
-    ever = replace(fault, breakages=(replace(fault.breakages[0], starts=()),))
+    ever = replace(fault, skill_faults=(replace(fault.skill_faults[0], starts=()),))
     short = replace(campaign.rehearsal, robot_time=-5.0)
     trial = try_out(campaign.subject, short, {number: ever})
     assert trial.problems[0] == (
@@ -151,8 +151,8 @@ def test_a_skill_that_says_in_its_second_start_that_it_dropped_something_has_let
     path = (
         "tree/2:repeat/do/carry_and_watch/try/retry/do/deliver_and_watch/parallel/deliver/1:retry/do/Transit"
     )
-    breakages = [Breakage(path, "fails", "dropped", (2,))]
-    result = run_mission("sort_overhead", substitutes=broken_skills(breakages, {path: skills["Transit"]}))
+    skill_faults = [SkillFault(path, "fails", "dropped", (2,))]
+    result = run_mission("sort_overhead", substitutes=broken_skills(skill_faults, {path: skills["Transit"]}))
     events = [timed.event for timed in result.events]
     assert "dropped" in {event.state for event in events if isinstance(event, ItemChanged)}
     ends = [event for event in events if isinstance(event, NodeEnded) and event.node == path]

@@ -14,7 +14,7 @@ from executive.cells.fake.cell import FakeCell
 from executive.errors import Blocked, NoDepth, Unavailable, Unreachable
 from executive.events import Event, NodeStarted, RequestGiven
 from executive.testing import faults as effects
-from executive.testing.faults import Disturbance, DisturbedCell, between, during
+from executive.testing.faults import FaultyCell, ScheduledFault, between, during
 from executive.testing.faults.effect import Effect
 from executive.testing.run_mission import run_mission
 from executive.testing.run_skill import run_skill
@@ -25,14 +25,14 @@ LATENCY = 0.05
 PLACES = {"cube": (0.6, -0.15), "sphere": (0.65, 0.1), "duck": (0.45, 0.2)}
 
 
-def cell_with(*what: Effect, start: float = 0.0, end: float = 100.0) -> DisturbedCell:
-    """Return a disturbed cell with three objects, the duck nearest to the tool; `told` is what it tells."""
+def cell_with(*what: Effect, start: float = 0.0, end: float = 100.0) -> FaultyCell:
+    """Return a cell with faults with three objects, the duck nearest to the tool; `told` is what it tells."""
     fake = FakeCell()
     for label, place in PLACES.items():
         fake.world.put(label, *place)
     told: list[Event] = []
     script = [between(start, end, effect) for effect in what]
-    cell = DisturbedCell(fake, script, told.append)
+    cell = FaultyCell(fake, script, told.append)
     cell.told, cell.fake = told, fake  # type: ignore[attr-defined]
     return cell
 
@@ -60,7 +60,7 @@ def labels(cell: Any) -> list[str]:
     return [thing.label for thing in cell.fake.world.objects]
 
 
-MISSIONS: list[tuple[Disturbance, str, list[str], str, int]] = [
+MISSIONS: list[tuple[ScheduledFault, str, list[str], str, int]] = [
     (during("*/Grasp", effects.seal_fails(), nth=2), "*/Grasp", ["missed"], "SUCCESS", 0),
     (during("*/Transit", effects.seal_breaks(), nth=1), "*/Transit", ["dropped"], "SUCCESS", 0),
     (during("*/Release", effects.tool_sticks(), nth=(2, 3, 4)), "*/Release", ["stuck"] * 3, "FAILURE", 5),
@@ -68,8 +68,8 @@ MISSIONS: list[tuple[Disturbance, str, list[str], str, int]] = [
     (during("tree/look/*/Detect", effects.detector_dead(), nth=1), "*/Detect", ["unavailable"], "SUCCESS", 0),
     (during("*/Transit", effects.object_removed(), nth=2), "*/Transit", ["dropped"], "FAILURE", 0),
 ]
-"""A disturbance, a pattern of nodes, their failures, the status of sort_overhead, and what it rejects."""
-MORE: list[tuple[Disturbance, str, list[str], str, int]] = [
+"""A fault, a pattern of nodes, their failures, the status of sort_overhead, and what it rejects."""
+MORE: list[tuple[ScheduledFault, str, list[str], str, int]] = [
     (
         during("*/Transit", effects.arm_runs_into(), nth=(1, 2, 3)),
         "*/Transit",
@@ -91,12 +91,12 @@ MORE: list[tuple[Disturbance, str, list[str], str, int]] = [
     ids=lambda one: getattr(one, "what", None),
 )
 def test_a_mission_deals_with_it_and_its_books_are_right(
-    one: Disturbance, pattern: str, reasons: list[str], status: str, rejected: int
+    one: ScheduledFault, pattern: str, reasons: list[str], status: str, rejected: int
 ) -> None:
-    result = run_mission("sort_overhead", disturbances=[one])
+    result = run_mission("sort_overhead", faults=[one])
     assert result.reasons(pattern) == reasons
     assert (result.status, result.items["rejected"], result.agrees) == (status, rejected, True)
-    assert {fault.name for fault in result.disturbances()} == {one.what.name}
+    assert {fault.name for fault in result.faults()} == {one.what.name}
 
 
 def test_an_operator_wants_something_else_first() -> None:
@@ -104,17 +104,17 @@ def test_an_operator_wants_something_else_first() -> None:
         during("*/AwaitRequest", effects.operator_asks_rescan(), nth=1),
         during("*/AwaitRequest", effects.operator_quits(), nth=3),
     ]
-    result = run_mission("pick_on_request", requests=["cube", "cube"], disturbances=script)
+    result = run_mission("pick_on_request", requests=["cube", "cube"], faults=script)
     assert result.reasons("*/AwaitRequest") == ["rescan", "quit"]
-    assert [fault.name for fault in result.disturbances()] == ["operator_asks_rescan", "operator_quits"]
+    assert [fault.name for fault in result.faults()] == ["operator_asks_rescan", "operator_quits"]
     assert [one.event.wanted for one in result.events if isinstance(one.event, RequestGiven)] == ["cube"]
 
 
-def ask(cell: DisturbedCell) -> Request:
+def ask(cell: FaultyCell) -> Request:
     return cell.cell.detectors["embedded"].request(cell.cell.camera.capture(), "table")
 
 
-def answered(cell: DisturbedCell, request: Request) -> float:
+def answered(cell: FaultyCell, request: Request) -> float:
     """Return when a request is answered [s]."""
     while not request.ready:
         assert cell.cell.clock.now < 50.0, "it is never answered"
@@ -270,7 +270,7 @@ def test_the_nearest_is_none_that_lies_in_a_bin_or_hangs_at_the_tool() -> None:
     assert labels(cell) == ["cube", "duck"]
 
 
-def node(cell: DisturbedCell, item: str) -> None:
+def node(cell: FaultyCell, item: str) -> None:
     cell.hear(at(1, NodeStarted("tree/Approach", "Approach", item)))
 
 
@@ -278,7 +278,7 @@ def test_the_object_of_a_node_is_what_the_ledger_takes_for_its_item() -> None:
     def removed(state: str, near: float = 0.0) -> list[str]:
         cell: Any = cell_with()
         script = [during("*/Approach", effects.object_removed())]
-        cell = DisturbedCell(cell.fake, script)
+        cell = FaultyCell(cell.fake, script)
         look = run_skill(Detect, cell).outputs["detections"]
         places = [Observation(one, np.array([*PLACES[one.label], 0.025]), 0.003) for one in look.found]
         items = {one.label: one.item for one in cell.cell.ledger.observe(look, places)}

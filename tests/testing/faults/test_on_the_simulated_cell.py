@@ -11,7 +11,7 @@ from executive.cells.sim.cell import SimCell
 from executive.events import FaultInjected, NodeEnded, TimedEvent
 from executive.geometry import Array
 from executive.testing import faults as effects
-from executive.testing.faults import Disturbance, after, during
+from executive.testing.faults import ScheduledFault, after, during
 from executive.testing.faults.hand import hand_of
 from executive.testing.oracle import oracle_cell
 from executive.testing.run_mission import MissionResult, run_mission
@@ -24,7 +24,7 @@ class Watched:
         self.seen: dict[str, object] = {}
         self._cell: SimCell | None = None
 
-    def run(self, disturbance: Disturbance, look: Callable[[SimCell], object]) -> MissionResult:
+    def run(self, fault: ScheduledFault, look: Callable[[SimCell], object]) -> MissionResult:
         """Run sort_overhead; keep what the first `look` at each kind of event, state or reason returns."""
 
         def watch(timed: TimedEvent) -> None:
@@ -37,9 +37,7 @@ class Watched:
         def keep(cell: SimCell) -> None:
             self._cell = cell
 
-        return run_mission(
-            "sort_overhead", oracle_cell(), disturbances=[disturbance], arrange=keep, observers=[watch]
-        )
+        return run_mission("sort_overhead", oracle_cell(), faults=[fault], arrange=keep, observers=[watch])
 
 
 @pytest.fixture
@@ -59,7 +57,7 @@ def holding(cell: SimCell) -> bool:
 @pytest.mark.slow
 def test_when_a_seal_breaks_in_mid_carry_the_object_falls_and_is_picked_up_again(watched: Watched) -> None:
     result = watched.run(during("*/Transit", effects.seal_breaks(), nth=3), places)
-    (told,) = result.disturbances()
+    (told,) = result.faults()
     hung = watched.seen["FaultInjected"]
     fallen = watched.seen["SelectTarget.unseen"]
     assert isinstance(hung, dict) and isinstance(fallen, dict)
@@ -73,7 +71,7 @@ def test_when_a_seal_breaks_in_mid_carry_the_object_falls_and_is_picked_up_again
 @pytest.mark.parametrize("name", ["seal_breaks", "arm_runs_into", "no_way"])
 def test_what_falls_or_is_put_down_is_not_taken_for_something_else(name: str) -> None:
     script = [during("*/Transit", getattr(effects, name)(), nth=2)]
-    assert run_mission("sort_overhead", oracle_cell(), disturbances=script).agrees
+    assert run_mission("sort_overhead", oracle_cell(), faults=script).agrees
 
 
 def test_what_is_taken_out_of_the_tool_is_parted_from_it_first(watched: Watched) -> None:
@@ -85,7 +83,7 @@ def test_what_is_taken_out_of_the_tool_is_parted_from_it_first(watched: Watched)
 @pytest.mark.slow
 def test_what_is_moved_is_found_where_it_is_now(watched: Watched) -> None:
     result = watched.run(during("*/Approach", effects.object_moved((0.0, 0.06)), nth=2), places)
-    (told,) = result.disturbances()
+    (told,) = result.faults()
     before, felt = watched.seen["FaultInjected"], watched.seen["no_contact"]
     assert isinstance(before, dict) and isinstance(felt, dict)
     (body,) = (body for body, place in before.items() if np.allclose(place, told.position, atol=1e-3))

@@ -18,12 +18,12 @@ from executive.errors import InputError
 from executive.events import FaultInjected, FrameSearched, NodeEnded, ToolCommanded, ignore
 from executive.testing import faults as effects
 from executive.testing.faults import (
-    Disturbance,
-    DisturbedCell,
+    FaultyCell,
+    ScheduledFault,
     after,
     between,
-    disturbed,
     during,
+    with_faults,
     with_probability,
 )
 from executive.testing.faults.hand import hand_of
@@ -34,8 +34,8 @@ SLIPS = effects.seal_fails()
 SHARE = "a share of a motion is more than 0 and less than 1"
 
 
-def sorted_with(*script: Disturbance) -> MissionResult:
-    return run_mission("sort_overhead", disturbances=script)
+def sorted_with(*script: ScheduledFault) -> MissionResult:
+    return run_mission("sort_overhead", faults=script)
 
 
 def slipped(result: MissionResult) -> list[int]:
@@ -50,7 +50,7 @@ def test_it_happens_in_the_activations_it_is_meant_for(nth: int | Sequence[int],
     result = sorted_with(during("*/Grasp", SLIPS, nth=nth))
     assert slipped(result)[: len(missed)] == missed
     assert len(slipped(result)) == len(missed) or nth == ()
-    assert len(result.disturbances()) == len(slipped(result))
+    assert len(result.faults()) == len(slipped(result))
     assert result.agrees
 
 
@@ -112,7 +112,7 @@ def test_a_script_is_a_value_that_can_be_sent_to_another_process_and_used_again(
 
 def test_what_happens_to_a_node_is_told_with_node_item_and_object() -> None:
     result = sorted_with(during("*/Transit", effects.seal_breaks(), nth=1), between(500.0, 600.0, SLIPS))
-    (told,) = result.disturbances()
+    (told,) = result.faults()
     assert (told.name, told.node.rpartition("/")[2]) == ("seal_breaks", "Transit")
     assert told.item.startswith(f"{told.object}-") and len(told.position) == 3
 
@@ -124,13 +124,13 @@ def test_a_mission_waits_for_a_detector_and_a_test_for_a_mission_for_so_long_onl
     ]
     assert (result.status, result.agrees) == ("SUCCESS", True)
     script = [during("tree/look/*/Detect", effects.detector_hangs())]
-    result = run_mission("sort_overhead", disturbances=script, longest=5.0)
+    result = run_mission("sort_overhead", faults=script, longest=5.0)
     assert result.message == "the mission is not done after 5 s on its clock"
 
 
 def test_everything_else_is_the_cell_that_it_wraps() -> None:
     fake = FakeCell()
-    cell = DisturbedCell(fake, [])
+    cell = FaultyCell(fake, [])
     for _ in range(3):
         cell.advance()
     assert (cell.steps, cell.cell.clock.now) == (3, fake.cell.clock.now)
@@ -140,8 +140,8 @@ def test_everything_else_is_the_cell_that_it_wraps() -> None:
     assert cell.cell.arm.tool_pose is fake.arm.tool_pose
 
 
-def test_a_kind_of_cell_is_disturbed_in_one_run_after_the_other() -> None:
-    kind = disturbed(FakeCell, [after(0.0, effects.table_bumped())])
+def test_a_kind_of_cell_has_faults_in_one_run_after_the_other() -> None:
+    kind = with_faults(FakeCell, [after(0.0, effects.table_bumped())])
     options = CellOptions(SilentOperator(), base=Path())
     for _ in range(2):
         cell = kind(bare_table(), seed=0, routes={}, emit=ignore, options=options)
@@ -155,7 +155,9 @@ def test_a_hand_reaches_through_wrapped_cells_and_into_no_unknown_one() -> None:
     assert [thing.label for thing in hand_of(CellWrapper(CellWrapper(fake))).things] == ["cube"]
     gone = [after(0.0, effects.object_removed(1))]
     strange: Any = SimpleNamespace(cell=FakeCell().cell, advance=lambda: None)
-    with pytest.raises(InputError, match="nobody knows how to reach into a SimpleNamespace; give `disturb"):
-        DisturbedCell(strange, gone).advance()
-    disturbed(lambda **_: strange, gone, hand=lambda _: hand_of(fake))().advance()
+    with pytest.raises(
+        InputError, match="nobody knows how to reach into a SimpleNamespace; give `with_faults"
+    ):
+        FaultyCell(strange, gone).advance()
+    with_faults(lambda **_: strange, gone, hand=lambda _: hand_of(fake))().advance()
     assert fake.world.objects == []

@@ -17,7 +17,7 @@ from executive.events import Emit, NodeEnded, NodeStarted, TimedEvent, ignore
 from executive.testing.faults.effect import Effect, Occasion
 from executive.testing.faults.hand import Hand, hand_of
 from executive.testing.faults.scene import Scene
-from executive.testing.faults.script import Disturbance, DuringNode, DuringTime
+from executive.testing.faults.script import DuringNode, DuringTime, ScheduledFault
 
 TIME_TOLERANCE = 1e-9
 """Rounding allowed when two times on the clock are compared [s]."""
@@ -31,7 +31,7 @@ _ANSWERS = frozenset(
 """Accesses whose answers effects can change."""
 
 
-class DisturbedCell(CellWrapper):
+class FaultyCell(CellWrapper):
     """A work cell with injected faults; implements `Workcell`.
 
     The cell must `hear` the events of its run, which tell it the running nodes. For each fault it emits a
@@ -39,7 +39,7 @@ class DisturbedCell(CellWrapper):
 
     Args:
         inner: The cell without faults.
-        disturbances: The faults and their times.
+        faults: The faults and their times.
         emit: Emits events of the run.
         hand: Returns the access to the world of a cell.
         longest: Time on the run's clock after which the run ends as a fault [s].
@@ -48,7 +48,7 @@ class DisturbedCell(CellWrapper):
     def __init__(
         self,
         inner: Workcell,
-        disturbances: Sequence[Disturbance],
+        faults: Sequence[ScheduledFault],
         emit: Emit = ignore,
         hand: Callable[[Workcell], Hand] = hand_of,
         longest: float = math.inf,
@@ -56,8 +56,8 @@ class DisturbedCell(CellWrapper):
         super().__init__(inner)
         self._scene = Scene(inner, hand, emit)
         self._longest = longest
-        self._by_node = [(one.what, one.when) for one in disturbances if isinstance(one.when, DuringNode)]
-        self._to_come = [(one.what, one.when) for one in disturbances if isinstance(one.when, DuringTime)]
+        self._by_node = [(one.what, one.when) for one in faults if isinstance(one.when, DuringNode)]
+        self._to_come = [(one.what, one.when) for one in faults if isinstance(one.when, DuringTime)]
         self._activations: Counter[int] = Counter()
         self._occasions: list[Occasion] = []
         self._cell = intercept(inner.cell, self._answer, _ROLES)
@@ -145,24 +145,24 @@ class DisturbedCell(CellWrapper):
         return result
 
 
-def disturbed(
+def with_faults(
     kind: Callable[..., Workcell],
-    disturbances: Sequence[Disturbance],
+    faults: Sequence[ScheduledFault],
     hand: Callable[[Workcell], Hand] = hand_of,
     longest: float = math.inf,
-) -> Callable[..., DisturbedCell]:
+) -> Callable[..., FaultyCell]:
     """Return a kind of cell, for `RunOptions.kind`: another kind, with a fault script.
 
     The run must be observed by its cell: `run.observe(run.workcell.hear)`.
 
     Args:
         kind: The other kind.
-        disturbances: The script.
+        faults: The script.
         hand: Returns the access to the world of a cell of that kind.
         longest: Time on the run's clock after which the run ends as a fault [s].
     """
 
-    def make(*args: Any, emit: Emit = ignore, **options: Any) -> DisturbedCell:
-        return DisturbedCell(kind(*args, emit=emit, **options), disturbances, emit, hand, longest)
+    def make(*args: Any, emit: Emit = ignore, **options: Any) -> FaultyCell:
+        return FaultyCell(kind(*args, emit=emit, **options), faults, emit, hand, longest)
 
     return make

@@ -1,4 +1,4 @@
-"""Under disturbances, the ledger agrees with the audit, or the run names the items in question."""
+"""Under injected faults, the ledger agrees with the audit, or the run names the items in question."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pytest
 from executive.cell.detection import Answer, Detection
 from executive.cells.fake.cell import FakeCell
 from executive.plugins import cell_kind
-from executive.testing.faults import Disturbance, after, during, object_bumped, with_probability
-from executive.testing.faults.detector import detector_disturbed
+from executive.testing.faults import ScheduledFault, after, during, object_bumped, with_probability
+from executive.testing.faults.detector import faulty_detector
 from executive.testing.faults.effect import Effect, Occasion
 from executive.testing.run_mission import MissionResult, run_mission
 
@@ -37,7 +37,7 @@ def exchange_objects(now: Occasion) -> bool:
     x, y = (others[0].position - first.position)[:2]
     hand.move(first, (float(x), float(y)))
     hand.move(others[0], (-float(x), -float(y)))
-    now.tell(first)
+    now.record(first)
     return True
 
 
@@ -46,7 +46,7 @@ def empty_bin(now: Occasion) -> bool:
     for bin in now.scene.cell.bins.values():
         inside = [thing for thing in now.scene.hand.things if bin.contains(thing.position)]
         for thing in inside:
-            now.tell(thing)
+            now.record(thing)
             now.scene.hand.remove(thing)
         if inside:
             return True
@@ -61,7 +61,7 @@ def detector_adds_false_box(seed: int) -> Effect:
     def add(answer: Answer) -> Answer:
         return replace(answer, found=(*answer.found, Detection("cube", 0.9, box)))
 
-    return detector_disturbed("detector_adds_false_box", add)
+    return faulty_detector("detector_adds_false_box", add)
 
 
 def detector_swaps_classes() -> Effect:
@@ -70,10 +70,10 @@ def detector_swaps_classes() -> Effect:
     def swap(answer: Answer) -> Answer:
         return replace(answer, found=tuple(replace(one, label=SWAPPED[one.label]) for one in answer.found))
 
-    return detector_disturbed("detector_swaps_classes", swap)
+    return faulty_detector("detector_swaps_classes", swap)
 
 
-def schedule(kind: str, seed: int) -> list[Disturbance]:
+def schedule(kind: str, seed: int) -> list[ScheduledFault]:
     if kind == "moved before each approach":
         return [during("*/Approach", object_bumped(X_RANGE, Y_RANGE))]
     if kind == "false detection":
@@ -104,6 +104,6 @@ def names_rejected_and_lost_items(result: MissionResult) -> bool:
 def test_ledger_and_audit_agree_or_the_run_names_the_items(kind: str, cell: str, seed: int) -> None:
     result = run_mission(
         "sort_overhead", FakeCell if cell == "fake" else cell_kind("sim"),
-        seed=seed, disturbances=schedule(kind, seed), set={"cell.kind": cell},
+        seed=seed, faults=schedule(kind, seed), set={"cell.kind": cell},
     )  # fmt: skip
     assert result.agrees or names_rejected_and_lost_items(result)
