@@ -37,24 +37,12 @@ def store_evaluation(
     """
     assert detector.cell is not None
     path = out or detector.base / f"{detector.cell.cell}{SUFFIX}"
-    measurement = _as_measurement(detector, evaluation, command, seconds)
-    instead = "name another file with --out, and copy it into the folder of your cell file"
-    with explained(InputError, f"the measurement {path} cannot be written", instead):
-        write_whole(path, format_measurements(read_measurements(path), measurement))
-    return path
-
-
-def _as_measurement(
-    detector: DetectorUnderTest, evaluation: Evaluation, command: str, seconds: float
-) -> Measurement:
-    """Convert the evaluation of a detector in its cell to a measurement."""
-    assert detector.cell is not None
     if evaluation.reliability is None:
         raise InputError(
             f"detector {detector.name} gave no answer for any image: {evaluation.why}; nothing was measured"
         )
     table = evaluation.confusion
-    return Measurement(
+    measurement = Measurement(
         detector=detector.name,
         fingerprint=dict(take_fingerprint(detector.cell, detector.name, detector.base)),
         command=command,
@@ -77,3 +65,7 @@ def _as_measurement(
         },
         frames=evaluation.frames,
     )
+    instead = "name another file with --out, and copy it into the folder of your cell file"
+    with explained(InputError, f"the measurement {path} cannot be written", instead):
+        write_whole(path, format_measurements(read_measurements(path), measurement))
+    return path

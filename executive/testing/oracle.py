@@ -125,7 +125,9 @@ class Oracle:
         for true in frame.truth:
             box = np.array(true.box) + random.normal(0.0, self.jitter, 4)
             seen = Detection(true.label, true.confidence, (box[0], box[1], box[2], box[3]))
-            if self._shows(frame, view, np.array(seen.centre)):
+            column, row = seen.centre
+            left, top, right, bottom = self.camera.area(view)
+            if left <= column < right and top <= row < bottom and frame.visible[int(row), int(column)]:
                 found.append(seen)
         answer: Future[list[Detection]] = Future()
         answer.set_result(found)
@@ -134,13 +136,6 @@ class Oracle:
 
     def close(self) -> None:
         """Have nothing to give back."""
-
-    def _shows(self, frame: Frame, view: str, pixel: Array) -> bool:
-        area = np.array(self.camera.area(view))
-        if np.any(pixel < area[:2]) or np.any(pixel >= area[2:]):
-            return False
-        column, row = pixel.astype(int)
-        return bool(frame.visible[row, column])
 
 
 def oracle_cell(*, jitter: float = 0.7, rendered: bool = False) -> Callable[..., SimCell]:

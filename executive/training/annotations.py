@@ -66,7 +66,7 @@ class ImageAnnotation:
 Annotations = Mapping[Path, ImageAnnotation]
 """The annotations of a folder by image, sorted by path."""
 NonNegative = Annotated[FiniteFloat, Field(ge=0)]
-ContentT = TypeVar("ContentT", bound=BaseModel)
+ContentT = TypeVar("ContentT")
 
 
 class _CocoImage(BaseModel):
@@ -115,7 +115,7 @@ def read_annotations(split: Path) -> Annotations:
 
 def _read_coco(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
     file = split / COCO_FILE_NAME
-    content = _parse(file, MAX_COCO_SIZE, lambda text: _CocoFile.model_validate_json(text))
+    content = parse_file(file, MAX_COCO_SIZE, lambda text: _CocoFile.model_validate_json(text))
     names = {category.id: category.name for category in content.categories}
     objects = {image.id: ImageAnnotation() for image in content.images}
     for what, values in (
@@ -145,7 +145,7 @@ def _read_yolo(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
     data = next((split.parent / name for name in YOLO_CLASS_FILES if (split.parent / name).is_file()), None)
     if data is None:
         raise InputError(f"{split.parent} has no data.yaml, which names the classes of a YOLO data set")
-    content = _parse(
+    content = parse_file(
         data,
         MAX_CLASS_FILE_SIZE,
         lambda text: _YoloClassFile.model_validate(yaml.load(text, Loader=yaml.BaseLoader)),
@@ -223,7 +223,7 @@ def _read_text(file: Path, max_size: int) -> str:
         raise InputError(f"{file} cannot be read: {error}") from error
 
 
-def _parse(file: Path, max_size: int, parse: Callable[[str], ContentT]) -> ContentT:
+def parse_file(file: Path, max_size: int, parse: Callable[[str], ContentT]) -> ContentT:
     """Return the parsed content of a file of at most `max_size` [byte].
 
     Raises:

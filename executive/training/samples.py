@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,9 +9,16 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
 from executive.errors import InputError
-from executive.training.annotations import COCO_FILE_NAME, is_split, read_annotations
+from executive.training.annotations import (
+    COCO_FILE_NAME,
+    MAX_COCO_SIZE,
+    is_split,
+    parse_file,
+    read_annotations,
+)
 from executive.training.labelled_image import LabelledImage
 
 SPLITS = ("test", "valid", "val", "train")
@@ -93,12 +99,6 @@ def _split(folder: Path) -> Path:
 
 
 def _read_json(path: Path) -> dict[str, Any]:
-    if not path.is_file():
-        return {}
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise InputError(f"{path} cannot be read: {error}") from error
-    if not isinstance(content, dict):
-        raise InputError(f"{path} must hold an object with a key for each image")
-    return content
+    """Return the object in a file with a key for each image; empty without a file."""
+    read = TypeAdapter(dict[str, Any]).validate_json
+    return parse_file(path, MAX_COCO_SIZE, read) if path.is_file() else {}

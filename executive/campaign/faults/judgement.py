@@ -60,11 +60,8 @@ def check_tree(root: Behaviour) -> Iterator[str]:
 
 def out_of_sight(things: Sequence[Thing], bins: Collection[Bin], events: Sequence[TimedEvent]) -> Hidden:
     """Return how many things lie where no look has shown a place since the tool last dropped anything."""
-    dropped = [
-        one.tick
-        for one in events
-        if isinstance(one.event, ItemChanged) and one.event.state == State.DROPPED.value
-    ]
+    changes = [(one.tick, one.event) for one in events if isinstance(one.event, ItemChanged)]
+    dropped = [tick for tick, change in changes if change.state == State.DROPPED.value]
     if not dropped:
         return NOTHING_HIDDEN
     later = (one.event for one in events if one.tick > dropped[-1])
