@@ -115,9 +115,10 @@ def command(
                 path = store_evaluation(tested, result, out, command=repeat, seconds=seconds)
                 click.echo(f"stored in {path}", err=True)
         if sheet is not None:
-            from executive.training.evaluation.misses import write_sheet
+            from executive.training.dataset import save_image
+            from executive.training.evaluation.misses import draw_sheet
 
-            write_sheet(sheet, worst.kept, ", ".join(measured))
+            save_image(sheet, draw_sheet(worst.kept, ", ".join(measured)))
             click.echo(f"the {len(worst.kept)} worst in {sheet}", err=True)
     if as_json:
         named_files = {"scene": scene and str(scene), "weights": weights and str(weights)}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -14,7 +13,6 @@ from numpy.typing import NDArray
 
 from executive.cell.detection import Detection
 from executive.cell.frame import Box
-from executive.errors import InputError
 from executive.training.evaluation.matching import Match
 from executive.training.labelled_image import LabelledImage
 
@@ -127,19 +125,6 @@ def draw_sheet(misses: Sequence[Miss], title: str) -> Picture:
         _write(sheet, f"{number + 1}. {miss.text}", (left, top + TILE + 15), INK)
         _write(sheet, miss.sample.file, (left, top + TILE + 32), FAINT)
     return sheet
-
-
-def write_sheet(path: Path, misses: Sequence[Miss], title: str) -> None:
-    """Write the picture to a file; the file's ending decides on the format.
-
-    Raises:
-        InputError: The file cannot be written.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    if not cv2.imwrite(str(path), draw_sheet(misses, title)[..., ::-1]):
-        raise InputError(
-            f"the picture {path} could not be written; is the disk full or the folder read-only?"
-        )
 
 
 def _picture(miss: Miss) -> Picture:

@@ -10,8 +10,9 @@ import pytest
 
 from executive.cell.detection import Detection
 from executive.errors import InputError
+from executive.training.dataset import save_image
 from executive.training.evaluation.matching import is_ignored, match
-from executive.training.evaluation.misses import FOUND, TRUE, WorstMisses, draw_sheet, misses, write_sheet
+from executive.training.evaluation.misses import FOUND, TRUE, WorstMisses, draw_sheet, misses
 
 
 def matches(sample, *found):
@@ -86,8 +87,8 @@ def test_a_sheet_without_mistakes_is_narrow_and_more_than_a_row_of_them_make_two
 
 def test_a_sheet_is_written_where_it_is_asked_for_or_that_is_explained(sample, tmp_path):
     path = tmp_path / "new" / "sheet.png"
-    write_sheet(path, told(sample), "overhead")
+    save_image(path, draw_sheet(told(sample), "overhead"))
     assert np.array_equal(cv2.imread(str(path))[..., ::-1], draw_sheet(told(sample), "overhead"))
     (tmp_path / "sheet.png").mkdir()
     with pytest.raises(InputError, match=r"sheet\.png could not be written; is the disk full"):
-        write_sheet(tmp_path / "sheet.png", told(sample), "overhead")
+        save_image(tmp_path / "sheet.png", draw_sheet(told(sample), "overhead"))
