@@ -87,24 +87,25 @@ def command(
     as_declared = not (weights or varied or scene or threshold) and view == "table"
     stored = bool(cells) and as_declared and (out is not None or not overrides)
     with stdout_kept_clean():
-        from executive.campaign.evaluation import SceneSettings, check_detector, list_detectors, measure
-        from executive.campaign.measurement_store import store_evaluation
+        from executive.campaign import evaluation
         from executive.cli.cells import find_cell, load_cells
         from executive.cli.progress import bar, report_polygons
         from executive.training.evaluation.misses import WorstMisses
         from executive.view.figures.detector import print_figures
 
-        worst, scenes = WorstMisses(), SceneSettings(images, seed, varied, view, workers, scene)
+        worst, scenes = WorstMisses(), evaluation.SceneSettings(images, seed, varied, view, workers, scene)
         named = cells or (() if dataset else ("overhead",))
         files = dict(zip(map(find_cell, named), load_cells(named, overrides).values(), strict=True))
-        asked = list(list_detectors(files, detector, weights, labels))
+        asked = list(evaluation.list_detectors(files, detector, weights, labels))
         if dataset is not None:
             report_polygons(dataset)
         for tested in asked:
-            check_detector(tested, renders_scenes=dataset is None, scene=scene)
+            evaluation.check_detector(tested, renders_scenes=dataset is None, scene=scene)
         for tested in asked:
             where, began = tested.name_measurement(dataset), time.monotonic()
-            result = measure(tested, dataset, scenes, threshold=threshold, worst_misses=worst, progress=bar)
+            result = evaluation.measure(
+                tested, dataset, scenes, threshold=threshold, worst_misses=worst, progress=bar
+            )
             print_figures(where, tested.name, result)
             kind = tested.configs[tested.name].kind
             measured[where] = {"detector": tested.name, "kind": kind, **result.as_dict()}
@@ -112,7 +113,7 @@ def command(
                 source = f"--dataset {dataset}" if dataset else f"--images {images} --seed {seed}"
                 repeat = f"executive evaluate --cell {tested.cell.cell} --detector {tested.name} {source}"
                 seconds = time.monotonic() - began
-                path = store_evaluation(tested, result, out, command=repeat, seconds=seconds)
+                path = evaluation.store_evaluation(tested, result, out, command=repeat, seconds=seconds)
                 click.echo(f"stored in {path}", err=True)
         if sheet is not None:
             from executive.training.dataset import save_image

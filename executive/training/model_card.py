@@ -1,10 +1,9 @@
-"""The text that goes with a trained model: where it comes from, how good it is, how to make it again."""
+"""Card of a trained model: its settings, its accuracy and the course of its training."""
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from executive.training.evaluation.figures import Evaluation, Spread
@@ -26,40 +25,25 @@ FIGURES = {
 """Figures of an evaluation that a card shows: heading, then name and format."""
 
 
-@dataclass(frozen=True)
-class ModelCard:
-    """What is to be said about a model.
+def write_card(
+    title: str,
+    summary: str,
+    settings: Mapping[str, str],
+    epochs: Sequence[Mapping[str, float]],
+    measured: Mapping[str, Evaluation],
+) -> str:
+    """Return the card of a model as Markdown.
 
-    Attributes:
+    Args:
         title: Name of the model.
-        summary: What it is for, in a sentence or two.
-        settings: Everything that decided what it became, by name.
-        epochs: One row of figures per epoch, by the names of `EPOCH_COLUMNS`.
-        measured: How good it is, by what it was measured on.
+        summary: Purpose of the model, one or two sentences.
+        settings: Settings of the training by name.
+        epochs: Figures of each epoch, by the names of `EPOCH_COLUMNS`.
+        measured: Measurements of the model by the name of the images.
     """
-
-    title: str
-    summary: str
-    settings: Mapping[str, str]
-    epochs: Sequence[Mapping[str, float]] = ()
-    measured: Mapping[str, Evaluation] = field(default_factory=dict)
-
-    def text(self) -> str:
-        """Return the card as Markdown."""
-        blocks = [f"# {self.title}", self.summary, _table(("setting", "value"), list(self.settings.items()))]
-        if self.measured:
-            blocks += ["## Measured", *self._measured()]
-        if self.epochs:
-            rows = [
-                (str(number), *(f"{row[name]:.4f}" if name in row else "" for name in EPOCH_COLUMNS))
-                for number, row in enumerate(self.epochs, 1)
-            ]
-            blocks += ["## Training", _table(("epoch", *EPOCH_COLUMNS.values()), rows)]
-        return "\n\n".join(blocks) + "\n"
-
-    def _measured(self) -> list[str]:
-        thresholds = sorted({evaluation.threshold for evaluation in self.measured.values()})
-        head = ("on", *FIGURES, "centre [px]", "position [mm]")
+    blocks = [f"# {title}", summary, _table(("setting", "value"), list(settings.items()))]
+    if measured:
+        confidences = ", ".join(f"{one:g}" for one in sorted({one.threshold for one in measured.values()}))
         rows = [
             (
                 where,
@@ -67,15 +51,22 @@ class ModelCard:
                 _spread(one.centre),
                 _spread(one.position),
             )
-            for where, one in self.measured.items()
+            for where, one in measured.items()
         ]
-        confidences = ", ".join(f"{threshold:g}" for threshold in thresholds)
-        return [
+        blocks += [
+            "## Measured",
             f"Precision and recall at confidence {confidences} and an overlap of 0.5. Centre and position: "
             "how far the centre of a found box lies from the true one's, in the image and in the world at "
             "the object's height; median / 95 % / 99 %.",
-            _table(head, rows),
+            _table(("on", *FIGURES, "centre [px]", "position [mm]"), rows),
         ]
+    if epochs:
+        figures = [
+            (str(number), *(f"{row[name]:.4f}" if name in row else "" for name in EPOCH_COLUMNS))
+            for number, row in enumerate(epochs, 1)
+        ]
+        blocks += ["## Training", _table(("epoch", *EPOCH_COLUMNS.values()), figures)]
+    return "\n\n".join(blocks) + "\n"
 
 
 def read_epochs(metrics: Path) -> list[dict[str, float]]:

@@ -10,7 +10,7 @@ from executive.errors import InputError
 from executive.perception.detectors.onnx_model import read_labels
 from executive.training.annotations import read_annotations
 from executive.training.evaluation.evaluate import evaluate_folder, label_file
-from executive.training.model_card import ModelCard, read_epochs
+from executive.training.model_card import read_epochs, write_card
 from executive.training.samples import splits_of
 
 ReportEpoch = Callable[[int, dict[str, float]], None]
@@ -86,7 +86,7 @@ def train(
     fit(dataset, out, settings, report_epoch, report_batch)
     model, labels = out / "model.onnx", out / "labels.txt"
     export_onnx(out / "checkpoint_best_total.pth", len(read_labels(labels)), model)
-    card = ModelCard(
+    card = write_card(
         title=f"Small RF-DETR trained on {dataset.name}",
         summary=f"Finds {', '.join(read_labels(labels))} in square images.",
         settings={
@@ -100,7 +100,7 @@ def train(
         epochs=read_epochs(out / "metrics.csv"),
         measured={"validation images": evaluate_folder(model, labels, _validation(dataset), CARD_THRESHOLD)},
     )
-    (out / "card.md").write_text(card.text(), encoding="utf-8")
+    (out / "card.md").write_text(card, encoding="utf-8")
 
 
 def learning_rate(start: Path | None, labels: list[str]) -> float:

@@ -11,7 +11,7 @@ import pytest
 
 from executive.errors import InputError
 from executive.training.evaluation.figures import Evaluation, Spread
-from executive.training.model_card import ModelCard, read_epochs
+from executive.training.model_card import read_epochs, write_card
 from executive.training.train import Settings, learning_rate, train
 
 
@@ -163,13 +163,13 @@ def test_epochs_are_put_together_from_the_rows_a_trainer_spreads_them_over(tmp_p
 
 
 def test_a_card_states_settings_and_figures():
-    text = ModelCard(
+    text = write_card(
         title="Small model",
         summary="Finds cubes.",
         settings={"seed": "1"},
         epochs=[{"train/loss": 6.5, "val/mAP_50": 0.5}],
         measured={"overhead": EVALUATION},
-    ).text()
+    )
     assert text.startswith("# Small model\n\nFinds cubes.\n")
     assert "| seed | 1 |" in text
     assert "| overhead | 300 | 900 | 0.9910 | 0.9900 | 0.9950 | 0.8000 | 0.60 / 1.50 / 2.90 |  |" in text

@@ -72,7 +72,7 @@ class _Trying:
     def __init__(self, subject: Subject, rehearsal: Rehearsal, faults: Numbered) -> None:
         self._subject, self._rehearsal, self._faults = subject, rehearsal, faults
         self._events: list[TimedEvent] = []
-        self._breakages = [skill_fault for fault in faults.values() for skill_fault in fault.skill_faults]
+        self._skill_faults = [skill_fault for fault in faults.values() for skill_fault in fault.skill_faults]
         self._activations = Activations()
         self._stopped = False
         cell_faults = [cell_fault for fault in faults.values() for cell_fault in fault.cell_faults]
@@ -81,7 +81,7 @@ class _Trying:
             subject.seed,
             subject.requests,
             kind=with_faults(self._kind, cell_faults, longest=rehearsal.longest),
-            substitutes=broken_skills(self._breakages, own),
+            substitutes=broken_skills(self._skill_faults, own),
         )
         self.run = assemble(subject.loaded, subject.skills, self.options, [self._see, self._activations])
         workcell = self.run.workcell
@@ -138,7 +138,7 @@ class _Trying:
 
     def _stop_if_due(self) -> None:
         """Stop the run when a skill is to be halted."""
-        for skill_fault in self._breakages:
+        for skill_fault in self._skill_faults:
             began = self._activations.began.get(skill_fault.node)
             is_meant = self._activations.counts[skill_fault.node] in skill_fault.starts
             is_due = began is not None and self.run.tick >= began + skill_fault.after
