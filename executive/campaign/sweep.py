@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from executive.campaign.pool import do_all
-from executive.cell.workcell import PLACES
 from executive.errors import ExecutiveError
-from executive.record.result import ITEM_COUNTS
-
-Result = Mapping[str, Any]
+from executive.record.result import Audit, Result
 
 
 @dataclass(frozen=True)
@@ -74,7 +71,7 @@ def run_job(job: Job) -> Result:
     options = RunOptions(job.seed, scene=job.scene)
     result = record_run(loaded, skills, options, job.runs, RecordOptions(frames=job.frames))
     # A run without a report counts as well as any other.
-    leave_report(result)
+    leave_report(result.run)
     return result
 
 
@@ -83,16 +80,16 @@ def summarize(results: Sequence[Result], asked: int) -> dict[str, Any]:
 
     Runs that were halted count as cut off, and in nothing else. `asked` is how many runs were wanted.
     """
-    results = [result for result in results if result["status"] != "HALTED"]
-    audits = [result["audit"] for result in results if result["audit"] is not None]
-    right = sum(audit["right"] for audit in audits)
-    total = sum(audit[place] for audit in audits for place in ("right", "wrong_bin", "left", "elsewhere"))
+    results = [result for result in results if result.status != "HALTED"]
+    audits = [result.audit for result in results if result.audit is not None]
+    right = sum(audit.right for audit in audits)
+    total = sum(audit.right + audit.wrong_bin + audit.left + audit.elsewhere for audit in audits)
     low, high = wilson(right, total)
     return {
         "asked": asked,
         "cut_off": len(results) < asked,
         "runs": len(results),
-        "succeeded": sum(result["status"] == "SUCCESS" for result in results),
+        "succeeded": sum(result.status == "SUCCESS" for result in results),
         "objects": {
             "right": right,
             "total": total,
@@ -100,23 +97,23 @@ def summarize(results: Sequence[Result], asked: int) -> dict[str, Any]:
             "interval_95": [round(low, 6), round(high, 6)],
         },
         "disagreements": [
-            {key: result[key] for key in ("seed", "items", "audit", "run")}
+            {"seed": result.seed, "items": asdict(result.items), "audit": asdict(audit), "run": result.run}
             for result in results
-            if result["audit"] is not None and not result["audit"]["agrees"]
+            if (audit := result.audit) is not None and not audit.agrees
         ],
-        "robot_time_s": spread([result["robot_time_s"] for result in results]),
+        "robot_time_s": spread([result.robot_time_s for result in results]),
         "robot_time_per_object_s": (
-            round(sum(result["robot_time_s"] for result in results) / right, 3) if right else None
+            round(sum(result.robot_time_s for result in results) / right, 3) if right else None
         ),
         "planning": {
-            key: round(sum(result["planning"][key] for result in results), 3)
+            key: round(sum(getattr(result.planning, key) for result in results), 3)
             for key in ("motions", "ahead", "waited_s")
         },
-        "wall_time_s": spread([result["wall_time_s"] for result in results]),
+        "wall_time_s": spread([result.wall_time_s for result in results]),
         "failures": [
-            {key: result[key] for key in ("seed", "status", "reason", "message", "node", "run")}
+            {key: getattr(result, key) for key in ("seed", "status", "reason", "message", "node", "run")}
             for result in results
-            if result["status"] != "SUCCESS"
+            if result.status != "SUCCESS"
         ],
     }
 
@@ -145,19 +142,12 @@ def spread(values: Sequence[float]) -> dict[str, float]:
 
 def _broken(job: Job, error: BaseException) -> Result:
     """Return the result of a run that left none."""
-    return {
-        "mission": job.mission,
-        "status": "FAULT",
-        "reason": "fault",
-        "message": str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}",
-        "node": "",
-        "seed": job.seed,
-        "items": dict.fromkeys(ITEM_COUNTS, 0),
-        "audit": {**dict.fromkeys(PLACES, 0), "agrees": True},
-        "planning": {"motions": 0, "ahead": 0, "waited_s": 0.0},
-        "ticks": 0,
-        "robot_time_s": 0.0,
-        "wall_time_s": 0.0,
-        "trace": "",
-        "run": "",
-    }
+    return Result(
+        mission=job.mission,
+        status="FAULT",
+        reason="fault",
+        message=str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}",
+        node="",
+        seed=job.seed,
+        audit=Audit(),
+    )

@@ -50,7 +50,7 @@ def command(
         speed = speed or format.speed
         with file_for(file, force=force) as part:
             if not quiet:
-                seconds = source.entries[-1]["clock"] / speed + HOLD
+                seconds = source.events[-1].clock / speed + HOLD
                 click.echo(f"making a film of about {seconds:.0f} s", err=True)
             with bar("frames", quiet=quiet, print_lines=True) as progress:
                 frames = film(source, part, format, speed=speed, workers=workers, progress=progress)

@@ -7,7 +7,7 @@ import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -24,6 +24,7 @@ from executive.cli.streams import print_json, stdout_kept_clean, unescaped_stder
 if TYPE_CHECKING:
     from executive.events import RunStarted
     from executive.record.recorded_run import RecordOptions
+    from executive.record.result import Result
     from executive.run.assembly import RunOptions
     from executive.view.live.page import LivePage
     from executive.view.terminal.lines import Lines
@@ -74,13 +75,15 @@ def command(
         ),
     )
     with stdout_kept_clean():
+        from executive.cell.plain import plain
+        from executive.record.diagnosis.text import diagnosis_lines
         from executive.record.guarded_view import GuardedView
         from executive.record.recorded_run import RecordOptions
         from executive.record.result import disagreement, exit_code
         from executive.record.run_directory import RunDirectory
         from executive.run.assembly import RunOptions
         from executive.view.report.page import leave_report
-        from executive.view.terminal.summary import repeat_command, story_lines, summary, verdict
+        from executive.view.terminal.summary import repeat_command, summary, verdict
 
         shown = None if quiet else _view()
         with _page(live) as page:
@@ -98,29 +101,30 @@ def command(
                 result = _start(mission, overrides, options, runs, record)
                 origin = mission, seed, overrides
             # What was asked for by a person is asked for again.
-            asked_for, used_scene = requests or result["requests"], RunDirectory(Path(result["run"])).scene
+            asked_for, used_scene = requests or result.requests, RunDirectory(Path(result.run)).scene
             repeat = repeat_command(*origin, asked_for, used_scene)
-            report, problem = leave_report(result)
+            report, problem = leave_report(result.run)
             if page is not None:
                 page.finish(result, report and str(Path(report).resolve()))
                 problem = "; ".join(filter(None, (problem, page.problem)))
         problem = "; ".join(filter(None, (problem, *(view.problem for view in views))))
-        if problem and (views or result["story"] is not None):
+        if problem and (views or result.story is not None):
             click.echo(f"note: {problem}", err=True)
         if shown is not None:
-            click.echo(summary(result, shown.items, repeat, report), err=True, nl=False)
-        elif result["story"] is not None:
-            click.echo("\n".join(story_lines(result["story"], result["run"], repeat, report)), err=True)
-        elif result["status"] == "INCOMPLETE" or disagreement(result):
-            click.echo("\n".join(filter(None, (disagreement(result), verdict(result)))), err=True)
+            click.echo(summary(result, shown.timeline.items.now(), repeat, report), err=True, nl=False)
+        elif result.story is not None:
+            click.echo("\n".join(diagnosis_lines(result.story, result.run, repeat, report)), err=True)
+        elif result.status == "INCOMPLETE" or disagreement(result):
+            ended = verdict(result.status, result.reason, result.node, result.message)
+            click.echo("\n".join(filter(None, (disagreement(result), ended))), err=True)
     if as_json:
-        print_json(result)
+        print_json(plain(result))
     ctx.exit(exit_code(result))
 
 
 def _start(
     mission: str, overrides: dict[str, str], options: RunOptions, runs: Path, record: RecordOptions
-) -> dict[str, Any]:
+) -> Result:
     """Run a mission from its start and return the result."""
     from executive.mission.load import load_mission
     from executive.plugins import cell_kind, discover
@@ -138,9 +142,7 @@ def _start(
     return record_run(loaded, skills, options, runs, record)
 
 
-def _resume(
-    name: str, options: RunOptions, runs: Path, record: RecordOptions
-) -> tuple[dict[str, Any], RunStarted]:
+def _resume(name: str, options: RunOptions, runs: Path, record: RecordOptions) -> tuple[Result, RunStarted]:
     """Resume a run; return its result and its start."""
     from executive.plugins import discover
     from executive.record.find_run import find_run

@@ -47,6 +47,7 @@ def command(
     """
     with stdout_kept_clean():
         from executive.campaign.sweep import Job, summarize, sweep
+        from executive.cell.plain import plain
         from executive.cli.progress import bar, print_halting
         from executive.mission.load import load_mission
         from executive.plugins import cell_kind, discover
@@ -66,7 +67,7 @@ def command(
         click.echo(_text(figures), err=True)
     if as_json:
         asked = {"mission": mission, "seeds": [seeds[0], seeds[-1]], "scene": scene and str(scene)}
-        print_json({**asked, **figures, "results": results})
+        print_json({**asked, **figures, "results": plain(results)})
     wrong = figures["succeeded"] < figures["runs"] or bool(figures["disagreements"])
     ctx.exit(130 if figures["cut_off"] else int(wrong))
 
@@ -107,8 +108,9 @@ def _text(figures: dict[str, Any]) -> str:
         lines.append(f"  seed {entry['seed']}: the ledger says {items}; the audit {audit}; {entry['run']}")
     if figures["failures"]:
         lines.append(f"{len(figures['failures'])} runs did not succeed:")
+    keys = ("status", "reason", "node", "message")
     for entry in figures["failures"]:
         # A run whose process broke, or that found no place for its record, has no directory.
         where = entry["run"] and f"; {entry['run']}"
-        lines.append(f"  seed {entry['seed']}: {verdict(entry)}{where}")
+        lines.append(f"  seed {entry['seed']}: {verdict(*map(entry.get, keys))}{where}")
     return "\n".join(lines)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,13 +13,16 @@ from executive.cell.frame import Frame, FrameTaken
 from executive.events import DetectedObject, FrameSearched, NodeEnded, TargetSelected, TimedEvent
 from executive.record.pictures.drawer import Drawer
 from executive.record.pictures.scene import Scene
-from executive.record.progress import Progress, skill_name
+from executive.record.timeline.activation import skill_name
+from executive.record.timeline.timeline import Timeline
 
 KEPT = 24
 """Looks remembered [1.2 MB each at 640 x 480]: a decision may rest on an earlier one than the last."""
 
 MOST = 200
 """Pictures of a run, so that one that goes on for hours does not fill the disk."""
+
+_OPEN_STATES = ("held", "dropped", "rejected", "skipped", "lost")
 
 
 class Frames:
@@ -32,10 +35,9 @@ class Frames:
 
     def __init__(self, folder: Path) -> None:
         self._drawer = Drawer(folder)
-        self._progress = Progress()
+        self._timeline = Timeline(history=False)
         self._taken: Frame | None = None
         self._looks: dict[int, tuple[Frame, FrameSearched]] = {}
-        self._choices: dict[str, TargetSelected] = {}
         self._rests_on: int | None = None
         self._unshown: int | None = None
         self._drawn = 0
@@ -50,13 +52,12 @@ class Frames:
         elif isinstance(event, FrameSearched):
             self._remember(event)
         elif isinstance(event, TargetSelected):
-            self._choices[event.item] = event
             self._rests_on = event.frame
             self._show(timed, event.frame, event, None)
         elif isinstance(event, NodeEnded) and event.skill and event.status == "FAILURE":
             self._show_failure(timed, event)
-        # Last: a skill that fails now is still what the robot was doing.
-        self._progress(timed)
+        # At last: a skill that fails now belongs to the phase that the picture names.
+        self._timeline(timed)
 
     def close(self, *, wait: bool = True) -> None:
         """Finish the waiting pictures, without `wait` only the one under way."""
@@ -78,7 +79,7 @@ class Frames:
             del self._looks[next(number for number in self._looks if number != self._rests_on)]
 
     def _show_failure(self, timed: TimedEvent, failure: NodeEnded) -> None:
-        choice = self._choices.get(failure.item)
+        choice = self._timeline.targets.get(failure.item)
         if choice is not None:
             self._show(timed, choice.frame, choice, failure)
         elif self._unshown is not None:
@@ -108,27 +109,41 @@ class Frames:
         failure: NodeEnded | None,
     ) -> Scene:
         frame, searched = look
+        timeline = self._timeline
         item = choice.item if choice else ""
-        known = self._progress.item(item)
+        known = timeline.items.by_name.get(item)
         return Scene(
             image=frame.image,
             visible=frame.visible,
             seen=[_detection(one) for one in searched.found],
-            chosen=_chosen(choice, searched.found, known.position if known else None),
-            mission=self._progress.mission,
+            chosen=_chosen(choice, searched.found, known.now.position if known else None),
+            mission=timeline.started.mission if timeline.started else "",
             clock=timed.clock,
             camera=frame.camera,
             detector=searched.detector,
             age=timed.clock - frame.stamp,
-            phase=self._progress.phase,
+            phase=" + ".join(skill_name(one.node) for one in timeline.running() if one.skill),
             item=item,
             bin=choice.bin if choice else "",
-            attempts=known.attempts if known else 0,
+            attempts=known.now.attempts if known else 0,
             failure=f"{skill_name(failure.node)}.{failure.reason}" if failure else "",
             message=failure.message if failure else "",
-            fates=self._progress.fates(),
-            classes=self._progress.classes,
+            fates=_fates(timeline),
+            classes=tuple(timeline.items.classes),
         )
+
+
+def _fates(timeline: Timeline) -> dict[str, list[str]]:
+    """Return the items by bin, then those in no bin by state, in the order of their last changes of state."""
+    bins: dict[str, list[str]] = defaultdict(list)
+    others: dict[str, list[str]] = defaultdict(list)
+    for item in sorted(timeline.items.by_name.values(), key=lambda item: item.changed):
+        state = item.now.state
+        if state == "placed":
+            bins[item.now.bin].append(item.now.item)
+        elif state in _OPEN_STATES:
+            others["in the tool" if state == "held" else state].append(item.now.item)
+    return bins | others
 
 
 def picture_of(folder: Path, item: str, reason: str) -> Path | None:

@@ -6,20 +6,21 @@ import contextlib
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from executive.errors import ExecutiveError
-from executive.events import MotionPlanned, Observer, RequestGiven, RunEnded, TimedEvent
+from executive.events import Observer, RunEnded, TimedEvent
 from executive.mission.outline import outline
 from executive.mission.text.files import read_source
-from executive.record.diagnosis.diagnosis import Story
+from executive.record.diagnosis.diagnose import diagnose
 from executive.record.recorded_mission import tree_text
 from executive.record.recorder import Recorder
-from executive.record.result import ENDED, result_of, write_result
+from executive.record.result import ENDED, ItemCounts, Result, audit_of, requests_of, write_result
 from executive.record.run_directory import RunDirectory
+from executive.record.timeline.timeline import Timeline
 
 if TYPE_CHECKING:
     from executive.mission.load import LoadedMission
@@ -65,8 +66,8 @@ def record_run(
     options: RunOptions,
     runs: Path,
     record: RecordOptions = RecordOptions(),
-) -> dict[str, Any]:
-    """Run a mission once, leave its run directory below `runs`, and return the result object.
+) -> Result:
+    """Run a mission once, leave its run directory below `runs`, and return the result.
 
     Args:
         loaded: The mission and its cell.
@@ -90,7 +91,7 @@ def record_run(
         recorder = Recorder(directory, frames=record.frames)
         recording = Recording(run, loaded, skills, directory, recorder, record.views)
         result = recording.execute(options.seed, began)
-    if not record.frames and result["status"] in ENDED:
+    if not record.frames and result.status in ENDED:
         # The log of the world is needed to resume a run and to make a film with its images: neither applies.
         directory.world.unlink(missing_ok=True)
     return result
@@ -141,10 +142,9 @@ class Recording:
     past: Iterable[TimedEvent] = ()
 
     def __post_init__(self) -> None:
-        self._noted: list[TimedEvent] = []
-        self._story = Story(self.loaded, self.skills)
+        self._timeline = Timeline(history=False)
 
-    def execute(self, seed: int, began: float) -> dict[str, Any]:
+    def execute(self, seed: int, began: float) -> Result:
         """Execute the run, write its result into the run directory, and return it.
 
         `began` is the time at which the work on the run began, by `time.perf_counter` [s].
@@ -152,35 +152,56 @@ class Recording:
         Raises:
             ExecutiveError: The result cannot be written.
         """
-        outcome, items, audit = self._execute_observed()
-        run, path = self.run, self.directory.path
-        result = result_of(
-            mission=self.loaded.mission.name, seed=seed, outcome=outcome, items=items, audit=audit,
-            noted=self._noted, story=self._story.tell(outcome, path, lambda: run.workcell.cell.arm.at_rest),
-            wall_time=time.perf_counter() - began, trace=self.recorder.trace, run=path,
-        )  # fmt: skip
+        outcome, audit = self._execute_observed()
+        result = self._result(seed, outcome, audit, time.perf_counter() - began)
         problems = [self.recorder.problem]
         try:
             write_result(self.directory.result, result)
         except ExecutiveError as error:
             problems.append(str(error))
-            if result["status"] != "FAULT":
+            if result.status != "FAULT":
                 # Then only `--json` prints the result.
-                result |= {"status": "FAULT", "reason": "fault", "message": str(error), "node": ""}
+                result = replace(result, status="FAULT", reason="fault", message=str(error), node="")
         if any(problems):
             for view in self.views:
                 view.note("; ".join(filter(None, problems)))
         return result
 
-    def _note(self, timed: TimedEvent) -> None:
-        """Keep plans and requests for the result."""
-        if isinstance(timed.event, MotionPlanned | RequestGiven):
-            self._noted.append(timed)
+    def _result(
+        self, seed: int, outcome: RunEnded, audit: Mapping[str, int] | None, wall_time: float
+    ) -> Result:
+        workcell, path, timeline = self.run.workcell, self.directory.path, self._timeline
+        accounts = workcell.accounts
+        balance = accounts.balance()
+        return Result(
+            mission=self.loaded.mission.name,
+            status=outcome.status,
+            reason=outcome.reason,
+            message=outcome.message,
+            node=outcome.node,
+            holds=outcome.holds,
+            seed=seed,
+            items=ItemCounts(**balance),
+            unknown=accounts.unknown,
+            doubts=accounts.doubts,
+            empty=outcome.empty,
+            audit=None if audit is None else audit_of(balance, audit, outcome.empty),
+            planning=timeline.planning,
+            requests=requests_of(timeline),
+            ticks=outcome.ticks,
+            robot_time_s=outcome.robot_time,
+            wall_time_s=round(wall_time, 3),
+            trace=self.recorder.trace,
+            run=str(path),
+            story=diagnose(
+                timeline, outcome, self.loaded, self.skills, path, lambda: workcell.cell.arm.at_rest
+            ),
+        )
 
-    def _execute_observed(self) -> tuple[RunEnded, dict[str, Any], Mapping[str, int] | None]:
+    def _execute_observed(self) -> tuple[RunEnded, Mapping[str, int] | None]:
         """Execute the run with all observers attached, and close them afterwards."""
         run, completed = self.run, False
-        watchers: list[Observer] = [self._note, self._story, *self.views]
+        watchers: list[Observer] = [self._timeline, *self.views]
         try:
             for view in self.views:
                 view.open(run)
@@ -190,7 +211,7 @@ class Recording:
                 for watcher in watchers:
                     watcher(event)
             run.record(self.recorder)
-            ended = run.execute(), run.items(), run.audit()
+            ended = run.execute(), run.audit()
             completed = True
         finally:
             with contextlib.ExitStack() as closing:

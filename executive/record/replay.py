@@ -20,8 +20,8 @@ from executive.events import (
     ToolCommanded,
 )
 from executive.mission.load import LoadedMission
-from executive.record.progress import skill_name
 from executive.record.recorded_mission import recorded_mission
+from executive.record.timeline.activation import skill_name
 from executive.replay.input_log import InputLog
 from executive.run.assembly import assemble_replay
 from executive.run.resume import ResumedRun

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+
+from pydantic import TypeAdapter
 
 from executive.cell.plain import plain
 from executive.cell.workcell import PLACES
 from executive.errors import ExecutiveError, explained
-from executive.events import MotionPlanned, RequestGiven, RunEnded, RunResumed, TimedEvent
+from executive.events import RunResumed, TimedEvent
+from executive.record.diagnosis.diagnosis import Diagnosis
 from executive.record.journal import ending_of
 from executive.record.run_directory import RunDirectory
+from executive.record.timeline.timeline import Planning, Timeline
 from executive.record.whole_file import write_whole
 
 QUIT = "quit"
@@ -20,9 +24,6 @@ QUIT = "quit"
 
 VERSION = 2
 """Version of the schema of `result.json`; the first had no `version`, no skipped items and no `agrees`."""
-
-ITEM_COUNTS = ("seen", "placed", "rejected", "skipped", "lost", "phantom")
-"""Keys of the counts of the ledger."""
 
 MISTAKES = {
     "wrong_bin": "in a wrong bin",
@@ -35,54 +36,84 @@ EXIT_CODES = {"SUCCESS": 0, "FAILURE": 1, "FAULT": 3, "INCOMPLETE": 4, "HALTED":
 """Exit code by the status of the run, unless the audit disagrees (`exit_code`)."""
 
 ENDED = ("SUCCESS", "FAILURE")
-"""Status of a run that cannot be resumed: its tree has come to its end, and nothing was rejected."""
+"""Status of a run that cannot be resumed: its tree has ended, and nothing was rejected."""
 
 
-def result_of(
-    *,
-    mission: str,
-    seed: int,
-    outcome: RunEnded,
-    items: Mapping[str, Any],
-    audit: Mapping[str, int] | None,
-    noted: Sequence[TimedEvent],
-    story: Mapping[str, Any] | None,
-    wall_time: float,
-    trace: str,
-    run: Path,
-) -> dict[str, Any]:
-    """Return the result as a plain mapping; `wall_time` in seconds, `run` the run directory.
+@dataclass(frozen=True)
+class ItemCounts:
+    """Counts of the items by final state; `seen` is the sum of the next four."""
 
-    `audit` is None in a cell that has no ground truth; `noted` are the plans and requests, and
-    `story` is as `Story.tell` returns it.
+    seen: int = 0
+    placed: int = 0
+    rejected: int = 0
+    skipped: int = 0
+    lost: int = 0
+    phantom: int = 0
+
+
+@dataclass(frozen=True)
+class Audit:
+    """Counts of the objects by true place, as in `executive.cell.workcell.PLACES`.
+
+    Attributes:
+        agrees: Result of `agrees`.
     """
-    return {
-        "version": VERSION,
-        "mission": mission,
-        "status": outcome.status,
-        "reason": outcome.reason,
-        # It may quote a file name that is not UTF-8.
-        "message": plain(outcome.message),
-        "node": outcome.node,
-        "holds": outcome.holds,
-        "seed": seed,
-        "items": {fate: int(items.get(fate, 0)) for fate in ITEM_COUNTS},
-        "unknown": dict(items.get("unknown", {})),
-        "doubts": list(items.get("doubts", ())),
-        "empty": outcome.empty,
-        "audit": None if audit is None else audit_section(items, audit, outcome.empty),
-        "planning": planning_of(noted),
-        "requests": requests_of(noted),
-        "ticks": outcome.ticks,
-        "robot_time_s": plain(outcome.robot_time),
-        "wall_time_s": round(wall_time, 3),
-        "trace": trace,
-        "run": plain(run),
-        "story": plain(story),
-    }
+
+    agrees: bool = True
+    right: int = 0
+    wrong_bin: int = 0
+    left: int = 0
+    elsewhere: int = 0
+    fell_in_wrong_bin: int = 0
+    unseen: int = 0
 
 
-def write_result(path: Path, result: Mapping[str, Any]) -> None:
+@dataclass(frozen=True, kw_only=True)
+class Result:
+    """Result of a run; the fields are the keys of `result.json`.
+
+    Attributes:
+        version: Version of the schema.
+        mission: Name of the mission.
+        status, reason, message, node, empty, holds, ticks: As in `RunEnded`.
+        seed: Seed of everything random.
+        items: Counts of the ledger.
+        unknown: Largest number of boxes in a look for each label that the cell file does not declare.
+        doubts: Reasons why error rates of detectors were assumed.
+        audit: Counts of the audit; None in a cell without ground truth.
+        planning: Planned motions.
+        requests: Requests of the operator, by `requests_of`.
+        robot_time_s: Time on the clock of the run [s].
+        wall_time_s: Wall time of the run [s].
+        trace: Hash of all decisions.
+        run: The run directory, or "".
+        story: Diagnosis of a run that did not succeed, or None.
+    """
+
+    version: int = VERSION
+    mission: str
+    status: str
+    reason: str
+    message: str
+    node: str
+    holds: str = ""
+    seed: int
+    items: ItemCounts = ItemCounts()
+    unknown: Mapping[str, int] = field(default_factory=dict)
+    doubts: Sequence[str] = ()
+    empty: bool = False
+    audit: Audit | None = None
+    planning: Planning = field(default_factory=Planning)
+    requests: Sequence[str] = ()
+    ticks: int = 0
+    robot_time_s: float = 0.0
+    wall_time_s: float = 0.0
+    trace: str = ""
+    run: str = ""
+    story: Diagnosis | None = None
+
+
+def write_result(path: Path, result: Result) -> None:
     """Write `result` to `path`, whole or not at all.
 
     Raises:
@@ -90,52 +121,41 @@ def write_result(path: Path, result: Mapping[str, Any]) -> None:
     """
     elsewhere = "the journal beside it tells how the run ended, and so does what --json prints"
     with explained(ExecutiveError, f'cannot write the result "{path}"', elsewhere):
-        write_whole(path, json.dumps(result, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+        write_whole(path, json.dumps(plain(result), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 
-def read_result(directory: RunDirectory, events: Sequence[TimedEvent]) -> Mapping[str, Any]:
-    """Return the result that belongs to a journal, else the journal's end; empty if the run was cut off."""
-    ending = ending_of(events)
+def read_result(directory: RunDirectory, events: Sequence[TimedEvent]) -> Result | None:
+    """Return the result that belongs to a journal, or None if there is none.
+
+    A resumed run may have the result of an earlier end.
+    """
     try:
-        result = json.loads(directory.result.read_text(encoding="utf-8"))
+        result = TypeAdapter(Result).validate_json(directory.result.read_bytes())
     except (OSError, ValueError):
-        result = None
-    told = result if isinstance(result, dict) else {}
+        return None
+    ending = ending_of(events)
     if ending is not None:
-        # Of a run that was taken up again it may be that of an end before the last.
-        same = (told.get("status"), told.get("ticks")) == (ending.status, ending.ticks)
-        return told if same else vars(ending)
-    # Where the disk did not take the end, the result alone knows of it.
-    once = not any(isinstance(timed.event, RunResumed) for timed in events)
-    return told if once and told.get("status") in EXIT_CODES else {}
+        return result if (result.status, result.ticks) == (ending.status, ending.ticks) else None
+    # If the disk did not take the end, only the result contains it.
+    is_resumed = any(isinstance(timed.event, RunResumed) for timed in events)
+    return result if result.status in EXIT_CODES and not is_resumed else None
 
 
-def requests_of(events: Iterable[TimedEvent]) -> list[str]:
+def requests_of(timeline: Timeline) -> list[str]:
     """Return the requests that make the operator's answers the same again.
 
     An operator who is asked after the end of the list wants nothing more: that need not be listed, unless the
     list would be empty without it.
     """
-    words = [one.event.wanted or QUIT for one in events if isinstance(one.event, RequestGiven)]
+    words = [wanted or QUIT for wanted in timeline.requests]
     while len(words) > 1 and words[-1] == QUIT:
         words.pop()
     return words
 
 
-def planning_of(events: Iterable[TimedEvent]) -> dict[str, float]:
-    """Return the number of plans asked for, of those made ahead, and the time waited for plans [s].
-
-    A motion planned again counts once more, and one for which no way was found counts, too.
-    """
-    plans = [one.event for one in events if isinstance(one.event, MotionPlanned)]
-    waited = sum(plan.waits for plan in plans)
-    ahead = sum(plan.ahead for plan in plans)
-    return {"motions": len(plans), "ahead": ahead, "waited_s": round(waited, 4)}
-
-
-def audit_section(items: Mapping[str, int], audit: Mapping[str, int], empty: bool) -> dict[str, int | bool]:
-    """Return the counts of the audit, and the result of `agrees` under the key `agrees`."""
-    return {"agrees": agrees(items, audit, empty), **{place: int(audit[place]) for place in PLACES}}
+def audit_of(items: Mapping[str, int], audit: Mapping[str, int], empty: bool) -> Audit:
+    """Return the counts of an audit with the result of `agrees`."""
+    return Audit(agrees(items, audit, empty), **{place: int(audit[place]) for place in PLACES})
 
 
 def agrees(items: Mapping[str, int], audit: Mapping[str, int], empty: bool) -> bool:
@@ -156,25 +176,22 @@ def agrees(items: Mapping[str, int], audit: Mapping[str, int], empty: bool) -> b
     )
 
 
-def disagreement(result: Mapping[str, Any]) -> str:
+def disagreement(result: Result) -> str:
     """Return one sentence with the counts of audit and ledger if the audit disagrees, else ""."""
-    audit = result.get("audit")
-    # Results of version 1 do not contain the answer.
-    if audit is None or audit.get("agrees", True):
+    audit, items = result.audit, result.items
+    if audit is None or audit.agrees:
         return ""
-    mistakes = ", ".join(f"{audit[place]} {words}" for place, words in MISTAKES.items() if audit[place])
-    books = result["items"]
+    counts = {words: getattr(audit, place) for place, words in MISTAKES.items()}
+    mistakes = ", ".join(f"{count} {words}" for words, count in counts.items() if count)
     comparison = (
-        f"the audit found {audit['right']} in their bins, {audit['left']} on the table and "
-        f"{audit['elsewhere']} elsewhere; the executive reports {books['placed']} placed, "
-        f"{books['rejected']} rejected, {books['skipped']} skipped and {books['lost']} lost"
+        f"the audit found {audit.right} in their bins, {audit.left} on the table and "
+        f"{audit.elsewhere} elsewhere; the executive reports {items.placed} placed, "
+        f"{items.rejected} rejected, {items.skipped} skipped and {items.lost} lost"
     )
-    return (
-        f"THE AUDIT DISAGREES: {mistakes}; {comparison}" if mistakes else f"THE AUDIT DISAGREES: {comparison}"
-    )
+    return "THE AUDIT DISAGREES: " + "; ".join(filter(None, (mistakes, comparison)))
 
 
-def exit_code(result: Mapping[str, Any]) -> int:
+def exit_code(result: Result) -> int:
     """Return the exit code of a run: 1 instead of 0 or 4 if the audit disagrees."""
-    code = EXIT_CODES[result["status"]]
+    code = EXIT_CODES[result.status]
     return 1 if code in (0, 4) and disagreement(result) else code

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from executive.errors import InputError
 from executive.events import MotionPlanned, RequestGiven, RunStarted
@@ -16,7 +16,7 @@ from executive.record.recorded_mission import recorded_mission
 from executive.record.recorded_run import Recording, RecordOptions
 from executive.record.recorder import Recorder
 from executive.record.replay import compare
-from executive.record.result import ENDED
+from executive.record.result import ENDED, Result
 from executive.record.run_directory import RunDirectory
 from executive.replay.input_log import InputLog
 
@@ -33,7 +33,7 @@ def resume_run(
     skills: Mapping[str, type[Skill]],
     options: RunOptions,
     record: RecordOptions,
-) -> dict[str, Any]:
+) -> Result:
     """Resume the run in a directory, and return the result object.
 
     First, the journal is replayed up to the interruption, which restores the tree, the variables and the

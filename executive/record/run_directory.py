@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping
 from datetime import datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import yaml
 
@@ -71,8 +70,8 @@ class RunDirectory:
         self,
         *,
         mission: str,
-        params: Mapping[str, Any],
-        cell: Mapping[str, Any],
+        params: Mapping[str, object],
+        cell: Mapping[str, object],
         tree: str = "",
         libraries: Mapping[str, str] | None = None,
         scene: str = "",

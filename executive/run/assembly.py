@@ -81,7 +81,7 @@ def assemble(
         options.requests,
         str(loaded.cell_path.parent.resolve()),
         workcell.cell.clock.step,
-        versions(),
+        dict(versions()),
     )
     root = parts.build_tree()
     name = loaded.mission.name

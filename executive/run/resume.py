@@ -97,7 +97,7 @@ class ResumedRun(Run):
         if replayed.is_live:
             self._wall_start = time.monotonic() - context.now
             ticked, intent = interruption.complete, interruption.last_action
-            context.emit(RunResumed(ticked, intent, versions()))
+            context.emit(RunResumed(ticked, intent, dict(versions())))
         restart_skills(self.root)
         require_rest(context.come_to_rest)
         if interruption.reopens:

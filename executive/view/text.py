@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import textwrap
 import unicodedata
-from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -55,7 +54,7 @@ def writable(text: str) -> str:
     return _NOT_XML.sub("�", text)
 
 
-def render(template: str, **values: Any) -> str:
+def render(template: str, **values: object) -> str:
     """Return a template of this package, filled in; texts are escaped, and replaced where XML lacks them."""
     environment = Environment(
         loader=PackageLoader("executive.view", "."),

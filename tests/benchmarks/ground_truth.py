@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -276,7 +276,7 @@ def _run_in_this_process(
     maker = AuditedCellMaker(detectors)
     options = RunOptions(seed, kind=maker, scene=scene)
     result = record_run(loaded, skills, options, runs, RecordOptions(frames=False))
-    reports = read_reports(Path(result["run"]) / "journal.jsonl")
+    reports = read_reports(Path(result.run) / "journal.jsonl")
     objects = tuple(
         replace(one, reports=tuple(reports[item] for item in one.items if item in reports))
         for one in maker.made.objects
@@ -284,17 +284,17 @@ def _run_in_this_process(
     return AuditedRun(
         mission=mission,
         seed=seed,
-        status=result["status"],
+        status=result.status,
         exit_code=exit_code(result),
-        message=result["message"],
-        items=result["items"],
-        audit=result["audit"],
+        message=result.message,
+        items=asdict(result.items),
+        audit=asdict(result.audit),
         objects=objects,
-        robot_time_s=result["robot_time_s"],
-        wall_time_s=result["wall_time_s"],
+        robot_time_s=result.robot_time_s,
+        wall_time_s=result.wall_time_s,
         # A forked process begins at zero.
         cpu_time_s=round(time.process_time(), 3),
-        run=result["run"],
+        run=result.run,
     )
 
 

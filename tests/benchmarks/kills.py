@@ -11,9 +11,8 @@ import os
 import shutil
 import signal
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import click
 import numpy as np
@@ -30,7 +29,7 @@ from executive.record.journal import ending_of, read_journal
 from executive.record.recorded_mission import recorded_mission
 from executive.record.recorded_run import RecordOptions
 from executive.record.replay import compare
-from executive.record.result import disagreement
+from executive.record.result import Result, disagreement
 from executive.record.resumed_run import resume_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
@@ -128,7 +127,7 @@ def resume_killed_run(subject: Subject, seed: int, runs: Path, change: str) -> F
         difference = compare(subject.loaded, subject.skills, after, seed).difference
         if difference:
             problems.append(f"the replay differs: {difference}")
-        ending = f"{result['status']} {result['reason']}".strip()
+        ending = f"{result.status} {result.reason}".strip()
         return {**kill, "change": done, "status": ending, "problems": problems}
 
     figures, problem = ForkRunner(RESUME_TIMEOUT).call(resume)
@@ -182,16 +181,16 @@ def is_on_table(position: Array, table: TableConfig) -> bool:
     return all(low <= x <= high for x, (low, high) in zip(position, (table.x, table.y), strict=True))
 
 
-def check_result(result: Mapping[str, Any], *, change_made: str) -> list[str]:
+def check_result(result: Result, *, change_made: str) -> list[str]:
     """Return what is wrong with the end of a resumed run; only a removed or dropped object may be lost."""
     problems = []
     if disagreement(result):
-        problems.append(f"the ledger says {result['items']}; the audit {result['audit']}")
+        problems.append(f"the ledger says {result.items}; the audit {result.audit}")
     may_lose = change_made.startswith(("removed", "dropped"))
-    if result["status"] != "SUCCESS" and not (may_lose and result["reason"] == "lost"):
-        problems.append(f"it ended with {result['status']} {result['reason']}: {result['message']}")
-    if result["holds"]:
-        problems.append(f"the tool holds {result['holds']} at the end")
+    if result.status != "SUCCESS" and not (may_lose and result.reason == "lost"):
+        problems.append(f"it ended with {result.status} {result.reason}: {result.message}")
+    if result.holds:
+        problems.append(f"the tool holds {result.holds} at the end")
     return problems
 
 

@@ -20,6 +20,7 @@ from rich.progress import track
 from rich.table import Table
 
 from executive.campaign.subject import Subject, load_subject
+from executive.cell.plain import plain
 from executive.cli.cells import load_cells
 from executive.cli.options import MISSION, json_option, oracle_option, overrides_option, seed_option
 from executive.cli.streams import print_json, stdout_kept_clean
@@ -89,13 +90,13 @@ def record_subject(subject: Subject, seed: int, runs: Path) -> tuple[Figures, st
     """Run a mission to its end, recorded below `runs`; return its result and, if it failed, a sentence."""
     options = RunOptions(seed, subject.requests, kind=subject.kind)
     result = record_run(subject.loaded, subject.skills, options, runs, RecordOptions(frames=False))
-    if result["status"] == "HALTED":
+    if result.status == "HALTED":
         raise KeyboardInterrupt
-    if result["status"] == "SUCCESS" and not disagreement(result):
-        return result, ""
-    return result, (
-        f"seed {seed} ended with {result['status']} {result['reason']}; the ledger says {result['items']}, "
-        f"the audit {result['audit']}"
+    if result.status == "SUCCESS" and not disagreement(result):
+        return plain(result), ""
+    return plain(result), (
+        f"seed {seed} ended with {result.status} {result.reason}; the ledger says {result.items}, "
+        f"the audit {result.audit}"
     )
 
 

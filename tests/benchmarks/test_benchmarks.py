@@ -7,6 +7,7 @@ import math
 import os
 import signal
 import sys
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ from executive.motion.limits import JointLimits
 from executive.motion.point_to_point import Connector
 from executive.motion.state import State
 from executive.motion.trajectory import Trajectory
+from executive.record.result import Result
 from tests.benchmarks import halts, journal, kills, report, soak, suction_map, tick
 from tests.benchmarks.forks import ForkRunner
 
@@ -167,17 +169,10 @@ class TestKills:
         ]
 
     def test_only_an_object_that_was_taken_away_may_be_lost(self) -> None:
-        result = {
-            "status": "FAILURE",
-            "reason": "lost",
-            "message": "",
-            "items": {},
-            "audit": None,
-            "holds": "",
-        }
+        result = Result(mission="sort", seed=3, status="FAILURE", reason="lost", message="", node="")
         assert kills.check_result(result, change_made="removed cube") == []
         assert len(kills.check_result(result, change_made="moved cube")) == 1
-        assert len(kills.check_result({**result, "holds": "cube-1"}, change_made="dropped cube")) == 1
+        assert len(kills.check_result(replace(result, holds="cube-1"), change_made="dropped cube")) == 1
 
 
 class TestSoak:

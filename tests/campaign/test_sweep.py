@@ -13,18 +13,18 @@ import pytest
 
 from executive.campaign.sweep import Job, run_job, spread, summarize, sweep, wilson
 from executive.errors import InputError
+from executive.record.result import Audit, ItemCounts, Result
+from executive.record.timeline.timeline import Planning
 
 
-def result(seed: int, status: str = "SUCCESS", right: int = 4, left: int = 0, **more) -> dict:
-    reason = "" if status == "SUCCESS" else "Grasp.missed"
-    items = {"seen": right + left, "placed": right, "rejected": left, "lost": 0, "phantom": 0}
-    audit = {"agrees": True, "right": right, "wrong_bin": 0, "left": left, "elsewhere": 0, "unseen": 0}
-    planning = {"motions": 10, "ahead": 8, "waited_s": 0.1}
-    return {
-        "seed": seed, "status": status, "reason": reason, "message": "", "node": "", "items": items,
-        "audit": audit, "planning": planning, "robot_time_s": 30.0 + seed, "wall_time_s": 6.0,
-        "run": f"runs/{seed}", **more,
+def result(seed: int, status: str = "SUCCESS", right: int = 4, left: int = 0, **more) -> Result:
+    fields = {
+        "mission": "sort", "status": status, "reason": "" if status == "SUCCESS" else "Grasp.missed",
+        "message": "", "node": "", "items": ItemCounts(seen=right + left, placed=right, rejected=left),
+        "audit": Audit(right=right, left=left), "planning": Planning(10, 8, 0.1), "robot_time_s": 30.0 + seed,
+        "wall_time_s": 6.0, "run": f"runs/{seed}",
     }  # fmt: skip
+    return Result(seed=seed, **fields | more)
 
 
 def swept(seeds: range, work, **options) -> list:
@@ -33,28 +33,28 @@ def swept(seeds: range, work, **options) -> list:
     return sweep(jobs, work=work, **options)
 
 
-def work(job: Job) -> dict:
+def work(job: Job) -> Result:
     """Do a run in another process, in a way that the seed says."""
     if job.seed == 3:
         raise ValueError("seed three")
     if job.seed == 4:
         raise InputError("there is no place for seed four")
-    return result(job.seed, process=os.getpid(), overrides=dict(job.overrides))
+    return result(job.seed, ticks=os.getpid(), unknown=dict(job.overrides))
 
 
 def test_every_seed_is_run_once_in_another_process():
     told = []
     results = swept(range(1, 5), work, progress=lambda done, total: told.append((done, total)))
-    assert [entry["seed"] for entry in results] == [1, 2, 3, 4]
-    assert results[0]["process"] != os.getpid()
-    assert results[0]["overrides"] == {"a": "1"}
-    assert (results[2]["status"], results[2]["message"]) == ("FAULT", "ValueError: seed three")
-    assert (results[3]["status"], results[3]["message"]) == ("FAULT", "there is no place for seed four")
-    assert results[2]["planning"] == {"motions": 0, "ahead": 0, "waited_s": 0.0}
+    assert [entry.seed for entry in results] == [1, 2, 3, 4]
+    assert results[0].ticks != os.getpid()
+    assert results[0].unknown == {"a": "1"}
+    assert (results[2].status, results[2].message) == ("FAULT", "ValueError: seed three")
+    assert (results[3].status, results[3].message) == ("FAULT", "there is no place for seed four")
+    assert results[2].planning == Planning()
     assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 
-def interrupt(job: Job) -> dict:
+def interrupt(job: Job) -> Result:
     """Do a run during which somebody presses Ctrl-C."""
     os.kill(os.getppid(), signal.SIGINT)
     time.sleep(0.2)
@@ -73,19 +73,19 @@ def sigint():
 def test_every_run_leaves_its_record_and_its_report(tmp_path):
     few = {"cell.kind": "fake", "cell.table.objects": "[1, 1]"}
     result = run_job(Job("sort_fruit", 3, few, tmp_path, frames=False))
-    assert result["status"] == "SUCCESS"
-    assert (Path(result["run"]) / "report.html").is_file()
+    assert result.status == "SUCCESS"
+    assert (Path(result.run) / "report.html").is_file()
 
 
 @pytest.mark.usefixtures("sigint")
 def test_after_ctrl_c_no_further_run_begins_and_the_results_so_far_are_kept():
     told = []
     results = swept(range(9), interrupt, workers=1, halting=lambda: told.append("halting"))
-    assert ([entry["seed"] for entry in results], told) == ([0], ["halting"])
+    assert ([entry.seed for entry in results], told) == ([0], ["halting"])
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def die(job: Job) -> dict:
+def die(job: Job) -> Result:
     """Take the process down with the run, if the seed says so."""
     if job.seed == 0:
         os._exit(1)
@@ -95,10 +95,10 @@ def die(job: Job) -> dict:
 @pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_run_that_takes_its_process_down_costs_only_what_runs_beside_it(workers):
     results = swept(range(4), die, workers=workers)
-    assert [entry["seed"] for entry in results] == [0, 1, 2, 3]
-    lost = [entry for entry in results if entry["status"] != "SUCCESS"]
-    assert lost[0]["seed"] == 0 and len(lost) <= workers
-    assert all("BrokenProcessPool" in entry["message"] for entry in lost)
+    assert [entry.seed for entry in results] == [0, 1, 2, 3]
+    lost = [entry for entry in results if entry.status != "SUCCESS"]
+    assert lost[0].seed == 0 and len(lost) <= workers
+    assert all("BrokenProcessPool" in entry.message for entry in lost)
 
 
 class Torn:
@@ -115,12 +115,11 @@ def test_a_pool_found_broken_is_replaced_and_no_run_is_lost(monkeypatch):
     pools = iter([Torn(), ThreadPoolExecutor(1)])
     monkeypatch.setattr("executive.campaign.pool.Workers", lambda count: next(pools))
     results = swept(range(2), lambda job: result(job.seed), workers=1)
-    assert [entry["status"] for entry in results] == ["SUCCESS", "SUCCESS"]
+    assert [entry.status for entry in results] == ["SUCCESS", "SUCCESS"]
 
 
 def test_the_summary_counts_objects_and_lists_what_went_wrong():
-    wrong = result(2, right=3)
-    wrong["audit"] = {"agrees": False, "right": 2, "wrong_bin": 1, "left": 0, "elsewhere": 0, "unseen": 0}
+    wrong = result(2, right=3, audit=Audit(agrees=False, right=2, wrong_bin=1))
     figures = summarize([result(0), result(1, "FAILURE", right=3, left=1), wrong], asked=3)
     assert (figures["asked"], figures["cut_off"]) == (3, False)
     assert (figures["runs"], figures["succeeded"]) == (3, 2)

@@ -8,42 +8,34 @@ import shutil
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner
 
+from executive.cell.plain import plain
 from executive.cli.main import COMMANDS, main
 from executive.errors import Fault, InputError
 from executive.mission.findings import Finding, MissionError
 from executive.mission.flow.endings import Ending
+from executive.record.result import Audit, ItemCounts, Result
+from executive.record.timeline.timeline import Planning
 from executive.run.assembly import RunOptions
 
-RESULT = {
-    "mission": "sort",
-    "status": "SUCCESS",
-    "reason": "",
-    "message": "",
-    "node": "",
-    "seed": 7,
-    "items": {"seen": 1, "placed": 1, "rejected": 0, "lost": 0, "phantom": 0},
-    "audit": {"agrees": True, "right": 1, "wrong_bin": 0, "left": 0, "elsewhere": 0, "unseen": 0},
-    "planning": {"motions": 3, "ahead": 2, "waited_s": 0.05},
-    "requests": [],
-    "story": None,
-    "robot_time_s": 30.0,
-    "wall_time_s": 6.0,
-    "trace": "0123456789abcdef",
-    "run": "runs/x",
-}
+RESULT = Result(
+    mission="sort", status="SUCCESS", reason="", message="", node="", seed=7,
+    items=ItemCounts(seen=1, placed=1), audit=Audit(right=1), planning=Planning(3, 2, 0.05),
+    robot_time_s=30.0, wall_time_s=6.0, trace="0123456789abcdef", run="runs/x",
+)  # fmt: skip
 
 
 @pytest.fixture
 def project(monkeypatch):
     """Stands for everything below the commands; tests say what it answers and read what it was asked."""
     asked = SimpleNamespace(
-        load=[], run=[], load_error=None, warnings=(), endings=(), run_error=None, result=dict(RESULT)
+        load=[], run=[], load_error=None, warnings=(), endings=(), run_error=None, result=RESULT
     )
 
     def load_mission(mission, skills, overrides=None, robot_check=None):
@@ -63,7 +55,7 @@ def project(monkeypatch):
     monkeypatch.setattr("executive.mission.load.load_mission", load_mission)
     monkeypatch.setattr("executive.record.recorded_run.record_run", record_run)
     monkeypatch.setattr("executive.plugins.discover", dict)
-    monkeypatch.setattr("executive.view.report.page.leave_report", lambda result: ("runs/x/report.html", ""))
+    monkeypatch.setattr("executive.view.report.page.leave_report", lambda run: ("runs/x/report.html", ""))
     return asked
 
 
@@ -118,12 +110,11 @@ def test_quiet_tells_the_story_of_a_run_that_does_not_succeed(missions, tmp_path
 
 def test_quiet_shows_a_run_with_rejected_objects_and_one_that_the_audit_contradicts(project):
     message = "1 object(s) were not sorted: cube-1 (could not be picked)"
-    project.result |= {"status": "INCOMPLETE", "reason": "rejected", "message": message}
+    project.result = replace(RESULT, status="INCOMPLETE", reason="rejected", message=message)
     shown = invoke("run", "sort", "--quiet")
     assert (shown.exit_code, shown.stderr.splitlines()[-1]) == (4, f"INCOMPLETE rejected: {message}")
-    wrong = {**RESULT["audit"], "agrees": False, "right": 0, "wrong_bin": 1, "fell_in_wrong_bin": 0}
-    items = {**RESULT["items"], "skipped": 0}
-    project.result |= {"status": "SUCCESS", "reason": "", "message": "", "audit": wrong, "items": items}
+    wrong = Audit(agrees=False, wrong_bin=1)
+    project.result = replace(RESULT, audit=wrong)
     shown = invoke("run", "sort", "--quiet")
     assert shown.exit_code == 1
     assert shown.stderr.splitlines()[-2].startswith("THE AUDIT DISAGREES: 1 in a wrong bin; ")
@@ -240,7 +231,7 @@ def test_a_bug_is_one_sentence_that_says_where_the_details_are(project):
 
 @pytest.mark.parametrize(("status", "code"), [("SUCCESS", 0), ("FAILURE", 1), ("FAULT", 3), ("HALTED", 130)])
 def test_a_run_ends_with_the_exit_code_of_its_outcome(project, status, code):
-    project.result["status"] = status
+    project.result = replace(RESULT, status=status)
     shown = invoke("run", "sort", "--quiet")
     assert (shown.exit_code, shown.output, project.run[0][2].views) == (code, "", [])
 
@@ -252,7 +243,7 @@ def test_a_run_passes_on_everything_it_was_asked_for(project):
     ((options, runs, record),) = project.run
     assert options == RunOptions(7, ("cube", "duck"), realtime=True)
     assert (runs, record.paused, len(record.views)) == (Path("out"), False, 1)
-    assert json.loads(shown.stdout) == RESULT, "nothing else is on standard output"
+    assert json.loads(shown.stdout) == plain(RESULT), "nothing else is on standard output"
     assert "repeat: executive run sort --seed 7" in shown.stderr
     invoke("run", "sort")
     assert project.run[1][0].requests is None, "the operator is asked"
@@ -294,17 +285,17 @@ def test_a_warning_is_told_and_stops_nothing(project):
     ],
 )
 def test_a_sweep_ends_by_its_worst_run(project, monkeypatch, tmp_path, statuses, asked, code, told):
-    results = [{**RESULT, "seed": seed, "status": status} for seed, status in enumerate(statuses)]
+    results = [replace(RESULT, seed=seed, status=status) for seed, status in enumerate(statuses)]
     monkeypatch.setattr("executive.campaign.sweep.sweep", lambda *args, **options: results)
     shown = invoke("sweep", "sort", "--seeds", f"0-{asked - 1}", "--json", "--runs", str(tmp_path))
     assert shown.exit_code == code
     assert told in shown.stderr
     figures = json.loads(shown.stdout)
-    assert (figures["asked"], figures["cut_off"], figures["results"]) == (asked, code == 130, results)
+    assert (figures["asked"], figures["cut_off"], figures["results"]) == (asked, code == 130, plain(results))
 
 
 def test_a_sweep_tells_of_a_run_without_a_directory_and_of_no_place_for_any(project, monkeypatch, tmp_path):
-    broken = {**RESULT, "status": "FAULT", "reason": "fault", "message": "it broke", "run": ""}
+    broken = replace(RESULT, status="FAULT", reason="fault", message="it broke", run="")
     monkeypatch.setattr("executive.campaign.sweep.sweep", lambda *args, **options: [broken, RESULT])
     shown = invoke("sweep", "sort", "--seeds", "7-8", "--runs", str(tmp_path))
     assert "1 runs did not succeed:\n  seed 7: FAULT: it broke\n" in shown.stderr

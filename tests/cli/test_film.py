@@ -31,7 +31,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
     monkeypatch.setattr(
         "executive.view.film.source.Source",
-        lambda directory: SimpleNamespace(directory=directory, entries=[{"clock": 4.0}]),
+        lambda directory: SimpleNamespace(directory=directory, events=[SimpleNamespace(clock=4.0)]),
     )
     monkeypatch.setattr("executive.view.film.film.film", film)
     return path

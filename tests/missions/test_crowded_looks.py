@@ -24,6 +24,7 @@ from executive.perception.detectors.requests import Pending
 from executive.perception.detectors.screening import screen_detectors
 from executive.plugins import cell_kind, discover
 from executive.record.recorded_run import RecordOptions, record_run
+from executive.record.result import Result
 from executive.run.assembly import RunOptions
 
 LABELS = ("cube", "sphere", "duck")
@@ -110,20 +111,20 @@ def _crowded(
 
 def run_crowded(
     runs: Path, kind: Callable[..., Workcell], mission: str = "sort_overhead"
-) -> tuple[dict[str, Any], str]:
+) -> tuple[Result, str]:
     """Run a shipped mission and return its result and its journal."""
     skills = discover()
     loaded = load_mission(mission, skills, kinds=cell_kind)
     options = RunOptions(1, keyboard=False, kind=kind)
     result = record_run(loaded, skills, options, runs, RecordOptions(frames=False))
-    return result, (Path(result["run"]) / "journal.jsonl").read_text()
+    return result, (Path(result.run) / "journal.jsonl").read_text()
 
 
 def assert_ended_as_crowded(result: Mapping[str, Any], journal: str, count: int) -> None:
-    assert (result["status"], result["reason"]) == ("FAILURE", "Detect.crowded")
-    assert result["message"].startswith(f"detector embedded found {count} boxes in the view table")
-    assert "at most 60 are allowed" in result["message"]
-    assert result["wall_time_s"] < MAX_WALL_TIME
+    assert (result.status, result.reason) == ("FAILURE", "Detect.crowded")
+    assert result.message.startswith(f"detector embedded found {count} boxes in the view table")
+    assert "at most 60 are allowed" in result.message
+    assert result.wall_time_s < MAX_WALL_TIME
     entries = [json.loads(line)["kind"] for line in journal.splitlines()]
     assert len(entries) < MAX_JOURNAL_ENTRIES
     assert not {"FrameSearched", "ItemChanged"} & set(entries)

@@ -7,9 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from executive.cells.fake.cell import FakeCell
+from executive.events import RunEnded
 from executive.mission.load import load_mission
 from executive.plugins import discover
-from executive.record.diagnosis.diagnosis import Story
+from executive.record.diagnosis.diagnose import diagnose
+from executive.record.diagnosis.diagnosis import Diagnosis
+from executive.record.timeline.timeline import Timeline
 from executive.run.assembly import RunOptions, assemble
 
 HEAD = """\
@@ -54,9 +57,9 @@ class FailedRun:
             file = Path("trial.yaml")
             file.write_text(HEAD + mission)
         self.loaded = load_mission(file, discover(), overrides or {})
-        self.story = Story(self.loaded, discover())
+        self.timeline = Timeline(history=False)
         options = RunOptions(3, requests, kind=FakeCell)
-        self.run = assemble(self.loaded, discover(), options, [self.story])
+        self.run = assemble(self.loaded, discover(), options, [self.timeline])
         assert isinstance(self.run.workcell, FakeCell)
         self.fake = self.run.workcell
         if objects:
@@ -64,9 +67,13 @@ class FailedRun:
             for label, x, y in objects:
                 self.fake.world.put(label, x, y)
 
-    def tell(self) -> dict[str, Any] | None:
-        """Execute the run and return its story."""
-        return self.story.tell(self.run.execute(), Path(), lambda: self.fake.arm.at_rest)
+    def tell(self, is_at_rest: Callable[[], bool] | None = None) -> Any:
+        """Execute the run and return its diagnosis, or None."""
+        return self.diagnose(self.run.execute(), is_at_rest or (lambda: self.fake.arm.at_rest))
+
+    def diagnose(self, end: RunEnded, is_at_rest: Callable[[], bool]) -> Diagnosis | None:
+        """Return the diagnosis of the run, which has ended."""
+        return diagnose(self.timeline, end, self.loaded, discover(), Path(), is_at_rest)
 
     def at_every_step(self, do: Callable[[], None]) -> None:
         """Have something done after every control step."""

@@ -97,7 +97,7 @@ def test_a_picture_says_what_the_run_is_about(tmp_path, drawn):
         ("cube", (20, 40, 50, 70)),
     ]
     assert (scene.chosen, scene.failure, scene.message) == (1, "", "")
-    assert scene.fates == {"yellow_bin": ("duck-1",)}
+    assert scene.fates == {"yellow_bin": ["duck-1"]}
     assert scene.classes == ("cube", "duck")
 
 

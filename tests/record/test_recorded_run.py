@@ -7,6 +7,7 @@ import json
 import py_trees
 import pytest
 
+from executive.cell.plain import plain
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.events import RunEnded, RunStarted, TargetSelected
@@ -60,8 +61,8 @@ def test_leaves_a_directory_that_explains_the_run(run, tmp_path):
         "mission.yaml", "params.yaml", "cell.yaml", "tree.json", "journal.jsonl", "world.log",
         "result.json", "frames",
     }  # fmt: skip
-    assert json.loads((left / "result.json").read_text()) == result
-    assert result["audit"]["agrees"]
+    assert json.loads((left / "result.json").read_text()) == plain(result)
+    assert result.audit.agrees
     events = read_journal(left / "journal.jsonl")
     (decision,) = (one for one in events if isinstance(one.event, TargetSelected))
     assert (left / "frames" / f"{decision.tick:06d}_{decision.event.item}.jpg").is_file()

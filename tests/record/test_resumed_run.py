@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from executive.cell.plain import plain
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.events import ItemChanged, MotionPlanned, NodeEnded, NodeStarted, RunResumed, TimedEvent
@@ -20,6 +21,7 @@ from executive.record.find_run import find_run
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.replay import replay
+from executive.record.result import Result
 from executive.record.resumed_run import resume_run
 from executive.run.assembly import RunOptions
 from executive.testing.faults.hand import Hand
@@ -60,7 +62,7 @@ def load(missions: Path, name: str) -> LoadedMission:
     return load_mission(missions / f"{name}.yaml", discover())
 
 
-def run_of(loaded: LoadedMission, runs: Path, **options: Any) -> dict[str, Any]:
+def run_of(loaded: LoadedMission, runs: Path, **options: Any) -> Result:
     """Run a mission on the fake cell, asking for every class four times."""
     skills, views = options.pop("skills", discover()), options.pop("views", ())
     run = RunOptions(SEED, [*loaded.routes] * 4, **{"kind": FakeCell, **options})
@@ -74,7 +76,7 @@ def cut_off(loaded: LoadedMission, runs: Path, tick: int, nth: int = 1) -> Path:
     return find_run("latest", runs)
 
 
-def resumed(path: Path, **options: Any) -> dict[str, Any]:
+def resumed(path: Path, **options: Any) -> Result:
     skills, views = options.pop("skills", discover()), options.pop("views", ())
     run = RunOptions(SEED, **{"kind": FakeCell, **options})
     return resume_run(path, skills, run, RecordOptions(views, frames=False))
@@ -114,11 +116,11 @@ def test_it_ends_as_if_nothing_had_happened(missions: Path, tmp_path: Path, name
     whole = run_of(loaded, tmp_path)
     path = cut_off(loaded, tmp_path, after, nth)
     result = resumed(path)
-    assert (result["status"], result["items"]) == (whole["status"], whole["items"])
-    assert result["audit"]["agrees"]
+    assert (result.status, result.items) == (whole.status, whole.items)
+    assert result.audit.agrees
     assert set(placed(path).values()) <= {1}
     assert redecided(path) == ""
-    assert json.loads((path / "result.json").read_text()) == result
+    assert json.loads((path / "result.json").read_text()) == plain(result)
 
 
 @pytest.mark.parametrize("nth", [1, 2, 3, 10])
@@ -127,7 +129,7 @@ def test_a_run_that_was_killed_in_its_first_control_step_starts_again(
 ) -> None:
     path = cut_off(load(missions, "sort_overhead"), tmp_path, 0, nth)
     result = resumed(path)
-    assert (result["status"], result["audit"]["agrees"]) == ("SUCCESS", True)
+    assert (result.status, result.audit.agrees) == ("SUCCESS", True)
     assert redecided(path) == ""
 
 
@@ -139,7 +141,7 @@ def test_the_world_of_a_scene_is_rebuilt(missions: Path, tmp_path: Path) -> None
     # What happens to the file afterwards is nothing to the run.
     scene.unlink()
     result = resumed(find_run("latest", tmp_path), kind=oracle_cell())
-    assert (result["status"], result["audit"]["right"], result["audit"]["agrees"]) == ("SUCCESS", 2, True)
+    assert (result.status, result.audit.right, result.audit.agrees) == ("SUCCESS", 2, True)
 
 
 @pytest.mark.slow
@@ -148,7 +150,7 @@ def test_it_may_be_cut_off_again_and_again(missions: Path, tmp_path: Path) -> No
     for after in (301, 800, 1500):
         with pytest.raises(Cut):
             resumed(path, views=[Cutter(after)])
-    assert resumed(path)["status"] == "SUCCESS"
+    assert resumed(path).status == "SUCCESS"
     assert set(placed(path).values()) == {1}
     assert [type(one.event) for one in read_journal(path / "journal.jsonl")].count(RunResumed) == 4
     assert redecided(path) == ""
@@ -174,12 +176,12 @@ def test_what_fell_from_the_tool_is_picked_again(missions: Path, tmp_path: Path,
         hand.part()
 
     loaded = load(missions, "sort_overhead")
-    path = cut_off(loaded, tmp_path, moment(Path(run_of(loaded, tmp_path)["run"]), skill))
+    path = cut_off(loaded, tmp_path, moment(Path(run_of(loaded, tmp_path).run), skill))
     meanwhile(path / "world.log", loaded, SEED, act, FakeCell)
     result = resumed(path)
     assert fell
-    assert (result["status"], result["audit"]["agrees"]) == ("SUCCESS", True)
-    assert result["items"]["placed"] == 6
+    assert (result.status, result.audit.agrees) == ("SUCCESS", True)
+    assert result.items.placed == 6
     assert set(placed(path).values()) == {1}
 
 
@@ -190,10 +192,10 @@ def test_a_run_that_was_halted_goes_on(missions: Path, tmp_path: Path) -> None:
                 os.kill(os.getpid(), signal.SIGINT)
 
     halted = run_of(load(missions, "sort_overhead"), tmp_path, views=[Stopper(0, 0)])
-    assert (halted["status"], bool(halted["holds"])) == ("HALTED", True)
-    path = Path(halted["run"])
+    assert (halted.status, bool(halted.holds)) == ("HALTED", True)
+    path = Path(halted.run)
     result = resumed(path)
-    assert (result["status"], result["items"]["placed"]) == ("SUCCESS", 6)
+    assert (result.status, result.items.placed) == ("SUCCESS", 6)
     assert set(placed(path).values()) == {1}
     assert redecided(path) == ""
     events = [one.event for one in read_journal(path / "journal.jsonl")]
@@ -208,17 +210,17 @@ def test_a_run_that_a_bug_has_ended_goes_on_once_it_is_mended(missions: Path, tm
     skills = discover()
     buggy = {**skills, name: raising(skills[name], ZeroDivisionError("a bug"), after=3)}
     first = run_of(load(missions, "sort_overhead"), tmp_path, skills=buggy)
-    assert (first["status"], "a bug" in first["message"]) == ("FAULT", True)
-    run = Path(first["run"])
+    assert (first.status, "a bug" in first.message) == ("FAULT", True)
+    run = Path(first.run)
     again = resumed(run, skills=buggy)
-    assert again["message"] == first["message"], "it is not mended yet"
+    assert again.message == first.message, "it is not mended yet"
     result = resumed(run)
-    assert (result["status"], result["audit"]["right"]) == ("SUCCESS", result["items"]["seen"])
+    assert (result.status, result.audit.right) == ("SUCCESS", result.items.seen)
     assert max(placed(run).values()) == 1
 
 
 def test_there_must_be_something_to_take_up(missions: Path, tmp_path: Path) -> None:
-    path = Path(run_of(load(missions, "sort_overhead"), tmp_path)["run"])
+    path = Path(run_of(load(missions, "sort_overhead"), tmp_path).run)
     with pytest.raises(InputError, match=r"came to its end: SUCCESS; there is nothing to take up again"):
         resumed(path)
     (path / "journal.jsonl").write_text("")
@@ -256,14 +258,14 @@ def unwilling(lets_go: bool) -> Any:
 def test_what_was_rejected_is_tried_again(missions: Path, tmp_path: Path) -> None:
     loaded = load_mission(missions / "sort_overhead.yaml", discover(), {"attempts": "1"})
     first = run_of(loaded, tmp_path, kind=unwilling(lets_go=False))
-    assert (first["status"], first["items"]["placed"], first["items"]["rejected"]) == ("INCOMPLETE", 5, 1)
-    path = Path(first["run"])
+    assert (first.status, first.items.placed, first.items.rejected) == ("INCOMPLETE", 5, 1)
+    path = Path(first.run)
     again = resumed(path, kind=unwilling(lets_go=False))
-    assert (again["status"], again["items"]["placed"], again["items"]["rejected"]) == ("INCOMPLETE", 5, 1)
+    assert (again.status, again.items.placed, again.items.rejected) == ("INCOMPLETE", 5, 1)
     assert redecided(path) == ""
     result = resumed(path, kind=unwilling(lets_go=True))
-    assert (result["status"], result["items"]["placed"], result["items"]["seen"]) == ("SUCCESS", 6, 6)
-    assert result["audit"]["agrees"]
+    assert (result.status, result.items.placed, result.items.seen) == ("SUCCESS", 6, 6)
+    assert result.audit.agrees
     assert set(placed(path).values()) == {1}
     assert redecided(path) == ""
     with pytest.raises(InputError, match="came to its end: SUCCESS"):
@@ -278,6 +280,6 @@ def test_a_camera_that_was_moved_before_a_run_is_resumed_ends_it(missions: Path,
 
     path = cut_off(load(missions, "sort_overhead"), tmp_path, 1200)
     result = resumed(path, kind=Moved)
-    assert (result["status"], result["reason"]) == ("FAILURE", "Detect.camera_moved")
-    assert result["items"]["placed"] < result["items"]["seen"]
+    assert (result.status, result.reason) == ("FAILURE", "Detect.camera_moved")
+    assert result.items.placed < result.items.seen
     assert redecided(path) == ""

@@ -55,7 +55,7 @@ def record(subject: Subject, rehearsal: Rehearsal, faults: Numbered, runs: Path)
         directory = new_directory(trying.run, loaded, trying.options, runs)
         recording = Recording(trying.run, loaded, subject.skills, directory, Recorder(directory), ())
         result = recording.execute(subject.seed, began)
-        leave_report(result)
+        leave_report(result.run)
         return trying.judged(trying.outcome), directory.path
 
 

@@ -1,1 +1,1 @@
-"""Why a run did not succeed: what is remembered of its course, and the story told from that in the end."""
+"""Diagnosis of a run that did not succeed, from its timeline."""

@@ -10,8 +10,8 @@ from executive.mission.model.nodes import Node
 from executive.mission.model.values import Value
 from executive.record.diagnosis.case import Case
 from executive.record.diagnosis.chain import attempts, constant
-from executive.record.diagnosis.course import Sense
-from executive.record.diagnosis.items import ItemCourse
+from executive.record.timeline.activation import Reading
+from executive.record.timeline.items import ItemTimeline
 
 REMEDIES: Mapping[str, str] = {
     "camera_moved": "mount camera and bins as the cell file says, or measure the pose again"
@@ -19,45 +19,45 @@ REMEDIES: Mapping[str, str] = {
 """Advice by the reason of a failure after which no mission can go on: every further look would mislead it."""
 
 
-def advice(case: Case, arm: str, reads: Sequence[Sense]) -> Iterator[str]:
-    """Yield what a person can do now, the most pressing first.
+def advice(case: Case, arm: str, reads: Sequence[Reading]) -> Iterator[str]:
+    """Yield advice for a person, the most pressing first.
 
     Args:
         case: The run.
         arm: The state of the arm in words.
-        reads: What the cell had answered to the skill that failed.
+        reads: Answers of the cell that the failed skill had.
     """
     if arm != "at rest":
         yield f"keep away from the arm until you have seen it stand still: {arm}"
-    if case.outcome.holds:
-        what = "what is in it" if case.outcome.holds == "something" else case.outcome.holds
-        ended = case.outcome.status == "FAILURE"
+    if case.end.holds:
+        what = "what is in it" if case.end.holds == "something" else case.end.holds
+        ended = case.end.status == "FAILURE"
         to_go_on = "" if ended else f"to go on with this run leave {what} in the tool; "
         yield f"{to_go_on}take {what} out of the tool before another run"
     else:
-        for name in case.course.items.held():
+        for name in case.timeline.items.unfinished("held"):
             yield f"see where {name} lies: it was let go as the run ended"
-    for sense in reads:
-        if sense.raised == Unavailable.__name__:
-            yield f"see to it that {sense.name} answers again"
-        elif sense.name == "arm.met":
-            yield f"see what is in the arm's way: {sense.value}"
-    if case.course.unrecorded:
+    for reading in reads:
+        if reading.raised == Unavailable.__name__:
+            yield f"see to it that {reading.name} answers again"
+        elif reading.name == "arm.met":
+            yield f"see what is in the arm's way: {reading.value}"
+    if case.is_unrecorded:
         yield "free some space on the disk of the run directory, or name another place with --runs DIR"
-    elif case.outcome.status == "FAULT":
+    elif case.end.status == "FAULT":
         yield "mend what is broken, in the code or in the cell: a fault is never tried again"
-    if remedy := REMEDIES.get(case.outcome.reason.rpartition(".")[2]):
+    if remedy := REMEDIES.get(case.end.reason.rpartition(".")[2]):
         yield remedy
     elif ways := list(_ways_on(case)):
-        yield f"to let the mission go on after {case.outcome.reason}: {', or '.join(ways)}"
+        yield f"to let the mission go on after {case.end.reason}: {', or '.join(ways)}"
     for name, item in case.lost.items():
         yield f"look for {name} by hand, {_whereabouts(item)}"
 
 
-def _whereabouts(item: ItemCourse) -> str:
-    if item.dropped is not None and (item.look is None or item.look["clock"] < item.dropped):
+def _whereabouts(item: ItemTimeline) -> str:
+    if item.dropped is not None and (item.sighting is None or item.sighting.clock < item.dropped):
         return "below where it was dropped"
-    return "around ({:.2f}, {:.2f}) m".format(*item.row["position"])
+    return "around ({:.2f}, {:.2f}) m".format(*item.now.position)
 
 
 def _ways_on(case: Case) -> Iterator[str]:
@@ -76,7 +76,7 @@ def _ways_on(case: Case) -> Iterator[str]:
             yield f"allow more than {constant(node.seconds):g} s {_where(case, node, node.seconds)}"
         elif isinstance(node, nodes.RetryNode) and link.gave_up:
             assert node.recover is not None
-            yield f"deal with {link.ran.last} in the recovery at {case.place(node.recover)}"
+            yield f"deal with {link.ran.last_handled} in the recovery at {case.place(node.recover)}"
             return
         elif isinstance(node, nodes.RetryNode) and (link.catches(node.on) or not node.on):
             attempt, most = attempts(link)

@@ -1,88 +1,94 @@
-"""Case of a run that did not succeed, put together once the run is over, and its verdict."""
+"""Case of a run that did not succeed, and its verdict."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from executive.errors import RecordLost
 from executive.events import RunEnded
 from executive.mission.model import nodes
 from executive.mission.model.nodes import Node
 from executive.record.diagnosis.chain import attempts, chain, way
-from executive.record.diagnosis.course import Course
-from executive.record.progress import skill_name
+from executive.record.timeline.activation import skill_name
+from executive.record.timeline.timeline import Timeline
 
 if TYPE_CHECKING:
     from executive.mission.load import LoadedMission
 
 MOST = 5
-"""Items that a sentence names one by one."""
+"""Largest number of items that a sentence names."""
 
 
 class Case:
-    """A run that did not succeed.
+    """A run that did not succeed, in the terms of its mission.
 
     Args:
         loaded: The mission.
-        course: Its events.
-        outcome: Its end.
+        timeline: Timeline of the run.
+        end: End of the run.
 
     Attributes:
-        links: The way of the failure that ended it, from the root to the node that decided; empty where the
-            run ended otherwise.
-        lost: The items whose loss ended it, by name.
-        decided: The last activation of the node that decided; None where none did.
-        node: The node that decided, as the mission has it; None where none did.
-        running: Paths of the skills that ran until they were halted, by the end of the run or the deciding
-            node.
-        item: The item it was all about, or "".
+        links: The nodes that the failure passed, from the root to its origin; empty for another end.
+        lost: The items whose loss ended the run, by name.
+        decided: The last activation of the deciding node, or None.
+        node: The deciding node in the mission, or None.
+        running: Paths of the skills that were halted by the end of the run or by the deciding node.
+        item: Item that the deciding node worked on, or "".
+        is_unrecorded: True if the run ended because the disk did not take the journal.
     """
 
-    def __init__(self, loaded: LoadedMission, course: Course, outcome: RunEnded) -> None:
-        self.loaded, self.course, self.outcome = loaded, course, outcome
-        failed = outcome.status == "FAILURE"
-        self.links = chain(loaded.tree, course, outcome.node, outcome.reason) if failed else ()
-        self.lost = course.items.lost() if failed and not outcome.node else {}
-        self.decided = course.node(outcome.node)
-        self.node = next(iter(way(loaded.tree, outcome.node)[-1:]), None)
-        self.running: Sequence[str] = course.cut
+    def __init__(self, loaded: LoadedMission, timeline: Timeline, end: RunEnded) -> None:
+        self.loaded, self.timeline, self.end = loaded, timeline, end
+        failed = end.status == "FAILURE"
+        self.links = chain(loaded.tree, timeline, end.node, end.reason) if failed else ()
+        self.lost = {
+            name: item
+            for name, item in timeline.items.by_name.items()
+            if failed and not end.node and item.now.state == "lost"
+        }
+        self.decided = timeline.nodes.get(end.node)
+        self.node = next(iter(way(loaded.tree, end.node)[-1:]), None)
+        self.running = timeline.halted
         if failed:
-            self.running = self.decided.cut if self.decided is not None else ()
-        activations = [self.decided, *map(course.node, self.running)]
+            self.running = self.decided.halted if self.decided is not None else ()
+        activations = [self.decided, *map(timeline.nodes.get, self.running)]
         about = [ran.item for ran in activations if ran is not None and ran.item]
         self.item = next(iter([*about, *self.lost]), "")
+        self.is_unrecorded = f".{RecordLost.__name__}: " in timeline.traceback
 
     def named(self, path: str) -> str:
-        """Return what a person calls a skill that ran: `Grasp of cube-1`."""
-        ran = self.course.node(path)
+        """Return the name of a skill that ran for a person: `Grasp of cube-1`."""
+        ran = self.timeline.nodes.get(path)
         return skill_name(path) + (f" of {ran.item}" if ran is not None and ran.item else "")
 
     def place(self, node: Node) -> str:
-        """Return where a node stands: the line, and the file where it is not the mission's."""
+        """Return the line of a node, and the file if it is not that of the mission."""
         return node.mark.place(self.loaded.tree.mark.source)
 
 
 def verdict(case: Case) -> str:
-    """Return in one sentence what ended a run: what failed, on what, how often it was tried, and why."""
-    outcome = case.outcome
+    """Return the cause of the end of a run in one sentence: skill, item, number of attempts and message."""
+    end = case.end
     running = " and ".join(map(case.named, case.running))
     during = f" during {running}" if running else ""
-    if outcome.status == "HALTED":
-        return outcome.message + (" while the operator was asked" if case.course.asking else during)
+    if end.status == "HALTED":
+        return end.message + (
+            " while the operator was asked" if case.timeline.question is not None else during
+        )
     if case.lost:
         were = "object was" if len(case.lost) == 1 else "objects were"
         more = f" and {len(case.lost) - MOST} more" if len(case.lost) > MOST else ""
         return f"{len(case.lost)} {were} lost: {', '.join(list(case.lost)[:MOST])}{more}"
     if not case.links:
-        return outcome.message
+        return end.message
     if isinstance(case.node, nodes.SkillNode):
-        reason = outcome.reason.rpartition(".")[2]
-        return f"{case.named(outcome.node)} failed ({reason}){_tried(case)}: {outcome.message}"
-    return f"{case.links[-1].name}{_tried(case)}: {outcome.message}{during}"
+        reason = end.reason.rpartition(".")[2]
+        return f"{case.named(end.node)} failed ({reason}){_tried(case)}: {end.message}"
+    return f"{case.links[-1].name}{_tried(case)}: {end.message}{during}"
 
 
 def _tried(case: Case) -> str:
-    """Return how often it was tried, as the innermost retry counted; "" for the first time."""
+    """Return the attempt that failed, as counted by the innermost retry; "" for the first."""
     retry = next((link for link in reversed(case.links) if isinstance(link.node, nodes.RetryNode)), None)
     if retry is None:
         return ""

@@ -10,7 +10,11 @@ from executive.mission.model import nodes
 from executive.mission.model.nodes import Node
 from executive.mission.model.paths import name_of
 from executive.mission.model.values import Literal, Match, Value
-from executive.record.diagnosis.course import Activation, Course
+from executive.record.timeline.activation import Activation
+from executive.record.timeline.timeline import Timeline
+
+_NEVER = Activation("", 0, "", "", "INVALID", 0, 0.0, 0, 0.0)
+"""Stands for the activation of a node that never started."""
 
 
 @dataclass(frozen=True)
@@ -44,12 +48,12 @@ class Link:
         return any((match.source, match.reason) in self.names for match in matches)
 
 
-def chain(tree: Node, course: Course, origin: str, failure: str) -> tuple[Link, ...]:
+def chain(tree: Node, timeline: Timeline, origin: str, failure: str) -> tuple[Link, ...]:
     """Return the nodes that a failure passed, from the root to the one at the path `origin`.
 
     Args:
         tree: The mission's tree.
-        course: Of the run.
+        timeline: Timeline of the run.
         origin: Where it began.
         failure: What it is: `Grasp.missed`.
     """
@@ -59,11 +63,11 @@ def chain(tree: Node, course: Course, origin: str, failure: str) -> tuple[Link, 
     links: list[Link] = []
     for index in reversed(range(len(passed))):
         node = passed[index]
-        ran = course.node(node.path) or Activation(0, 0.0)
+        ran = timeline.nodes.get(node.path) or _NEVER
         below = passed[index + 1] if index + 1 < len(passed) else None
         inside = next((one.name for one in reversed(passed[:index]) if isinstance(one, nodes.UseNode)), "")
         named = frozenset((name, reason) for name in names)
-        links.append(Link(node, below, inside, ran, named, _recovery_failed(node, ran, course)))
+        links.append(Link(node, below, inside, ran, named, _recovery_failed(node, ran, timeline)))
         names |= {node.label} if node.label else set()
     return tuple(reversed(links))
 
@@ -83,7 +87,7 @@ def attempts(link: Link) -> tuple[int, int]:
     """Return the how manieth attempt of a `retry` failed, and of how many."""
     assert isinstance(link.node, nodes.RetryNode)
     # Every failure but the last one was passed over, and so was that of a recovery.
-    return link.ran.passed.total() + (-1 if link.gave_up else 1), constant(link.node.attempts)
+    return link.ran.handled.total() + (-1 if link.gave_up else 1), constant(link.node.attempts)
 
 
 def constant(value: Value | None) -> Any:
@@ -102,10 +106,10 @@ def _ways(node: Node, path: str) -> Iterator[list[Node]]:
 
 
 def _retry(node: nodes.RetryNode, link: Link) -> str:
-    passed = dict(link.ran.passed)
+    passed = dict(link.ran.handled)
     attempt, most = attempts(link)
     if link.gave_up:
-        last = f"{link.ran.last}: {link.ran.said[link.ran.last]}"
+        last = f"{link.ran.last_handled}: {link.ran.messages[link.ran.last_handled]}"
         return f"gave up after attempt {attempt} of {most}: its recovery failed with {last}"
     if node.on and not link.catches(node.on):
         before = f"; before: {_counted(passed)}" if passed else ""
@@ -118,8 +122,8 @@ def _try(node: nodes.TryNode, link: Link) -> str:
     if link.below is node.finish:
         return "its finally failed"
     if link.below is not node.do:
-        last = link.ran.last
-        return f"caught {last} ({link.ran.said.get(last, '')}), but what it did instead failed"
+        last = link.ran.last_handled
+        return f"caught {last} ({link.ran.messages.get(last, '')}), but what it did instead failed"
     named = [match for catch in node.catches for match in catch.on]
     return f"catches only {_listed(named)}" if named else "has no catch"
 
@@ -137,12 +141,12 @@ def _for_each(node: nodes.ForEachNode, link: Link) -> str:
 
 
 def _timeout(node: nodes.TimeoutNode, link: Link) -> str:
-    took = link.ran.ended - link.ran.began
+    took = link.ran.end - link.ran.start
     return f"limits only the time: {took:.2f} of {constant(node.seconds):g} s had passed"
 
 
 def _fallback(node: nodes.FallbackNode, link: Link) -> str:
-    others = ", ".join(f"{reason} ({said})" for reason, said in link.ran.said.items())
+    others = ", ".join(f"{reason} ({said})" for reason, said in link.ran.messages.items())
     return f"all {len(node.choices)} choices failed" + (f"; the others with {others}" if others else "")
 
 
@@ -152,15 +156,15 @@ def _parallel(node: nodes.ParallelNode, link: Link) -> str:
         return "ends as its lead does"
     needs = {"all": f"all {count}", "any": f"one of its {count}"}.get(wanted, f"{wanted} of its {count}")
     # The failure that it passes on may be among those it told of while the others went on.
-    others = [reason for reason in link.ran.passed if reason != link.ran.reason]
+    others = [reason for reason in link.ran.handled if reason != link.ran.reason]
     return f"needs {needs} branches" + (f"; also failed: {', '.join(others)}" if others else "")
 
 
-def _recovery_failed(node: Node, ran: Activation, course: Course) -> bool:
+def _recovery_failed(node: Node, ran: Activation, timeline: Timeline) -> bool:
     """Tell whether a retry's recovery ran in its last activation, and failed there."""
     recover = getattr(node, "recover", None)
-    recovery = None if recover is None else course.node(recover.path)
-    return recovery is not None and recovery.order > ran.order and recovery.status == "FAILURE"
+    recovery = None if recover is None else timeline.nodes.get(recover.path)
+    return recovery is not None and recovery.number > ran.number and recovery.status == "FAILURE"
 
 
 def _listed(matches: Sequence[Match]) -> str:

@@ -64,7 +64,7 @@ def _pages(
     start, directory = source.start, source.directory
     note = f"seed {start.seed} · cell {source.config.cell}" + (f" · {speed:g}x speed" if speed != 1 else "")
     length = steps[-1] * start.step
-    course = Course(source.entries, source.nodes, list(directory.frames.glob("*.jpg")))
+    course = Course(source.events, source.nodes, list(directory.frames.glob("*.jpg")))
     view = overview(source.config, STAGE, SHOWN)
     shoot = Shoot(source.config, start.seed, directory.world, view, directory.scene)
     with closing(shots(shoot, steps, workers)) as pictures:

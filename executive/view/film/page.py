@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import asdict
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from executive.events import RunEnded
 from executive.record.pictures.strip import HEIGHT as STRIP
-from executive.record.result import ITEM_COUNTS
+from executive.record.result import Result
 from executive.view.film import panel
 from executive.view.film.course import Course
 from executive.view.film.ink import BACK, DIM, FAILURE, INK, RULE, RUNNING, SUCCESS, clipped, font, wrapped
@@ -56,12 +56,12 @@ def draw_page(
     _draw_head(page, source.start.mission, note, course.clock, length)
     top = HEIGHT - _BELOW - panel.height(source.items)
     ImageDraw.Draw(page).line((LEFT, top - 10, RIGHT, top - 10), RULE, 1)
-    panel.draw_items(page, (LEFT, top, RIGHT, HEIGHT), course.items, source.bins)
+    panel.draw_items(page, (LEFT, top, RIGHT, HEIGHT), course.timeline.items.now(), source.bins)
     panel.draw_branch(page, (LEFT, _TREE_TOP, RIGHT, top - 18), source.nodes, course)
     return page
 
 
-def draw_ending(page: Image.Image, result: Mapping[str, Any]) -> Image.Image:
+def draw_ending(page: Image.Image, result: Result | RunEnded | None) -> Image.Image:
     """Return a page with the end of a run, by its result, written over the picture of the cell."""
     status, sentence, figures = ending_of(result)
     lines = wrapped(sentence, _END_TYPE, CARD - 2 * _END_PAD, 4)
@@ -85,16 +85,15 @@ def draw_ending(page: Image.Image, result: Mapping[str, Any]) -> Image.Image:
     return shown
 
 
-def ending_of(result: Mapping[str, Any]) -> tuple[str, str, str]:
+def ending_of(result: Result | RunEnded | None) -> tuple[str, str, str]:
     """Return status, sentence and figures of the end of a run; without a result the run was cut off."""
-    if not result:
+    if result is None:
         return "CUT OFF", "the record ends here; nothing says how the run would have ended", ""
-    figures = ""
-    if items := result.get("items"):
-        fates = ", ".join(f"{items[fate]} {fate}" for fate in ITEM_COUNTS if items.get(fate))
-        figures = f"{fates}; {result['robot_time_s']:.1f} s"
-    story = result.get("story") or {}
-    return result["status"], story.get("verdict") or result["message"], figures
+    if isinstance(result, RunEnded):
+        return result.status, result.message, ""
+    ends = ", ".join(f"{count} {end}" for end, count in asdict(result.items).items() if count)
+    verdict = result.message if result.story is None else result.story.verdict
+    return result.status, verdict, f"{ends}; {result.robot_time_s:.1f} s"
 
 
 def _draw_head(page: Image.Image, title: str, note: str, clock: float, length: float) -> None:

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from PIL import Image, ImageDraw
 
 from executive.cell.frame import Box
+from executive.events import ItemChanged
 from executive.mission.outline import OutlineNode
 from executive.view.film import ink
 from executive.view.film.course import Course
 from executive.view.film.ink import DIM, FAILURE, FAINT, INK, RULE, RUNNING, STATUS, SUCCESS
-from executive.view.items import Row
 from executive.view.tree.outline import branches, opened
 
 TYPE, HEAD, MARK = 14, 12, 11
@@ -44,7 +44,8 @@ def draw_branch(image: Image.Image, box: Box, nodes: Sequence[OutlineNode], cour
     for row, (node, branch) in enumerate(zip(shown, branches(shown), strict=True)):
         middle = top + NODE_ROW * (row + 0.5)
         _draw_lines(draw, branch, left, middle)
-        now = course.status.get(node.path, "")
+        last = course.timeline.current(node.path)
+        now = last.status if last else ""
         x = left + INDENT * (len(branch) // _CELL)
         ink.put_mark(image, now, (x + MARK / 2, middle), MARK)
         x += MARK + 8
@@ -54,7 +55,7 @@ def draw_branch(image: Image.Image, box: Box, nodes: Sequence[OutlineNode], cour
         name = ink.clipped(node.name, TYPE, right - x)
         draw.text((x, middle), name, colour, ink.font(TYPE), "lm")
         x += ink.font(TYPE).getlength(name) + 10
-        why = ink.clipped(course.beside.get(node.path, ""), TYPE, right - x)
+        why = ink.clipped(last.note if last else "", TYPE, right - x)
         draw.text((x, middle), why, FAILURE if now == "FAILURE" else DIM, ink.font(TYPE), "lm")
 
 
@@ -68,7 +69,8 @@ def fitted(nodes: Sequence[OutlineNode], course: Course, rows: int) -> list[Outl
 
     def worth(index: int) -> tuple[bool, bool, int]:
         path = shown[index].path
-        return path in is_open, course.status.get(path) in STATUS, -index
+        last = course.timeline.current(path)
+        return path in is_open, last is not None and last.status in STATUS, -index
 
     kept = sorted(sorted(range(len(shown)), key=worth, reverse=True)[:rows])
     return [shown[index] for index in kept]
@@ -79,7 +81,7 @@ def height(items: int) -> int:
     return ITEM_ROW * (min(items, MOST) + 1)
 
 
-def draw_items(image: Image.Image, box: Box, rows: Sequence[Row], bins: Mapping[str, str]) -> None:
+def draw_items(image: Image.Image, box: Box, rows: Sequence[ItemChanged], bins: Mapping[str, str]) -> None:
     """Draw the items that there is room for; what is settled gives way to what is not.
 
     Args:
@@ -107,7 +109,7 @@ def draw_items(image: Image.Image, box: Box, rows: Sequence[Row], bins: Mapping[
             draw.rectangle((x, y, x + _SWATCH - 1, y + _SWATCH - 1), bins.get(row.bin, DIM))
 
 
-def kept(rows: Sequence[Row]) -> list[Row]:
+def kept(rows: Sequence[ItemChanged]) -> list[ItemChanged]:
     """Return at most `MOST` items in their order; those settled first are left out first."""
     order = sorted(range(len(rows)), key=lambda index: (rows[index].state not in _SETTLED, index))
     left_out = set(order[: max(len(rows) - MOST, 0)])

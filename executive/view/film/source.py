@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from executive.cells.sim.command_log import is_log
 from executive.errors import InputError
-from executive.record.entry import old_entry
-from executive.record.journal import read_journal, start_of
+from executive.events import ItemChanged
+from executive.record.journal import ending_of, read_journal, start_of
 from executive.record.recorded_mission import read_tree, recorded_cell
 from executive.record.result import read_result
 from executive.record.run_directory import RunDirectory
@@ -20,13 +20,13 @@ class Source:
 
     Attributes:
         directory: The run directory.
-        entries: The entries of its journal that count.
-        start: The entry for how the run began.
+        events: The events of its journal that count.
+        start: Start of the run.
         nodes: Its tree.
         config: Its cell.
         bins: Colour of each bin, by name.
-        items: Number of items that the run met with.
-        result: Its result; without one the journal's end; empty if the run was cut off.
+        items: Number of items in the run.
+        result: Its result; without one the end in the journal; None if the run was cut off.
 
     Raises:
         InputError: The record lacks what a film is made from.
@@ -37,15 +37,16 @@ class Source:
         events = read_journal(directory.journal)
         self.directory = directory
         self.start = start_of(events, directory.path, "there is nothing to film")
-        self.entries = [old_entry(timed) for timed in InputLog.of(events).events]
+        self.events = InputLog.of(events).events
         self.nodes = read_tree(directory.tree)
         self.config = recorded_cell(directory.path)
         self.bins = {
             name: "#" + "".join(f"{round(255 * share):02x}" for share in bin.colour)
             for name, bin in self.config.bins.items()
         }
-        self.items = len({entry["item"] for entry in self.entries if entry["kind"] == "item"})
-        self.result = read_result(directory, events)
+        changes = (one.event for one in self.events if isinstance(one.event, ItemChanged))
+        self.items = len({change.item for change in changes})
+        self.result = read_result(directory, events) or ending_of(events)
 
 
 def _require_log(directory: RunDirectory) -> None:

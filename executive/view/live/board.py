@@ -1,56 +1,103 @@
-"""State of the page at this moment, and its news since browsers were told last."""
+"""State of the page at this moment, and its changes since the browsers got the last message."""
 
 from __future__ import annotations
 
 import base64
+from collections import Counter
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from executive.view.live.telling import News
+from executive import events
+from executive.cell.frame import Frame
+from executive.record.timeline.timeline import Timeline
+from executive.view.live.messages import CameraImage, Change, Message
 
 QUALITY = 80
 """JPEG quality of the camera's image, 0 to 100."""
 SHADE = 0.45
 """Darkening of the pixels that the arm hides: 0 none, 1 black."""
 
+Json = dict[str, Any]
+"""JSON object for `page.js`: nodes by path, items by name, and one key for each other part of the page."""
+
 
 class Board:
-    """Follows the news of a run.
+    """Follows the messages of a run.
 
     Attributes:
-        everything: All that is to be shown.
+        everything: State of the page as JSON.
     """
 
     def __init__(self) -> None:
-        self.everything: News = {"paused": False, "over": False, "nodes": {}, "items": {}}
-        self._news: News = {}
+        self.everything: Json = {"paused": False, "over": False, "nodes": {}, "items": {}}
+        self._news: Json = {}
+        self._timeline = Timeline(history=False)
 
-    def take(self, news: News) -> None:
-        """Take in what is to be shown otherwise; nodes and items that it does not name stay as they are."""
-        if "look" in news:
-            news = {**news, "look": _encoded(**news["look"])}
-        for shown in (self.everything, self._news):
-            for key, value in news.items():
-                if key in ("nodes", "items"):
-                    shown.setdefault(key, {}).update(value)
-                else:
-                    shown[key] = value
+    def take(self, message: Message) -> None:
+        """Change the state of the page by a message."""
+        match message:
+            case events.TimedEvent():
+                self._timeline(message)
+                self._show(clock=message.clock)
+                self._take_event(message.event)
+            case CameraImage():
+                self._show(look=_encoded(message.frame, message.look))
+            case Change():
+                self._show(**{part: value for part, value in asdict(message).items() if value is not None})
 
-    def news(self) -> News:
-        """Return what is to be shown otherwise than when this was last asked; empty for nothing."""
+    def news(self) -> Json:
+        """Return the changes since the last call; empty if there are none."""
         fresh, self._news = self._news, {}
         return fresh
 
+    def _take_event(self, event: events.Event) -> None:
+        match event:
+            case events.NodeStarted(node) | events.NodeEnded(node):
+                self._put("nodes", node, self._node(node))
+            case events.ItemChanged():
+                self._put("items", event.item, vars(event))
+            case events.TargetSelected():
+                self._show(decision=vars(event))
+            case events.RunStarted():
+                self._show(run={"mission": event.mission, "seed": event.seed})
+            case events.OperatorAsked():
+                self._show(asking=event.choices)
+            case events.RequestGiven():
+                self._show(asking=None)
+            case events.RunEnded():
+                self._show(asking=None, over=True)
 
-def _encoded(image: np.ndarray[Any, Any], hidden: np.ndarray[Any, Any] | None, **look: Any) -> News:
-    """Return a look with its RGB image as a page takes it, hidden pixels darker."""
+    def _node(self, path: str) -> Json:
+        last, counts = self._timeline.nodes[path], self._timeline.counts.get(path, Counter())
+        ends = {"done": "SUCCESS", "failed": "FAILURE", "halted": "INVALID"}
+        return {
+            **{word: counts[status] for word, status in ends.items()},
+            "status": last.status.lower(), "said": last.failure, "item": last.item,
+        }  # fmt: skip
+
+    def _show(self, **parts: object) -> None:
+        self.everything |= parts
+        self._news |= parts
+
+    def _put(self, part: str, name: str, value: Json) -> None:
+        for shown in (self.everything, self._news):
+            shown.setdefault(part, {})[name] = value
+
+
+def _encoded(frame: Frame, look: events.FrameSearched) -> Json:
+    """Return a look with its image as JPEG, in which the pixels that the arm hides are darker."""
     import cv2
 
-    shown = cv2.cvtColor(image, cv2.COLOR_RGB2BGR)
-    if hidden is not None:
+    shown = cv2.cvtColor(frame.image, cv2.COLOR_RGB2BGR)
+    if frame.visible is not None:
+        hidden = ~frame.visible
         shown[hidden] = (shown[hidden] * (1 - SHADE)).astype(np.uint8)
     _, data = cv2.imencode(".jpg", shown, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
-    source = "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode()
-    height, width = image.shape[:2]
-    return {**look, "source": source, "width": width, "height": height}
+    height, width = frame.image.shape[:2]
+    return {
+        "source": "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode(),
+        "width": width, "height": height, "frame": frame.id, "camera": frame.camera,
+        "detector": look.detector, "stamp": frame.stamp, "found": [vars(one) for one in look.found],
+    }  # fmt: skip

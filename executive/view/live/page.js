@@ -183,7 +183,7 @@ function outcome(result) {
   panel.hidden = false;
   panel.className = kinds[result.status] ?? "invalid";
   const lines = [
-    result.story ? result.story.verdict : result.message,
+    result.sentence,
     result.report ? `report: ${result.report}` : `record: ${result.run}`,
   ];
   panel.replaceChildren(...lines.filter(Boolean).map((line) => {

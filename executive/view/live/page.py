@@ -12,19 +12,19 @@ import subprocess
 import tempfile
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
+from dataclasses import replace
 from importlib.util import find_spec
-from typing import Any
 
 from executive.cell.frame import Frame, FrameTaken
 from executive.cell.visuals import Visuals
 from executive.errors import InputError
-from executive.events import FrameSearched, TimedEvent
+from executive.events import FrameSearched, InputRead, TimedEvent
 from executive.mission.outline import outline
 from executive.processes import program
-from executive.record.entry import old_event
+from executive.record.result import Result
 from executive.run.run import Run
-from executive.view.live.telling import News, Teller, picture, poses
+from executive.view.live.messages import CameraImage, Change, Message, Outcome, SceneChange, Wish, places_of
 from executive.view.tree.svg import Note, svg
 
 LOOPBACK = "127.0.0.1"
@@ -72,7 +72,7 @@ class LivePage:
                 # Out of reach of Ctrl-C: it ends when its input does, and says first how the run ended.
                 start_new_session=True,
             )  # fmt: skip
-        self._queue: queue.SimpleQueue[News | None] = queue.SimpleQueue()
+        self._queue: queue.SimpleQueue[tuple[str, int] | Message | None] = queue.SimpleQueue()
         self._run: Run | None = None
         self._visuals: Visuals | None = None
         self._gone = False
@@ -81,12 +81,11 @@ class LivePage:
         self._period = PERIOD
         self._paused = False
         self._taken: Frame | None = None
-        self._last_look: tuple[Frame, FrameSearched] | None = None
-        self._teller = Teller()
+        self._last_look: CameraImage | None = None
         self.problem = ""
         """What went wrong with the page first, or ""."""
         # Not as an argument: those can be read by everybody on the machine.
-        self._tell(token=token, port=port)
+        self._queue.put((token, port))
         self._threads = [
             threading.Thread(target=work, name="page", daemon=True) for work in (self._send, self._listen)
         ]
@@ -103,37 +102,39 @@ class LivePage:
         # A line in every node for what became of it so far.
         blank = {node.path: Note("", ("",)) for node in nodes}
         shapes = tuple(self._visuals.shapes) if self._visuals is not None else ()
-        self._tell(tree=svg(nodes, mission, blank), shapes=shapes)
+        self._tell(SceneChange(shapes=shapes))
+        self._tell(Change(tree=svg(nodes, mission, blank)))
         run.control.between_ticks(self._look_around)
         self._look_around()
 
     def __call__(self, timed: TimedEvent) -> None:
-        """Tell of an event what a person wants to see."""
+        """Send an event that changes the page."""
         event = timed.event
         with self._harmless():
             if isinstance(event, FrameTaken):
-                self._taken = event.frame
+                # Depth, which the page does not show, is three times as large as the rest.
+                self._taken = replace(event.frame, depth=None)
             elif isinstance(event, FrameSearched) and self._taken is not None:
-                self._last_look = self._taken, event
+                self._last_look = CameraImage(self._taken, event)
                 if self._watched and self._keeps_up:
-                    self._tell(**picture(*self._last_look))
-            elif (news := self._teller.news(old_event(timed))) is not None:
-                self._tell(**news)
+                    self._tell(self._last_look)
+            elif not isinstance(event, InputRead):
+                self._tell(timed)
 
     def close(self) -> None:
         """Go on without new events; `finish` says how the run ended."""
 
     def note(self, sentence: str) -> None:
         """Show a sentence about the record."""
-        self._tell(note=sentence)
+        self._tell(Change(note=sentence))
 
-    def finish(self, result: Mapping[str, Any] | None = None, report: str = "") -> None:
+    def finish(self, result: Result | None = None, report: str = "") -> None:
         """Say how the run ended, and end the page; more calls do nothing."""
         if not self._threads:
             return
         if result is not None:
-            keys = ("status", "reason", "message", "story", "run")
-            self._tell(result={key: result.get(key) for key in keys} | {"report": report})
+            sentence = result.message if result.story is None else result.story.verdict
+            self._tell(Change(result=Outcome(result.status, sentence, result.run, report)))
         self._queue.put(None)
         try:
             if self._server.wait(SHUTDOWN_TIMEOUT) != 0:
@@ -155,17 +156,18 @@ class LivePage:
         with self._harmless():
             if self._run.control.paused != self._paused:
                 self._paused = not self._paused
-                self._tell(paused=self._paused)
+                self._tell(Change(paused=self._paused))
             if self._watched and self._keeps_up and self._visuals is not None:
-                self._tell(**poses(self._run.now, self._visuals.poses()))
+                self._tell(Change(clock=self._run.now))
+                self._tell(SceneChange(bodies=places_of(self._visuals.poses())))
 
     @property
     def _keeps_up(self) -> bool:
         return self._queue.qsize() < MAX_QUEUED_NEWS
 
-    def _tell(self, **news: Any) -> None:
+    def _tell(self, message: Message) -> None:
         if not self._gone:
-            self._queue.put(news)
+            self._queue.put(message)
 
     @contextlib.contextmanager
     def _harmless(self) -> Iterator[None]:
@@ -185,7 +187,9 @@ class LivePage:
                 while not self._queue.empty():
                     batch.append(self._queue.get())
                 over = None in batch
-                pickle.dump([news for news in batch if news is not None], pipe, pickle.HIGHEST_PROTOCOL)
+                pickle.dump(
+                    [message for message in batch if message is not None], pipe, pickle.HIGHEST_PROTOCOL
+                )
                 pipe.flush()
                 if not over:
                     time.sleep(GATHER)
@@ -202,17 +206,17 @@ class LivePage:
         assert self._server.stdout is not None
         for line in self._server.stdout:
             with self._harmless():
-                self._do(json.loads(line))
+                self._do(Wish(**json.loads(line)))
         self._watched, self._gone = 0, True
 
-    def _do(self, wish: Mapping[str, Any]) -> None:
-        control, what = None if self._run is None else self._run.control, wish["do"]
-        if what == "watched":
-            self._watched = wish["by"]
-            self._period = SPARING_PERIOD if wish["sparing"] else PERIOD
+    def _do(self, wish: Wish) -> None:
+        control = None if self._run is None else self._run.control
+        if wish.do == "watched":
+            self._watched = wish.watchers
+            self._period = SPARING_PERIOD if wish.is_sparing else PERIOD
             if self._watched and self._last_look is not None:
-                self._tell(**picture(*self._last_look))
-        elif control is not None and what == "request":
-            control.request(wish["word"])
-        elif control is not None and what in ("pause", "resume", "step", "stop"):
-            getattr(control, what)()
+                self._tell(self._last_look)
+        elif control is not None and wish.do == "request":
+            control.request(wish.word)
+        elif control is not None:
+            getattr(control, wish.do)()

@@ -10,15 +10,15 @@ import socket
 import sys
 import tempfile
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from aiohttp import web
 
 from executive.view.live.board import Board
-from executive.view.live.server import Server, Wish
-from executive.view.live.telling import News
+from executive.view.live.messages import Message, SceneChange, Wish
+from executive.view.live.server import Server
 from executive.view.live.tunnel import Tunnel
 
 
@@ -29,8 +29,8 @@ def main() -> None:
     wishes = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
 
-    def say(wish: Mapping[str, Any]) -> None:
-        wishes.write(json.dumps(wish) + "\n")
+    def say(wish: Wish) -> None:
+        wishes.write(json.dumps(asdict(wish)) + "\n")
         wishes.flush()
 
     with tempfile.TemporaryDirectory(prefix="executive-") as folder:
@@ -39,19 +39,20 @@ def main() -> None:
     os._exit(0)
 
 
-async def _serve(listener: socket.socket, path: Path, say: Wish) -> None:
+async def _serve(listener: socket.socket, path: Path, say: Callable[[Wish], None]) -> None:
     loop, over = asyncio.get_running_loop(), asyncio.Event()
-    first, *rest = pickle.load(sys.stdin.buffer)
+    (token, port), *rest = pickle.load(sys.stdin.buffer)
     board, tunnel = Board(), Tunnel(path)
-    server = Server(board, tunnel, say, first["token"], first["port"])
+    server = Server(board, tunnel, say, token, port)
 
-    def take(batch: list[News]) -> None:
-        for news in batch:
-            if "shapes" in news:
-                tunnel.show(news.pop("shapes"))
-            if "bodies" in news:
-                tunnel.move(news.pop("bodies"))
-            board.take(news)
+    def take(batch: list[Message]) -> None:
+        for message in batch:
+            if not isinstance(message, SceneChange):
+                board.take(message)
+            elif message.shapes is not None:
+                tunnel.show(message.shapes)
+            elif message.bodies is not None:
+                tunnel.move(message.bodies)
 
     def listen() -> None:
         try:

@@ -6,13 +6,13 @@ import asyncio
 import contextlib
 import json
 import secrets
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable
 from importlib.resources import files
-from typing import Any
 
 from aiohttp import WSMsgType, web
 
 from executive.view.live.board import Board
+from executive.view.live.messages import Wish
 from executive.view.live.tunnel import Tunnel
 
 PERIOD = 1 / 8
@@ -43,7 +43,6 @@ _FILES = {
 }
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
-Wish = Callable[[Mapping[str, Any]], None]
 
 
 class Server:
@@ -57,7 +56,9 @@ class Server:
         port: The server's.
     """
 
-    def __init__(self, board: Board, tunnel: Tunnel, wish: Wish, token: str, port: int) -> None:
+    def __init__(
+        self, board: Board, tunnel: Tunnel, wish: Callable[[Wish], None], token: str, port: int
+    ) -> None:
         self._board = board
         self._wish = wish
         self._token = token
@@ -121,7 +122,7 @@ class Server:
         try:
             async for message in socket:
                 wish = understood(message.data) if message.type is WSMsgType.TEXT else None
-                if wish == {"do": "spare"}:
+                if wish is not None and wish.do == "spare":
                     self._watchers[socket] = True
                     self._tell_watched()
                 elif wish is not None:
@@ -134,7 +135,7 @@ class Server:
     def _tell_watched(self) -> None:
         """Tell the run how many watch, and whether it should be sparing with one of them."""
         sparing = any(self._watchers.values())
-        self._wish({"do": "watched", "by": len(self._watchers), "sparing": sparing})
+        self._wish(Wish("watched", watchers=len(self._watchers), is_sparing=sparing))
 
 
 def refusal(request: web.Request, token: str, host: str) -> str:
@@ -154,8 +155,8 @@ def refusal(request: web.Request, token: str, host: str) -> str:
     return ""
 
 
-def understood(text: str) -> dict[str, Any] | None:
-    """Return what a browser wants, or None for something that nobody can want."""
+def understood(text: str) -> Wish | None:
+    """Return the wish in a message of a browser, or None if the message is invalid."""
     try:
         wish = json.loads(text)
     except ValueError:
@@ -163,7 +164,7 @@ def understood(text: str) -> dict[str, Any] | None:
     if not isinstance(wish, dict):
         return None
     if wish.get("do") in WISHES:
-        return {"do": wish["do"]}
+        return Wish(wish["do"])
     if wish.get("do") == "request" and isinstance(wish.get("word"), str):
-        return {"do": "request", "word": wish["word"]}
+        return Wish("request", wish["word"])
     return None

@@ -6,13 +6,12 @@ import shlex
 from pathlib import Path
 
 from executive.mission.text.files import shipped_folder
-from executive.record.entry import OldEvent, old_entry
-from executive.record.journal import read_journal, start_of
+from executive.record.diagnosis.text import resume_command
+from executive.record.journal import ending_of, read_journal, start_of
 from executive.record.recorded_mission import read_tree
 from executive.record.result import ENDED, read_result, requests_of
 from executive.record.run_directory import RunDirectory
-from executive.view.items import ItemTable
-from executive.view.report.course import spans
+from executive.record.timeline.timeline import Timeline
 from executive.view.report.pictures import pictures
 from executive.view.report.shares import shares
 from executive.view.terminal.summary import repeat_command
@@ -29,20 +28,19 @@ class Facts:
 
     Attributes:
         path: The run directory.
-        start: The journal's first entry.
-        result: As `result.json` holds it; else what the journal tells of the end, which may be nothing.
-        status: `SUCCESS`, `FAILURE`, `FAULT`, `HALTED` or `CUT OFF`.
-        end: End of the record, on the run's clock [s].
+        start: Start of the run.
+        result: Content of `result.json`, or None if it does not belong to the journal.
+        ended: The result, else the end in the journal, else None.
+        status: `SUCCESS`, `INCOMPLETE`, `FAILURE`, `FAULT`, `HALTED` or `CUT OFF`.
         nodes: The tree.
-        course: Every time that a node ran.
-        objects: Last state of each object, phantoms left out.
+        timeline: Timeline of the run.
+        objects: Last change of each item, without phantoms.
         shares: Time by object and activity.
         pictures: Pictures of decisions and failures.
         requests: Requests of the operator.
-        disturbances: Disturbances brought about in the run, each with its time [s].
         repeat: The command that repeats the run.
-        resume: The command that goes on with it; "" for a run that came to its end.
-        replay: The command that decides it again.
+        resume: The command that resumes it; "" for a run that cannot be resumed.
+        replay: The command that replays it.
 
     Raises:
         InputError: The directory lacks the journal or the tree, or holds a run that had not begun.
@@ -51,30 +49,21 @@ class Facts:
     def __init__(self, path: Path) -> None:
         directory = RunDirectory(path)
         events = read_journal(directory.journal)
-        entries = [old_entry(timed) for timed in events]
-        start = start_of(events, path, "there is nothing to report")
-        table = ItemTable()
-        for entry in entries:
-            if entry["kind"] == "item":
-                table(OldEvent("item", entry["tick"], entry["clock"], entry))
-        decisions = [(entry["clock"], entry["item"]) for entry in entries if entry["kind"] == "decision"]
         self.path = path
-        self.start = start
+        self.start = start_of(events, path, "there is nothing to report")
         self.result = read_result(directory, events)
-        self.status = self.result.get("status", CUT_OFF)
-        self.end = entries[-1]["clock"]
+        self.ended = self.result or ending_of(events)
+        self.status = CUT_OFF if self.ended is None else self.ended.status
         self.nodes = read_tree(directory.tree)
-        self.course = spans(entries)
-        self.objects = [row for row in table.rows if row.state != "phantom"]
-        self.shares = shares(self.course, self.nodes, decisions, self.end)
-        self.pictures = pictures(directory.frames, [row.item for row in table.rows])
-        self.requests = requests_of(events)
-        self.disturbances = [
-            (each["clock"], each["what"]) for each in entries if each["kind"] == "disturbance"
-        ]
-        file = Path(start.file)
+        self.timeline = Timeline.of(events)
+        items = self.timeline.items.now()
+        self.objects = [item for item in items if item.state != "phantom"]
+        self.shares = shares(self.timeline, self.nodes)
+        self.pictures = pictures(directory.frames, [item.item for item in items])
+        self.requests = requests_of(self.timeline)
+        file = Path(self.start.file)
         mission = file.stem if file.parent == shipped_folder() else str(file)
-        self.repeat = repeat_command(mission, start.seed, start.overrides, self.requests, directory.scene)
-        ended = self.status in ENDED
-        self.resume = "" if ended else shlex.join(["executive", "run", "--resume", str(path)])
+        origin = mission, self.start.seed, self.start.overrides
+        self.repeat = repeat_command(*origin, self.requests, directory.scene)
+        self.resume = "" if self.status in ENDED else resume_command(str(path))
         self.replay = shlex.join(["executive", "replay", str(path)])

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from math import ceil
-from typing import Any
 
 from executive.mission.outline import OutlineNode
-from executive.view.report.course import Span, by_node, counts, last_failure
+from executive.record.timeline.activation import Activation, by_node, count_ends, last_failure
+from executive.record.timeline.timeline import Timeline
 from executive.view.text import extent, fitted, render
 
 SHORTEST, LONGEST = 900.0, 6000.0
@@ -24,14 +25,40 @@ _CLOCK = 55.0
 _WORST = ("FAILURE", "RUNNING", "INVALID", "SUCCESS")
 
 
-def timeline(course: Sequence[Span], nodes: Sequence[OutlineNode], end: float) -> str:
-    """Return the timeline as an SVG document, up to the time `end` [s].
+@dataclass(frozen=True)
+class Bar:
+    """Bar of a lane.
 
-    The words of a bar are shown where the pointer rests on it. Activations that cannot be told apart in a
-    lane are one bar, in the colour of the worst of them, so the size of the timeline has a bound however long
+    Attributes:
+        start, end: Times of its ends [s].
+        kind: The worst status of its activations, in lower case.
+        words: Text that is shown while the pointer rests on the bar.
+    """
+
+    start: float
+    end: float
+    kind: str
+    words: str
+
+
+@dataclass(frozen=True)
+class Lane:
+    """Lane of a node: the name, its left end [pixel] and the bars."""
+
+    node: OutlineNode
+    name: str
+    x: int
+    bars: Sequence[Bar]
+
+
+def draw_lanes(timeline: Timeline, nodes: Sequence[OutlineNode]) -> str:
+    """Return the activations of a run as an SVG document, up to its last event.
+
+    The words of a bar are shown while the pointer rests on it. Activations that cannot be told apart in a
+    lane are one bar, in the colour of the worst of them, so the size of the document has a bound however long
     the run was.
     """
-    ran = by_node(course)
+    ran, end = by_node(timeline.activations), timeline.clock
     shown = [node for node in nodes if node.path in ran]
     names = {node.path: "".join(fitted(node.name, _COLUMNS)) for node in shown}
     left = max((_STEP * node.depth + extent(names[node.path], _LETTERS) for node in shown), default=0.0) + 12
@@ -39,13 +66,9 @@ def timeline(course: Sequence[Span], nodes: Sequence[OutlineNode], end: float) -
     scale = length / max(end, 1e-9)
     bars = _bars(ran, scale)
     lanes = [
-        {
-            "kind": "skill" if node.kind == "skill" else "control",
-            "path": node.path,
-            "name": names[node.path],
-            "x": round(_STEP * node.depth),
-            "bars": [_bar(node, blot) for blot in bars[node.path]],
-        }
+        Lane(
+            node, names[node.path], round(_STEP * node.depth), [_bar(node, blot) for blot in bars[node.path]]
+        )
         for node in shown
     ]
     ticks = _ticks(end, scale)
@@ -60,7 +83,7 @@ def _ticks(end: float, scale: float) -> Iterator[float]:
         yield number * step
 
 
-def _bars(lanes: Mapping[str, Sequence[Span]], scale: float) -> dict[str, list[list[Span]]]:
+def _bars(lanes: Mapping[str, Sequence[Activation]], scale: float) -> dict[str, list[list[Activation]]]:
     """Return what each bar of each lane stands for."""
     coarse = 1
     while True:
@@ -70,27 +93,27 @@ def _bars(lanes: Mapping[str, Sequence[Span]], scale: float) -> dict[str, list[l
         coarse *= 2
 
 
-def _told_apart(lane: Sequence[Span], scale: float) -> Iterator[list[Span]]:
-    """Yield the spans of a lane, together those that would be one blot to the eye."""
-    blot: list[Span] = []
-    for span in lane:
+def _told_apart(lane: Sequence[Activation], scale: float) -> Iterator[list[Activation]]:
+    """Yield the activations of a lane, together those that would be one blot to the eye."""
+    blot: list[Activation] = []
+    for one in lane:
         if blot and (
-            (span.began - blot[-1].ended) * scale >= APART or (span.ended - blot[0].began) * scale >= BLOT
+            (one.start - blot[-1].end) * scale >= APART or (one.end - blot[0].start) * scale >= BLOT
         ):
             yield blot
             blot = []
-        blot.append(span)
+        blot.append(one)
     if blot:
         yield blot
 
 
-def _bar(node: OutlineNode, blot: Sequence[Span]) -> dict[str, Any]:
-    """Return the times of a bar, its class, which is the worst status in it, and its words."""
-    began, ended = blot[0].began, blot[-1].ended
-    items = {span.item for span in blot}
+def _bar(node: OutlineNode, blot: Sequence[Activation]) -> Bar:
+    """Return the bar of activations that look like one."""
+    start, end = blot[0].start, blot[-1].end
+    items = {one.item for one in blot}
     item = f" of {blot[0].item}" if blot[0].item and len(items) == 1 else ""
-    how = blot[0].status if len(blot) == 1 else counts(blot)
-    when = f"{began:.2f} s to {ended:.2f} s ({ended - began:.2f} s)"
+    how = blot[0].status if len(blot) == 1 else count_ends(blot)
+    when = f"{start:.2f} s to {end:.2f} s ({end - start:.2f} s)"
     words = "\n".join(filter(None, (f"{node.name}{item}: {how}", when, last_failure(blot))))
-    worst = min((span.status for span in blot), key=_WORST.index)
-    return {"began": began, "ended": ended, "kind": worst.lower(), "words": words}
+    worst = min((one.status for one in blot), key=_WORST.index)
+    return Bar(start, end, worst.lower(), words)

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from executive.mission.outline import OutlineNode
-from executive.view.report.course import Span
+from executive.record.timeline.activation import Activation
+from executive.record.timeline.timeline import Timeline
 
 LOOK, RETRY, WAITING = "look", "retry", "waiting"
 """Activities that are no skill's: to find out what to do next; attempts that failed, and what it took to try
@@ -33,26 +34,23 @@ class Shares:
     rows: Mapping[str, Mapping[str, float]]
 
 
-def shares(
-    course: Sequence[Span], nodes: Sequence[OutlineNode], decisions: Sequence[tuple[float, str]], end: float
-) -> Shares:
-    """Return where the time went, from the start of the run to its `end` [s].
+def shares(timeline: Timeline, nodes: Sequence[OutlineNode]) -> Shares:
+    """Return the shares of the time from the start of a run to the last event of its timeline.
 
     Where skills ran at the same time, it is that of the one that began first and was about an object.
 
     Args:
-        course: Every time that a node ran.
+        timeline: Timeline of the run, with its history.
         nodes: The tree.
-        decisions: When it was decided for which object, in order.
-        end: Not before the end of anything that ran.
     """
     skills = {node.path: node for node in nodes if node.kind == "skill"}
-    ran = [span for span in course if span.node in skills]
+    ran = [one for one in timeline.activations if one.node in skills]
+    decisions = timeline.selections
     spent: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))
     seen: dict[str, None] = {}
     retried = _retried(ran, skills, decisions)
-    for began, ended, running in _slices(ran, end):
-        about = next((span for span in running if span.item), None)
+    for began, ended, running in _slices(ran, timeline.clock):
+        about = next((one for one in running if one.item), None)
         if about is not None:
             item, activity = about.item, skills[about.node].skill.lower()
         else:
@@ -70,21 +68,21 @@ def shares(
     return Shares(tuple(name for name in known if name in used), {item: dict(spent[item]) for item in order})
 
 
-def _slices(ran: Sequence[Span], end: float) -> Iterator[tuple[float, float, list[Span]]]:
+def _slices(ran: Sequence[Activation], end: float) -> Iterator[tuple[float, float, list[Activation]]]:
     """Yield the time between any two changes, with the skills that run then, in the order they began."""
-    to_come = deque(sorted((span for span in ran if span.ended > span.began), key=lambda span: span.began))
-    times = sorted({0.0, end, *(time for span in ran for time in (span.began, span.ended))})
-    running: list[Span] = []
+    to_come = deque(sorted((one for one in ran if one.end > one.start), key=lambda one: one.start))
+    times = sorted({0.0, end, *(time for one in ran for time in (one.start, one.end))})
+    running: list[Activation] = []
     for began, ended in pairwise(times):
-        running = [span for span in running if span.ended > began]
-        while to_come and to_come[0].began <= began:
+        running = [one for one in running if one.end > began]
+        while to_come and to_come[0].start <= began:
             running.append(to_come.popleft())
         yield began, ended, running
 
 
-def _between(running: Sequence[Span], skills: Mapping[str, OutlineNode]) -> str:
+def _between(running: Sequence[Activation], skills: Mapping[str, OutlineNode]) -> str:
     """Return what is done while no skill is about an object."""
-    nodes = [skills[span.node] for span in running]
+    nodes = [skills[one.node] for one in running]
     return LOOK if any(node.senses or "arm" in node.uses for node in nodes) else WAITING
 
 
@@ -95,19 +93,19 @@ def _next_item(decisions: Sequence[tuple[float, str]], now: float) -> str:
 
 
 def _retried(
-    ran: Sequence[Span], skills: Mapping[str, OutlineNode], decisions: Sequence[tuple[float, str]]
+    ran: Sequence[Activation], skills: Mapping[str, OutlineNode], decisions: Sequence[tuple[float, str]]
 ) -> dict[str, tuple[float, float]]:
     """Return from when to when each object with a failed attempt was tried without success."""
     failed = {
-        span.item: span.ended
-        for span in ran
-        if span.item and span.status == "FAILURE"
-        if skills[span.node].uses and not skills[span.node].senses
+        one.item: one.end
+        for one in ran
+        if one.item and one.status == "FAILURE"
+        if skills[one.node].uses and not skills[one.node].senses
     }
     retried = {}
     for item, last in failed.items():
         decided = [time for time, name in decisions if name == item]
-        first = min(decided, default=min(span.began for span in ran if span.item == item))
+        first = min(decided, default=min(one.start for one in ran if one.item == item))
         # Looks that led to the next attempt are the price of the failed one.
         retried[item] = first, next((time for time in decided if time > last), last)
     return retried

@@ -1,48 +1,48 @@
-"""One plain line for everything that matters, for logs and pipes."""
+"""Plain lines about a run, for logs and pipes."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, TextIO
 
-from executive.events import TimedEvent
+from executive import events
 from executive.mission.outline import outline
-from executive.record.entry import OldEvent as Event
-from executive.record.entry import old_event
-from executive.view.items import ItemTable
+from executive.record.timeline.timeline import Timeline
 from executive.view.tree.outline import skills
 
 if TYPE_CHECKING:
     from executive.run.run import Run
 
-_ENDS = {"SUCCESS": "done", "FAILURE": "failed", "INVALID": "halted"}
+ENDS = {"SUCCESS": "done", "FAILURE": "failed", "INVALID": "halted"}
+"""Words for the status of a node that has ended."""
 
 
 class Lines:
     """Writes a line when a skill starts or ends, a control node decides, or an item's state changes.
 
-    How control nodes start and end is not told: it follows from their skills.
+    Starts and ends of control nodes follow from those of their skills.
+
+    Attributes:
+        timeline: Timeline of the run.
     """
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
         self._names: dict[str, str] = {}
         self._skills: dict[str, str] = {}
-        self.items = ItemTable()
+        self.timeline = Timeline(history=False)
 
     def open(self, run: Run) -> None:
-        """Learn the names of the nodes; a log has no keys to want anything of the run."""
+        """Read the names of the nodes."""
         nodes = outline(run.root)
         self._names = {node.path: node.name for node in nodes}
         self._skills = skills(nodes)
 
-    def __call__(self, timed: TimedEvent) -> None:
-        """Write the line that `event` deserves, if any."""
-        event = old_event(timed)
-        text = self._text(event)
-        if text:
-            self._stream.write(f"{event.clock:9.2f} s  {text}\n")
+    def __call__(self, timed: events.TimedEvent) -> None:
+        """Write the line of an event, if it has one."""
+        if text := self._text(timed.event):
+            self._stream.write(f"{timed.clock:9.2f} s  {text}\n")
             self._stream.flush()
+        self.timeline(timed)
 
     def close(self) -> None:
         """Leave the stream as it is: every line is out already."""
@@ -51,37 +51,39 @@ class Lines:
         """Write `sentence` on a line of its own."""
         self._stream.write(f"note: {sentence}\n")
 
-    def _text(self, event: Event) -> str:
-        data = event.data
-        if event.kind == "run":
-            return f"{data.get('mission', 'mission')} starts, seed {data.get('seed', 0)}"
-        if event.kind == "resume":
-            return "taken up again: what was under way begins anew"
-        if event.kind == "disturbance":
-            return f"disturbance: {data['what']}"
-        if event.kind == "status":
-            return self._transition(data)
-        if event.kind == "choice":
-            after = f", after {data['reason']}" if data["reason"] else ""
-            return f"{self._names[data['node']]}: {data['choice']}{after}"
-        if event.kind == "request":
-            return "request: " + ", ".join(f"{key} {value}" for key, value in data.items())
-        if event.kind == "item":
-            return self._item(event)
+    def _text(self, event: events.Event) -> str:
+        match event:
+            case events.RunStarted():
+                return f"{event.mission} starts, seed {event.seed}"
+            case events.RunResumed():
+                return "resumed: the nodes that were running start again"
+            case events.FaultInjected():
+                return f"injected fault: {event.name}"
+            case events.NodeStarted() if event.skill:
+                return f"{self._named(event)} ..."
+            case events.NodeEnded() if event.skill:
+                why = "".join(f": {text}" for text in (event.reason, event.message) if text)
+                return f"{self._named(event)} {ENDS[event.status]}{why}"
+            case events.BranchChosen():
+                after = f", after {event.reason}" if event.reason else ""
+                return f"{self._names[event.node]}: {event.choice}{after}"
+            case events.RequestGiven():
+                return f"request: {event.wanted}"
+            case events.ItemChanged():
+                return self._change(event)
         return ""
 
-    def _transition(self, data: Mapping[str, Any]) -> str:
-        if data["node"] not in self._skills:
-            return ""
-        name = self._skills[data["node"]] + (f" [{data['item']}]" if data.get("item") else "")
-        if data["status"] == "RUNNING":
-            return f"{name} ..."
-        why = ": ".join(str(data[key]) for key in ("reason", "message") if data.get(key))
-        return f"{name} {_ENDS[data['status']]}" + (f": {why}" if why else "")
+    def _named(self, event: events.NodeStarted | events.NodeEnded) -> str:
+        return self._skills[event.node] + (f" [{event.item}]" if event.item else "")
 
-    def _item(self, event: Event) -> str:
-        row = self.items(event)
-        if row is None:
+    def _change(self, now: events.ItemChanged) -> str:
+        """Return the line of an item; "" if only its position or its counts changed."""
+        known = self.timeline.items.by_name.get(now.item)
+        if known is not None and _shown(known.now) == _shown(now):
             return ""
-        where = f" in {row.bin}" if row.state == "placed" and row.bin else ""
-        return f"{row.item} {row.state}{where}" + (f": {row.why}" if row.why else "")
+        where = f" in {now.bin}" if now.state == "placed" and now.bin else ""
+        return f"{now.item} {now.state}{where}" + (f": {now.why}" if now.why else "")
+
+
+def _shown(item: events.ItemChanged) -> tuple[str, ...]:
+    return item.label, item.state, item.bin, item.why

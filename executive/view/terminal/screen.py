@@ -11,12 +11,11 @@ from rich.table import Table
 from rich.text import Text
 
 from executive.errors import escape_control_characters
-from executive.events import TimedEvent
+from executive.events import OperatorAsked, RequestGiven, TimedEvent
 from executive.mission.outline import OutlineNode, outline
-from executive.record.entry import old_event
+from executive.record.timeline.timeline import Timeline
 from executive.run.run import Run
 from executive.run.run_control import RunControl
-from executive.view.items import ItemTable
 from executive.view.terminal.keys import HELP, HELP_PAUSED, Keys
 from executive.view.tree.outline import branches, opened
 
@@ -40,6 +39,9 @@ class Terminal:
     Args:
         console: The terminal.
         keyboard: File descriptor of the terminal's keyboard; None: keys do nothing.
+
+    Attributes:
+        timeline: Timeline of the run.
     """
 
     def __init__(self, console: Console, keyboard: int | None = None) -> None:
@@ -48,12 +50,8 @@ class Terminal:
         self._control: RunControl | None = None
         self._keys: Keys | None = None
         self._outline: Sequence[OutlineNode] = ()
-        self._status: dict[str, str] = {}
-        self._why: dict[str, str] = {}
-        self._header = ""
-        self._clock = 0.0
         self._lock = threading.Lock()
-        self.items = ItemTable()
+        self.timeline = Timeline(history=False)
         self._live = Live(
             console=console, get_renderable=self.render, refresh_per_second=REDRAWS_PER_SECOND, transient=True
         )
@@ -68,21 +66,10 @@ class Terminal:
 
     def __call__(self, timed: TimedEvent) -> None:
         """Show an event; step aside while the operator is asked something."""
-        event = old_event(timed)
-        if event.kind in ("asking", "request"):
-            self._show(event.kind == "request")
-        data = event.data
+        if isinstance(timed.event, OperatorAsked | RequestGiven):
+            self._show(isinstance(timed.event, RequestGiven))
         with self._lock:
-            self._clock = event.clock
-            if event.kind == "run":
-                self._header = f"{data.get('mission', '')}  seed {data.get('seed', 0)}"
-            elif event.kind == "status":
-                node = str(data.get("node", ""))
-                self._status[node] = str(data.get("status", ""))
-                why = str(data.get("reason") or data.get("item") or "")
-                self._why[node] = escape_control_characters(why)
-            elif event.kind == "item":
-                self.items(event)
+            self.timeline(timed)
 
     def close(self) -> None:
         """Take the view away; what remains to be said is the summary's."""
@@ -98,7 +85,9 @@ class Terminal:
         with self._lock:
             page = Table.grid(padding=(0, 4))
             page.add_row(self._tree(), self._items())
-            head = Text(f"{self._header}  {self._clock:.1f} s", style="bold")
+            started = self.timeline.started
+            title = "" if started is None else f"{started.mission}  seed {started.seed}"
+            head = Text(f"{title}  {self.timeline.clock:.1f} s", style="bold")
             if self._keys is not None:
                 paused = self._control is not None and self._control.paused
                 head.append(f"   {HELP_PAUSED if paused else HELP}", style="yellow" if paused else "dim")
@@ -114,20 +103,22 @@ class Terminal:
 
     def _tree(self) -> RenderableType:
         """Return the running path and its surroundings: a whole mission is taller than a terminal."""
-        shown = opened(self._outline, {path for path, status in self._status.items() if status == "RUNNING"})
+        shown = opened(self._outline, {running.node for running in self.timeline.running()})
         lines = Text()
         for node, branch in zip(shown, branches(shown), strict=True):
-            mark, style = _MARKS.get(self._status.get(node.path, ""), ("·", "dim"))
+            last = self.timeline.nodes.get(node.path)
+            mark, style = _MARKS.get(last.status if last else "", ("·", "dim"))
+            note = escape_control_characters(last.note) if last else ""
             lines.append(branch, style="dim")
             lines.append(f"{mark} {node.name}", style=style)
-            lines.append(f"  {self._why.get(node.path, '')}\n", style="dim")
+            lines.append(f"  {note}\n", style="dim")
         return lines
 
     def _items(self) -> RenderableType:
         table = Table(box=None, header_style="dim", padding=(0, 1))
         for column in ("item", "class", "state", "bin"):
             table.add_column(column)
-        for row in self.items.rows:
+        for row in self.timeline.items.now():
             state = Text(row.state, style=_STATES.get(row.state, ""))
             table.add_row(Text(row.item), Text(row.label), state, Text(row.bin))
         return table

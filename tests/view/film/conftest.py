@@ -23,4 +23,4 @@ def filmed_run(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
     skills = discover()
     loaded = load_mission(folder / "bring_one.yaml", skills)
     result = record_run(loaded, skills, RunOptions(5, kind=oracle_cell()), folder / "runs")
-    return RunDirectory(Path(result["run"]))
+    return RunDirectory(Path(result.run))

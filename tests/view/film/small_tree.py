@@ -1,7 +1,10 @@
-"""A small tree, and what a journal says of its nodes."""
+"""A small tree, and events of its nodes."""
 
 from __future__ import annotations
 
+from events import at, skill_ended, skill_started
+
+from executive.events import NodeStarted, TimedEvent
 from executive.mission.outline import OutlineNode
 
 
@@ -13,5 +16,9 @@ def node(path: str, depth: int, kind: str = "skill") -> OutlineNode:
 NODES = [node("tree", 0, "sequence"), node("tree/Grasp", 1), node("tree/Transit", 1)]
 
 
-def status(tick: int, path: str, now: str, **data):
-    return {"tick": tick, "clock": tick / 240, "kind": "status", "node": path, "status": now, **data}
+def started(tick: int, path: str, item: str = "") -> TimedEvent:
+    return at(tick, skill_started(path, item) if item else NodeStarted(path))
+
+
+def ended(tick: int, path: str, status: str = "SUCCESS", item: str = "", **fields: str) -> TimedEvent:
+    return at(tick, skill_ended(path, status, item, **fields))

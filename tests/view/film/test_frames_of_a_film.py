@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from events import run_started
+from events import item_changed, run_ended, run_started
 from PIL import Image, ImageColor
-from small_tree import NODES, node, status
+from small_tree import NODES, ended, node, started
 
+from executive.record.result import ItemCounts, Result
 from executive.view.film.course import Course
 from executive.view.film.film import shown_steps
 from executive.view.film.ink import BACK, FAILURE, FAINT, RUNNING, SUCCESS, clipped, font, put_mark, wrapped
 from executive.view.film.page import draw_ending, draw_page, ending_of
 from executive.view.film.panel import MOST, draw_branch, draw_items, fitted, height, kept
-from executive.view.items import Row
 
 
 def course_of(*entries) -> Course:
@@ -29,8 +30,7 @@ def test_what_never_ran_gives_way_first_then_what_rests() -> None:
         node("t", 0, "try"), node("t/A", 1), node("t/do", 1, "sequence"), node("t/do/B", 2), node("t/C", 1)
     ]  # fmt: skip
     course = course_of(
-        status(0, "t", "RUNNING"), status(0, "t/A", "SUCCESS"), status(1, "t/do", "RUNNING"),
-        status(1, "t/do/B", "RUNNING"),
+        started(0, "t"), started(0, "t/A"), ended(0, "t/A"), started(1, "t/do"), started(1, "t/do/B"),
     )  # fmt: skip
     names = [[one.path for one in fitted(nodes, course, rows)] for rows in (9, 4, 3)]
     assert names == [
@@ -40,10 +40,10 @@ def test_what_never_ran_gives_way_first_then_what_rests() -> None:
 
 def test_nothing_is_drawn_outside_of_its_box() -> None:
     deep = [node("/".join("abcdefghijklmnop"[: n + 1]) + "long" * n, n, "sequence") for n in range(16)]
-    course = course_of(*(status(0, one.path, "RUNNING", reason="x" * 200) for one in deep))
+    course = course_of(*(started(0, one.path, "x" * 200) for one in deep))
     page = Image.new("RGB", (400, 300), BACK)
     draw_branch(page, (20, 20, 300, 220), deep, course)
-    rows = [Row("item-" + "9" * 60, "class" * 9, "placed", "bin" * 30, "")] * 30
+    rows = [item_changed("item-" + "9" * 60, "placed", label="class" * 9, bin="bin" * 30)] * 30
     draw_items(page, (20, 225, 300, 300), rows[:2], {})
     drawn = np.argwhere((np.asarray(page) != np.asarray(Image.new("RGB", (1, 1), BACK))).any(axis=2))
     (top, left), (bottom, right) = drawn.min(axis=0), drawn.max(axis=0)
@@ -51,7 +51,7 @@ def test_nothing_is_drawn_outside_of_its_box() -> None:
 
 
 def test_settled_items_give_way_to_those_still_to_do() -> None:
-    rows = [Row(f"cube-{n}", "cube", "placed" if n % 2 else "seen", "", "") for n in range(MOST + 3)]
+    rows = [item_changed(f"cube-{n}", "placed" if n % 2 else "seen") for n in range(MOST + 3)]
     names = [row.item for row in kept(rows)]
     assert len(names) == MOST
     assert not {"cube-1", "cube-3", "cube-5"} & set(names)
@@ -85,8 +85,11 @@ def test_a_mark_has_the_colour_of_its_status_and_covers_so_much(status, colour, 
     assert share[5:16, 5:16].sum() == pytest.approx(share.sum())
 
 
-ITEMS = {"seen": 6, "placed": 5, "rejected": 1, "lost": 0, "phantom": 0}
-RESULT = {"status": "SUCCESS", "message": "", "items": ITEMS, "robot_time_s": 15.54, "story": None}
+RESULT = Result(
+    mission="sort", seed=5, status="SUCCESS", reason="", message="", node="",
+    items=ItemCounts(seen=6, placed=5, rejected=1), robot_time_s=15.54,
+)  # fmt: skip
+STORY = SimpleNamespace(verdict="Grasp failed: no seal")
 
 
 @pytest.mark.parametrize(
@@ -94,11 +97,11 @@ RESULT = {"status": "SUCCESS", "message": "", "items": ITEMS, "robot_time_s": 15
     [
         (RESULT, ("SUCCESS", "", "6 seen, 5 placed, 1 rejected; 15.5 s")),
         (
-            {**RESULT, "status": "FAILURE", "message": "x", "story": {"verdict": "Grasp failed: no seal"}},
+            replace(RESULT, status="FAILURE", message="x", story=STORY),
             ("FAILURE", "Grasp failed: no seal", "6 seen, 5 placed, 1 rejected; 15.5 s"),
         ),
-        ({"status": "HALTED", "message": "by the user"}, ("HALTED", "by the user", "")),
-        ({}, ("CUT OFF", "the record ends here; nothing says how the run would have ended", "")),
+        (run_ended("HALTED", message="by the user"), ("HALTED", "by the user", "")),
+        (None, ("CUT OFF", "the record ends here; nothing says how the run would have ended", "")),
     ],
 )
 def test_an_end_is_told_by_the_story_else_the_message_and_the_items(result, ending) -> None:
@@ -108,7 +111,7 @@ def test_an_end_is_told_by_the_story_else_the_message_and_the_items(result, endi
 def test_the_end_stands_on_the_picture_and_leaves_the_page_as_it_was() -> None:
     page = Image.new("RGB", (1280, 720), "#808080")
     message = "a long sentence about what went wrong " * 12
-    shown = draw_ending(page, {**RESULT, "status": "FAILURE", "message": message})
+    shown = draw_ending(page, replace(RESULT, status="FAILURE", message=message))
     assert page.getcolors() == [(1280 * 720, (128, 128, 128))]
     (top, left), (bottom, right) = (
         each(np.argwhere((np.asarray(shown) != 128).any(axis=2)), axis=0) for each in (np.min, np.max)
@@ -128,7 +131,7 @@ def test_steps_are_shown_at_even_times_up_to_the_last(steps, each, shown) -> Non
 
 def test_a_page_shows_picture_camera_caption_and_how_far_the_run_is(tmp_path) -> None:
     Image.new("RGB", (640, 556), "white").save(tmp_path / "000000_cube-1.jpg")
-    entries = [status(0, "tree", "RUNNING"), status(1, "tree/Grasp", "RUNNING", item="cube-1")]
+    entries = [started(0, "tree"), started(1, "tree/Grasp", "cube-1")]
     course = Course(entries, NODES, [tmp_path / "000000_cube-1.jpg"])
     course.go_to(240, 1.0)
     source = SimpleNamespace(start=run_started(mission="sort"), items=0, bins={}, nodes=NODES)

@@ -16,6 +16,7 @@ from executive.cells.sim.shots import steps_in
 from executive.cells.sim.spawn import first_world
 from executive.cells.sim.tool import SuctionTool
 from executive.errors import InputError
+from executive.events import NodeEnded, ToolCommanded
 from executive.record.run_directory import RunDirectory
 from executive.view.film.course import Course
 from executive.view.film.film import film
@@ -56,9 +57,11 @@ def test_a_run_becomes_a_film(filmed_run: RunDirectory, tmp_path: Path) -> None:
 
 def test_picture_and_tree_are_in_step(filmed_run: RunDirectory) -> None:
     source = Source(filmed_run)
-    entries = source.entries
-    (grasped,) = (e["tick"] for e in entries if e.get("node") == "tree/Grasp" and e["status"] == "SUCCESS")
-    (closed,) = (e["tick"] for e in entries if e["kind"] == "intent" and e["action"] == "close")
+    events = source.events
+    (grasped,) = (
+        one.tick for one in events if isinstance(one.event, NodeEnded) and one.event.skill == "Grasp"
+    )
+    (closed,) = (one.tick for one in events if one.event == ToolCommanded("close"))
     world = first_world(source.config, source.start.seed)
     tool = SuctionTool(world, source.config.tool)
     rebuilding, holds = Rebuilding(world, tool), [False]
@@ -67,25 +70,26 @@ def test_picture_and_tree_are_in_step(filmed_run: RunDirectory) -> None:
         if command.kind == STEP:
             holds.append(tool.holding)
     world.close()
-    course = Course(entries, source.nodes, [])
+    course = Course(events, source.nodes, [])
     course.go_to(grasped, 0.0)
-    assert course.status["tree/Grasp"] == "SUCCESS"
-    assert {row.item: row.state for row in course.items}[course.beside["tree/Grasp"]] == "held"
+    grasp = course.timeline.nodes["tree/Grasp"]
+    assert grasp.status == "SUCCESS"
+    assert course.timeline.items.by_name[grasp.item].now.state == "held"
     assert holds[grasped]
     assert not any(holds[: closed + 1])
     # The last thing that the journal tells of happened after the last step.
-    assert entries[-1]["tick"] == steps_in(filmed_run.world) == len(holds) - 1
+    assert events[-1].tick == steps_in(filmed_run.world) == len(holds) - 1
 
 
 def test_the_source_is_the_record_and_may_be_cut_off(copy: RunDirectory) -> None:
     source = Source(copy)
     assert (source.start.mission, source.start.seed) == ("bring_one", 5)
     assert (source.config.cell, source.nodes[0].path) == ("overhead", "tree")
-    assert (source.result["status"], source.items) == ("SUCCESS", 6)
+    assert (source.result.status, source.items) == ("SUCCESS", 6)
     lines = copy.journal.read_text().splitlines(keepends=True)
     copy.journal.write_text("".join(lines[:-1]))
     copy.result.write_text("{")
-    assert Source(copy).result == {}
+    assert Source(copy).result is None
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ import signal
 import threading
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import aiohttp
@@ -18,15 +17,19 @@ import numpy as np
 import pytest
 from events import at, frame_searched
 
-from executive.cell.frame import FrameTaken
+from executive.cell.frame import Frame, FrameTaken
 from executive.cells.fake.cell import FakeCell
 from executive.events import RunEnded
+from executive.geometry import Pose
 from executive.mission.load import load_mission
 from executive.plugins import discover
+from executive.record.result import Result
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
 from executive.view.live.page import MAX_QUEUED_NEWS, LivePage
 from tests.record.conftest import MISSION
+
+RESULT = Result(mission="sort", seed=3, status="SUCCESS", reason="", message="", node="", run="runs/x")
 
 
 class Watched:
@@ -98,7 +101,7 @@ def test_a_watcher_sees_a_first_step_then_the_run_to_its_end(tmp_path: Path) -> 
         assert shown["run"] == {"mission": "bring_one", "seed": 3}
         assert {item["state"] for item in shown["items"].values()} >= {"placed"}
         assert shown["look"]["source"].startswith("data:image/jpeg;base64,")
-        watched.page.finish({"status": "SUCCESS", "run": "runs/x"}, "runs/x/report.html")
+        watched.page.finish(RESULT, "runs/x/report.html")
         shown = await watched.until(lambda shown: "result" in shown)
         assert shown["result"]["report"] == "runs/x/report.html"
 
@@ -153,7 +156,7 @@ def test_a_page_that_died_costs_the_run_nothing(tmp_path: Path) -> None:
     page.open(run)
     page._server.kill()
     assert run.execute().status == "SUCCESS"
-    page.finish({"status": "SUCCESS"})
+    page.finish(RESULT)
     assert page.problem == "the page ended before the run: exit status -9"
     run.close()
 
@@ -166,12 +169,12 @@ def test_a_page_that_hangs_is_told_no_more_than_so_much_and_costs_a_few_seconds(
     page._server.send_signal(signal.SIGSTOP)
     page._watched = 1
     image = np.zeros((480, 640, 3), np.uint8)
-    frame = SimpleNamespace(image=image, visible=None, id=1, camera="overhead", stamp=0.0)
+    frame = Frame(1, "overhead", image, None, np.eye(3), Pose.identity(), 0.0, None, 0)
     for tick in range(200):
         page(at(tick, FrameTaken(frame)))
         page(at(tick, frame_searched()))
     assert page._queue.qsize() <= MAX_QUEUED_NEWS
-    page.finish({"status": "SUCCESS"})
+    page.finish(RESULT)
     assert page._server.returncode == -signal.SIGKILL
 
 
@@ -182,7 +185,7 @@ def test_what_goes_wrong_with_it_is_said_and_the_run_goes_on() -> None:
             page(at(1, FrameTaken(object())))
             page(at(1, frame_searched()))
         assert page.problem == (
-            "not all was shown on the page: AttributeError: 'object' object has no attribute 'image'"
+            "not all was shown on the page: TypeError: replace() should be called on dataclass instances"
         )
     finally:
         page.finish()

@@ -7,17 +7,19 @@ import socket
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import aiohttp
 import pytest
 from aiohttp import web
 from aiohttp.test_utils import make_mocked_request
+from events import at, run_started
 
 from executive.cell.visuals import Shape
 from executive.geometry import Pose
 from executive.view.live import scene
 from executive.view.live.board import Board
+from executive.view.live.messages import Change, Wish
 from executive.view.live.server import HEADERS, POLICY, Server, refusal, understood
 from executive.view.live.tunnel import Tunnel
 
@@ -65,17 +67,17 @@ class Site:
     session: aiohttp.ClientSession
     address: str
     board: Board
-    wishes: list[dict[str, Any]]
+    wishes: list[Wish]
 
 
 def serve(do: Callable[[Site], Awaitable[None]]) -> None:
     """Serve a page while something is done with it."""
 
     async def work() -> None:
-        wishes: list[dict[str, Any]] = []
+        wishes: list[Wish] = []
         listener = socket.create_server(("127.0.0.1", 0))
         port, board = listener.getsockname()[1], Board()
-        server = Server(board, Tunnel(Path("nowhere")), lambda wish: wishes.append(dict(wish)), TOKEN, port)
+        server = Server(board, Tunnel(Path("nowhere")), wishes.append, TOKEN, port)
         runner = web.AppRunner(server.app)
         await runner.setup()
         await web.SockSite(runner, listener).start()
@@ -122,28 +124,28 @@ def test_serves_the_page_to_the_page_and_nothing_else() -> None:
 
 def test_a_watcher_is_told_everything_then_news_and_is_heard() -> None:
     async def look(site: Site) -> None:
-        site.board.take({"run": {"mission": "sort", "seed": 3}})
+        site.board.take(at(0, run_started(mission="sort", seed=3)))
         origin = {"Origin": site.address}
         async with site.session.ws_connect(f"{site.address}/{TOKEN}/live", headers=origin) as socket:
             assert (await socket.receive_json())["run"] == {"mission": "sort", "seed": 3}
-            assert site.wishes == [{"do": "watched", "by": 1, "sparing": False}]
+            assert site.wishes == [Wish("watched", watchers=1)]
             site.board.news()
-            site.board.take({"paused": True})
+            site.board.take(Change(paused=True))
             await site.server.tell()
             assert await socket.receive_json() == {"paused": True}
             wishes = ('{"do": "spare"}', '{"do": "pause"}', "rubbish", '{"do": "request", "word": "cube"}')
             for said in (*wishes, '{"do": "fly"}', '{"do": "stop"}'):
                 await socket.send_str(said)
-            while site.wishes[-1] != {"do": "stop"}:
+            while site.wishes[-1] != Wish("stop"):
                 await asyncio.sleep(0)
-            site.board.take({"over": True})
+            site.board.take(Change(note="over"))
             await site.server.end()
-            assert await socket.receive_json() == {"over": True}
+            assert await socket.receive_json() == {"note": "over"}
             assert (await socket.receive()).type is aiohttp.WSMsgType.CLOSE
-        while site.wishes[-1] != {"do": "watched", "by": 0, "sparing": False}:
+        while site.wishes[-1] != Wish("watched"):
             await asyncio.sleep(0)
-        assert site.wishes[1] == {"do": "watched", "by": 1, "sparing": True}
-        assert site.wishes[2:-1] == [{"do": "pause"}, {"do": "request", "word": "cube"}, {"do": "stop"}]
+        assert site.wishes[1] == Wish("watched", watchers=1, is_sparing=True)
+        assert site.wishes[2:-1] == [Wish("pause"), Wish("request", "cube"), Wish("stop")]
 
     serve(look)
 
@@ -153,7 +155,7 @@ def test_a_watcher_is_told_everything_then_news_and_is_heard() -> None:
     [
         ("", None), ("[]", None), ("null", None), ('"pause"', None), ("{", None), ('{"do": null}', None),
         ('{"do": "watched", "by": 7}', None), ('{"do": ["pause"]}', None), ('{"do": "request"}', None),
-        ('{"do": "request", "word": 3}', None), ('{"do": "stop", "word": "x"}', {"do": "stop"}),
+        ('{"do": "request", "word": 3}', None), ('{"do": "stop", "word": "x"}', Wish("stop")),
     ],
 )  # fmt: skip
 def test_wishes_that_nobody_can_have_are_dropped(text: str, wish: object) -> None:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from executive.mission.outline import OutlineNode
-from executive.view.report.course import Entry, Span
+from executive.record.timeline.activation import Activation
 
 
 def skill(name: str, *uses: str, senses: bool = False) -> OutlineNode:
@@ -27,23 +26,24 @@ TREE = (
 """A pick: what moves, what looks, what decides, and what only lets time pass."""
 
 
-def ran(name: str, began: float, ended: float, item: str = "", status: str = "SUCCESS", *why: str) -> Span:
-    """Return one time that a skill of the tree ran; `why` is the reason and the message of a failure."""
-    reason, message = why or ("", "")
-    return Span(f"tree/{name}", began, ended, status, reason, message, item)
+def activation(
+    path: str, start: float, end: float, item: str = "", status: str = "SUCCESS", *why: str
+) -> Activation:
+    """Return an activation; `why` is the reason and the message of a failure."""
+    now = (round(240 * start), start, round(240 * end), end)
+    return Activation(path, 1, path.rpartition("/")[2], item, status, *now, *why)
 
 
-def told(clock: float, node: str, status: str, **data: Any) -> Entry:
-    """Return what a journal says of a node at a time."""
-    stamp = {"tick": round(240 * clock), "clock": clock, "kind": "status"}
-    return {**stamp, "node": node, "status": status, **data}
+def ran(name: str, start: float, end: float, *item_status_and_why: str) -> Activation:
+    """Return an activation of a skill of the tree."""
+    return activation(f"tree/{name}", start, end, *item_status_and_why)
 
 
-def picks(count: int, pace: float = 5.0) -> Sequence[Span]:
+def picks(count: int, pace: float = 5.0) -> Sequence[Activation]:
     """Return the course of a run that brings so many objects, each in so much time [s]."""
     looks = {"MoveToScan": 0.2, "Detect": 0.01}
     acts = {"SelectTarget": 0.0, "Approach": 0.3, "Grasp": 0.02, "Transit": 0.4, "Release": 0.02}
-    course: list[Span] = []
+    course: list[Activation] = []
     began = 0.0
     for number in range(count):
         for name, share in {**looks, **acts}.items():

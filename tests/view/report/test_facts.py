@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from events import at, run_ended
 
+from executive.cell.plain import plain
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.events import Event, FaultInjected, RequestGiven, RunResumed
@@ -33,11 +34,11 @@ def without_end(run: Path) -> None:
 
 def test_a_run_that_ended_is_told_by_its_result(failed):
     facts = Facts(failed)
-    assert facts.result == json.loads((failed / "result.json").read_text())
-    assert (facts.status, facts.end) == ("FAILURE", facts.result["robot_time_s"])
+    assert plain(facts.result) == json.loads((failed / "result.json").read_text())
+    assert (facts.status, facts.timeline.clock) == ("FAILURE", facts.result.robot_time_s)
     assert facts.resume == ""
     assert {each.item for each in facts.pictures if not each.reason} == {"sphere-1"}
-    assert {span.node for span in facts.course} <= {node.path for node in facts.nodes}
+    assert {one.node for one in facts.timeline.activations} <= {node.path for node in facts.nodes}
 
 
 @pytest.mark.slow
@@ -47,20 +48,20 @@ def test_a_run_that_was_cut_off_and_taken_up_again_is_told_as_one(killed, copy):
     resume_run(run, discover(), RunOptions(3, kind=FakeCell), RecordOptions(frames=False))
     facts = Facts(run)
     assert (facts.status, facts.resume) == ("SUCCESS", "")
-    transits = [span for span in facts.course if span.node.endswith("/Transit")]
-    assert [span.status for span in transits] == ["INVALID", "SUCCESS"]
-    assert transits[0].ended <= transits[1].began
-    assert sum(sum(row.values()) for row in facts.shares.rows.values()) == pytest.approx(facts.end)
+    transits = [one for one in facts.timeline.activations if one.node.endswith("/Transit")]
+    assert [one.status for one in transits] == ["INVALID", "SUCCESS"]
+    assert transits[0].end <= transits[1].start
+    assert sum(sum(row.values()) for row in facts.shares.rows.values()) == pytest.approx(facts.timeline.clock)
 
 
 def test_a_result_from_before_the_run_was_taken_up_again_is_not_its_end(failed, copy):
     run = copy(failed)
     append(run, 312, RunResumed(310, "", {}))
     facts = Facts(run)
-    assert (facts.status, facts.result, facts.end) == (CUT_OFF, {}, 1.3)
+    assert (facts.status, facts.ended, facts.timeline.clock) == (CUT_OFF, None, 1.3)
     append(run, 400, run_ended("HALTED", reason="halted", message="halted by the user", ticks=400))
     facts = Facts(run)
-    assert (facts.status, facts.result["message"]) == ("HALTED", "halted by the user")
+    assert (facts.status, facts.ended.message) == ("HALTED", "halted by the user")
     assert facts.resume == shlex.join(["executive", "run", "--resume", str(run)])
 
 
@@ -70,7 +71,7 @@ def test_a_run_whose_end_the_disk_did_not_take_is_told_by_its_result(failed, cop
     result = json.loads((run / "result.json").read_text()) | {"status": "FAULT"}
     (run / "result.json").write_text(json.dumps(result))
     facts = Facts(run)
-    assert (facts.status, facts.result) == ("FAULT", result)
+    assert (facts.status, plain(facts.result)) == ("FAULT", result)
 
 
 @pytest.mark.parametrize("content", ["", "[1]", "{}", '{"status": "ODD"}', "\ud800"])
@@ -78,9 +79,9 @@ def test_a_result_that_is_none_tells_nothing(failed, copy, content):
     run = copy(failed)
     (run / "result.json").write_bytes(content.encode(errors="surrogatepass"))
     facts = Facts(run)
-    assert (facts.status, facts.result["holds"]) == ("FAILURE", "")
+    assert (facts.status, facts.ended) == ("FAILURE", facts.timeline.ended)
     without_end(run)
-    assert (Facts(run).status, Facts(run).result) == (CUT_OFF, {})
+    assert (Facts(run).status, Facts(run).ended) == (CUT_OFF, None)
 
 
 def test_a_shipped_mission_is_repeated_by_its_name_and_with_what_was_asked_for(done, copy):
@@ -93,7 +94,7 @@ def test_a_shipped_mission_is_repeated_by_its_name_and_with_what_was_asked_for(d
     facts = Facts(run)
     assert facts.repeat == "executive run sort_fruit --seed 3 --request apple"
     assert facts.replay == shlex.join(["executive", "replay", str(run)])
-    assert (facts.requests, facts.disturbances) == (["apple"], [(1.8, "object removed")])
+    assert (facts.requests, facts.timeline.faults) == (["apple"], [(1.8, "object removed")])
 
 
 def test_a_run_that_had_not_begun_has_nothing_to_report(done, copy):

@@ -3,25 +3,32 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import pytest
-from made_up_runs import TREE, picks, ran
+from made_up_runs import TREE, activation, picks, ran
 
 from executive.mission.outline import OutlineNode
-from executive.view.report.course import Span
-from executive.view.report.lanes import LONGEST, MOST, SHORTEST, timeline
+from executive.record.timeline.activation import Activation
+from executive.record.timeline.timeline import Timeline
+from executive.view.report.lanes import LONGEST, MOST, SHORTEST, draw_lanes
 
 THINNEST = 1.5
 SVG = "{http://www.w3.org/2000/svg}"
 NASTY = """</title><script>alert("x")</script> & 'y' {{ 7 * 7 }} \x00 \ud800"""
 
 
-def lanes(course: list[Span], end: float, nodes: tuple[OutlineNode, ...] = TREE) -> dict[str, Element]:
-    picture = ElementTree.fromstring(timeline(course, nodes, end))
+def drawn(course: list[Activation], end: float, nodes: Sequence[OutlineNode] = TREE) -> str:
+    """Return the picture of activations up to a time."""
+    return draw_lanes(Timeline(activations=course, clock=end), nodes)
+
+
+def lanes(course: list[Activation], end: float) -> dict[str, Element]:
+    picture = ElementTree.fromstring(drawn(course, end))
     return {lane.attrib["data-path"]: lane for lane in picture.findall(f"{SVG}g")}
 
 
@@ -35,7 +42,7 @@ def said(lane: Element) -> list[str]:
 
 
 def test_every_node_that_ran_has_a_lane_in_the_order_of_the_tree():
-    found = lanes([ran("Wait", 0.0, 1.0), ran("Detect", 1.0, 2.0), Span("tree", 0.0, 2.0, "SUCCESS")], 2.0)
+    found = lanes([ran("Wait", 0.0, 1.0), ran("Detect", 1.0, 2.0), activation("tree", 0.0, 2.0)], 2.0)
     assert list(found) == ["tree", "tree/Detect", "tree/Wait"]
     assert [lane.attrib["class"] for lane in found.values()] == ["lane control", "lane skill", "lane skill"]
     assert [lane.findtext(f"{SVG}text") for lane in found.values()] == ["tree", "Detect", "Wait"]
@@ -69,7 +76,7 @@ def test_bars_that_can_be_told_apart_stay_apart_and_what_took_no_time_can_be_see
 
 
 def test_however_long_the_run_its_timeline_has_a_bound():
-    text = timeline(picks(3_000), TREE, 15_000.0)
+    text = drawn(picks(3_000), 15_000.0)
     assert MOST / 3 < text.count("<rect") <= MOST + len(TREE)
     assert len(text) < 300 * MOST
 
@@ -78,7 +85,7 @@ def test_however_long_the_run_its_timeline_has_a_bound():
     ("end", "length"), [(0.0, SHORTEST), (1.0, SHORTEST), (100.0, 4500.0), (4e6, LONGEST)]
 )
 def test_the_time_axis_is_neither_too_short_nor_too_long_and_its_times_stand_clear(end, length):
-    picture = ElementTree.fromstring(timeline([ran("Wait", 0.0, end)], TREE, end))
+    picture = ElementTree.fromstring(drawn([ran("Wait", 0.0, end)], end))
     (bar,) = picture.iter(f"{SVG}rect")
     assert float(bar.attrib["width"]) == pytest.approx(length if end else THINNEST)
     width = float(picture.attrib["width"])
@@ -91,8 +98,8 @@ def test_the_time_axis_is_neither_too_short_nor_too_long_and_its_times_stand_cle
 
 def test_text_from_a_mission_cannot_leave_its_place():
     node = replace(TREE[1], path=f"tree/{NASTY}", name=NASTY)
-    span = Span(node.path, 0.0, 1.0, "FAILURE", NASTY, NASTY, NASTY)
-    text = timeline([span], [node], 1.0)
+    span = activation(node.path, 0.0, 1.0, NASTY, "FAILURE", NASTY, NASTY)
+    text = drawn([span], 1.0, [node])
     picture = ElementTree.fromstring(text)
     assert {element.tag.removeprefix(SVG) for element in picture.iter()} == {
         "svg", "title", "path", "text", "g", "rect",

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import pytest
 
 from executive.view.report.page import leave_report
@@ -12,7 +9,7 @@ from executive.view.report.page import leave_report
 
 def test_a_run_that_ended_leaves_its_report(done, copy):
     run = copy(done)
-    assert leave_report({"run": str(run)}) == (str(run / "report.html"), "")
+    assert leave_report(str(run)) == (str(run / "report.html"), "")
     assert (run / "report.html").read_text().startswith("<!doctype html>")
 
 
@@ -32,15 +29,15 @@ def test_why_there_is_none_is_told(done, copy, file: str, content: str | None, s
         (run / file).mkdir()
     else:
         (run / file).write_text(content)
-    left, problem = leave_report({"run": str(run)})
+    left, problem = leave_report(str(run))
     assert left == ""
     assert problem.startswith("no report was written: " + sentence.format(run=run))
     assert not (run / "report.html").is_file()
 
 
-@pytest.mark.parametrize("result", [{}, {"run": "/nowhere"}])
-def test_a_result_that_leads_nowhere_raises_nothing(result: Mapping[str, Any], tmp_path, monkeypatch):
+@pytest.mark.parametrize("run", ["", "/nowhere"])
+def test_a_result_that_leads_nowhere_raises_nothing(run: str, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    file, problem = leave_report(result)
+    file, problem = leave_report(run)
     assert file == ""
     assert problem.startswith("no report was written: ")

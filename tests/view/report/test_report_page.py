@@ -87,7 +87,7 @@ def test_the_rows_of_time_sum_up_to_the_time_of_the_run(failed, done, killed, co
         facts = Facts(run)
         rows = re.findall(r"</td><td>([0-9.]+)</td>\s*<td class=\"bar\">", report(facts))
         assert len(rows) == len(facts.shares.rows)
-        assert sum(map(float, rows)) == pytest.approx(facts.end, abs=0.01 * len(rows))
+        assert sum(map(float, rows)) == pytest.approx(facts.timeline.clock, abs=0.01 * len(rows))
 
 
 def test_params_versions_and_the_commands_that_repeat_it_are_there(failed):

@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from made_up_runs import TREE, ran, skill
 
-from executive.view.report.course import Span
-from executive.view.report.shares import LOOK, NOBODY, RETRY, WAITING, shares
+from executive.mission.outline import OutlineNode
+from executive.record.timeline.activation import Activation
+from executive.record.timeline.timeline import Timeline
+from executive.view.report.shares import LOOK, NOBODY, RETRY, WAITING, Shares
+from executive.view.report.shares import shares as shares_of
 
 ITEMS = ("cube-1", "duck-1", "big_duck-2")
+
+
+def shares(
+    course: list[Activation], nodes: Sequence[OutlineNode], decisions: list[tuple[float, str]], end: float
+) -> Shares:
+    """Return the shares of activations and selections up to a time."""
+    return shares_of(Timeline(activations=course, selections=decisions, clock=end), nodes)
 
 
 def near(row: dict[str, float]) -> object:
@@ -72,7 +84,7 @@ TIMES = st.integers(0, 240).map(lambda ticks: ticks / 24)
 
 
 @st.composite
-def spans(draw: st.DrawFn) -> Span:
+def spans(draw: st.DrawFn) -> Activation:
     began, ended = sorted((draw(TIMES), draw(TIMES)))
     name = draw(st.sampled_from([node.name for node in TREE[1:]]))
     item = draw(st.sampled_from(["", *ITEMS]))
@@ -85,8 +97,8 @@ def spans(draw: st.DrawFn) -> Span:
     after=st.sampled_from([0.0, 0.5]),
 )
 def test_every_instant_belongs_to_one_object_and_one_activity(course, decisions, after):
-    course.sort(key=lambda span: span.began)
-    end = max((span.ended for span in course), default=0.0) + after
+    course.sort(key=lambda span: span.start)
+    end = max((span.end for span in course), default=0.0) + after
     told = shares(course, TREE, decisions, end)
     spent = [seconds for row in told.rows.values() for seconds in row.values()]
     assert sum(spent) == pytest.approx(end)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import time
+from dataclasses import replace
 from types import SimpleNamespace
 
 import py_trees
@@ -14,9 +15,8 @@ from rich.console import Console
 
 from executive.events import BranchChosen, NodeEnded, NodeStarted, TimedEvent
 from executive.mission.outline import outline
-from executive.record.entry import old_event
+from executive.record.result import Result
 from executive.run.run_control import RunControl
-from executive.view.items import ItemTable
 from executive.view.terminal.lines import Lines
 from executive.view.terminal.screen import Terminal
 from executive.view.terminal.summary import repeat_command, summary
@@ -98,7 +98,7 @@ def test_the_live_view_shows_the_running_path_the_items_and_the_clock():
     view.open(RUN)
     for event in (
         at(0, run_started(mission="sort", seed=7)), started("tree/sort"), started("tree/sort/repeat"),
-        failed(GRASP, reason="missed"),
+        started(GRASP), failed(GRASP, reason="missed"),
         item("placed", bin="red_bin"),
     ):  # fmt: skip
         view(event)
@@ -121,19 +121,17 @@ def test_the_live_view_redraws_ten_times_a_second(monkeypatch):
     assert 3 < len(renders) <= 10
 
 
-RESULT = {
-    "status": "FAILURE", "reason": "Transit.dropped", "message": "lost at 1.2 m/s", "node": "sort/0/3",
-    "robot_time_s": 34.25, "wall_time_s": 6.84, "run": "runs/latest",
-}  # fmt: skip
+RESULT = Result(
+    mission="sort", seed=7, status="FAILURE", reason="Transit.dropped", message="lost at 1.2 m/s",
+    node="sort/0/3", robot_time_s=34.25, wall_time_s=6.84, run="runs/latest",
+)  # fmt: skip
 
 
 def test_the_summary_says_how_it_ended_how_long_it_took_and_how_to_repeat_it_in_a_shell():
-    items = ItemTable()
-    for event in (
-        item("placed", bin="red_bin"), item("placed", item="cube-2", bin="red_bin"),
-        item("rejected", item="duck-1", why="three misses"),
-    ):  # fmt: skip
-        items(old_event(event))
+    items = [
+        item_changed("cube-1", "placed", bin="red_bin"), item_changed("cube-2", "placed", bin="red_bin"),
+        item_changed("duck-1", "rejected", position=[0.5, 0.1, 0.0], why="three misses"),
+    ]  # fmt: skip
     repeat = repeat_command("my mission.yaml", 7, {"attempts": "a b"}, ["cube"])
     lines = [
         "FAILURE Transit.dropped at sort/0/3: lost at 1.2 m/s",
@@ -143,8 +141,8 @@ def test_the_summary_says_how_it_ended_how_long_it_took_and_how_to_repeat_it_in_
         "  rejected: duck-1 (x 0.50 m, y 0.10 m: three misses)",
     ]
     assert summary(RESULT, items, repeat).splitlines() == lines
-    result = {**RESULT, "status": "SUCCESS", "reason": "", "node": "", "message": ""}
-    shown = summary(result, ItemTable(), repeat, "runs/x/report.html").splitlines()
+    result = replace(RESULT, status="SUCCESS", reason="", node="", message="")
+    shown = summary(result, [], repeat, "runs/x/report.html").splitlines()
     assert shown == ["SUCCESS", *lines[1:3], "report: runs/x/report.html"]
 
 

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import pytest
 
-from executive.view.terminal.summary import WIDTH, story_lines
+from executive.record.diagnosis.diagnosis import DecidingNode, Diagnosis, PassedNode
+from executive.record.diagnosis.text import WIDTH, diagnosis_lines
+from executive.record.timeline.items import Sighting
 from tests.record.failed_runs import PICK, FailedRun
 
 CUBE = [("cube", 0.5, 0.1)]
@@ -31,7 +34,7 @@ GO_ON = "go on       executive run --resume runs/latest\n"
 
 def text(run: FailedRun, *, numbered: bool = True, tail: str = TAIL) -> str:
     """Execute a run; return its story up to its tail, lines of code and shipped missions unnumbered."""
-    told = "\n".join(story_lines(run.tell(), "runs/latest", "executive run trial")) + "\n"
+    told = "\n".join(diagnosis_lines(run.tell(), "runs/latest", "executive run trial")) + "\n"
     assert told.endswith(tail)
     told = re.sub(r"py:\d+", "py:N", told.removesuffix(tail))
     return told if numbered else unnumbered(told)
@@ -69,9 +72,9 @@ def test_a_time_that_is_over(abroad) -> None:
     body = "".join(f"    {line}\n" for line in PICK.splitlines())
     tree = "  timeout:\n    seconds: $patience\n    do:\n" + body
     story = FailedRun(tree, objects=CUBE, overrides={"patience": "1.0"}).tell()
-    assert story["verdict"] == "timeout: not done after 1 s during Transit of cube-1"
-    assert (story["node"]["path"], story["node"]["place"]) == ("tree/timeout", "trial.yaml:7")
-    assert story["next"] == [
+    assert story.verdict == "timeout: not done after 1 s during Transit of cube-1"
+    assert (story.node.path, story.node.place) == ("tree/timeout", "trial.yaml:7")
+    assert story.next == [
         "take cube-1 out of the tool before another run",
         "to let the mission go on after timeout.timeout: put a try with a catch for it around line 7, or "
         "allow more than 1 s with --set patience=...",
@@ -90,7 +93,8 @@ def test_an_exception_in_a_part(abroad) -> None:
         == """\
 FAULT after 0.62 s: Grasp: ZeroDivisionError: vacuum gauge
 where       tree/5:retry/do/Grasp (trial.yaml:15)
-raised at   terminal/test_story_text.py:N, in broken; the whole traceback is in the journal, event "fault"
+raised at   terminal/test_story_text.py:N, in broken; the whole traceback is in the journal, event
+            "FaultRaised"
 the cell    command raised ZeroDivisionError (0.62 s)
 last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera overhead, by embedded, at 0.05 s;
             1 look, 0 failed attempts in all
@@ -105,9 +109,9 @@ def test_a_detector_that_gives_no_answer(at_home) -> None:
     run = FailedRun("sort_overhead", objects=CUBE)
     run.fake.detector.answers = lambda look, true: "the server is gone"
     story = run.tell()
-    chain = [link["why"] for link in story["chain"] if link["why"]]
+    chain = [link.why for link in story.chain if link.why]
     assert chain[0::2] == ["catches only Detect.unsure", "all 10 attempts failed: 10 x Detect.unavailable"]
-    assert [unnumbered(each) for each in story["next"]] == [
+    assert [unnumbered(each) for each in story.next] == [
         "see to it that detector.embedded answers again",
         "to let the mission go on after Detect.unavailable: catch it in the try at "
         "missions/library/sorting.yaml:N, or allow more than 10 attempts at missions/library/sorting.yaml:N",
@@ -118,17 +122,17 @@ def test_a_camera_that_was_moved_is_mounted_again_and_its_failure_not_caught(at_
     run = FailedRun("sort_overhead", objects=CUBE)
     run.fake.camera.displaced = "camera overhead is not where the cell file says"
     story = run.tell()
-    assert story["reason"] == "Detect.camera_moved"
-    assert story["next"] == ["mount camera and bins as the cell file says, or measure the pose again"]
+    assert story.reason == "Detect.camera_moved"
+    assert story.next == ["mount camera and bins as the cell file says, or measure the pose again"]
 
 
 def test_a_halt_while_something_hangs_on_the_tool(at_home) -> None:
     run = FailedRun("sort_overhead", objects=[*CUBE, *DUCK])
     run.at_every_step(lambda: run.run.control.stop() if run.fake.world.held and run.height > 0.1 else None)
     story = run.tell()
-    assert (story["holds"], story["left"], story["resumes"]) == ("cube-1", ["cube-1", "duck-1"], True)
-    assert story["verdict"] == "halted by the user during Transit of cube-1 and Wait"
-    assert story["next"] == [
+    assert (story.holds, story.left, story.resumes) == ("cube-1", ["cube-1", "duck-1"], True)
+    assert story.verdict == "halted by the user during Transit of cube-1 and Wait"
+    assert story.next == [
         "to go on with this run leave cube-1 in the tool; take cube-1 out of the tool before another run"
     ]
 
@@ -179,30 +183,28 @@ next        to let the mission go on after PutDown.blocked: catch it in the try 
     )
 
 
-STORY = {
-    "status": "FAILURE", "reason": "Grasp.missed", "clock": 1.0, "mission": "trial.yaml", "item": "",
-    "verdict": "Grasp failed (missed): no seal", "chain": [], "reads": [], "look": None, "lost": [],
-    "node": {"path": "tree/Grasp", "name": "Grasp", "place": "trial.yaml:7"}, "running": [], "left": [],
-    "arm": "at rest", "holds": "", "raised_at": "", "picture": "", "next": [],
-    "recorded": True, "resumes": False,
-}  # fmt: skip
+STORY = Diagnosis(
+    status="FAILURE", reason="Grasp.missed", clock=1.0, mission="trial.yaml", item="",
+    verdict="Grasp failed (missed): no seal", chain=[], reads=[], look=None, lost=[],
+    node=DecidingNode("tree/Grasp", "Grasp", "trial.yaml:7"), running=[], left=[], arm="at rest", holds="",
+    raised_at="", picture="", next=[], recorded=True, resumes=False,
+)  # fmt: skip
 
 
 def test_long_texts_are_wrapped_and_cut_but_a_command_is_neither() -> None:
     names = [f"some_subtree_{index}: retry" for index in range(9)]
-    chain = [{"name": name, "path": name, "place": "a.yaml:1", "why": "w" + " why" * 99} for name in names]
-    look = {"item": "cube-1", "frame": 1, "camera": "c", "detector": "d", "clock": 1.0, "label": "cube"}
-    story = {
-        **STORY,
-        "verdict": "Grasp failed: " + "no seal, " * 90,
-        "chain": [*chain, {"name": "Grasp", "path": "tree/Grasp", "place": "trial.yaml:7", "why": ""}],
-        "look": {**look, "confidence": 0.5, "position": [0.1, 0.2, 0.3], "looks": 1, "attempts": 0},
-        "left": [f"cube-{index}" for index in range(400)],
-        "next": ["do this " * 60],
-        "picture": "frames/000001_cube-1_missed.jpg",
-    }
+    chain = [PassedNode(name, name, "a.yaml:1", "w" + " why" * 99) for name in names]
+    story = replace(
+        STORY,
+        verdict="Grasp failed: " + "no seal, " * 90,
+        chain=[*chain, PassedNode("tree/Grasp", "Grasp", "trial.yaml:7", "")],
+        look=Sighting(1, "c", "d", 1.0, "cube-1", 0, 1, "cube", 0.5, [0.1, 0.2, 0.3]),
+        left=[f"cube-{index}" for index in range(400)],
+        next=["do this " * 60],
+        picture="frames/000001_cube-1_missed.jpg",
+    )
     repeat = "executive run trial" + " --set a=b" * 30
-    lines = story_lines(story, "runs/latest", repeat, "report.html")
+    lines = diagnosis_lines(story, "runs/latest", repeat, "report.html")
     assert lines[-2] == "report      report.html"
     assert lines[-1] == f"repeat      {repeat}"
     assert max(map(len, lines[:-1])) <= WIDTH
@@ -221,5 +223,5 @@ def test_long_texts_are_wrapped_and_cut_but_a_command_is_neither() -> None:
     ],
 )
 def test_what_is_known_of_arm_and_tool_is_said_in_words(arm, holds, said) -> None:
-    lines = story_lines({**STORY, "arm": arm, "holds": holds}, "runs/latest", "executive run trial")
+    lines = diagnosis_lines(replace(STORY, arm=arm, holds=holds), "runs/latest", "executive run trial")
     assert any(re.fullmatch(f"now         the arm ?{said}", line) for line in lines)

@@ -1,0 +1,144 @@
+"""Text of a diagnosis for a terminal and for a report."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import textwrap
+from collections.abc import Iterator, Sequence
+
+from executive.record.diagnosis.diagnosis import Diagnosis, LostItem
+from executive.record.timeline.activation import Reading
+from executive.record.timeline.items import Look, Sighting
+
+WIDTH = 110
+"""Length at which long lines are wrapped [columns]."""
+
+MAX_NODES = 5
+"""Largest number of control nodes that are shown; those next to the root are left out first."""
+
+_MAX_READINGS = 3
+_MAX_LOST = 3
+_LABEL_WIDTH = 12
+_UNIT = re.compile(r"(?<=[0-9)]) (?=(?:s|m)\b)")
+_JOINED = "\N{NO-BREAK SPACE}"
+
+
+def resume_command(run: str) -> str:
+    """Return the command line that resumes the run in a directory."""
+    return shlex.join(["executive", "run", "--resume", run])
+
+
+def diagnosis_lines(diagnosis: Diagnosis, run: str, repeat: str, report: str = "") -> list[str]:
+    """Return the lines of a diagnosis, the most important first; commands are not wrapped.
+
+    Args:
+        diagnosis: The diagnosis.
+        run: The run directory.
+        repeat: The command that repeats the run.
+        report: File of the report of the run, or "".
+    """
+    lines = wrapped(
+        f"{diagnosis.status} after {diagnosis.clock:.2f} s: {diagnosis.verdict}", "", "  ", most=3
+    )
+    lines += _passed_nodes(diagnosis)
+    for label, text in facts(diagnosis):
+        lines += wrapped(text, f"{label:{_LABEL_WIDTH}}", " " * _LABEL_WIDTH, most=3)
+    commands = {"record": run, "report": report, "repeat": repeat}
+    if diagnosis.resumes:
+        commands["go on"] = resume_command(run)
+    return lines + [f"{label:{_LABEL_WIDTH}}{command}" for label, command in commands.items() if command]
+
+
+def facts(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
+    """Yield a word and a sentence for each fact besides the verdict and the nodes."""
+    node = diagnosis.node
+    if node is not None and not any(link.why for link in diagnosis.chain):
+        yield "where", f"{node.path} ({node.place})"
+    if diagnosis.raised_at:
+        whole = '; the whole traceback is in the journal, event "FaultRaised"' if diagnosis.recorded else ""
+        yield "raised at", diagnosis.raised_at + whole
+    if diagnosis.reads:
+        reads = diagnosis.reads[:_MAX_READINGS]
+        yield "the cell", ", ".join(_read(reading, diagnosis.verdict) for reading in reads)
+    for lost in diagnosis.lost[:_MAX_LOST]:
+        yield "lost", _lost(lost)
+    # The fact about a lost item contains its last look.
+    if not diagnosis.lost:
+        yield "last look", _look(diagnosis.look)
+    if diagnosis.picture:
+        yield "picture", diagnosis.picture
+    holds = {"": "is empty", "something": "holds something that nobody knows"}
+    arm = "the arm is at rest" if diagnosis.arm == "at rest" else f"the arm: {diagnosis.arm}"
+    yield "now", f"{arm}, the tool {holds.get(diagnosis.holds, 'holds ' + diagnosis.holds)}"
+    if diagnosis.left:
+        yield "left to do", f"{len(diagnosis.left)}: {', '.join(diagnosis.left)}"
+    for sentence in diagnosis.next:
+        yield "next", sentence
+
+
+def _passed_nodes(diagnosis: Diagnosis) -> list[str]:
+    """Return a line for each node that did not handle the failure, and one for the deciding node."""
+    here = f"{diagnosis.mission}:"
+    passed = [(link.name, link.why, link.place) for link in diagnosis.chain if link.why]
+    node = diagnosis.node
+    if not passed or node is None:
+        return []
+    above = f", {len(passed) - MAX_NODES} nodes above left out" if len(passed) > MAX_NODES else ""
+    shown = [*passed[-MAX_NODES:], (node.name, node.path, node.place)]
+    width = max(len(name) for name, _, _ in shown)
+    lines = [f"why nothing in {diagnosis.mission} stopped it, from the root down{above}:"]
+    for name, why, place in shown:
+        line = f"line {place.removeprefix(here)}" if place.startswith(here) else place
+        lines += wrapped(f"{why} ({line})", f"  {name:{width}}  ", " " * (width + 4))
+    return lines
+
+
+def wrapped(text: str, first: str, others: str, *, most: int = 2) -> list[str]:
+    """Return a text in at most `most` lines of `WIDTH`; numbers stay on the line of their units."""
+    lines = textwrap.wrap(
+        _UNIT.sub(_JOINED, text), WIDTH, initial_indent=first, subsequent_indent=others, max_lines=most,
+        placeholder=" ...", break_on_hyphens=False,
+    )  # fmt: skip
+    return [line.replace(_JOINED, " ") for line in lines]
+
+
+def _read(reading: Reading, verdict: str) -> str:
+    """Return an answer of the cell; the message of an exception only if the verdict lacks it."""
+    name, value, when = reading.name, reading.value, f"({reading.clock:.2f} s)"
+    if reading.raised:
+        text = "" if str(value) in verdict else f": {value}"
+        return f"{name} raised {reading.raised} {when}{text}"
+    return f"{name} = {value:g} {when}" if isinstance(value, float) else f"{name} = {value} {when}"
+
+
+def _look(look: Sighting | Look | None) -> str:
+    if look is None:
+        return "none so far"
+    where = f"frame {look.frame}, camera {look.camera}, by {look.detector}, at {look.clock:.2f} s"
+    if isinstance(look, Look):
+        return f"{where}: {_counted(look.found, 'box', 'boxes')}"
+    seen = "" if look.confidence is None else f" as {look.label} {look.confidence:.2f}"
+    known = f"{_counted(look.looks, 'look')}, {_counted(look.attempts, 'failed attempt')} in all"
+    return f"{look.item}{seen}{_at(look.position)}: {where}; {known}"
+
+
+def _lost(lost: LostItem) -> str:
+    look, failed, dropped = lost.look, lost.failed, lost.dropped
+    facts = [lost.item]
+    if look is not None:
+        facts[0] += f" seen last{_at(look.position)} at {look.clock:.2f} s"
+        facts[0] += f", not in the {_counted(lost.unseen, 'look')} since"
+    if dropped is not None and (failed is None or failed.clock != dropped):
+        facts.append(f"dropped at {dropped:.2f} s")
+    if failed is not None:
+        facts.append(f"{failed.what} at {failed.clock:.2f} s: {failed.message}")
+    return "; ".join(facts)
+
+
+def _at(position: Sequence[float] | None) -> str:
+    return "" if position is None else " at ({:.3f}, {:.3f}, {:.3f}) m".format(*position)
+
+
+def _counted(count: int, one: str, many: str = "") -> str:
+    return f"{count} {one if count == 1 else many or one + 's'}"

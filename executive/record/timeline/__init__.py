@@ -1,0 +1,1 @@
+"""Timeline of a run: the fold of its events."""

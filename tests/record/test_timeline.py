@@ -1,0 +1,241 @@
+"""Timelines of runs: live and recorded, and their memory."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from events import at, detected, frame_searched, item_changed, read, run_started, skill_ended, skill_started
+from failed_runs import PICK, FailedRun
+
+from executive.cell.frame import FrameTaken
+from executive.events import (
+    BranchChosen,
+    Event,
+    FaultInjected,
+    ItemChanged,
+    MotionPlanned,
+    NodeEnded,
+    NodeStarted,
+    OperatorAsked,
+    RequestGiven,
+    RunResumed,
+    TargetSelected,
+    TimedEvent,
+)
+from executive.record.journal import Journal, read_journal
+from executive.record.timeline.activation import by_node, count_ends, last_failure, skill_name
+from executive.record.timeline.timeline import Planning, Timeline
+
+
+def folded(*events: Event, history: bool = True) -> Timeline:
+    """Return the timeline of events at the control steps 0, 240, 480, …"""
+    timeline = Timeline(history)
+    for second, event in enumerate(events):
+        timeline(at(240 * second, event))
+    return timeline
+
+
+@pytest.mark.parametrize("mission", [PICK, "pick_on_request"])
+def test_the_journal_of_a_run_gives_the_timeline_that_was_observed(mission, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    run = FailedRun(mission, requests=["cube", "quit"])
+    live, journal = Timeline(), Journal(Path("journal.jsonl"))
+    run.run.observe(live)
+    run.run.observe(lambda timed: None if isinstance(timed.event, FrameTaken) else journal(timed))
+    run.slip(2)
+    run.run.execute()
+    journal.close()
+    recorded = Timeline.of(read_journal(Path("journal.jsonl")))
+    assert live.activations and live.items.by_name and live.items.look and live.ended
+    assert recorded == live
+    # Without history, only the past is missing.
+    assert (
+        replace(run.timeline, history=True, activations=live.activations, selections=live.selections) == live
+    )
+
+
+def test_an_activation_lasts_from_the_start_of_its_node_to_its_end() -> None:
+    timeline = folded(
+        NodeStarted("tree"), skill_started("tree/Detect"),
+        skill_ended("tree/Detect", "FAILURE", reason="unsure", message="too dark"),
+        NodeEnded("tree", "FAILURE", reason="Detect.unsure", message="too dark"),
+    )  # fmt: skip
+    tree, detect = timeline.activations
+    assert (tree.start, tree.end, tree.status, tree.failure) == (0, 3, "FAILURE", "Detect.unsure: too dark")
+    assert (detect.start_tick, detect.end_tick, detect.skill) == (240, 480, "Detect")
+    assert timeline.nodes == {"tree": tree, "tree/Detect": detect}
+    assert timeline.last_end == tree
+
+
+def test_the_item_of_a_skill_may_be_known_at_its_start_or_only_at_its_end() -> None:
+    timeline = folded(
+        skill_started("tree/Approach", "cube-1"), skill_ended("tree/Approach"),
+        skill_started("tree/SelectTarget"), skill_ended("tree/SelectTarget", item="duck-1"),
+    )  # fmt: skip
+    assert [one.item for one in timeline.activations] == ["cube-1", "duck-1"]
+
+
+def test_an_end_without_a_start_is_no_activation() -> None:
+    assert folded(skill_ended("tree/Detect")).activations == []
+
+
+def test_an_activation_that_ran_at_the_end_of_the_record_lasts_until_then() -> None:
+    events = [at(0, NodeStarted("tree")), at(600, read("arm.q", []))]
+    (tree,) = Timeline.of(events).activations
+    assert (tree.status, tree.start, tree.end) == ("RUNNING", 0, 2.5)
+
+
+def test_a_node_that_a_resumed_run_starts_again_was_halted_by_the_interruption() -> None:
+    timeline = folded(skill_started("tree/Transit", "cube-1"), RunResumed(240, "", {}),
+                      skill_started("tree/Transit", "cube-1"), skill_ended("tree/Transit"))  # fmt: skip
+    found = [(one.start, one.end, one.status) for one in timeline.activations]
+    assert found == [(0, 2, "INVALID"), (2, 3, "SUCCESS")]
+
+
+def test_the_ends_of_a_node_are_counted_and_its_last_failure_is_found() -> None:
+    ends = [("FAILURE", "missed"), ("FAILURE", "blocked"), ("INVALID", ""), ("SUCCESS", "")]
+    timeline = folded(
+        *(event for status, reason in ends
+          for event in (skill_started("tree/Grasp"), skill_ended("tree/Grasp", status, reason=reason))),
+        skill_started("tree/Wait"),
+    )  # fmt: skip
+    grasp, wait = by_node(timeline.activations).values()
+    assert (count_ends(grasp), last_failure(grasp)) == ("1 done, 2 failed, 1 halted", "blocked")
+    assert (count_ends(wait), last_failure(wait)) == ("1 under way", "")
+    assert timeline.counts == {"tree/Grasp": {"FAILURE": 2, "INVALID": 1, "SUCCESS": 1}}
+
+
+def test_an_activation_is_current_until_an_ancestor_starts_again() -> None:
+    timeline = folded(NodeStarted("tree"), skill_started("tree/do/Grasp"), skill_ended("tree/do/Grasp"))
+    assert timeline.current("tree/do/Grasp") == timeline.nodes["tree/do/Grasp"]
+    timeline(at(960, NodeStarted("tree")))
+    assert timeline.current("tree/do/Grasp") is None
+    assert timeline.current("tree") == timeline.nodes["tree"]
+
+
+def test_the_failures_that_a_control_node_handled_are_counted_with_their_last_message() -> None:
+    timeline = folded(
+        NodeStarted("tree/retry"), BranchChosen("tree/retry", "attempt 2 of 3", "Grasp.missed", "no seal"),
+        BranchChosen("tree/retry", "attempt 3 of 3", "Grasp.missed", "too far"),
+    )  # fmt: skip
+    retry = timeline.nodes["tree/retry"]
+    assert (retry.choice, retry.last_handled) == ("attempt 3 of 3", "Grasp.missed")
+    assert (retry.handled, retry.messages) == ({"Grasp.missed": 2}, {"Grasp.missed": "too far"})
+
+
+def test_a_control_node_knows_the_skills_that_it_halted() -> None:
+    timeline = folded(
+        NodeStarted("tree"), skill_started("tree/Wait"), skill_ended("tree/Wait", "INVALID"),
+        NodeEnded("tree", "FAILURE", reason="timeout.timeout"),
+    )  # fmt: skip
+    assert (timeline.nodes["tree"].halted, timeline.halted) == (("tree/Wait",), ())
+
+
+def test_a_failed_skill_has_the_answers_of_the_cell_until_then_without_lists() -> None:
+    timeline = folded(
+        read("arm.met", None), read("arm.q", [0.0] * 7), skill_started("tree/Approach", "cube-1"),
+        read("arm.met", "a wrench"), skill_ended("tree/Approach", "FAILURE", "cube-1", reason="blocked"),
+        read("tool.holding", True),
+    )  # fmt: skip
+    readings = timeline.nodes["tree/Approach"].readings
+    assert [(reading.name, reading.value, reading.clock) for reading in readings] == [
+        ("arm.met", "a wrench", 3)
+    ]
+
+
+def test_skills_that_run_are_in_the_order_of_their_starts() -> None:
+    timeline = folded(
+        skill_started("tree/Transit"), skill_started("tree/Detect"), skill_ended("tree/Transit"),
+        skill_started("tree/Transit"),
+    )  # fmt: skip
+    assert [one.node for one in timeline.running()] == ["tree/Detect", "tree/Transit"]
+
+
+@pytest.mark.parametrize(
+    ("path", "name"),
+    [("tree/do/Grasp", "Grasp"), ("tree/do/2:Detect", "Detect"), ("tree/recover/look/pick", "pick")],
+)
+def test_a_skill_has_its_name_or_label(path: str, name: str) -> None:
+    assert skill_name(path) == name
+
+
+def test_an_item_has_its_last_sighting_and_the_number_of_looks_since_then() -> None:
+    far, near = detected("cube", position=[0.9, 0.0, 0.0]), detected("cube", confidence=0.8)
+    timeline = folded(
+        item_changed("cube-1", position=[0.5, 0.1, 0.0]), frame_searched(far, near, frame=7),
+        frame_searched(frame=8), frame_searched(frame=9),
+    )  # fmt: skip
+    item = timeline.items.by_name["cube-1"]
+    assert (item.sighting.frame, item.sighting.confidence, item.unseen) == (7, 0.8, 2)
+    assert (timeline.items.look.frame, timeline.items.look.found) == (9, 0)
+
+
+def test_an_item_has_the_times_at_which_the_tool_got_and_lost_it() -> None:
+    states = ("seen", "held", "held", "dropped")
+    item = folded(*(item_changed("cube-1", state) for state in states)).items.by_name["cube-1"]
+    assert (item.held, item.dropped) == (1.0, 3.0)
+
+
+def test_the_accounts_after_the_end_of_the_tree_leave_the_final_states_as_they_were() -> None:
+    timeline = folded(
+        NodeStarted("tree"), item_changed("cube-1"), item_changed("cube-2", "held"),
+        NodeEnded("tree", "FAILURE"), item_changed("cube-1", "rejected"), item_changed("cube-2", "placed"),
+    )  # fmt: skip
+    assert list(timeline.items.unfinished("seen", "held")) == ["cube-1"]
+
+
+def test_an_item_has_its_last_failure() -> None:
+    timeline = folded(
+        item_changed("cube-1"), skill_started("tree/Grasp", "cube-1"),
+        skill_ended("tree/Grasp", "FAILURE", "cube-1", reason="missed"),
+    )  # fmt: skip
+    assert timeline.items.by_name["cube-1"].failure == timeline.nodes["tree/Grasp"]
+
+
+def test_a_class_keeps_its_place() -> None:
+    looks = [("sphere", "cube"), ("cube", "duck")]
+    timeline = folded(*(frame_searched(*map(detected, labels)) for labels in looks))
+    assert list(timeline.items.classes) == ["cube", "sphere", "duck"]
+
+
+def test_motions_targets_questions_and_injected_faults_are_kept() -> None:
+    selected = TargetSelected("cube-1", "cube", 1, "red_bin")
+    timeline = folded(
+        run_started(), MotionPlanned(False, 0.05, 1.0), MotionPlanned(True, 0.02, 1.0), selected,
+        OperatorAsked(["cube"]), RequestGiven(None), FaultInjected("object removed", "", "", "", []),
+    )  # fmt: skip
+    assert timeline.planning == Planning(2, 1, 0.07)
+    assert (timeline.targets, timeline.selections) == ({"cube-1": selected}, [(3.0, "cube-1")])
+    assert (timeline.question, timeline.requests) == (None, [None])
+    assert timeline.faults == [(6.0, "object removed")]
+
+
+@pytest.mark.slow
+def test_the_memory_of_a_live_run_grows_only_with_its_items(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    run = FailedRun("sort_overhead")
+    events: list[TimedEvent] = []
+    run.run.observe(events.append)
+    run.slip(2)
+    run.run.execute()
+    timeline, sizes = Timeline(history=False), []
+    for number in range(40):
+        for timed in events:
+            if not isinstance(timed.event, FrameTaken):
+                timeline(timed if number < 20 else _renamed(timed, number))
+        sizes.append(len(pickle.dumps(timeline)))
+    assert sizes[19] < 1.01 * sizes[1]
+    items = len(timeline.items.by_name)
+    assert (sizes[39] - sizes[19]) / (items - items / 21) < 1000
+    assert len(events) > 500
+
+
+def _renamed(timed: TimedEvent, number: int) -> TimedEvent:
+    """Return an event about an item of another name."""
+    event = timed.event
+    if isinstance(event, ItemChanged):
+        event = replace(event, item=f"{event.item}-{number}")
+    return replace(timed, event=event)
