@@ -50,7 +50,8 @@ class Journal:
         """Append an event if its kind is recorded.
 
         Raises:
-            RecordLost: The disk does not take it, or the file was deleted: the run must not go on unrecorded.
+            RecordLost: The disk does not take it, or another program deleted, replaced or truncated the file:
+                the run must not go on unrecorded.
                 Later events are dropped without another fault, so that the arm can be brought to rest.
             Fault: JSON cannot hold the event; only this event is missing.
         """
@@ -67,7 +68,8 @@ class Journal:
             self._broken = True
             # A part of the line is of no use to anybody.
             with contextlib.suppress(OSError):
-                os.ftruncate(self._file, self._length)
+                if os.fstat(self._file).st_size > self._length:
+                    os.ftruncate(self._file, self._length)
             raise RecordLost(
                 f'the journal "{self._path}" cannot be written: {reason_of(error)}; '
                 "the run stops because it could not be explained afterwards"
@@ -104,9 +106,18 @@ class Journal:
     def _sync(self, file: int) -> None:
         os.fsync(file)
         self._unsynced = False
-        if os.fstat(file).st_nlink == 0:
-            # The disk takes what is written to a deleted file, and forgets it when the file is closed.
+        status = os.fstat(file)
+        # The disk takes what is written to a deleted file, and forgets it when the file is closed.
+        if not self._path.exists():
             raise FileNotFoundError(errno.ENOENT, "it was deleted while the run went on")
+        if not os.path.samestat(status, self._path.stat()):
+            raise FileExistsError(errno.EEXIST, "another program replaced it while the run went on")
+        if status.st_size != self._length:
+            raise OSError(
+                errno.EIO,
+                f"another program changed its length from {self._length} to {status.st_size} bytes while the "
+                "run went on",
+            )
 
 
 def read_journal(path: Path) -> list[TimedEvent]:

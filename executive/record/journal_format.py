@@ -12,6 +12,7 @@ from pydantic_core import from_json
 
 from executive.errors import Fault, InputError
 from executive.events import JOURNAL_FORMAT, Event, InputRead, RunStarted, TimedEvent
+from executive.replay.recorded_cell import check_input
 
 MAX_TICK = 10**9
 """Largest number of a control step: 48 days in simulation."""
@@ -117,6 +118,8 @@ def decode_all(lines: Iterable[bytes], name: str) -> list[TimedEvent]:
                 raise ValueError(f'"tick" {timed.tick} and "clock" {timed.clock} contradict each other')
             if isinstance(event, InputRead) and event.name == "clock" and not event.raised:
                 ahead = _offset(event.value)
+            elif isinstance(event, InputRead) and not event.raised:
+                check_input(event.name, event.value)
         except ValueError as error:
             if number == 1 and (old := _describe_old_format(line)):
                 raise InputError(f"{name}: {old}") from error

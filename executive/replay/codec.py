@@ -17,6 +17,9 @@ from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
 from executive.geometry import Array, Pose
 
+MAX_PIXELS = 10**8
+"""Largest number of pixels of an image."""
+
 
 class Codec(NamedTuple):
     """Functions between an answer of a cell and its plain form.
@@ -70,6 +73,8 @@ def write_frame(frame: Frame) -> dict[str, Any]:
 def read_frame(value: Any) -> Frame:
     """Return what `write_frame` was given, its image black and without depth."""
     height, width = value["size"]
+    if not 0 < height * width <= MAX_PIXELS:
+        raise ValueError(f"an image of {height} x {width} pixels")
     return Frame(
         id=value["id"],
         camera=value["camera"],

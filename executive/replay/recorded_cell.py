@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import re
+import zlib
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
+
+from pydantic import JsonValue
 
 from executive.cell.clock import StepClock
 from executive.cell.protocols import Cell
@@ -86,6 +90,27 @@ RECORDED_ROLES = ("arm", "tool", "camera", "detector", "operator", "localizer")
 
 _COMMAND = InputFormat("command", NOTHING)
 """Format of the answer to a command: None, unless the cell raises an exception."""
+
+
+_PATTERNS = [
+    (re.compile(re.sub(r"\\{.*?\\}", ".+", re.escape(form.name))), form.codec)
+    for form in sorted(INPUT_FORMATS.values(), key=lambda form: -len(form.name))
+]
+"""Pattern of the names of the inputs of each format, and their codec; the most specific ones first."""
+
+
+def check_input(name: str, value: JsonValue) -> None:
+    """Return if an answer can be replayed; one with an unknown name is not asked for.
+
+    Raises:
+        ValueError: The answer has not the form of the answers to this question.
+    """
+    codec = next((codec for pattern, codec in _PATTERNS if pattern.fullmatch(name)), PLAIN)
+    try:
+        codec.read(value)
+    except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, zlib.error) as error:
+        problem = f"{type(error).__name__}: {error}"
+        raise ValueError(f'"value" is no answer of the input "{name}" ({problem})') from error
 
 
 def recorded_cell(cell: Cell, recorder: InputRecorder, clock: StepClock, emit: Emit) -> Cell:

@@ -20,7 +20,7 @@ from events import (
 )
 from jsonschema import Draft7Validator
 
-from executive.errors import Fault, InputError
+from executive.errors import Fault, InputError, RecordLost
 from executive.events import (
     BranchChosen,
     FaultInjected,
@@ -131,6 +131,32 @@ def test_a_journal_deleted_meanwhile_is_a_fault_at_the_next_command_of_the_tool_
     with pytest.raises(Fault, match="cannot be written: it was deleted while the run went on; the run stops"):
         journal(at(2, event))
     journal.close()
+
+
+def test_a_journal_that_another_program_replaced_or_truncated_is_reported(path):
+    changes = {
+        "another program replaced it": lambda: path.with_name("new").replace(path),
+        "another program changed its length from": lambda: os.truncate(path, 5),
+    }
+    for problem, change in changes.items():
+        path.unlink(missing_ok=True)
+        path.with_name("new").write_bytes(b"")
+        journal = Journal(path)
+        journal(at(0, NODE))
+        change()
+        with pytest.raises(RecordLost, match=f"cannot be written: {problem}.*; the run stops"):
+            journal(at(1, ToolCommanded("open")))
+        journal.close()
+        assert b"\0" not in path.read_bytes()
+
+
+def test_an_answer_that_cannot_be_replayed_is_refused(path):
+    write(path, at(0, run_started()), at(0, read("camera.frame", {"size": [1, 2]})))
+    with pytest.raises(InputError, match=r'journal.jsonl:2: .*"value" is no answer of the input "camera.fra'):
+        read_journal(path)
+    write(path.with_name("other.jsonl"), at(0, run_started()), at(0, read("arm.tool_pose", [1.0])))
+    with pytest.raises(InputError, match=r'other.jsonl:2: .* no answer of the input "arm.tool_pose"'):
+        read_journal(path.with_name("other.jsonl"))
 
 
 def test_a_line_the_disk_takes_in_parts_is_whole(path, monkeypatch):
@@ -277,7 +303,7 @@ def test_every_kind_of_event_comes_back_as_it_was(path):
         BranchChosen("a", "again", "Grasp.missed", "no seal"),
         frame_searched(detected("cube"), unknown=["x"]),
         item_changed("cube-1"), TargetSelected("cube-1", "cube", 1, "red_bin"), MotionPlanned(True, 0.0, 1.5),
-        ToolCommanded("close"), InputRead("arm.q", 1, value), OperatorAsked(["cube"]), RequestGiven(None),
+        ToolCommanded("close"), InputRead("sensor", 1, value), OperatorAsked(["cube"]), RequestGiven(None),
         FaultInjected("seal_breaks", "a", "cube-1", "cube", [0.5]), RunHalted(True),
         RunResumed(3, "close", {"python": "3.11"}), FaultRaised("Traceback"), END,
     ]  # fmt: skip

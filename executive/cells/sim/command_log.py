@@ -6,6 +6,7 @@ same bits.
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,6 +22,8 @@ from executive.motion.trajectory import Trajectory
 
 VERSION = 2
 """Version of the format."""
+MAX_JOINTS = 100
+"""Largest number of joints of an arm."""
 MAGIC = b"executive world "
 """Begins every log; version and number of joints follow in the first line: `executive world 2 joints 7`."""
 STEP, IDLE, CLOSE, OPEN, PART, JOINTS_TO, MOTION, DONE, PLACE, REMOVE = b"SICOPJMDXR"
@@ -121,10 +124,17 @@ def _commands(path: Path) -> Iterator[tuple[Command, int]]:
             f'the log of the world "{path}" has version {version.decode(errors="replace")}; this program '
             f"reads version {VERSION}; run the mission again"
         )
+    if not (len(rest) == 2 and rest[1].isdigit() and 0 < int(rest[1]) <= MAX_JOINTS):
+        raise InputError(f'the log of the world "{path}" does not state its number of joints; it was changed')
     place, joint_count = len(header) + 1, int(rest[1])
     bodies, state = {**_BODIES, JOINTS_TO: f"{1 + joint_count}d"}, 3 * joint_count
     while place < len(data):
-        kind = data[place]
+        kind, start = data[place], place
+        if kind not in bodies:
+            if not data[place:].strip(b"\0"):
+                # A power cut lost the last blocks.
+                return
+            raise _damaged(path, start)
         body = struct.Struct(f"<{bodies[kind]}")
         if place + 1 + body.size > len(data):
             return
@@ -137,7 +147,19 @@ def _commands(path: Path) -> Iterator[tuple[Command, int]]:
                 return
             states = np.frombuffer(data, "<f8", state * int(numbers[-1]), place).reshape(-1, state)
             place += size
+        # The time from which on a motion is guarded may be infinite.
+        finite = numbers if states is None else (numbers[0], *states.flat)
+        if not all(map(math.isfinite, finite)):
+            raise _damaged(path, start)
         yield Command(kind, numbers, states), place
+
+
+def _damaged(path: Path, place: int) -> InputError:
+    """Return the error for a log that holds no command at a place [bytes]."""
+    return InputError(
+        f'the log of the world "{path}" is damaged at byte {place}: a log is only ever appended to, so '
+        "somebody changed it after the run, or the disk lost a part of it; restore a copy"
+    )
 
 
 def _content(path: Path) -> bytes:

@@ -73,6 +73,24 @@ def test_what_goes_on_begins_after_the_last_whole_command(path: Path) -> None:
     assert [one.kind for one in read_commands(path)] == [log.STEP, log.OPEN]
 
 
+def test_a_damaged_log_says_so(path: Path) -> None:
+    written = CommandLog(path, 7)
+    written.note(log.STEP)
+    written.note(log.JOINTS_TO, *range(8))
+    written.close()
+    content = path.read_bytes()
+    path.write_bytes(content + bytes(4096))
+    assert [one.kind for one in read_commands(path)] == [log.STEP, log.JOINTS_TO]
+    not_finite = content[:-8] + np.float64(np.nan).tobytes()
+    for damaged in (content + b"?" + content, not_finite):
+        path.write_bytes(damaged)
+        with pytest.raises(InputError, match=r"is damaged at byte \d+: .* restore a copy"):
+            list(read_commands(path))
+    path.write_bytes(content.replace(b"joints 7", b"joints x"))
+    with pytest.raises(InputError, match="does not state its number of joints"):
+        list(read_commands(path))
+
+
 def test_a_file_that_is_no_log_says_so(path: Path) -> None:
     with pytest.raises(InputError, match=r"cannot read the log of the world .*without it a simulated run"):
         list(read_commands(path))
