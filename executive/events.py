@@ -307,7 +307,8 @@ class RunResumed(Event):
 
     Attributes:
         ticked: Number of control steps before the interruption that count.
-        intent: Last action of the tool before the interruption, `open` or `close`; "" if there was none.
+        intent: Last action of the tool before the interruption, `open` or `close`; "" if there was none;
+            `unknown` if arm or tool did more than the journal knows.
         versions: Versions of this project, Python, the machine and the required packages.
     """
 

@@ -35,8 +35,8 @@ class PutDown(Skill):
 
     def run(self, cell: Cell) -> Steps:
         """Carry the item to the place, lower it, release it."""
-        goal = aside(cell, self.held, self.drop)
-        height = cell.classes[cell.ledger.get_label(self.held)].height
+        kind = cell.classes[cell.ledger.get_label(self.held)]
+        goal, height = aside(cell, kind, self.drop, self.held), kind.height
         lying = float(cell.safe_place[2]) + height
         try:
             yield from carry(self, cell, self.held, goal, "the safe place")

@@ -42,6 +42,11 @@ class CellWrapper:
         """Number of control steps since the run began."""
         return self.inner.steps
 
+    @property
+    def last_command(self) -> int:
+        """Control step of the last command to arm or tool."""
+        return self.inner.last_command
+
     def log_to(self, path: Path) -> None:
         """Start a log file from which the simulated world can be rebuilt."""
         self.inner.log_to(path)

@@ -57,6 +57,13 @@ class Workcell(Protocol):
     def steps(self) -> int:
         """Number of control steps since the run began, those before a resumption included."""
 
+    @property
+    def last_command(self) -> int:
+        """Control step of the last start of a motion, or of the last opening or closing of the tool.
+
+        0 if there was none, or if the cell of an interrupted run cannot know it.
+        """
+
     def log_to(self, path: Path) -> None:
         """Start a log file from which the simulated world can be rebuilt as it is at any moment.
 

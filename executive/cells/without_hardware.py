@@ -38,13 +38,15 @@ class CellWithoutHardware:
         accounts: The ledger.
         cell: The cell that skills see.
         steps: Number of control steps since the run began.
+        last_command: Control step of the last command to arm or tool that the log of the world holds, or 0.
     """
 
     def __init__(
         self, config: CellConfig, *, seed: int, routes: Routes, emit: Emit, options: CellOptions
     ) -> None:
         del seed
-        self.config, self.routes, self.steps = config, dict(routes), 0
+        self.config, self.routes = config, dict(routes)
+        self.steps = self.last_command = 0
         self.accounts = Tracker(
             config.ledger, config.table, bins_of(config), self.routes, emit, classes_distinct_by_touch(config)
         )

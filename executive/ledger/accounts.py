@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 
 from executive.ledger.certainty import Certainty
-from executive.ledger.item import LYING, REASON_NOT_FOUND, REASON_UNCERTAIN, Record, State
+from executive.ledger.item import LYING, REASON_NOT_FOUND, REASON_UNCERTAIN, REASON_UNTRACKED, Record, State
 
 MIN_EMPTY_PROBES = 3
 """Number of times that the tool must find nothing but the table at an item's place to prove it a phantom."""
@@ -26,7 +26,8 @@ def find_final_state(
     3. An item that is likelier a false detection than an object is a phantom. So is an item that was detected
        repeatedly, if the tool reached the table at its place without a contact at least `MIN_EMPTY_PROBES`
        times, never touched it, and touched another item.
-    4. An item that was dropped, or whose place was found empty, is lost.
+    4. An item that was dropped, or whose place was found empty, is lost; it is rejected if the tool may have
+       moved it while nothing was recorded.
     5. An item without a route is skipped.
     6. If the mission was completed, an item that is sure, not contradicted and not attempted is skipped: a
        quota was reached, or the operator quit.
@@ -50,6 +51,8 @@ def find_final_state(
         return State.PHANTOM, REASON_NOT_FOUND
     if record.empty_probes >= MIN_EMPTY_PROBES and touched_any and not record.had_contact:
         return State.PHANTOM, f"the tool found only the table at its place, {record.empty_probes} times"
+    if record.state is State.DROPPED and record.is_untracked:
+        return State.REJECTED, REASON_UNTRACKED
     if record.state is State.DROPPED or certainty.is_gone(record):
         return State.LOST, "known to exist, not found again"
     if record.state is State.REJECTED:

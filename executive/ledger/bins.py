@@ -90,7 +90,7 @@ class Bins:
             for bin in self.routes.get(record.label, ()):
                 known = sum(other.bin == bin and other.label == record.label for other in records)
                 is_shown = shown[record.label, bin] > known
-                if is_shown or self._is_searched(bin, look):
+                if is_shown or self.is_searched(bin, look):
                     update_bin_log_odds(record, bin, look.error_rates, is_shown=is_shown)
                 if record.bin_log_odds[bin] >= -math.log(self.config.overlooked):
                     record.bin = bin
@@ -99,7 +99,7 @@ class Bins:
                     break
         return found
 
-    def _is_searched(self, name: str, look: Detections) -> bool:
+    def is_searched(self, name: str, look: Detections) -> bool:
         """Return True if a look shows the whole floor of a bin."""
         bin = self.bins[name]
         half_size = np.append(bin.size[:2] / 2 - WALL_MARGIN, 0.0)

@@ -21,6 +21,8 @@ SAME_POSITION_TOLERANCE = 0.01
 """Distance up to which two measured positions count as the same one [m]."""
 REASON_NOT_FOUND = "more looks missed it than saw it"
 """Reason of a phantom that looks did not find again."""
+REASON_UNTRACKED = "its place is unknown: the journal lacks actions of the tool, and no look showed it since"
+"""Reason why an item is rejected that the tool may have moved while nothing was recorded."""
 REASON_UNCERTAIN = "no look is sure of it"
 """Reason of the rejection of an item with low-confidence detections only."""
 
@@ -81,6 +83,7 @@ class Record:
         contradictions: Number of looks with evidence against its class, since it may have been moved.
         contradiction: The last evidence against its class besides the detector's score, or "".
         bin_log_odds: For a dropped item, log odds that it lies in each bin.
+        is_untracked: True if the tool may have moved it while nothing was recorded.
     """
 
     item: str
@@ -108,6 +111,7 @@ class Record:
     contradictions: int = 0
     contradiction: str = ""
     bin_log_odds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
+    is_untracked: bool = False
 
     def __post_init__(self) -> None:
         self.position = self.first_position

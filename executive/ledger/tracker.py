@@ -23,6 +23,8 @@ from executive.ledger.accounts import (
     find_lost_elsewhere,
     forget_rejected,
 )  # fmt: skip
+from executive.ledger.belief import LOG_ODDS_OF_PROOF, Belief
+from executive.ledger.bin_contents import BinContents
 from executive.ledger.bins import Bins, find_believed_bin
 from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage
@@ -66,6 +68,8 @@ class Tracker:
         self._coverage, self._staleness = Coverage(table), Staleness()
         self._records: dict[Item, Record] = {}
         self._names: Counter[str] = Counter()
+        self._bin_contents: BinContents | None = None
+        """Contents of the bins since `lose_track`, until `count_bins`."""
         self._frame = 0
         self.unknown: Counter[str] = Counter()
         self.doubts: list[str] = []
@@ -212,6 +216,7 @@ class Tracker:
     def record_drop(self, item: Item, landing: Array | None = None) -> None:
         """Record that the tool lost an item on the way; all positions are in doubt now."""
         record = self._find(item)
+        record.is_untracked = False
         self._change(record, State.DROPPED)
         self._bins.predict(record, landing)
         record.attempts += 1
@@ -246,6 +251,36 @@ class Tracker:
     def invalidate_positions(self) -> None:
         """Record that any object on the table may have been moved."""
         self._invalidate(np.zeros(3), math.inf)
+
+    def lose_track(self) -> None:
+        """Record that the tool may have moved any item that is not in a bin."""
+        self._bin_contents = BinContents(self._bins)
+        self._search_everywhere([one for one in self.records if one.state in (State.HELD, State.DROPPED)])
+
+    def search_unseen(self) -> None:
+        """Search every item that no look has shown since `lose_track`, on the table and in the bins."""
+        self._search_everywhere(
+            [
+                record
+                for record in self.records
+                if record.state is State.SEEN
+                and record.belief.probability >= 0.5
+                and not self._staleness.is_settled(record)
+            ]
+        )
+
+    def count_bins(self) -> None:
+        """Place an item for each object that most full looks since `lose_track` have shown in a bin."""
+        contents, self._bin_contents = self._bin_contents, None
+        assert contents is not None, "bins are counted after `lose_track`"
+        for label, bin in contents.find_surplus(self.records):
+            searched = (one for one in self.records if one.state is State.DROPPED and one.is_untracked)
+            record = next((one for one in searched if one.label == label), None) or self._add_in(bin, label)
+            if bin in self._routes.get(label, ()):
+                record.why = "found there when the run was resumed"
+                self.record_placement(record.item, bin)
+            else:
+                self.reject(record.item, f"found in {bin} when the run was resumed")
 
     def close(self, *, completed: bool) -> None:
         """Decide the final state of each item; `completed` is True if the tree succeeded."""
@@ -285,9 +320,28 @@ class Tracker:
         for record in update.apply([one for one, bin in in_bins.items() if bin is None]):
             self._certainty.reject_if_uncertain(record, is_settled=self._staleness.is_settled(record))
             self._emit(record.summary)
-        if detections.view == "full":
+        if detections.view == "full" and self._bin_contents is not None:
+            self._bin_contents.add(detections, in_bins)
+        elif detections.view == "full":
             for record in self._bins.find_dropped(detections, in_bins, self.records):
                 self._emit(record.summary)
+
+    def _search_everywhere(self, records: Collection[Record]) -> None:
+        """Search items of unknown place on the table and in the bins; all positions are in doubt now."""
+        for record in records:
+            record.epoch, record.is_untracked = self.epoch, True
+            record.bin_log_odds.clear()
+            self._change(record, State.DROPPED)
+        self.invalidate_positions()
+
+    def _add_in(self, bin: str, label: str) -> Record:
+        """Add an item that was first seen in a bin; its first position is the middle of the bin."""
+        self._names[label] += 1
+        belief = Belief(label, LOG_ODDS_OF_PROOF, is_proved=True)
+        place = self._bins.bins[bin].position
+        record = Record(f"{label}-{self._names[label]}", belief, place, self.epoch, 0.0, True)
+        self._records[record.item] = record
+        return record
 
     def _find(self, item: Item) -> Record:
         try:

@@ -143,13 +143,12 @@ def over(bin: Bin, number: int, height: float, tallest: float, drop: float = DRO
     return Goal((x, y, level(bin, layer, tallest) + height + drop))
 
 
-def aside(cell: Cell, item: Item, drop: float) -> Goal:
-    """Return the goal of putting an item down: `drop` [m] above the free place nearest the safe one.
+def aside(cell: Cell, kind: ObjectClass, drop: float, item: Item | None = None) -> Goal:
+    """Return the goal of putting an object down: `drop` [m] above the free place nearest the safe one.
 
     A place is free where nothing is believed to stand and no bin is; if none is far and wide, it is the safe
     place itself.
     """
-    kind = cell.classes[cell.ledger.get_label(item)]
     apart = 2 * kind.radius + SIDE_BY_SIDE
     x, y, floor = (float(value) for value in cell.safe_place)
     steps = [step * apart for step in range(-ROWS, ROWS + 1)]
@@ -161,7 +160,7 @@ def aside(cell: Cell, item: Item, drop: float) -> Goal:
     return Goal((*place, floor + kind.height + drop))
 
 
-def _is_free(cell: Cell, place: Array, radius: float, but: Item) -> bool:
+def _is_free(cell: Cell, place: Array, radius: float, but: Item | None) -> bool:
     """Tell whether nothing else is within `radius` [m] of a place `(2,)` [m] on the table."""
     if any(bin.contains(place, radius + BIN_THICKNESS) for bin in cell.bins.values()):
         return False

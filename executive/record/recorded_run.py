@@ -131,6 +131,7 @@ class Recording:
         recorder: Recorder of the run.
         views: Displays of the run.
         past: Events that the observers get before the run.
+        remark: Sentence for the displays at the start of the run, or "".
     """
 
     run: Run
@@ -140,6 +141,7 @@ class Recording:
     recorder: Recorder
     views: Sequence[View]
     past: Iterable[TimedEvent] = ()
+    remark: str = ""
 
     def __post_init__(self) -> None:
         self._timeline = Timeline(history=False)
@@ -205,6 +207,8 @@ class Recording:
         try:
             for view in self.views:
                 view.open(run)
+                if self.remark:
+                    view.note(self.remark)
             for watcher in watchers:
                 run.observe(watcher)
             for event in self.past:

@@ -39,6 +39,7 @@ class Replay:
         replayed: The decision of the replay instead, or None if there was none.
         edited: True if the mission is not the recorded one.
         unanswered: Message of the question without a recorded answer that ended the replay, or "".
+        is_complete: True if the replay repeated the last control step of the record, too.
     """
 
     decisions: int
@@ -47,6 +48,7 @@ class Replay:
     replayed: TimedEvent | None
     edited: bool
     unanswered: str = ""
+    is_complete: bool = True
 
     @property
     def same(self) -> bool:
@@ -113,7 +115,9 @@ def compare(
     run.execute()
     comparison.end()
     recorded, replayed = comparison.difference
-    return Replay(comparison.same, run.tick, recorded, replayed, edited, comparison.unanswered)
+    return Replay(
+        comparison.same, run.tick, recorded, replayed, edited, comparison.unanswered, comparison.is_complete
+    )
 
 
 class _Comparison:
@@ -123,6 +127,7 @@ class _Comparison:
         same: Number of equal decisions.
         difference: The first recorded decision that differs, and the new one; None if there is none.
         unanswered: Message of a question without a recorded answer before the first difference, or "".
+        is_complete: True if the replay repeated all recorded decisions and had no others.
         run: The replay; it is stopped at the first difference.
     """
 
@@ -133,11 +138,12 @@ class _Comparison:
         self._edited = edited
         self._recorded = [d for timed in log.events if (d := _decision(timed, edited))]
         # Of an interrupted run, the last control step may be incomplete.
-        self._is_complete = any(isinstance(timed.event, RunEnded) for timed in log.events)
+        self._has_ended = any(isinstance(timed.event, RunEnded) for timed in log.events)
         self._is_over = False
         self.same = 0
         self.difference: tuple[TimedEvent | None, TimedEvent | None] = (None, None)
         self.unanswered = ""
+        self.is_complete = True
 
     def __call__(self, timed: TimedEvent) -> None:
         if self._is_over:
@@ -149,14 +155,17 @@ class _Comparison:
         if recorded == decision:
             self.same += 1
             return
-        self._is_over, self.unanswered = True, self.run.replayed.unanswered
-        if self._is_complete or self._counts(decision) or (recorded is not None and self._counts(recorded)):
+        self._is_over, self.is_complete, self.unanswered = True, False, self.run.replayed.unanswered
+        if self._has_ended or self._counts(decision) or (recorded is not None and self._counts(recorded)):
             self.difference = (recorded, decision)
         self.run.control.stop()
 
     def end(self) -> None:
         """Compare the end of the replay with the end of the record."""
-        if not self._is_over and self.same < len(self._recorded) and self._counts(self._recorded[self.same]):
+        if self._is_over or self.same == len(self._recorded):
+            return
+        self.is_complete = False
+        if self._counts(self._recorded[self.same]):
             self.difference = (self._recorded[self.same], None)
             self.unanswered = self.run.replayed.unanswered
 

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from executive.errors import InputError
-from executive.events import MotionPlanned, RequestGiven, RunStarted
+from executive.events import MotionPlanned, RequestGiven, RunStarted, TimedEvent
 from executive.record.journal import ending_of, read_journal, start_of
 from executive.record.recorded_mission import recorded_mission
 from executive.record.recorded_run import Recording, RecordOptions
 from executive.record.recorder import Recorder
 from executive.record.replay import compare
-from executive.record.result import ENDED, Result
+from executive.record.result import ENDED, Result, read_result
 from executive.record.run_directory import RunDirectory
-from executive.replay.input_log import InputLog
+from executive.replay.input_log import UNKNOWN_ACTION, InputLog
+from executive.replay.replayed_cell import ReplayedCell
 
 if TYPE_CHECKING:
     from executive.run.assembly import RunOptions
@@ -42,7 +43,10 @@ def resume_run(
     doubted until the next look, and each skill that was running starts again.
 
     A run that ended as INCOMPLETE is resumed as well: the tree starts again, and rejected and skipped items
-    are searched anywhere. Placed items stay placed and counted.
+    are searched anywhere. Placed items stay placed and counted. Of a run that ended otherwise, but whose
+    result was not written any more, the result is written.
+
+    If the world did more than the journal knows, the scene is observed before the run continues.
 
     Args:
         path: The run directory.
@@ -62,8 +66,9 @@ def resume_run(
     # Before anything else: from here on no other process writes to the directory.
     recorder = Recorder(directory, frames=record.frames, again=True)
     try:
-        log, start = _read_log(directory)
-        seed = start.seed
+        events = read_journal(directory.journal)
+        log, start = InputLog.of(events), start_of(events, path, "run the mission anew")
+        has_ended, seed = _has_ended(directory, events), start.seed
         loaded = recorded_mission(path, start, skills)
         # Without the step of a halt or of a bug in a skill: a corrected skill may continue there.
         certain = log if log.halt is None else log.before(log.halt.tick)
@@ -74,7 +79,9 @@ def resume_run(
                 "skill has been changed since; go back to what it was run with, or run the mission anew"
             )
         options = replace(options, seed=seed, requests=start.requests, scene=directory.scene)
-        run = assemble_resumed(loaded, skills, options, log, directory.world)
+        run = assemble_resumed(
+            loaded, skills, options, log, directory.world, is_complete=replay.is_complete, has_ended=has_ended
+        )
     except BaseException:
         recorder.close(wait=False)
         raise
@@ -84,25 +91,41 @@ def resume_run(
         replayed = run.replayed.log
         recorder.remember(replayed.events)
         past = [one for one in replayed.events if isinstance(one.event, NOT_REPEATED)]
-        return Recording(run, loaded, skills, directory, recorder, record.views, past).execute(seed, began)
+        recording = Recording(
+            run, loaded, skills, directory, recorder, record.views, past, _describe_gap(run.replayed)
+        )
+        return recording.execute(seed, began)
 
 
-def _read_log(directory: RunDirectory) -> tuple[InputLog, RunStarted]:
-    """Return the inputs of a run that can be resumed, and its start.
+def _has_ended(directory: RunDirectory, events: Sequence[TimedEvent]) -> bool:
+    """Return True if a run has ended and only its result was not written any more.
 
     Raises:
         InputError: The run cannot be resumed.
     """
-    events = read_journal(directory.journal)
     ending = ending_of(events)
-    if ending is not None and ending.status == "INCOMPLETE" and ending.holds:
+    if ending is None:
+        return False
+    if ending.status == "INCOMPLETE" and ending.holds:
         raise InputError(
             f'the run in "{directory.path}" ended with {ending.holds} in the tool and cannot be '
             "resumed; take it out and run the mission anew"
         )
-    if ending is not None and ending.status in ENDED:
+    if ending.status in ENDED and read_result(directory, events) is not None:
         raise InputError(
             f'the run in "{directory.path}" came to its end: {ending.status}; '
             "there is nothing to take up again"
         )
-    return InputLog.of(events), start_of(events, directory.path, "run the mission anew")
+    return ending.status in ENDED
+
+
+def _describe_gap(replayed: ReplayedCell) -> str:
+    """Return a warning if the world of a run did more than the journal knows, else ""."""
+    last = replayed.last
+    if last is None or last.last_action != UNKNOWN_ACTION:
+        return ""
+    steps = last.resumed - last.complete
+    return (
+        f"the journal ends {steps} control steps ({steps * replayed.log.step:.2f} s) before the log of the "
+        "world, so actions of the tool are unknown; the whole scene is observed before the run continues"
+    )

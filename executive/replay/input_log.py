@@ -18,6 +18,9 @@ from executive.events import (
     ToolCommanded,
 )
 
+UNKNOWN_ACTION = "unknown"
+"""Last action of the tool before an interruption, if the journal lacks it."""
+
 
 class RecordedInput(NamedTuple):
     """One answer of a cell.
@@ -37,7 +40,8 @@ class Interruption:
 
     Attributes:
         complete: Number of control steps before the interruption that count.
-        last_action: Last action of the tool before the interruption, `open` or `close`; "" if there was none.
+        last_action: Last action of the tool before the interruption, `open` or `close`; "" if there was none;
+            `UNKNOWN_ACTION` if arm or tool did more than the journal knows.
         reopens: True if the run had ended as INCOMPLETE, so that the tree starts again.
         resumed: Control step at which the run was resumed.
     """
@@ -119,23 +123,29 @@ class InputLog:
         events = (timed.event for timed in reversed(self.events))
         return next((event.action for event in events if isinstance(event, ToolCommanded)), "")
 
-    def interruption_after(self, steps: int) -> Interruption:
+    def interruption_after(
+        self, steps: int, last_command: int = 0, *, is_complete: bool = True
+    ) -> Interruption:
         """Return the interruption at the end of the log.
 
-        The last control step with an event may be incomplete. The steps in which the arm only braked do not
-        count: those from a halt on, and those of an interrupted resumption. A run that ended as INCOMPLETE
-        counts as a whole.
+        The steps in which the arm only braked do not count: those from a halt on, and those of an interrupted
+        resumption. A run that ended as INCOMPLETE counts as a whole.
 
         Args:
             steps: Number of control steps that the world of the cell has made.
+            last_command: Control step in which the arm or the tool was last commanded, by the world.
+            is_complete: True if the log holds all events of its last control step.
         """
         if self.last_tick in _incomplete_ends(self.events):
             return Interruption(self.last_tick + 1, self.last_action, True, self.last_tick + 1)
-        complete = min(steps, self.last_tick + 1 if self.halt is None else self.halt.tick)
+        end = self.last_tick + is_complete if self.halt is None else self.halt.tick
+        complete = min(steps, end)
         for earlier in reversed(list(self.interruptions.values())):
             if earlier.resumed >= complete:
                 complete = min(complete, earlier.complete)
-        return Interruption(complete, self.last_action, complete - 1 in _incomplete_ends(self.events), steps)
+        lacks_actions = last_command > self.last_tick or (not is_complete and steps > self.last_tick)
+        action = UNKNOWN_ACTION if lacks_actions else self.last_action
+        return Interruption(complete, action, complete - 1 in _incomplete_ends(self.events), steps)
 
     def is_over(self, tick: int) -> bool:
         """Return True if the recorded run ended before its tree was ticked in this control step."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -29,6 +31,7 @@ class ReplayedCell(CellWrapper):
 
     Attributes:
         log: The recorded inputs that are replayed: those before the last interruption.
+        last: Interruption at the end of the log, or None.
         interruption: Interruption before this control step after which the run was not resumed yet, or None.
         is_live: True from the moment at which the cell inside has taken over.
     """
@@ -36,7 +39,7 @@ class ReplayedCell(CellWrapper):
     def __init__(self, inner: Workcell, log: InputLog, last: Interruption | None = None) -> None:
         super().__init__(inner)
         self.log = log if last is None else log.before(last.complete)
-        self._last = last
+        self.last = last
         self._replayer = InputReplayer(self.log)
         self._is_halted = False
         self.is_live = False
@@ -63,7 +66,7 @@ class ReplayedCell(CellWrapper):
     @property
     def is_over(self) -> bool:
         """True if the recorded run ended before its tree was ticked in this control step."""
-        return self._last is None and self.log.is_over(self._steps)
+        return self.last is None and self.log.is_over(self._steps)
 
     @property
     def is_reopened(self) -> bool:
@@ -78,12 +81,21 @@ class ReplayedCell(CellWrapper):
         """
         interruption, self.interruption = self.interruption, None
         assert interruption is not None, "only an interrupted run can be resumed"
-        if interruption is not self._last:
+        if interruption is not self.last:
             self._begin_step(interruption.resumed)
             return
         while self.inner.steps < interruption.complete:
             self.inner.advance()
         self.is_live = True
+
+    @contextmanager
+    def muted(self) -> Iterator[None]:
+        """Answer with the last recorded answers meanwhile; no command has an effect."""
+        is_live, self.is_live = self.is_live, False
+        try:
+            yield
+        finally:
+            self.is_live = is_live
 
     def advance(self) -> None:
         """Let one control step pass.
@@ -94,7 +106,7 @@ class ReplayedCell(CellWrapper):
         if self.is_live:
             self.inner.advance()
             return
-        if self._last is None and not self._is_halted and self.log.is_halted_after_tick(self._steps):
+        if self.last is None and not self._is_halted and self.log.is_halted_after_tick(self._steps):
             self._is_halted = True
             raise Stopped("the recorded run was halted here")
         self._begin_step(self._steps + 1)
@@ -105,8 +117,8 @@ class ReplayedCell(CellWrapper):
         self._replayer.begin_step(steps)
 
     def _interruption_at(self, steps: int) -> Interruption | None:
-        if self._last is not None and steps == self._last.complete:
-            return self._last
+        if self.last is not None and steps == self.last.complete:
+            return self.last
         return self.log.interruptions.get(steps)
 
     def _now(self) -> float:

@@ -94,8 +94,11 @@ def assemble_resumed(
     options: RunOptions,
     log: InputLog,
     world: Path,
+    *,
+    is_complete: bool = True,
+    has_ended: bool = False,
 ) -> ResumedRun:
-    """Return a run that replays an interrupted run and continues on its cell.
+    """Return a run that replays a recorded run on its rebuilt cell and, if it was interrupted, continues.
 
     Args:
         loaded: The mission and its cell.
@@ -103,6 +106,8 @@ def assemble_resumed(
         options: Options of the interrupted run.
         log: The recorded inputs.
         world: File from which the cell rebuilds its world.
+        is_complete: True if the log holds all events of its last control step.
+        has_ended: True if the run is not continued.
 
     Raises:
         InputError: The cell is of a kind that is not installed, or its world cannot be rebuilt.
@@ -110,7 +115,8 @@ def assemble_resumed(
     parts = _Parts(loaded, skills, options)
     frames, turns = (log.number_of_answers(f"camera.{name}") for name in ("frame", "next_pose"))
     inner = parts.build_cell(ResumePoint(world, frames, turns), log.number_of(RequestGiven))
-    return parts.build_resumed_run(inner, log, log.interruption_after(inner.steps))
+    last = log.interruption_after(inner.steps, inner.last_command, is_complete=is_complete)
+    return parts.build_resumed_run(inner, log, None if has_ended else last)
 
 
 def assemble_replay(

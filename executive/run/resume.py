@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable
 
@@ -12,13 +13,15 @@ from executive.cell.protocols import Cell
 from executive.errors import Fault
 from executive.events import Observer, RunEnded, RunResumed
 from executive.mission.build import TreeNode
-from executive.replay.input_log import Interruption
+from executive.replay.input_log import UNKNOWN_ACTION, Interruption
 from executive.replay.replayed_cell import ReplayedCell
 from executive.run.planning_ahead import PlanningAhead
 from executive.run.run import Run
 from executive.run.run_context import RunContext, come_to_rest
 from executive.run.run_control import RunControl
+from executive.run.scene_recovery import recover_scene
 from executive.run.versions import versions
+from executive.tree.halting import halt
 from executive.tree.skill_leaf import SkillNode
 
 
@@ -54,6 +57,7 @@ class ResumedRun(Run):
         self.replayed = replayed
         self._paces_live_part = realtime
         self._recorders: list[Observer] = []
+        self._is_scene_known = True
         self._planner = PlanningAhead(replayed.inner.cell)
         context.observe(self._planner.observe)
         control.between_ticks(self._follow_record)
@@ -72,12 +76,11 @@ class ResumedRun(Run):
 
     def _follow_record(self) -> None:
         """Stop or resume where the recorded run was stopped or resumed; called between two ticks."""
-        if self.replayed.is_live:
-            return
-        if self.replayed.is_over:
+        replayed = self.replayed
+        while not replayed.is_live and not replayed.is_over and replayed.interruption is not None:
+            self._resume(replayed.interruption)
+        if not replayed.is_live and replayed.is_over:
             self.control.stop()
-        elif (interruption := self.replayed.interruption) is not None:
-            self._resume(interruption)
 
     def _resume(self, interruption: Interruption) -> None:
         """Continue after an interruption, in which nothing observed the cell.
@@ -98,11 +101,30 @@ class ResumedRun(Run):
             self._wall_start = time.monotonic() - context.now
             ticked, intent = interruption.complete, interruption.last_action
             context.emit(RunResumed(ticked, intent, dict(versions())))
-        restart_skills(self.root)
+        self._is_scene_known &= interruption.last_action != UNKNOWN_ACTION
+        # The arm is no longer where the skills left it: no skill may open the tool there at its end.
+        if self._is_scene_known:
+            restart_skills(self.root)
+        else:
+            with replayed.muted(), contextlib.suppress(Fault):
+                restart_skills(self.root)
         require_rest(context.come_to_rest)
         if interruption.reopens:
             replayed.accounts.reopen()
-        reconcile(context.cell, interruption.last_action)
+        if self._is_scene_known:
+            reconcile(context.cell, interruption.last_action)
+        else:
+            self._recover_scene()
+
+    def _recover_scene(self) -> None:
+        """Observe the scene; after an interruption or a stop meanwhile, the scene stays unknown."""
+        for _ in recover_scene(self._context.cell):
+            self._context.advance()
+            replayed = self.replayed
+            is_over = not replayed.is_live and (replayed.is_over or replayed.interruption is not None)
+            if self.control.stopped or is_over:
+                return
+        self._is_scene_known = True
 
 
 def require_rest(brake: Callable[[], str]) -> None:
@@ -119,12 +141,15 @@ def restart_skills(root: Behaviour) -> None:
     """Halt every running skill, so that it starts again at the next tick.
 
     Control nodes keep their state: attempts are counted on, and variables keep their values.
+
+    Raises:
+        Fault: The clean-up of a skill failed; all the others were halted none the less.
     """
     running = [
         node for node in root.iterate() if isinstance(node, SkillNode) and node.status is Status.RUNNING
     ]
-    for node in running:
-        node.stop(Status.INVALID)
+    if problems := [problem for node in running for problem in halt(node)]:
+        raise Fault("; ".join(problems))
 
 
 def reconcile(cell: Cell, last_action: str) -> None:

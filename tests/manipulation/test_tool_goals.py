@@ -32,7 +32,8 @@ def picked(fake: FakeCell, label: str) -> str:
 
 
 def test_it_is_the_safe_place_if_that_is_free(fake: FakeCell, held: str) -> None:
-    assert aside(fake.cell, held, 0.01).position == pytest.approx((*SAFE, 0.05 + 0.01))
+    cube = fake.cell.classes["cube"]
+    assert aside(fake.cell, cube, 0.01, held).position == pytest.approx((*SAFE, 0.05 + 0.01))
 
 
 def test_what_is_put_down_one_after_another_stands_side_by_side(fake: FakeCell, held: str) -> None:
@@ -57,7 +58,8 @@ def test_where_nothing_is_free_it_is_the_safe_place_all_the_same(
     monkeypatch.setattr("executive.manipulation.tool_goals.ROWS", 0)
     run_skill(PutDown(held=held), fake)
     fake.world.put("cube", 0.5, 0.1)
-    assert aside(fake.cell, picked(fake, "cube"), 0.01).position[:2] == pytest.approx(SAFE)
+    item, cube = picked(fake, "cube"), fake.cell.classes["cube"]
+    assert aside(fake.cell, cube, 0.01, item).position[:2] == pytest.approx(SAFE)
 
 
 def test_the_goal_of_an_approach_lies_below_the_surface_and_the_last_part_is_slow(fake: FakeCell) -> None:

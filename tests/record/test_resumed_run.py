@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 from collections import Counter
 from pathlib import Path
@@ -65,8 +66,9 @@ def load(missions: Path, name: str) -> LoadedMission:
 def run_of(loaded: LoadedMission, runs: Path, **options: Any) -> Result:
     """Run a mission on the fake cell, asking for every class four times."""
     skills, views = options.pop("skills", discover()), options.pop("views", ())
+    frames = options.pop("frames", False)
     run = RunOptions(SEED, [*loaded.routes] * 4, **{"kind": FakeCell, **options})
-    return record_run(loaded, skills, run, runs, RecordOptions(views, frames=False))
+    return record_run(loaded, skills, run, runs, RecordOptions(views, frames=frames))
 
 
 def cut_off(loaded: LoadedMission, runs: Path, tick: int, nth: int = 1) -> Path:
@@ -230,6 +232,62 @@ def test_there_must_be_something_to_take_up(missions: Path, tmp_path: Path) -> N
         find_run("nowhere", tmp_path)
     with pytest.raises(InputError, match=r"there is none at all; say where they are with --runs DIR"):
         find_run("latest", tmp_path / "empty")
+
+
+class Watcher(Cutter):
+    """A view that keeps the sentences about the record."""
+
+    def __init__(self) -> None:
+        super().__init__(10**9)
+        self.notes: list[str] = []
+
+    def note(self, sentence: str) -> None:
+        self.notes.append(sentence)
+
+
+def truncate(path: Path, share: float) -> None:
+    content = (path / "journal.jsonl").read_bytes()
+    (path / "journal.jsonl").write_bytes(content[: int(share * len(content))])
+
+
+@pytest.mark.parametrize("share", [0.15, 0.6, pytest.param(0.9, marks=pytest.mark.slow)])
+def test_a_scene_is_observed_if_the_journal_lacks_actions_of_the_tool(
+    missions: Path, tmp_path: Path, share: float
+) -> None:
+    path = Path(run_of(load(missions, "sort_overhead"), tmp_path, frames=True)["run"])
+    truncate(path, share)
+    watcher = Watcher()
+    result = resumed(path, views=[watcher])
+    assert (result["status"], result["items"]["placed"]) == ("SUCCESS", 6)
+    assert result["audit"]["agrees"]
+    assert redecided(path) == ""
+    (note,) = watcher.notes
+    assert re.match(r"the journal ends \d+ control steps \([\d.]+ s\) before the log of the world", note)
+
+
+def test_a_scene_whose_observation_was_interrupted_is_observed_again(missions: Path, tmp_path: Path) -> None:
+    path = Path(run_of(load(missions, "sort_overhead"), tmp_path, frames=True)["run"])
+    truncate(path, 0.6)
+    steps = json.loads((path / "world.log").read_text())["steps"]
+    with pytest.raises(Cut):
+        resumed(path, views=[Cutter(steps + 1, 3)])
+    result = resumed(path)
+    assert (result["status"], result["items"]["placed"]) == ("SUCCESS", 6)
+    assert result["audit"]["agrees"]
+    assert redecided(path) == ""
+
+
+def test_the_result_of_a_run_that_was_killed_after_its_end_is_written(missions: Path, tmp_path: Path) -> None:
+    result = run_of(load(missions, "sort_overhead"), tmp_path, frames=True)
+    path = Path(result["run"])
+    journal = (path / "journal.jsonl").read_bytes()
+    (path / "result.json").unlink()
+    completed = resumed(path)
+    assert {**completed, "wall_time_s": 0} == {**result, "wall_time_s": 0}
+    assert json.loads((path / "result.json").read_text()) == completed
+    assert (path / "journal.jsonl").read_bytes() == journal
+    with pytest.raises(InputError, match="there is nothing to take up again"):
+        resumed(path)
 
 
 def test_a_mission_that_is_decided_otherwise_now_is_not_gone_on_with(missions: Path, tmp_path: Path) -> None:

@@ -66,6 +66,25 @@ def test_a_control_step_counts_if_the_world_made_it_and_the_journal_reaches_it(
     assert InputLog.of([START, sense(8, 1)]).interruption_after(steps).complete == complete
 
 
+@pytest.mark.parametrize(
+    ("last_command", "is_complete", "complete", "action"),
+    [(8, True, 9, "open"), (9, True, 9, "unknown"), (8, False, 8, "unknown"), (20, False, 8, "unknown")],
+)
+def test_a_world_that_did_more_than_the_journal_knows(
+    last_command: int, is_complete: bool, complete: int, action: str
+) -> None:
+    log = InputLog.of([START, at(8, ToolCommanded("open"))])
+    interruption = log.interruption_after(20, last_command, is_complete=is_complete)
+    assert (interruption.complete, interruption.last_action) == (complete, action)
+
+
+def test_a_kill_within_a_control_step_loses_no_action() -> None:
+    interruption = InputLog.of([START, at(8, ToolCommanded("open"))]).interruption_after(
+        8, 8, is_complete=False
+    )
+    assert (interruption.complete, interruption.last_action) == (8, "open")
+
+
 @pytest.mark.parametrize(("steps", "complete"), [(9, 6), (10, 10)])
 def test_a_resumption_that_was_interrupted_at_once_is_repeated_from_its_beginning(
     steps: int, complete: int

@@ -131,6 +131,7 @@ class FakeArm:
         if not isinstance(motion, FakeMotion):
             raise Fault(f"the fake arm follows its own planned motions, not a {type(motion).__name__}")
         self.commanded.append("start")
+        self._world.is_commanded = True
         self._path = list(motion.path)
         self._half = len(self._path) // 2
         self._met = None
@@ -236,12 +237,14 @@ class FakeTool:
 
     def close(self) -> None:
         """Seal what the cup is on."""
+        self._world.is_commanded = True
         thing = self._world.under(self._tip())
         if thing is not None and self.seals():
             self._world.held, thing.fell = thing, False
 
     def open(self) -> None:
         """Let go; the object falls straight down."""
+        self._world.is_commanded = True
         self._let_go()
 
     def part(self) -> None:

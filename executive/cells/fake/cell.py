@@ -105,7 +105,7 @@ class FakeCell(CellWithoutHardware):
         self.detector = next(iter(self.detectors.values()))
         self._log: FakeLog | None = None
         if options.resume is not None:
-            self.steps = restore(options.resume.log, self.world, self.arm)
+            self.steps, self.last_command = restore(options.resume.log, self.world, self.arm)
             self.camera.skip(options.resume.frames, options.resume.turns)
             self.log_to(options.resume.log)
         self.cell = replace(
@@ -148,10 +148,12 @@ class FakeCell(CellWithoutHardware):
     def note(self) -> None:
         """Write the present state of the world into the log."""
         if self._log is not None:
-            self._log.keep(self.steps, self.world, self.arm)
+            self._log.keep(self.steps, self.last_command, self.world, self.arm)
 
     def advance(self) -> None:
         """Let one control step pass."""
+        if self.world.is_commanded:
+            self.last_command, self.world.is_commanded = self.steps, False
         self.arm.advance()
         super().advance()
         self.note()
@@ -163,11 +165,13 @@ class FakeCell(CellWithoutHardware):
     def audit(self) -> dict[str, int]:
         """Return the true final counts of the objects; see `executive.cells.audit.audit_objects`."""
         world = self.world
-        objects = [
-            FinalObject(one.label, self._find_bin(one), one.stood, one.fell, one is world.held, is_removed)
-            for is_removed, group in ((False, world.objects), (True, world.removed))
-            for one in group
-        ]
+        objects = []
+        for is_removed, group in ((False, world.objects), (True, world.removed)):
+            for one in group:
+                bin = self._find_bin(one)
+                # A resumed run may see an object for the first time in a bin; the ledger takes its middle.
+                places = [*one.stood, self.cell.bins[bin].position] if bin else one.stood
+                objects.append(FinalObject(one.label, bin, places, one.fell, one is world.held, is_removed))
         return audit_objects(objects, self.ledger.records, self.routes, self.config.ledger.gate)
 
     def _find_bin(self, one: FakeObject) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from executive.cells.fake.arm import FakeArm
 from executive.cells.fake.world import FakeObject, FakeWorld
 from executive.cells.log_file import LogFile
 from executive.errors import InputError
-from executive.geometry import Pose
+from executive.geometry import Array, Pose
 
 
 class FakeLog(LogFile):
@@ -23,7 +23,7 @@ class FakeLog(LogFile):
         super().__init__(path, "the state of the world")
         self._length = 0
 
-    def keep(self, steps: int, world: FakeWorld, arm: FakeArm) -> None:
+    def keep(self, steps: int, last_command: int, world: FakeWorld, arm: FakeArm) -> None:
         """Write the present state, after a number of control steps.
 
         Raises:
@@ -33,6 +33,7 @@ class FakeLog(LogFile):
             return
         state = {
             "steps": steps,
+            "last_command": last_command,
             "objects": [vars(thing) for thing in world.objects],
             "removed": [vars(thing) for thing in world.removed],
             "held": next((n for n, thing in enumerate(world.objects) if thing is world.held), None),
@@ -44,24 +45,33 @@ class FakeLog(LogFile):
         self.write(text.ljust(self._length), 0)
 
 
-def restore(path: Path, world: FakeWorld, arm: FakeArm) -> int:
-    """Bring world and arm into the state in a log, the arm at rest, and return the number of control steps.
+def restore(path: Path, world: FakeWorld, arm: FakeArm) -> tuple[int, int]:
+    """Bring world and arm into the state in a log, the arm at rest.
+
+    Returns:
+        Number of control steps, and control step of the last command to arm or tool.
 
     Raises:
         InputError: The log contains no state.
     """
     try:
         state: Mapping[str, Any] = json.loads(path.read_bytes())
-    except (OSError, ValueError) as error:
+        world.objects[:] = [_read_object(**one) for one in state["objects"]]
+        world.removed[:] = [_read_object(**one) for one in state["removed"]]
+        world.held = None if state["held"] is None else world.objects[state["held"]]
+        rotation, position = map(_read_array, state["tool"])
+        arm.put(Pose(rotation.reshape(3, 3), position.reshape(3)))
+        return int(state["steps"]), int(state["last_command"])
+    except (OSError, ValueError, TypeError, LookupError, RecursionError) as error:
         raise InputError(
             f'the world cannot be rebuilt from "{path}": {error}; run the mission again from its start'
         ) from error
-    world.objects[:] = [_read_object(**one) for one in state["objects"]]
-    world.removed[:] = [_read_object(**one) for one in state["removed"]]
-    world.held = None if state["held"] is None else world.objects[state["held"]]
-    arm.put(Pose(*map(np.array, state["tool"])))
-    return int(state["steps"])
 
 
-def _read_object(label: str, position: list[float], stood: list[list[float]], fell: bool) -> FakeObject:
-    return FakeObject(label, np.array(position), [np.array(place) for place in stood], fell)
+def _read_array(value: object) -> Array:
+    return np.array(value, dtype=np.float64)
+
+
+def _read_object(label: str, position: object, stood: Sequence[object], fell: bool) -> FakeObject:
+    places = [_read_array(place).reshape(3) for place in stood]
+    return FakeObject(str(label), _read_array(position).reshape(3), places, bool(fell))

@@ -47,6 +47,7 @@ class FakeWorld:
         removed: Those that somebody took away.
         bins: What objects may lie in.
         held: The object at the tool, or None.
+        is_commanded: True if arm or tool was commanded in this control step.
     """
 
     classes: Mapping[str, ObjectClass]
@@ -54,6 +55,7 @@ class FakeWorld:
     removed: list[FakeObject] = field(default_factory=list)
     bins: Collection[Bin] = ()
     held: FakeObject | None = None
+    is_commanded: bool = False
 
     def put(self, label: str, x: float, y: float) -> FakeObject:
         """Stand an object on the table and return it.

@@ -29,7 +29,8 @@ def audit(
 
     Args:
         world: The simulated world at the end of the run.
-        stood: By body, its positions `(3,)` [m] at the start and after each time that it was moved by hand.
+        stood: By body, its positions `(3,)` [m] at the start and after each time that it was moved by hand
+            or released by the tool.
         records: The items of the ledger.
         bins: The bins of the cell.
         routes: Names of the right bins of each class.
@@ -45,7 +46,9 @@ def audit(
                 world.removed[body] if is_removed else (world.bodies[body], world.object_pose(body).position)
             )
             bin = _find_bin(position, bins)
-            yield FinalObject(label, bin, positions, body in fallen, body == held, is_removed)
+            # A resumed run may see an object for the first time in a bin; the ledger takes its middle.
+            places = [*positions, bins[bin].position] if bin else positions
+            yield FinalObject(label, bin, places, body in fallen, body == held, is_removed)
 
     return audit_objects(final_objects(), records, routes, reach)
 

@@ -177,7 +177,7 @@ class SimCell(CellWithoutHardware):
     def _rebuild(self, log: Path) -> UnderWay:
         """Rebuild the world from its log, and continue the log."""
         under_way = rebuild(self._world, self._tool, read_commands(log))
-        self.steps = under_way.steps
+        self.steps, self.last_command = under_way.steps, under_way.last_command
         self._world.log = CommandLog(log, self._world.robot.joint_count, again=True)
         return under_way
 

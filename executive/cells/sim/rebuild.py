@@ -29,12 +29,14 @@ class UnderWay:
         motion: The motion it followed, or None.
         time: How far on that path it was [s].
         steps: Number of control steps of the run.
+        last_command: Control step of the last command to arm or tool; 0 if there was none.
     """
 
     command: Array
     motion: Trajectory | None
     time: float
     steps: int
+    last_command: int
 
 
 class Rebuilding:
@@ -52,7 +54,7 @@ class Rebuilding:
         self._command: Array = np.zeros(0)
         self._motion: Trajectory | None = None
         self._time = 0.0
-        self._steps = 0
+        self._steps = self._last_command = 0
         self._stepped: tuple[Array, float] | None = None
         """Command before the last physics step, and its time; None if no command has followed the step."""
 
@@ -66,11 +68,13 @@ class Rebuilding:
         command, time = self._command, self._time
         if self._stepped and self._motion is not None:
             command, time = self._stepped
-        return UnderWay(command, self._motion, time, self._steps)
+        return UnderWay(command, self._motion, time, self._steps, self._last_command)
 
     def do(self, command: Command) -> None:
         """Do the next command."""
         kind, numbers, _ = command
+        if kind in (log.MOTION, log.CLOSE, log.OPEN):
+            self._last_command = self._steps
         world, tool = self._world, self._tool
         if kind in (log.STEP, log.IDLE):
             self._steps += kind == log.STEP

@@ -98,6 +98,9 @@ class SuctionTool:
         self._world.log.note(command_log.OPEN)
         self._vacuum = False
         self._parting = None
+        if self._grip is not None:
+            body = self._grip.body
+            self._world.stood.setdefault(body, []).append(self._world.object_pose(body).position)
         self._let_go()
 
     def part(self) -> None:

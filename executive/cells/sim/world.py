@@ -59,7 +59,7 @@ class World:
         steps: Physics steps made so far.
         log: Where all that is done to it is noted, before it is done.
         idle: True while it is stepped for nobody's run.
-        stood: Where loose objects `(3,)` [m] were put after they had been added, by body.
+        stood: Where loose objects `(3,)` [m] were put or released after they had been added, by body.
         removed: Class and last position `(3,)` [m] of each object that somebody took away, by body.
     """
 

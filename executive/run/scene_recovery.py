@@ -1,0 +1,96 @@
+"""Recovery of the scene, if a run is resumed whose journal lacks the last actions of its tool."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+from executive.cell.arm import Goal, Task
+from executive.cell.detection import Detections
+from executive.cell.objects import Load
+from executive.cell.protocols import Cell, Steps
+from executive.errors import Blocked, Fault, NoDepth, Unavailable, Unreachable
+from executive.manipulation.obstacles import around
+from executive.manipulation.tool_goals import DROP, aside
+
+LOOKS_PER_POSE = 3
+"""Number of looks from each scan pose of the camera."""
+MIN_LOOKS = 5
+"""Number of looks, at least."""
+RELEASE_TIME = 0.1
+"""Time allowed for the vacuum to vanish [s]."""
+
+
+def recover_scene(cell: Cell) -> Steps:
+    """Empty the tool, then look at everything that the camera sees, bins included.
+
+    Afterwards the ledger knows every item that a look has shown, on the table or in a bin. It searches the
+    other items; they are rejected unless the mission finds them.
+
+    Raises:
+        Fault: The tool holds an object that cannot be put down.
+    """
+    cell.ledger.lose_track()
+    if cell.tool.holding:
+        yield from _put_down(cell)
+    cell.tool.open()
+    yield from cell.clock.sleep(RELEASE_TIME)
+    poses = cell.camera.scan_poses
+    for number in range(max(MIN_LOOKS, LOOKS_PER_POSE * len(poses))):
+        yield from _look(cell, poses[number % len(poses)])
+        if number == 0:
+            cell.ledger.search_unseen()
+    cell.ledger.count_bins()
+
+
+def _put_down(cell: Cell) -> Steps:
+    """Carry the object in the tool, whose class is unknown, to a free place on the table."""
+    kind = max(cell.classes.values(), key=lambda kind: kind.height)
+    goal = aside(cell, kind, DROP)
+    problems = []
+    # In a bin or on the table, a load as high as the highest class may seem to be in collision.
+    for load in (Load(kind, cell.tool.bears), None):
+        try:
+            yield from _move(cell, goal, Task(load, around(cell)))
+        except (Unreachable, Blocked) as error:
+            problems.append(str(error))
+        else:
+            return
+    raise Fault(
+        f"the tool holds an object that cannot be put down: {problems[0]}; take it out of the tool and "
+        "resume the run again"
+    )
+
+
+def _look(cell: Cell, pose: str) -> Steps:
+    """Observe everything that the camera sees from an arm pose, or from the present one if it is blocked."""
+    with suppress(Unreachable, Blocked):
+        yield from _move(cell, pose, Task(around=around(cell)))
+    frame = cell.camera.capture()
+    request = next(iter(cell.detectors.values())).request(frame, "full")
+    while not request.ready:
+        yield
+    try:
+        answer = request.result()
+        detections = Detections(**vars(answer), frame=frame, view="full", area=cell.camera.area("full"))
+        observations = cell.localizer.localize(detections)
+    except (Unavailable, NoDepth):
+        return
+    # The skills report a camera that was moved.
+    if not cell.camera.displacement(frame):
+        cell.ledger.observe(detections, observations)
+
+
+def _move(cell: Cell, goal: Goal | str, task: Task) -> Steps:
+    """Yield until the arm is at rest at a goal, or was stopped by a contact.
+
+    Raises:
+        Unreachable, Blocked: There is no such motion.
+    """
+    planning = cell.arm.plan(goal, task)
+    while not planning.ready:
+        yield
+    cell.arm.start(planning.result())
+    while not cell.arm.at_rest:
+        yield
+    if cell.arm.met is not None:
+        cell.ledger.invalidate_positions()
