@@ -81,12 +81,12 @@ def run_case(write: Writer, case: int) -> tuple[CommandResult, Arguments, list[s
     """Run the command of a case in a new folder, and return its result, its arguments and its problems."""
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as logs:
         arguments = write(case, Path(folder))
-        result = run_in_child(arguments, Path(folder), Path(logs))
+        result = run_in_child(lambda: main(arguments), Path(folder), Path(logs))
     return result, arguments, find_problems(arguments, result)
 
 
-def run_in_child(arguments: Arguments, folder: Path, logs: Path) -> CommandResult:
-    """Run the command `executive` in a forked child whose working directory is `folder`."""
+def run_in_child(command: Callable[[], object], folder: Path, logs: Path) -> CommandResult:
+    """Run a command, which ends with SystemExit, in a forked child whose working directory is `folder`."""
     outputs = [logs / "output.txt", logs / "errors.txt"]
     child = os.fork()
     if child == 0:
@@ -96,7 +96,7 @@ def run_in_child(arguments: Arguments, folder: Path, logs: Path) -> CommandResul
                 os.dup2(os.open(file, os.O_WRONLY | os.O_CREAT), descriptor)
             sys.stdout, sys.stderr = (os.fdopen(os.dup(number), "w") for number in (1, 2))
             os.environ["TMPDIR"] = tempfile.tempdir = str(logs)
-            main(arguments)
+            command()
         except SystemExit as end:
             sys.stdout.flush()
             sys.stderr.flush()

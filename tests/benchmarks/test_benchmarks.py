@@ -27,8 +27,8 @@ from executive.motion.limits import JointLimits
 from executive.motion.point_to_point import Connector
 from executive.motion.state import State
 from executive.motion.trajectory import Trajectory
-from executive.record.result import Result
-from tests.benchmarks import halts, journal, kills, report, soak, suction_map, tick
+from executive.record.result import Audit, ItemCounts, Result
+from tests.benchmarks import damaged_records, halts, journal, kills, report, soak, suction_map, tick
 from tests.benchmarks.forks import ForkRunner
 
 FAKE = {"cell.kind": "fake", "cell.table.objects": "[2, 2]"}
@@ -173,6 +173,39 @@ class TestKills:
         assert kills.check_result(result, change_made="removed cube") == []
         assert len(kills.check_result(result, change_made="moved cube")) == 1
         assert len(kills.check_result(replace(result, holds="cube-1"), change_made="dropped cube")) == 1
+
+
+class TestDamagedRecords:
+    @pytest.mark.slow
+    @pytest.mark.parametrize("simulated", [False, True])
+    def test_a_damaged_record_is_read_replayed_resumed_and_filmed_or_refused(
+        self, tmp_path: Path, simulated: bool
+    ) -> None:
+        subject = load_subject("sort_overhead", {}, oracle=True, seed=7) if simulated else load()
+        figures = damaged_records.measure(
+            subject, tmp_path, reports=12, others=6, films=2 * simulated, truncations=6, kills=2
+        )
+        assert figures["problems"] == []
+        assert [row["records"] for row in figures["damaged"]] == [12, 6, 6, 2 * simulated]
+        assert [row["agree"] for row in figures["resumed"]] == [6, 2]
+        assert list(tmp_path.iterdir()) == []
+
+    def test_only_an_incomplete_run_may_disagree_with_the_audit(self) -> None:
+        result = Result(
+            mission="sort",
+            seed=3,
+            status="INCOMPLETE",
+            reason="rejected",
+            message="1 object(s) were not sorted: cube-1",
+            node="",
+            items=ItemCounts(seen=2, placed=1, rejected=1),
+            audit=Audit(agrees=False, right=2),
+        )
+        assert damaged_records.find_wrong_claims(result) == []
+        assert len(damaged_records.find_wrong_claims(replace(result, status="SUCCESS"))) == 1
+        assert len(damaged_records.find_wrong_claims(replace(result, status="FAULT"))) == 1
+        wrong = replace(result, items=ItemCounts(seen=3, placed=3))
+        assert len(damaged_records.find_wrong_claims(wrong)) == 1
 
 
 class TestSoak:

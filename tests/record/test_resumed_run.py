@@ -7,6 +7,7 @@ import os
 import re
 import signal
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -254,37 +255,37 @@ def truncate(path: Path, share: float) -> None:
 def test_a_scene_is_observed_if_the_journal_lacks_actions_of_the_tool(
     missions: Path, tmp_path: Path, share: float
 ) -> None:
-    path = Path(run_of(load(missions, "sort_overhead"), tmp_path, frames=True)["run"])
+    path = Path(run_of(load(missions, "sort_overhead"), tmp_path, frames=True).run)
     truncate(path, share)
     watcher = Watcher()
     result = resumed(path, views=[watcher])
-    assert (result["status"], result["items"]["placed"]) == ("SUCCESS", 6)
-    assert result["audit"]["agrees"]
+    assert (result.status, result.items.placed) == ("SUCCESS", 6)
+    assert result.audit.agrees
     assert redecided(path) == ""
     (note,) = watcher.notes
     assert re.match(r"the journal ends \d+ control steps \([\d.]+ s\) before the log of the world", note)
 
 
 def test_a_scene_whose_observation_was_interrupted_is_observed_again(missions: Path, tmp_path: Path) -> None:
-    path = Path(run_of(load(missions, "sort_overhead"), tmp_path, frames=True)["run"])
+    path = Path(run_of(load(missions, "sort_overhead"), tmp_path, frames=True).run)
     truncate(path, 0.6)
     steps = json.loads((path / "world.log").read_text())["steps"]
     with pytest.raises(Cut):
         resumed(path, views=[Cutter(steps + 1, 3)])
     result = resumed(path)
-    assert (result["status"], result["items"]["placed"]) == ("SUCCESS", 6)
-    assert result["audit"]["agrees"]
+    assert (result.status, result.items.placed) == ("SUCCESS", 6)
+    assert result.audit.agrees
     assert redecided(path) == ""
 
 
 def test_the_result_of_a_run_that_was_killed_after_its_end_is_written(missions: Path, tmp_path: Path) -> None:
     result = run_of(load(missions, "sort_overhead"), tmp_path, frames=True)
-    path = Path(result["run"])
+    path = Path(result.run)
     journal = (path / "journal.jsonl").read_bytes()
     (path / "result.json").unlink()
     completed = resumed(path)
-    assert {**completed, "wall_time_s": 0} == {**result, "wall_time_s": 0}
-    assert json.loads((path / "result.json").read_text()) == completed
+    assert completed == replace(result, wall_time_s=completed.wall_time_s)
+    assert json.loads((path / "result.json").read_text()) == plain(completed)
     assert (path / "journal.jsonl").read_bytes() == journal
     with pytest.raises(InputError, match="there is nothing to take up again"):
         resumed(path)
