@@ -140,10 +140,11 @@ class InputLog:
             return Interruption(self.last_tick + 1, self.last_action, True, self.last_tick + 1)
         end = self.last_tick + is_complete if self.halt is None else self.halt.tick
         complete = min(steps, end)
+        lacks_actions = last_command > self.last_tick or (not is_complete and steps > self.last_tick)
         for earlier in reversed(list(self.interruptions.values())):
             if earlier.resumed >= complete:
                 complete = min(complete, earlier.complete)
-        lacks_actions = last_command > self.last_tick or (not is_complete and steps > self.last_tick)
+                lacks_actions |= earlier.last_action == UNKNOWN_ACTION
         action = UNKNOWN_ACTION if lacks_actions else self.last_action
         return Interruption(complete, action, complete - 1 in _incomplete_ends(self.events), steps)
 

@@ -78,6 +78,12 @@ def test_a_world_that_did_more_than_the_journal_knows(
     assert (interruption.complete, interruption.last_action) == (complete, action)
 
 
+def test_actions_stay_unknown_if_the_resumption_was_interrupted_at_once() -> None:
+    log = InputLog.of([START, sense(5, 1), resume(9, 6, "unknown"), sense(9, 2)])
+    interruption = log.interruption_after(9, 8)
+    assert (interruption.complete, interruption.last_action) == (6, "unknown")
+
+
 def test_a_kill_within_a_control_step_loses_no_action() -> None:
     interruption = InputLog.of([START, at(8, ToolCommanded("open"))]).interruption_after(
         8, 8, is_complete=False
