@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pydantic import JsonValue
 
-from executive.errors import InputError
+from executive.errors import InputError, escape_control_characters
 from executive.events import (
     BranchChosen,
     ItemChanged,
@@ -216,4 +216,5 @@ def _describe(decision: TimedEvent | None) -> str:
     event = decision.event
     shown = {key: value for key, value in vars(event).items() if value and key not in ("outputs", "skill")}
     values = ", ".join(f"{key} {value}" for key, value in shown.items())
-    return f"at {decision.clock:.3f} s (step {decision.tick}) {type(event).__name__}: {values}"
+    text = f"at {decision.clock:.3f} s (step {decision.tick}) {type(event).__name__}: {values}"
+    return escape_control_characters(text)
