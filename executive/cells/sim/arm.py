@@ -74,7 +74,8 @@ class SimArm:
         self._fault: str | None = None
         self._met: str | None = None
         self._command = self.q
-        if under_way is None:
+        # The log of a world may lack even the first command.
+        if under_way is None or not under_way.command.size:
             self.hold()
         else:
             self._command, self._motion, self._time = under_way.command, under_way.motion, under_way.time
