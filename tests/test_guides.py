@@ -31,6 +31,7 @@ from executive.mission.findings import CODES, MissionError
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.model import grammar
 from executive.mission.parse.cell_file import load_cell
+from executive.mission.parse.control import inner_keys
 from executive.mission.schema.files import mission_schema
 from executive.mission.source import Source
 from executive.mission.text.files import shipped_missions
@@ -39,6 +40,10 @@ from executive.plugins import cell_kind, discover
 from executive.record.result import EXIT_CODES
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.run_skill import run_skill
+from executive.tree.node import ControlNode
+from executive.tree.registry import control_nodes
+from executive.tree.retry import Backoff
+from executive.tree.try_catch import Catch
 
 LONGEST = 300.0
 """Time on the run's clock within which every mission shown is done on the fake cell [s]."""
@@ -99,7 +104,7 @@ def test_the_mission_on_the_front_page_does_its_work(tmp_path: Path) -> None:
 def test_an_editor_marks_nothing_in_the_missions_of_the_authors_guide(name: str) -> None:
     root, _ = parse_yaml(Source(name, FILES[name].text))
     assert root is not None
-    jsonschema.validate(plain(root), mission_schema(discover()))
+    jsonschema.validate(plain(root), mission_schema(discover(), control_nodes()))
 
 
 @pytest.mark.parametrize("name", MISTAKES)
@@ -155,8 +160,8 @@ def test_the_authors_guide_names_every_other_key_of_a_file() -> None:
         "a library": grammar.LIBRARY,
         "a subtree": grammar.SUBTREE,
         "a param": grammar.PARAM,
-        "an item of `catch`": grammar.CATCH,
-        "`backoff`": grammar.BACKOFF,
+        "an item of `catch`": Catch.keys,
+        "`backoff`": Backoff.keys,
     }
     told = rows("### Keys")
     assert {name: in_code(told[name][0]) for name in mappings} == {
@@ -231,5 +236,11 @@ def test_every_file_and_folder_that_a_guide_links_to_exists() -> None:
 def test_the_authors_guide_names_every_control_node_with_its_keys() -> None:
     told = rows("### Control nodes")
     assert {cell.strip("`"): set(in_code(keys)) for cell, (keys, *_) in told.items() if "`" in cell} == {
-        word: {*form.keys, *form.partners} for word, form in grammar.CONTROL.items()
+        **{word: {*inner_keys(kind), *partners(kind)} for word, kind in control_nodes().items()},
+        grammar.USE: set(grammar.USE_PARTNERS),
     }
+
+
+def partners(kind: type[ControlNode]) -> list[str]:
+    """Return the keys that stand beside the word of a control node."""
+    return [name for name, key in kind.keys.items() if key.is_partner]

@@ -65,10 +65,10 @@ def _outline_of(mission: str, overrides: dict[str, str]) -> tuple[str, Sequence[
     from executive.mission.load import load_mission
     from executive.mission.outline import outline
     from executive.plugins import discover
-    from executive.tree.blackboard import Scope
+    from executive.tree.blackboard import Blackboard
 
     skills = discover()
     loaded = load_mission(mission, skills, overrides)
     # A tree that never runs needs no cell, only a clock, which stands still.
     nowhere = cast("Cell", SimpleNamespace(clock=SimpleNamespace(now=0.0)))
-    return loaded.mission.name, outline(build(loaded, skills, nowhere, Scope(), ignore))
+    return loaded.mission.name, outline(build(loaded, skills, nowhere, Blackboard(), ignore))

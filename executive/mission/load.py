@@ -24,6 +24,7 @@ from executive.mission.parse.validate import mark_of
 from executive.mission.text.files import find_mission, shipped_folder
 from executive.perception.envelope.rated_detectors import find_unmeasured
 from executive.skill import Skill
+from executive.tree.registry import control_nodes
 
 Kinds = Callable[[str], CellKind]
 """Finds the installed kind of cells of a name; raises InputError where there is none."""
@@ -88,8 +89,8 @@ def load_mission(
         MissionError: Something is wrong with mission or cell; every finding is in it.
         InputError: There is no such mission.
     """
-    file = find_mission(path)
-    files = read_mission(file, overrides or {}, skills, cell)
+    file, control = find_mission(path), control_nodes()
+    files = read_mission(file, overrides or {}, skills, control, cell)
     mission, config = files.mission, files.cell.config if files.cell else None
     findings = list(files.findings)
     kind = _kind(files, kinds, findings)
@@ -102,7 +103,7 @@ def load_mission(
         least = None if wrong else kind.least_times(config)
     expanded = expand(mission, skills)
     tree = with_paths(expanded.tree or UnknownNode(files.source.mark(), ""))
-    case = Case(mission, tree, expanded.unused, skills, config, labels, least)
+    case = Case(mission, tree, expanded.unused, skills, control, config, labels, least)
     findings += (*expanded.findings, *check(case))
     ordered = in_file_order(findings, files.source.path)
     is_sound = expanded.tree is not None and all(finding.severity != "error" for finding in findings)

@@ -10,8 +10,8 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 
-from executive.tree.skill_leaf import SkillNode
-from executive.tree.try_catch import Try
+from executive.tree.node import ControlNode
+from executive.tree.skill_leaf import SkillLeaf
 
 _NUMBER = re.compile(r"[0-9]+:")
 
@@ -39,6 +39,7 @@ class OutlineNode:
         depth: How many nodes are above it.
         detail: What the mission says about it, in a few words.
         kind: `skill`, or the word of a control node.
+        symbol, shape: Its symbol and its Graphviz shape in drawings; "" for a skill.
         title: What it is called without regard to its parent: label, skill or word.
         slot: What it is to its parent: `do`, `recover`, `catch 1`; "" in a list.
         when: After which failures it runs, for a catch: `on Grasp.missed`; else "".
@@ -69,6 +70,8 @@ class OutlineNode:
     reasons: tuple[str, ...] = ()
     senses: bool = False
     uses: tuple[str, ...] = ()
+    symbol: str = ""
+    shape: str = ""
 
     @property
     def subtree(self) -> str:
@@ -96,16 +99,17 @@ def children(nodes: Sequence[OutlineNode]) -> list[list[int]]:
 def _outline(node: Behaviour, parent: Behaviour | None, depth: int = 0) -> Iterator[OutlineNode]:
     path = _path(node)
     place = path.removeprefix(f"{_path(parent) if parent else 'tree'}/")
-    facts = _skill_facts(node) if isinstance(node, SkillNode) else {"kind": _word(node)}
+    facts = _skill_facts(node) if isinstance(node, SkillLeaf) else _inner_facts(node)
     label, detail = getattr(node, "label", ""), getattr(node, "detail", "")
-    if label and not isinstance(node, SkillNode):
-        detail = ", ".join(part for part in (_word(node), detail) if part)
+    if label and not isinstance(node, SkillLeaf):
+        detail = ", ".join(part for part in (facts["kind"], detail) if part)
     title = label or facts.get("skill") or facts["kind"]
     subtrees = tuple(getattr(node, "subtrees", ()))
+    slot = _slot(place, parent, node, title, subtrees) if parent else ""
+    when = parent.when(node) if isinstance(parent, ControlNode) else ""
     yield OutlineNode(
-        path, _name(place), depth, detail, title=title, subtrees=subtrees,
-        slot=_slot(place, parent, title, subtrees) if parent else "", when=_when(node, parent), **facts,
-    )  # fmt: skip
+        path, _name(place), depth, detail, title=title, subtrees=subtrees, slot=slot, when=when, **facts
+    )
     for child in node.children:
         yield from _outline(child, node, depth + 1)
 
@@ -114,15 +118,11 @@ def _path(node: Behaviour) -> str:
     return str(getattr(node, "path", node.name))
 
 
-def _word(node: Behaviour) -> str:
-    """Return the word of a control node; a stock py_trees behaviour goes by the name of its class."""
-    return str(getattr(node, "word", type(node).__name__.lower()))
-
-
-def _when(node: Behaviour, parent: Behaviour | None) -> str:
-    """Return when a node runs, where its parent makes it wait for certain failures."""
-    when = getattr(parent, "when", None)
-    return str(when(node)) if when else ""
+def _inner_facts(node: Behaviour) -> dict[str, str]:
+    """Return the facts of a control node; a stock py_trees behaviour has the name of its class."""
+    if isinstance(node, ControlNode):
+        return {"kind": node.word, "symbol": node.symbol, "shape": node.shape}
+    return {"kind": type(node).__name__.lower(), "symbol": ControlNode.symbol, "shape": ControlNode.shape}
 
 
 def _name(place: str) -> str:
@@ -134,10 +134,10 @@ def _name(place: str) -> str:
     return f"{slot} {last}" if last.isdigit() else f"{slot}: {last}" if slot else last
 
 
-def _slot(place: str, parent: Behaviour, title: str, subtrees: tuple[str, ...]) -> str:
-    """Return what is left of a node's place below its parent without its own name and its subtrees'.
+def _slot(place: str, parent: Behaviour, node: Behaviour, title: str, subtrees: tuple[str, ...]) -> str:
+    """Return the rest of a node's place below its parent without its own name and its subtrees'.
 
-    A bare list has no name of its own: it is the slot. The body of a `try` has no slot in its path.
+    A bare list has no name of its own: it is the slot. Some keys are left out of paths.
     """
     parts = [_NUMBER.sub("", part) for part in place.split("/")]
     if parts[-1] == title:
@@ -145,10 +145,14 @@ def _slot(place: str, parent: Behaviour, title: str, subtrees: tuple[str, ...]) 
     for subtree in reversed(subtrees):
         if parts and parts[-1] == subtree:
             del parts[-1]
-    return " ".join(parts) or ("do" if isinstance(parent, Try) else "")
+    if not parts and isinstance(parent, ControlNode):
+        for key in parent.keys.values():
+            if not key.is_in_path and node in parent.children_of(key.name):
+                return key.name
+    return " ".join(parts)
 
 
-def _skill_facts(node: SkillNode) -> dict[str, Any]:
+def _skill_facts(node: SkillLeaf) -> dict[str, Any]:
     """Return what an outline says of a skill only."""
     skill, wiring = node.skill_type, node.wiring
     ports = skill.ports

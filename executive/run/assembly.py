@@ -23,7 +23,7 @@ from executive.run.run_context import RunContext
 from executive.run.run_control import RunControl
 from executive.run.versions import versions
 from executive.skill import Skill
-from executive.tree.blackboard import Scope
+from executive.tree.blackboard import Blackboard
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ class _Parts:
     def build_tree(self) -> TreeNode:
         """Return the tree."""
         cell, emit = self.context.cell, self.context.emit
-        return build(self._loaded, self._skills, cell, Scope(), emit, self._options.substitutes)
+        return build(self._loaded, self._skills, cell, Blackboard(), emit, self._options.substitutes)
 
     def build_resumed_run(
         self, inner: Workcell, log: InputLog, last: Interruption | None = None

@@ -22,7 +22,7 @@ from executive.run.run_control import RunControl
 from executive.run.scene_recovery import recover_scene
 from executive.run.versions import versions
 from executive.tree.halting import halt
-from executive.tree.skill_leaf import SkillNode
+from executive.tree.skill_leaf import SkillLeaf
 
 
 class ResumedRun(Run):
@@ -146,7 +146,7 @@ def restart_skills(root: Behaviour) -> None:
         Fault: The clean-up of a skill failed; all the others were halted none the less.
     """
     running = [
-        node for node in root.iterate() if isinstance(node, SkillNode) and node.status is Status.RUNNING
+        node for node in root.iterate() if isinstance(node, SkillLeaf) and node.status is Status.RUNNING
     ]
     if problems := [problem for node in running for problem in halt(node)]:
         raise Fault("; ".join(problems))

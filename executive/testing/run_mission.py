@@ -21,7 +21,7 @@ from executive.run.run import Run
 from executive.skill import Skill
 from executive.testing.faults.faulty_cell import FaultyCell, with_faults
 from executive.testing.faults.script import ScheduledFault
-from executive.tree.skill_leaf import SkillNode
+from executive.tree.skill_leaf import SkillLeaf
 
 LONGEST = 600.0
 """Time on its clock after which a mission that is not done counts as one that never ends [s]."""
@@ -130,7 +130,7 @@ def run_mission(
 def _require_fitting_substitutes(run: Run, skills: Mapping[str, type[Skill]]) -> None:
     """Return if every node runs its own skill, or a subclass of that."""
     for node in run.root.iterate():
-        if isinstance(node, SkillNode) and not issubclass(node.skill_type, skills[node.skill_name]):
+        if isinstance(node, SkillLeaf) and not issubclass(node.skill_type, skills[node.skill_name]):
             raise InputError(
                 f"{node.path} runs {node.skill_name}, and {node.skill_type.__name__} is none; "
                 "give its substitute a pattern that fits nodes of its own skill only"

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 
-class Scope(Mapping[str, Any]):
+class Blackboard(Mapping[str, Any]):
     """The variables of one run by name; skills read them when they start and write them when they succeed.
 
     One store per run, never one per process: many missions may run side by side. Subtrees share it;

@@ -1,4 +1,4 @@
-"""Why a node failed, in the words a mission matches: `Skill.reason` or `label.reason`."""
+"""Failures of nodes, and the names `Skill.reason` and `label.reason` that a mission gives them."""
 
 from __future__ import annotations
 
@@ -7,11 +7,27 @@ from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
-class Failure:
-    """A declared failure on its way up the tree.
+class Reason:
+    """Name of a failure in a mission.
 
     Attributes:
-        reason: One of the skill's declared reasons, or the control node's own: `timeout`, `inverted`.
+        source: Name of a skill, word of a control node, or label.
+        reason: One of its reasons.
+    """
+
+    source: str
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.source}.{self.reason}"
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A declared failure that is propagated up the tree.
+
+    Attributes:
+        reason: One of the declared reasons of the skill or of the control node.
         message: One sentence with numbers.
         source: Name of the skill, or the word of the control node, that failed.
         path: Path of the node that failed.
@@ -27,11 +43,11 @@ class Failure:
     def __str__(self) -> str:
         return f"{self.source}.{self.reason}"
 
-    def matches(self, names: Iterable[tuple[str, str]]) -> bool:
-        """Tell whether one of the `(skill or label, reason)` pairs means this failure."""
+    def matches(self, names: Iterable[Reason]) -> bool:
+        """Return True if one of the names means this failure."""
         return any(
-            reason == self.reason and (source == self.source or source in self.labels)
-            for source, reason in names
+            name.reason == self.reason and (name.source == self.source or name.source in self.labels)
+            for name in names
         )
 
     def seen_from(self, label: str) -> Failure:

@@ -1,25 +1,33 @@
-"""The other way round."""
+"""Exchange of success and failure."""
 
 from __future__ import annotations
 
-from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.node import ControlNode, Site
+from executive.tree.flow import Enter, Flow, Raise, State, joined
+from executive.tree.keys import Child, key
+from executive.tree.node import ControlNode
 
 
 class Invert(ControlNode):
-    """Succeeds where its body fails, and fails with `inverted` where it succeeds."""
+    """Succeeds where its body fails; fails with `inverted` where it succeeds."""
 
     word = "invert"
+    reasons = ("inverted",)
+    symbol = "¬"
 
-    def __init__(self, site: Site, body: Behaviour) -> None:
-        super().__init__(site, [body])
-        self._body = body
+    do: Child = key(bare=True, doc="What is done.")
 
     def step(self) -> Status:
         """Tick the body."""
-        status = self.run_child(self._body)
+        status = self.run_child(self.do)
         if status is Status.SUCCESS:
-            return self.fail_for("inverted", f"{self._body.name} succeeded")
+            return self.fail_for("inverted", f"{self.do.name} succeeded")
         return Status.SUCCESS if status is Status.FAILURE else status
+
+    def flow(self, enter: Enter, state: State) -> Flow:
+        """Exchange the ends of the body."""
+        body = enter(self.do, state)
+        inverted = Raise(self.word, "inverted", self.path)
+        failures = {} if body.success is None else {inverted: body.success}
+        return Flow(joined(body.failures.values()), failures, body.halted)

@@ -1,81 +1,219 @@
-"""What every control node is: a py_trees composite that ticks its children directly.
+"""Base class of control nodes: a py_trees behaviour that ticks its children directly.
 
-`tick_once` is the primitive. It costs one call a level where py_trees' generators cost several, and it
-never walks over finished children. `tick` offers the same to py_trees' own tools, which then see one
-node, not its descendants: the executive observes a tree through events, not through visitors.
+A control node is one class in one file, registered by an entry point. The class declares its keys and writes
+`start` and `step` for the run, `flow` and `min_time` for the checker, and `explain` for the diagnosis.
+`tick_once` costs one call per level and never walks over finished children.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Composite
+from pydantic import ValidationError
 
-from executive.errors import Fault
+from executive.cell.protocols import Clock
+from executive.errors import Fault, InputError
 from executive.events import BranchChosen, Emit, NodeEnded, NodeStarted, ignore
+from executive.tree.blackboard import Blackboard
 from executive.tree.failure import Failure
+from executive.tree.flow import Enter, Flow, State
 from executive.tree.halting import halt
+from executive.tree.inspection import Advice, Complaint, Facts, MinTimes, PassedFailure
+from executive.tree.keys import Child, Declared, Kind, Section
 
 
 @dataclass(frozen=True)
 class Site:
-    """Where a node stands and who is told about it.
+    """Place of a node in a tree, and the parts of the run that it works with.
 
     Attributes:
         path: Unique path from the root of the tree.
-        label: What the mission calls it with `as:`, or "".
-        emit: Takes its `status` and `choice` events.
+        clock: Clock of the run.
+        blackboard: Variables of the run.
+        label: Its label in the mission, or "".
+        emit: Receives the events of the node.
     """
 
     path: str
+    clock: Clock
+    blackboard: Blackboard
     label: str = ""
     emit: Emit = ignore
 
 
-class ControlNode(Composite):
-    """Base of the control nodes; a subclass says in `start` how it begins and in `step` how it goes on.
+class ControlNode(Declared, Behaviour):
+    """Base of the control nodes.
 
     Attributes:
-        word: What the node is called in a mission; the source of failures of its own.
+        word: Its name in missions and the source of its own failures.
+        reasons: The reasons of its own failures.
+        symbol: Character that stands before its name in drawings.
+        shape: Its shape in Graphviz drawings.
+        remedy: Instruction to the author how this node would handle a failure of a node around which it is
+            put; "" if it cannot.
+        elsewhere: Hints for words of other languages that mean this node.
         path: Unique path from the root of the tree.
-        failure: Why it failed, while its status is FAILURE; else None.
+        label: Its label in the mission, or "".
+        failure: Cause of the failure while its status is FAILURE; else None.
         subtrees: Names of the subtrees that begin with it, the outermost first.
     """
 
-    word = "node"
+    word: ClassVar[str] = ""
+    reasons: ClassVar[tuple[str, ...]] = ()
+    symbol: ClassVar[str] = "◇"
+    shape: ClassVar[str] = "ellipse"
+    remedy: ClassVar[str] = ""
+    elsewhere: ClassVar[Mapping[str, str]] = {}
     subtrees: tuple[str, ...] = ()
 
-    def __init__(self, site: Site, children: Sequence[Behaviour]) -> None:
-        super().__init__(site.label or self.word, children)
+    def __init__(self, site: Site, **values: Any) -> None:
+        super().__init__(site.label or self.word)
         self.path, self.label = site.path, site.label
+        self.clock, self.blackboard = site.clock, site.blackboard
         self.failure: Failure | None = None
         self._emit = site.emit
+        self.set_keys(values)
+        self.children = [child for key in self.keys for child in self.children_of(key)]
+        for child in self.children:
+            child.parent = self
+        self._check_constants()
+
+    def children_of(self, name: str) -> list[Child]:
+        """Return the nodes that stand under a key, those in its sections included."""
+        key = self.keys[name]
+        return _nodes(getattr(self, key.attribute))
 
     @property
     def detail(self) -> str:
-        """What the mission says about it, in a few words, for outlines."""
-        return ""
+        """Its constants in a few words, for outlines."""
+        constants = [key for key in self.keys.values() if key.kind is Kind.CONSTANT]
+        given = {key.name: getattr(self, key.attribute) for key in constants}
+        return ", ".join(
+            f"{name}: {value}" for name, value in given.items() if value != self.keys[name].default
+        )
 
-    def when(self, child: Behaviour) -> str:
-        """Return after which failures a child runs, in a few words; "" for one that needs none."""
+    def when(self, child: Child) -> str:
+        """Return after which failures a child runs, in a few words; "" if it needs none."""
         del child
         return ""
 
+    # The run.
+
     def start(self) -> None:
-        """Begin anew; called before the first `step` of every activation."""
+        """Begin an activation; called before its first `step`."""
 
     def step(self) -> Status:
-        """Go on by one tick and return RUNNING, SUCCESS or FAILURE; set `failure` before FAILURE."""
+        """Continue by one tick and return RUNNING, SUCCESS or FAILURE; set `failure` before FAILURE."""
         raise NotImplementedError
 
     def clean_up(self) -> None:
-        """Leave nothing behind; called once at the end of every activation, however it ends."""
+        """End an activation; called once, also after a halt or a fault."""
+
+    # The checker.
+
+    def flow(self, enter: Enter, state: State) -> Flow:
+        """Return how the node may end if it is entered in a state; `enter` runs a child in the same sense."""
+        raise NotImplementedError
+
+    def min_time(self, times: MinTimes) -> float:
+        """Return a lower bound of the time in which the node can succeed [s]; `times` has that of a child."""
+        del times
+        return 0.0
+
+    def check(self, facts: Facts) -> Iterator[Complaint]:
+        """Yield mistakes in the mission that only this kind of node knows."""
+        del facts
+        yield from ()
+
+    def explain_unreachable(self, child: Child) -> str:
+        """Return why a child can never run; "" if another finding says so."""
+        del child
+        return ""
+
+    @property
+    def first_child(self) -> Child | None:
+        """The child that begins in the tick in which the node begins, before all others; None if unknown."""
+        return None
+
+    @property
+    def concurrent(self) -> tuple[Child, ...]:
+        """Children that run at the same time."""
+        return ()
+
+    @property
+    def halted(self) -> tuple[Child, ...]:
+        """Children that are halted when another child has ended, even if they would never end themselves."""
+        return ()
+
+    # Explanations.
+
+    def explain(self, failure: PassedFailure) -> str:
+        """Return why the node did not handle a failure of a child; "" if it handles none."""
+        del failure
+        return ""
+
+    def attempt(self, failure: PassedFailure) -> tuple[int, int] | None:
+        """Return the number of the failed attempt and of the allowed ones; None if there are no attempts."""
+        del failure
+        return None
+
+    def advise(self, failure: PassedFailure) -> Iterator[Advice]:
+        """Yield changes after which this node would handle a failure."""
+        del failure
+        yield from ()
+
+    def contingencies(self) -> Iterator[tuple[str, Child]]:
+        """Yield the children that run only after a failure or at the end, each with its name in a report."""
+        yield from ()
+
+    # Helpers of subclasses.
+
+    def run_child(self, child: Child) -> Status:
+        """Tick a child and return its status."""
+        child.tick_once()
+        status = child.status
+        if status is Status.INVALID:
+            raise Fault(f"{child.name} was ticked and has no status", self.path)
+        return status
+
+    def halt_children(self, children: Iterable[Child]) -> None:
+        """End every running node in and below these children, one after the other.
+
+        Raises:
+            Fault: The clean-up of some of them failed; all the others were ended nevertheless.
+        """
+        if problems := [problem for child in children for problem in halt(child)]:
+            raise Fault("; ".join(problems), self.path)
+
+    def failure_of(self, child: Child) -> Failure:
+        """Return the failure of a child; a stock py_trees behaviour has no reason but `failed`."""
+        failure = getattr(child, "failure", None)
+        if isinstance(failure, Failure):
+            return failure
+        return Failure("failed", child.feedback_message, child.name, self.path)
+
+    def fail(self, failure: Failure) -> Status:
+        """Pass on a failure from below, and return FAILURE."""
+        self.failure = failure.seen_from(self.label)
+        return Status.FAILURE
+
+    def fail_for(self, reason: str, message: str) -> Status:
+        """Fail with a reason of this node, and return FAILURE."""
+        return self.fail(Failure(reason, message, self.word, self.path))
+
+    def choose(self, choice: str, cause: Failure | None = None) -> None:
+        """Report the next step of the node, and the failure that caused it, if any."""
+        reason, message = (str(cause), cause.message) if cause else ("", "")
+        self._emit(BranchChosen(self.path, choice, reason, message))
+
+    # The interface of py_trees.
 
     def tick_once(self) -> None:
-        """Go on by one tick."""
+        """Continue by one tick."""
         if self.status is not Status.RUNNING:
             self.failure = None
             self.status = Status.RUNNING
@@ -85,16 +223,22 @@ class ControlNode(Composite):
         if status is not Status.RUNNING:
             self._end(status)
 
+    def update(self) -> Status:
+        """Continue by one tick and return the status."""
+        self.tick_once()
+        status: Status = self.status
+        return status
+
     def tick(self) -> Iterator[Behaviour]:
-        """Go on by one tick, then yield this node."""
+        """Continue by one tick, then yield this node."""
         self.tick_once()
         yield self
 
     def stop(self, new_status: Status = Status.INVALID) -> None:
-        """End with `new_status`; what still runs below is halted first.
+        """End with `new_status`; running nodes below are halted first.
 
         Raises:
-            Fault: The clean-up of a node below failed; all the others were halted none the less.
+            Fault: The clean-up of a node below failed; all the others were halted nevertheless.
         """
         was_running = self.status is Status.RUNNING
         try:
@@ -105,47 +249,36 @@ class ControlNode(Composite):
                 self.clean_up()
                 self._emit(NodeEnded(self.path, new_status.value))
 
-    def run_child(self, child: Behaviour) -> Status:
-        """Tick a child and return its status."""
-        child.tick_once()
-        status = child.status
-        if status is Status.INVALID:
-            raise Fault(f"{child.name} was ticked and has no status", self.path)
-        return status
-
-    def halt_children(self, children: Iterable[Behaviour]) -> None:
-        """End whatever runs in and below these children, one after the other.
-
-        Raises:
-            Fault: The clean-up of some of them failed; all the others were ended none the less.
-        """
-        if problems := [problem for child in children for problem in halt(child)]:
-            raise Fault("; ".join(problems), self.path)
-
-    def failure_of(self, child: Behaviour) -> Failure:
-        """Return why a child failed; a stock py_trees behaviour can only say that it did."""
-        failure = getattr(child, "failure", None)
-        if isinstance(failure, Failure):
-            return failure
-        return Failure("failed", child.feedback_message, child.name, self.path)
-
-    def fail(self, failure: Failure) -> Status:
-        """Fail for a reason that came from below, and return FAILURE."""
-        self.failure = failure.seen_from(self.label)
-        return Status.FAILURE
-
-    def fail_for(self, reason: str, message: str) -> Status:
-        """Fail for a reason of this node's own, and return FAILURE."""
-        return self.fail(Failure(reason, message, self.word, self.path))
-
-    def choose(self, choice: str, why: Failure | None = None) -> None:
-        """Tell the observers what the node does next, and about which failure, if it is about one."""
-        reason, message = (str(why), why.message) if why else ("", "")
-        self._emit(BranchChosen(self.path, choice, reason, message))
-
     def _end(self, status: Status) -> None:
         self.status = status
         self.clean_up()
         failure = self.failure if status is Status.FAILURE else None
         reason, message, origin = (str(failure), failure.message, failure.path) if failure else ("", "", "")
         self._emit(NodeEnded(self.path, status.value, reason=reason, message=message, origin=origin))
+
+    def _check_constants(self) -> None:
+        """Return if all constants have the declared types and bounds.
+
+        Raises:
+            InputError: One has not.
+        """
+        for key in self.keys.values():
+            value = getattr(self, key.attribute)
+            if key.kind is Kind.CONSTANT and value != key.default:
+                most = len(self.children_of(key.max_of)) if key.max_of else None
+                try:
+                    key.adapter(most).validate_python(value, strict=True)
+                except ValidationError as problems:
+                    found = problems.errors()
+                    problem = next((one for one in found if "than" in one["type"]), found[0])["msg"]
+                    name = f"{self.word}.{key.name}"
+                    raise InputError(f"{self.path}: {name} cannot be {value!r}: {problem}") from None
+
+
+def _nodes(value: object) -> list[Child]:
+    """Return the nodes in the value of a key."""
+    if isinstance(value, Section):
+        return [node for key in value.keys.values() for node in _nodes(getattr(value, key.attribute))]
+    if isinstance(value, tuple):
+        return [node for item in value for node in _nodes(item)]
+    return [value] if isinstance(value, Behaviour) else []

@@ -1,71 +1,103 @@
-"""Side by side."""
+"""Children that run at the same time."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
-from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.errors import InputError
 from executive.tree.failure import Failure
-from executive.tree.node import ControlNode, Site
+from executive.tree.flow import Enter, Flow, Raise, State, grips_at_end, joined, together
+from executive.tree.inspection import MinTimes, PassedFailure
+from executive.tree.keys import Children, key
+from executive.tree.node import ControlNode
+
+MAX_BRANCHES = 200
+"""Largest number of branches: every two of them are compared."""
 
 
 class Parallel(ControlNode):
-    """Ticks all its children side by side until `wait_for` of them have succeeded (None: all).
+    """All at the same time. Running ones may finish before it fails.
 
-    Every tick goes to each child that still runs, in order; one that ended is not run again. What to
-    do is decided once all of them were ticked:
+    Every running child is ticked once per tick, in order; a child that ended is not run again. The node
+    decides after all of them were ticked:
 
-    * Enough have succeeded: success, whatever failed in the same tick; what still runs is halted.
-    * Too many have failed for enough to succeed: the others may finish first, or are halted at once
-      with `halt`. Then it fails with the failure that came first, in the same tick with that of the
-      first child. An arm that a sibling moves is so not stopped in mid-air.
+    * Enough have succeeded: success, even if others failed in the same tick; the running ones are halted.
+    * Too many have failed: the others may finish first, or are halted at once with `halt`. The node fails
+      with the first failure, in the same tick with that of the first child. So an arm that a sibling moves is
+      not stopped on its way.
 
-    Every other failure is told to the observers.
-
-    Raises:
-        InputError: `wait_for` is not between 1 and the number of children.
+    With `wait_for: lead` the node ends as its first child does, in the same tick, and halts the others.
     """
 
     word = "parallel"
+    symbol, shape = "⇉", "parallelogram"
 
-    def __init__(
-        self, site: Site, children: Sequence[Behaviour], wait_for: int | None = None, halt: bool = False
-    ) -> None:
-        if wait_for is not None and not 1 <= wait_for <= len(children):
-            raise InputError(
-                f"{site.path}: a parallel of {len(children)} can wait for 1 to {len(children)} "
-                f"of them, not for {wait_for}"
-            )
-        super().__init__(site, children)
-        self._wait_for = len(children) if wait_for is None else wait_for
-        self._halt = halt
+    wait_for: Literal["all", "any", "lead"] | int = key(
+        default="all", ge=1, max_of="do",
+        doc="How many must succeed: `all`, `any` or a number; `lead`: the first branch alone.",
+    )  # fmt: skip
+    halt: bool = key(
+        default=False, doc="After a failure halt the others at once instead of letting them finish."
+    )
+    do: Children = key(bare=True, max_count=MAX_BRANCHES, doc="What is done at the same time.")
+
+    @property
+    def _has_lead(self) -> bool:
+        return self.wait_for == "lead"
+
+    @property
+    def _needed(self) -> int:
+        """Number of children that must succeed, if no child is the lead."""
+        if isinstance(self.wait_for, int):
+            return self.wait_for
+        return 1 if self.wait_for == "any" else len(self.do)
 
     @property
     def detail(self) -> str:
-        """How many it waits for, and whether a failure halts the others."""
-        count = len(self.children)
-        wait = "wait for all" if self._wait_for == count else f"wait for {self._wait_for} of {count}"
-        return f"{wait}, halt" if self._halt else wait
+        """The number of children that must succeed, and whether a failure halts the others."""
+        if self._has_lead:
+            return "wait for the lead"
+        count = len(self.do)
+        wait = "wait for all" if self._needed == count else f"wait for {self._needed} of {count}"
+        return f"{wait}, halt" if self.halt else wait
 
     def start(self) -> None:
         """Begin with all children."""
-        self._running = list(self.children)
-        self._missing = self._wait_for
+        self._running = list(self.do)
+        self._missing = self._needed
         self._first: Failure | None = None
+        self._tick = self._follow_lead if self._has_lead else self._run_all
 
     def step(self) -> Status:
-        """Tick every child that still runs."""
-        ended = not self._running
+        """Tick every running child."""
+        return self._tick()
+
+    def _follow_lead(self) -> Status:
+        """Tick the lead, and unless it ended the running others."""
+        lead, *others = self._running
+        status = self.run_child(lead)
+        if status is not Status.RUNNING:
+            self.halt_children(others)
+            return status if status is Status.SUCCESS else self.fail(self.failure_of(lead))
+        for child in others:
+            ended = self.run_child(child)
+            if ended is not Status.RUNNING:
+                self._running.remove(child)
+            if ended is Status.FAILURE:
+                self.choose("go on without it", self.failure_of(child))
+        return Status.RUNNING
+
+    def _run_all(self) -> Status:
+        has_ended = not self._running
         for child in self._running:
             if self.run_child(child) is not Status.RUNNING:
-                ended = True
-        return self._decide() if ended else Status.RUNNING
+                has_ended = True
+        return self._decide() if has_ended else Status.RUNNING
 
     def _decide(self) -> Status:
-        """Count who ended in this tick, and say how to go on."""
+        """Count the children that ended in this tick, and return the status of the node."""
         ticked = self._running
         self._running = [child for child in ticked if child.status is Status.RUNNING]
         self._missing -= sum(child.status is Status.SUCCESS for child in ticked)
@@ -73,17 +105,78 @@ class Parallel(ControlNode):
         self._first = next(iter(failures), None) if self._first is None else self._first
         if self._missing <= 0:
             self.halt_children(self._running)
-            self._tell("enough others succeeded", failures)
+            self._report("enough others succeeded", failures)
             return Status.SUCCESS
         hopeless = self._missing > len(self._running)
-        if self._running and not (hopeless and self._halt):
-            self._tell("let the others finish, then fail" if hopeless else "go on with the others", failures)
+        if self._running and not (hopeless and self.halt):
+            self._report(
+                "let the others finish, then fail" if hopeless else "go on with the others", failures
+            )
             return Status.RUNNING
         self.halt_children(self._running)
         assert self._first is not None
-        self._tell(f"fail with {self._first}", [other for other in failures if other is not self._first])
+        self._report(f"fail with {self._first}", [other for other in failures if other is not self._first])
         return self.fail(self._first)
 
-    def _tell(self, choice: str, failures: Sequence[Failure]) -> None:
+    def _report(self, choice: str, failures: Sequence[Failure]) -> None:
         for failure in failures:
             self.choose(choice, failure)
+
+    def flow(self, enter: Enter, state: State) -> Flow:
+        """Enter all children in the same state and join their ends."""
+        flows = [enter(branch, state) for branch in self.do]
+        taken = [grips_at_end(flow, state, halts=True) for flow in flows]
+        halted = joined(flow.halted for flow in flows)
+        halted = halted and halted.gripping(together(state.grips, taken))
+        failures: dict[Raise, State] = {}
+        if self._has_lead:
+            others = taken[1:]
+            for failure, after in flows[0].failures.items():
+                failures[failure] = after.gripping(together(state.grips, [after.grips, *others]))
+            end = flows[0].success
+            return Flow(end and end.gripping(together(state.grips, [end.grips, *others])), failures, halted)
+        needed = self._needed
+        ends = [grips_at_end(flow, state, self.halt or needed < len(flows)) for flow in flows]
+        if sum(bool(flow.failures) for flow in flows) > len(flows) - needed:
+            for index, flow in enumerate(flows):
+                others = [*ends[:index], *ends[index + 1 :]]
+                for failure, after in flow.failures.items():
+                    failures[failure] = after.gripping(together(state.grips, [after.grips, *others]))
+        return Flow(self._success(flows, state), failures, halted)
+
+    def _success(self, flows: Sequence[Flow], state: State) -> State | None:
+        """Return the facts once enough branches have succeeded; None if so many cannot."""
+        succeeding = [flow.success for flow in flows if flow.success is not None]
+        success = joined(succeeding)
+        if success is None or len(succeeding) < self._needed:
+            return None
+        if self._needed < len(flows):
+            ends = [grips_at_end(flow, state, halts=True) for flow in flows]
+            return success.gripping(together(state.grips, ends))
+        everything = success.writing(name for end in succeeding for name in end.written or ())
+        return everything.gripping(together(state.grips, [end.grips for end in succeeding]))
+
+    def min_time(self, times: MinTimes) -> float:
+        """Return the time of the lead, or of the slowest child of as many as must succeed."""
+        return times(self.do[0]) if self._has_lead else sorted(map(times, self.do))[self._needed - 1]
+
+    @property
+    def concurrent(self) -> Children:
+        """All children."""
+        return self.do
+
+    @property
+    def halted(self) -> Children:
+        """The children beside the lead."""
+        return self.do[1:] if self._has_lead else ()
+
+    def explain(self, failure: PassedFailure) -> str:
+        """Return the number of children that must succeed, and the other failures."""
+        if self._has_lead:
+            return "ends as its lead does"
+        count = len(self.do)
+        needs = {"all": f"all {count}", "any": f"one of its {count}"}
+        needed = needs.get(str(self.wait_for), f"{self.wait_for} of its {count}")
+        # The failure that it passes on may be among those that it reported while the others went on.
+        others = [reason for reason in failure.handled if reason != failure.reason]
+        return f"needs {needed} branches" + (f"; also failed: {', '.join(others)}" if others else "")

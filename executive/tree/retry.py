@@ -1,59 +1,65 @@
-"""Again after a failure."""
+"""Further attempts after a failure."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
+from math import inf, isfinite
 
-from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.cell.protocols import Clock, Steps
-from executive.errors import InputError
-from executive.tree.backoff import Backoff
+from executive.cell.protocols import Steps
+from executive.skill import Seconds
 from executive.tree.failure import Failure
-from executive.tree.loop import Rounds
-from executive.tree.node import Site
+from executive.tree.flow import Enter, Flow, Raise, State, joined, loop
+from executive.tree.inspection import Advice, Complaint, Facts, MinTimes, PassedFailure, listed
+from executive.tree.keys import Child, Reasons, Section, key
+from executive.tree.loop import Loop
 
 
-class Retry(Rounds):
-    """Runs its body again after a failure, at most `attempts` times in all.
+class Backoff(Section):
+    """Waits that grow from one failure to the next."""
 
-    Only failures `on` the list are tried again (an empty list means every failure); others, and the
-    last one, are passed on. Before every further attempt it waits for `backoff` on the run's clock and
-    then runs `recover`, where there are such; if `recover` fails, the retry fails with the failure it
-    was recovering from.
+    first: Seconds = key(gt=0, bare=True, doc="Wait before the second attempt [s].")
+    factor: float = key(default=1.0, ge=1, doc="By how much every further wait is longer; 1 if not given.")
+    most: Seconds = key(default=inf, gt=0, doc="Longest wait [s].")
 
-    Raises:
-        InputError: `attempts` is below 1, or there is a backoff and no clock.
+    def __str__(self) -> str:
+        grows = f", times {self.factor:g} each" if self.factor != 1 else ""
+        ends = f", at most {self.most:g} s" if isfinite(self.most) else ""
+        return f"{self.first:g} s{grows}{ends}"
+
+    def delay(self, attempt: int) -> float:
+        """Return the wait after the failure of an attempt, counted from 1 [s]."""
+        try:
+            return min(self.first * self.factor ** (attempt - 1), self.most)
+        except OverflowError:
+            return self.most
+
+
+class Retry(Loop):
+    """Again after a failure.
+
+    Failures that are not `on` the list, and the last one, are passed on. Every further attempt is preceded by
+    the wait `backoff` on the run's clock and then by `recover`; if `recover` fails, the retry fails with the
+    failure from which it was recovering.
     """
 
     word = "retry"
 
-    def __init__(
-        self,
-        site: Site,
-        body: Behaviour,
-        attempts: int,
-        on: Sequence[tuple[str, str]] = (),
-        recover: Behaviour | None = None,
-        backoff: Backoff | None = None,
-        clock: Clock | None = None,
-    ) -> None:
-        if attempts < 1:
-            raise InputError(f"{site.path}: a retry makes 1 attempt or more, not {attempts}")
-        if backoff is not None and clock is None:
-            raise InputError(f"{site.path}: a retry with a backoff needs a clock to wait on")
-        super().__init__(site, [body] if recover is None else [recover, body])
-        self._body, self._recover = body, recover
-        self._attempts, self._on = attempts, tuple(on)
-        self._backoff, self._clock = backoff, clock
+    attempts: int = key(ge=1, doc="How often at most, first time included.")
+    on: Reasons = key(default=(), doc="Failures worth another attempt; every failure if not given.")
+    recover: Child | None = key(default=None, doc="What is done before every further attempt.")
+    backoff: Backoff | None = key(
+        default=None, doc="Wait before every further attempt [s], or first, factor and most."
+    )
+    do: Child = key(doc="What is done.")
 
     @property
     def detail(self) -> str:
-        """How often, after which failures, and after what wait."""
-        after = ", ".join(".".join(name) for name in self._on) or "any failure"
-        backoff = "" if self._backoff is None else f", backoff {self._backoff}"
-        return f"up to {self._attempts} attempts, on {after}{backoff}"
+        """The number of attempts, their causes and the waits."""
+        after = listed(self.on) or "any failure"
+        backoff = "" if self.backoff is None else f", backoff {self.backoff}"
+        return f"up to {self.attempts} attempts, on {after}{backoff}"
 
     def start(self) -> None:
         """Begin the first attempt."""
@@ -62,16 +68,16 @@ class Retry(Rounds):
         self._pending: Failure | None = None
 
     def step(self) -> Status:
-        """Tick what is under way; begin the next attempt in the same tick if time passed."""
+        """Tick the current child; begin the next attempt in the same tick if time passed."""
         while True:
             if self._pending is None:
-                status = self.run_round(self._body)
+                status = self.run_round(self.do)
                 if status is not Status.FAILURE:
                     return status
-                failure = self.failure_of(self._body)
-                if self._attempt == self._attempts or (self._on and not failure.matches(self._on)):
+                failure = self.failure_of(self.do)
+                if self._attempt == self.attempts or (self.on and not failure.matches(self.on)):
                     return self.fail(failure)
-                self._pending, self._wait = failure, self._next_wait(failure)
+                self._pending, self._wait = failure, self._begin_wait(failure)
             status = self._prepare(self._pending)
             if status is not Status.SUCCESS:
                 return status
@@ -79,23 +85,114 @@ class Retry(Rounds):
             if not self.next_round():
                 return Status.RUNNING
 
-    def _next_wait(self, failure: Failure) -> Steps:
-        """Tell that there will be another attempt; return the wait before it."""
-        delay = 0.0 if self._backoff is None else self._backoff.delay(self._attempt)
+    def _begin_wait(self, failure: Failure) -> Steps:
+        """Report the next attempt; return the wait before it."""
+        delay = 0.0 if self.backoff is None else self.backoff.delay(self._attempt)
         self._attempt += 1
         when = f" in {delay:g} s" if delay else ""
-        self.choose(f"attempt {self._attempt} of {self._attempts}{when}", failure)
-        return iter(()) if self._clock is None else self._clock.sleep(delay)
+        self.choose(f"attempt {self._attempt} of {self.attempts}{when}", failure)
+        return self.clock.sleep(delay)
 
     def _prepare(self, pending: Failure) -> Status:
-        """Go on with the wait, then with the recovery."""
+        """Continue the wait, then the recovery."""
         if next(self._wait, self) is not self:
             self.took_time = True
             return Status.RUNNING
-        if self._recover is None:
+        if self.recover is None:
             return Status.SUCCESS
-        status = self.run_round(self._recover)
+        status = self.run_round(self.recover)
         if status is Status.FAILURE:
-            self.choose("give up: the recovery failed", self.failure_of(self._recover))
+            self.choose("give up: the recovery failed", self.failure_of(self.recover))
             return self.fail(pending)
         return status
+
+    def flow(self, enter: Enter, state: State) -> Flow:
+        """Enter recovery and body in turn until no new state occurs."""
+        recovery: list[Flow] = []
+        waiting: State | None = None
+
+        def is_retried(failure: Raise) -> bool:
+            return not self.on or failure.may_match(self.on)
+
+        def again(body: Flow) -> State | None:
+            nonlocal waiting
+            recovery.clear()
+            retried = (after.dealt_with(one) for one, after in body.failures.items() if is_retried(one))
+            waiting = joined(retried) if self.attempts != 1 else None
+            if waiting is None or self.recover is None:
+                return waiting
+            recovery.append(enter(self.recover, waiting))
+            return recovery[0].success
+
+        body, _ = loop(enter, self.do, state, again)
+        given_up = joined(after for flow in recovery for after in flow.failures.values())
+        failures = {
+            failure: after.join(given_up or after) if is_retried(failure) else after
+            for failure, after in body.failures.items()
+        }
+        waits = waiting if self.backoff else None
+        return Flow(body.success, failures, joined((body.halted, *(flow.halted for flow in recovery), waits)))
+
+    def min_time(self, times: MinTimes) -> float:
+        """Return the time of one attempt."""
+        return times(self.do)
+
+    def check(self, facts: Facts) -> Iterator[Complaint]:
+        """Find attempts that change nothing, and a single attempt."""
+        skills = facts.skills()
+        if not self.backoff and skills and not any(one is None or one.senses or one.moves for one in skills):
+            message = "this retry changes nothing between its attempts: nothing in it looks, moves or waits"
+            hint = "Put a look or a motion into do or recover, or wait with backoff."
+            yield Complaint("", "unchanging-retry", message, hint, is_warning=True)
+        # A param may be 1 in one run and 3 in the next.
+        if self.attempts == 1 and facts.is_literal("attempts"):
+            message = "a retry with 1 attempt never tries again"
+            yield Complaint("attempts", "unchanging-retry", message, is_warning=True)
+
+    def explain_unreachable(self, child: Child) -> str:
+        """Return the reason why the recovery never runs."""
+        if child is not self.recover:
+            return ""
+        return (
+            "there is one attempt only" if self.attempts == 1 else "" if self.on else "the body never fails"
+        )
+
+    def explain(self, failure: PassedFailure) -> str:
+        """Return the failures of all attempts."""
+        handled = dict(failure.handled)
+        if self._gave_up(failure):
+            attempt, most = self.attempt(failure)
+            last = f"{failure.last}: {failure.messages[failure.last]}"
+            return f"gave up after attempt {attempt} of {most}: its recovery failed with {last}"
+        if self.on and not failure.is_one_of(self.on):
+            before = f"; before: {_counted(handled)}" if handled else ""
+            return f"tries again only after {listed(self.on)}{before}"
+        handled[failure.reason] = handled.get(failure.reason, 0) + 1
+        if self.attempts == 1:
+            return "has no second attempt"
+        return f"all {self.attempts} attempts failed: {_counted(handled)}"
+
+    def attempt(self, failure: PassedFailure) -> tuple[int, int]:
+        """Return the number of the attempt that failed, and of allowed attempts."""
+        # Every failure but the last one was handled, and so was that of a recovery.
+        return sum(failure.handled.values()) + (-1 if self._gave_up(failure) else 1), self.attempts
+
+    def advise(self, failure: PassedFailure) -> Iterator[Advice]:
+        """Yield a better recovery, or more attempts."""
+        most = self.attempts
+        if self._gave_up(failure):
+            yield Advice(f"deal with {failure.last} in the recovery", child=self.recover)
+        elif (not self.on or failure.is_one_of(self.on)) and self.attempt(failure)[0] == most:
+            yield Advice(f"allow more than {most} attempt{'s' * (most > 1)}", "attempts")
+
+    def contingencies(self) -> Iterator[tuple[str, Child]]:
+        """Yield the recovery."""
+        if self.recover is not None:
+            yield "recover", self.recover
+
+    def _gave_up(self, failure: PassedFailure) -> bool:
+        return self.recover is not None and failure.has_failed(self.recover)
+
+
+def _counted(handled: dict[str, int]) -> str:
+    return ", ".join(f"{count} x {reason}" for reason, count in handled.items())

@@ -1,28 +1,31 @@
-"""One after the other."""
+"""Sequence of nodes."""
 
 from __future__ import annotations
 
 from py_trees.common import Status
 
+from executive.tree.flow import Enter, Flow, Raise, State, joined
+from executive.tree.inspection import MinTimes
+from executive.tree.keys import Child, Children, key
 from executive.tree.node import ControlNode
 
 
 class Sequence(ControlNode):
-    """Runs its children one after the other; fails with the first that fails, succeeds with the last.
-
-    It remembers where it is: a child that succeeded is not run again.
-    """
+    """One after the other; fails with the first that fails."""
 
     word = "sequence"
+    symbol, shape = "→", "box"
+
+    do: Children = key(bare=True, doc="What is done.")
 
     def start(self) -> None:
         """Begin with the first child."""
         self._next = 0
 
     def step(self) -> Status:
-        """Tick the current child; go on to the next in the same tick."""
-        while self._next < len(self.children):
-            child = self.children[self._next]
+        """Tick the current child; continue with the next in the same tick."""
+        while self._next < len(self.do):
+            child = self.do[self._next]
             status = self.run_child(child)
             if status is Status.RUNNING:
                 return status
@@ -30,3 +33,30 @@ class Sequence(ControlNode):
                 return self.fail(self.failure_of(child))
             self._next += 1
         return Status.SUCCESS
+
+    def flow(self, enter: Enter, state: State) -> Flow:
+        """Enter each child in the state after the one before it."""
+        failures: dict[Raise, State] = {}
+        halted = None
+        here: State | None = state
+        for child in self.do:
+            if here is None:
+                break
+            flow = enter(child, here)
+            failures.update(flow.failures)
+            here, halted = flow.success, joined((halted, flow.halted))
+        return Flow(here, failures, halted)
+
+    def min_time(self, times: MinTimes) -> float:
+        """Return the sum over all children."""
+        return sum(map(times, self.do))
+
+    def explain_unreachable(self, child: Child) -> str:
+        """Return the cause, an earlier child."""
+        del child
+        return "what stands before it never succeeds"
+
+    @property
+    def first_child(self) -> Child | None:
+        """The first child."""
+        return self.do[0]

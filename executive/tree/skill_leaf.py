@@ -16,7 +16,6 @@ from executive.cell.protocols import Cell
 from executive.errors import Fault
 from executive.events import NodeEnded, NodeStarted
 from executive.skill import Skill, SkillFailed
-from executive.tree.blackboard import Scope
 from executive.tree.failure import Failure
 from executive.tree.node import Site
 from executive.tree.skill_run import SkillRun
@@ -37,7 +36,7 @@ class Wiring:
     outputs: Mapping[str, str] = field(default_factory=dict)
 
 
-class SkillNode(Behaviour):
+class SkillLeaf(Behaviour):
     """Runs one skill: a fresh instance per start, one step of its generator per tick.
 
     Attributes:
@@ -50,14 +49,12 @@ class SkillNode(Behaviour):
 
     subtrees: tuple[str, ...] = ()
 
-    def __init__(
-        self, site: Site, name: str, skill: type[Skill], wiring: Wiring, cell: Cell, scope: Scope
-    ) -> None:
+    def __init__(self, site: Site, name: str, skill: type[Skill], wiring: Wiring, cell: Cell) -> None:
         super().__init__(site.label or name)
         self.path, self.label, self.skill_name = site.path, site.label, name
         self.failure: Failure | None = None
         self._emit = site.emit
-        self.skill_type, self.wiring, self._cell, self._scope = skill, wiring, cell, scope
+        self.skill_type, self.wiring, self._cell, self._blackboard = skill, wiring, cell, site.blackboard
         self._run: SkillRun | None = None
         self._item = ""
         # An item that may be left out narrows a choice; what the skill works on it always has.
@@ -133,12 +130,12 @@ class SkillNode(Behaviour):
     def _read(self) -> dict[str, Any]:
         inputs = {}
         for port, variable in self.wiring.inputs.items():
-            if variable in self._scope:
-                inputs[port] = self._scope[variable]
+            if variable in self._blackboard:
+                inputs[port] = self._blackboard[variable]
             elif self.skill_type.ports[port].required:
                 raise Fault(
                     f'the input "{port}" reads ${variable}, which nothing has written yet; '
-                    f"written so far: {', '.join(self._scope) or 'nothing'}"
+                    f"written so far: {', '.join(self._blackboard) or 'nothing'}"
                 )
         return inputs
 
@@ -151,7 +148,7 @@ class SkillNode(Behaviour):
 
     def _succeed(self, values: Mapping[str, Any]) -> None:
         outputs = {port: values[port] for port in self.wiring.outputs}
-        self._scope.write({self.wiring.outputs[port]: value for port, value in outputs.items()})
+        self._blackboard.write({self.wiring.outputs[port]: value for port, value in outputs.items()})
         self._item = self._item_of(outputs) or self._item
         self._close(Status.SUCCESS)
         plain = {port: plain_or_type(value) for port, value in outputs.items()}

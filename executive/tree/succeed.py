@@ -1,27 +1,34 @@
-"""In any case."""
+"""Success in any case."""
 
 from __future__ import annotations
 
-from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.node import ControlNode, Site
+from executive.tree.flow import Enter, Flow, State, joined
+from executive.tree.keys import Child, key
+from executive.tree.node import ControlNode
 
 
 class Succeed(ControlNode):
-    """Succeeds however its body ends; without a body, at once."""
+    """Succeeds however its body ends; without a body at once."""
 
     word = "succeed"
+    symbol = "✓"
 
-    def __init__(self, site: Site, body: Behaviour | None = None) -> None:
-        super().__init__(site, [] if body is None else [body])
+    do: Child | None = key(bare=True, default=None, doc="What is done.")
 
     def step(self) -> Status:
         """Tick the body, if any."""
-        for body in self.children:
-            status = self.run_child(body)
-            if status is Status.FAILURE:
-                self.choose("succeed none the less", self.failure_of(body))
-            elif status is Status.RUNNING:
-                return status
-        return Status.SUCCESS
+        if self.do is None:
+            return Status.SUCCESS
+        status = self.run_child(self.do)
+        if status is Status.FAILURE:
+            self.choose("succeed none the less", self.failure_of(self.do))
+        return Status.RUNNING if status is Status.RUNNING else Status.SUCCESS
+
+    def flow(self, enter: Enter, state: State) -> Flow:
+        """Join all ends of the body."""
+        if self.do is None:
+            return Flow(state, {}, None)
+        body = enter(self.do, state)
+        return Flow(joined((body.success, *body.failures.values())), {}, body.halted)

@@ -1,42 +1,89 @@
-"""Not longer than."""
+"""Limit of the duration of a body."""
 
 from __future__ import annotations
 
-from py_trees.behaviour import Behaviour
+from collections.abc import Iterator
+
 from py_trees.common import Status
 
-from executive.cell.protocols import Clock
-from executive.tree.node import ControlNode, Site
+from executive.skill import Seconds
+from executive.tree.flow import Enter, Flow, Raise, State
+from executive.tree.inspection import Advice, Complaint, Facts, MinTimes, PassedFailure
+from executive.tree.keys import Child, key
+from executive.tree.node import ControlNode
+
+CLOCK_TOLERANCE = 0.005
+"""Half a control step, by which a wait may end too early [s]."""
 
 
 class Timeout(ControlNode):
-    """Runs a body that must end within `seconds` [s] on the run's clock, else fails with `timeout`.
+    """Fails with `timeout` when its body takes longer on the run's clock.
 
-    A body that ends in the very tick in which its time is up has made it.
+    A body that ends in the tick in which its time is up is in time.
     """
 
     word = "timeout"
+    reasons = ("timeout",)
+    symbol = "◷"
 
-    def __init__(self, site: Site, body: Behaviour, seconds: float, clock: Clock) -> None:
-        super().__init__(site, [body])
-        self._body, self._seconds, self._clock = body, seconds, clock
+    seconds: Seconds = key(gt=0, doc="How long it may take [s].")
+    do: Child = key(doc="What is done.")
 
     @property
     def detail(self) -> str:
-        """How long."""
-        return f"{self._seconds:g} s"
+        """The limit."""
+        return f"{self.seconds:g} s"
 
     def start(self) -> None:
-        """Begin to count."""
-        self._deadline = self._clock.now + self._seconds
+        """Set the deadline."""
+        self._deadline = self.clock.now + self.seconds
 
     def step(self) -> Status:
-        """Tick the body, then look at the clock."""
-        status = self.run_child(self._body)
+        """Tick the body, then compare the clock with the deadline."""
+        status = self.run_child(self.do)
         if status is Status.FAILURE:
-            return self.fail(self.failure_of(self._body))
-        # A nanosecond of slack: a clock that adds up steps may miss the deadline by rounding.
-        if status is Status.RUNNING and self._clock.now >= self._deadline - 1e-9:
-            self.halt_children([self._body])
-            return self.fail_for("timeout", f"not done after {self._seconds:g} s")
+            return self.fail(self.failure_of(self.do))
+        # A nanosecond of tolerance: a clock that adds up steps may miss the deadline by rounding.
+        if status is Status.RUNNING and self.clock.now >= self._deadline - 1e-9:
+            self.halt_children([self.do])
+            return self.fail_for("timeout", f"not done after {self.seconds:g} s")
         return status
+
+    def flow(self, enter: Enter, state: State) -> Flow:
+        """Add the timeout to the ends of a body that waits."""
+        body = enter(self.do, state)
+        failures = dict(body.failures)
+        if body.halted is not None:
+            failures[Raise(self.word, "timeout", self.path)] = body.halted
+        return Flow(body.success, failures, body.halted)
+
+    def min_time(self, times: MinTimes) -> float:
+        """Return the time of the body."""
+        return times(self.do)
+
+    def check(self, facts: Facts) -> Iterator[Complaint]:
+        """Compare the limit with the least time of the body."""
+        shortest = facts.min_time(self.do)
+        if self.seconds >= shortest - CLOCK_TOLERANCE:
+            return
+        message = (
+            f"timeout.seconds is {self.seconds:g} s, but its body takes {shortest:.2f} s at the very least"
+        )
+        parts = [(name, time) for name, time in facts.skill_times(self.do) if time > 0]
+        hint = f"At the least: {', '.join(f'{name} {time:.2f} s' for name, time in parts)}."
+        is_sum = abs(sum(time for _, time in parts) - shortest) <= 1e-9
+        yield Complaint("seconds", "short-timeout", message, hint if is_sum else "")
+
+    @property
+    def first_child(self) -> Child | None:
+        """The body."""
+        return self.do
+
+    def explain(self, failure: PassedFailure) -> str:
+        """Return the duration of the body."""
+        return f"limits only the time: {failure.duration:.2f} of {self.seconds:g} s had passed"
+
+    def advise(self, failure: PassedFailure) -> Iterator[Advice]:
+        """Yield a longer limit after a timeout."""
+        if failure.child is None:
+            yield Advice(f"allow more than {self.seconds:g} s", "seconds")

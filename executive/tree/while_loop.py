@@ -1,33 +1,36 @@
-"""As long as."""
+"""Loop with a condition."""
 
 from __future__ import annotations
 
-from py_trees.behaviour import Behaviour
+from collections.abc import Iterator
+
 from py_trees.common import Status
 
-from executive.tree.loop import Rounds
-from executive.tree.node import Site
+from executive.tree.flow import Enter, Flow, State, joined, loop
+from executive.tree.inspection import Complaint, Facts, PassedFailure
+from executive.tree.keys import Child, key
+from executive.tree.loop import Loop
 
 
-class While(Rounds):
-    """Runs its condition, and while that succeeds its body, and so on.
+class While(Loop):
+    """Again as long as a condition succeeds, which is asked before every round.
 
-    Ends with success when the condition fails; a failure of the body is passed on.
+    Succeeds when the condition fails; a failure of the body is passed on.
     """
 
     word = "while"
+    symbol = "↺"
 
-    def __init__(self, site: Site, condition: Behaviour, body: Behaviour) -> None:
-        super().__init__(site, [condition, body])
-        self._condition, self._body = condition, body
+    condition: Child = key(doc="What is asked; its failure ends the loop with success.")
+    do: Child = key(doc="What is done.")
 
     def start(self) -> None:
         """Begin with the condition."""
         super().start()
-        self._current = self._condition
+        self._current = self.condition
 
     def step(self) -> Status:
-        """Tick what is under way; begin the next round in the same tick if this one took time."""
+        """Tick the current child; begin the next round in the same tick if this one took time."""
         while True:
             current = self._current
             status = self.run_round(current)
@@ -35,13 +38,46 @@ class While(Rounds):
                 return status
             if status is Status.FAILURE:
                 failure = self.failure_of(current)
-                if current is self._body:
+                if current is self.do:
                     return self.fail(failure)
                 self.choose("done", failure)
                 return Status.SUCCESS
-            if current is self._condition:
-                self._current = self._body
+            if current is self.condition:
+                self._current = self.do
             else:
-                self._current = self._condition
+                self._current = self.condition
                 if not self.next_round():
                     return Status.RUNNING
+
+    def flow(self, enter: Enter, state: State) -> Flow:
+        """Enter condition and body in turn until no new state occurs."""
+        rounds: list[Flow] = []
+
+        def again(condition: Flow) -> State | None:
+            rounds.clear()
+            if condition.success is None:
+                return None
+            rounds.append(enter(self.do, condition.success))
+            return rounds[0].success
+
+        condition, entry = loop(enter, self.condition, state, again)
+        failures = {failure: after for flow in rounds for failure, after in flow.failures.items()}
+        halted = joined((condition.halted, entry, *(flow.halted for flow in rounds)))
+        return Flow(joined(condition.failures.values()), failures, halted)
+
+    def check(self, facts: Facts) -> Iterator[Complaint]:
+        """Find a loop that never ends."""
+        condition = facts.flow(self.condition)
+        if condition is not None and not condition.failures and not facts.is_halted_by_sibling:
+            message = f"this loop never ends: its condition, {facts.name(self.condition)}, cannot fail"
+            yield Complaint("", "endless", message, "Use repeat with times or until.")
+
+    def explain_unreachable(self, child: Child) -> str:
+        """Return the cause, the condition."""
+        del child
+        return "the condition never succeeds"
+
+    def explain(self, failure: PassedFailure) -> str:
+        """Return the rule of failures of the body."""
+        del failure
+        return "a failure of its body ends it"

@@ -28,11 +28,11 @@ from executive.events import Event, Observer, TimedEvent
 from executive.record.recorder import Recorder
 from executive.record.run_directory import RunDirectory
 from executive.skill import Skill
-from executive.tree.blackboard import Scope
+from executive.tree.blackboard import Blackboard
 from executive.tree.node import Site
 from executive.tree.retry import Retry
 from executive.tree.sequence import Sequence as SequenceNode
-from executive.tree.skill_leaf import SkillNode, Wiring
+from executive.tree.skill_leaf import SkillLeaf, Wiring
 from executive.tree.timeout import Timeout
 from tests.benchmarks.report import Figures, run_command
 
@@ -113,7 +113,7 @@ def build_ours(nodes: int, last_skill: type[Skill], *observers: Observer) -> Beh
 
     All other leaves succeed at once. Events are stamped and passed on as a run does it.
     """
-    cell, scope, number = FakeCell().cell, Scope(), itertools.count(1)
+    cell, blackboard, number = FakeCell().cell, Blackboard(), itertools.count(1)
 
     def emit(event: Event) -> None:
         timed = TimedEvent(0, round(cell.clock.now, 6), event)
@@ -121,12 +121,13 @@ def build_ours(nodes: int, last_skill: type[Skill], *observers: Observer) -> Beh
             observer(timed)
 
     def make_site(name: str) -> Site:
-        return Site(f"tree/repeat/do/{next(number)}:{name}", emit=emit)
+        return Site(f"tree/repeat/do/{next(number)}:{name}", cell.clock, blackboard, emit=emit)
 
     skills = [*[_SucceedAtOnce] * (nodes - 4), last_skill]
-    leaves = [SkillNode(make_site(skill.__name__), "leaf", skill, Wiring(), cell, scope) for skill in skills]
-    timeout = Timeout(make_site("timeout"), SequenceNode(make_site("do"), leaves), TIMEOUT, cell.clock)
-    return Retry(make_site("retry"), timeout, 3)
+    leaves = [SkillLeaf(make_site(skill.__name__), "leaf", skill, Wiring(), cell) for skill in skills]
+    body = SequenceNode(make_site("do"), do=leaves)
+    timeout = Timeout(make_site("timeout"), seconds=TIMEOUT, do=body)
+    return Retry(make_site("retry"), attempts=3, do=timeout)
 
 
 def build_bare(nodes: int, last_status: Status) -> Behaviour:

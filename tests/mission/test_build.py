@@ -14,7 +14,7 @@ from executive.mission.build import build
 from executive.mission.load import LoadedMission
 from executive.mission.outline import outline
 from executive.skill import Skill
-from executive.tree.blackboard import Scope
+from executive.tree.blackboard import Blackboard
 
 HEAD = "mission: m\ncell: cells/small.yaml\n"
 
@@ -47,10 +47,10 @@ trees:
 
 @pytest.fixture
 def built(load: Callable[..., LoadedMission], skills: dict[str, type[Skill]]) -> Any:
-    def built(text: str, scope: Scope | None = None, emit: Any = ignore) -> Any:
+    def built(text: str, scope: Blackboard | None = None, emit: Any = ignore) -> Any:
         clock = SimpleNamespace(now=0.0)
         cell: Any = SimpleNamespace(clock=clock)
-        return build(load(text), skills, cell, Scope() if scope is None else scope, emit)
+        return build(load(text), skills, cell, Blackboard() if scope is None else scope, emit)
 
     return built
 
@@ -87,7 +87,7 @@ def test_the_outline_reads_like_the_mission_and_paths_are_unique(built: Any) -> 
 
 
 def test_a_built_tree_runs_and_moves_values_along(built: Any) -> None:
-    scope = Scope()
+    scope = Blackboard()
     events: list[Event] = []
     root = built(
         HEAD + "tree: [Look, {Pick: {held: $thing}}, {Drop: {held: $thing, bin: red_bin}}]\n",
@@ -107,8 +107,8 @@ def test_two_trees_of_one_mission_share_nothing(
     load: Callable[..., LoadedMission], skills: dict[str, type[Skill]]
 ) -> None:
     loaded = load(HEAD + "tree: Look\n")
-    first, second = Scope(), Scope()
-    cell: Any = SimpleNamespace()
+    first, second = Blackboard(), Blackboard()
+    cell: Any = SimpleNamespace(clock=None)
     one, two = (build(loaded, skills, cell, scope, ignore) for scope in (first, second))
     one.tick_once()
     one.tick_once()

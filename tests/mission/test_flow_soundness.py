@@ -23,8 +23,9 @@ from executive.mission.parse.mission_file import parse_mission
 from executive.mission.source import Source
 from executive.mission.text.yaml_text import parse_yaml
 from executive.skill import ANY, EMPTY, HOLDING, In, Out, Skill, port
-from executive.tree.blackboard import Scope
+from executive.tree.blackboard import Blackboard
 from executive.tree.halting import halt
+from executive.tree.registry import control_nodes
 
 MOST_TICKS = 400
 
@@ -195,10 +196,10 @@ def sound(tree: Tree) -> Case | None:
     source = Source("m.yaml", json.dumps({"mission": "m", "cell": "none", "tree": tree}))
     root, wrong = parse_yaml(source)
     assert root is not None
-    mission, malformed = parse_mission(root, {}, SKILLS)
+    mission, malformed = parse_mission(root, {}, SKILLS, control_nodes())
     expanded = expand(mission, SKILLS)
     assert expanded.tree is not None
-    case = Case(mission, with_paths(expanded.tree), (), SKILLS, None, {}, None)
+    case = Case(mission, with_paths(expanded.tree), (), SKILLS, control_nodes(), None, {}, None)
     findings = [*wrong, *malformed, *expanded.findings, *check(case)]
     return None if any(finding.severity == "error" for finding in findings) else case
 
@@ -206,7 +207,7 @@ def sound(tree: Tree) -> Case | None:
 def run(case: Case, seed: int) -> tuple[World, Any]:
     """Run a mission until it ends or for long enough; return its world and its root."""
     world = World(seed)
-    root = Builder(SKILLS, cast("Cell", world), Scope(), ignore).node(case.tree)
+    root = Builder(SKILLS, cast("Cell", world), Blackboard(), ignore).node(case.tree)
     while world.ticks < MOST_TICKS:
         root.tick_once()
         if root.status is not Status.RUNNING:

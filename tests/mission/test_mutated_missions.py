@@ -21,12 +21,13 @@ from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.mission.findings import Finding, MissionError
 from executive.mission.load import LoadedMission, load_mission
-from executive.mission.model.grammar import CONTROL
+from executive.mission.model.grammar import USE
 from executive.plugins import cell_kind, discover
 from executive.run import assembly
 from executive.run.assembly import RunOptions, assemble
 from executive.skill import Skill
-from executive.tree.blackboard import Scope
+from executive.tree.blackboard import Blackboard
+from executive.tree.registry import control_nodes
 from tests.mission.mutations import places
 from tests.mission.mutator import Base, Mutator
 from tests.mission.unkind_cell import UnkindCell
@@ -120,8 +121,8 @@ def _misplaced(findings: Iterable[Finding]) -> list[str]:
 def _run(loaded: LoadedMission, skills: Mapping[str, type[Skill]], seed: int) -> list[str]:
     """Return what must not be in a run of a mission."""
     wishes = random.Random(seed).choices([*loaded.routes, "rescan"], k=5)
-    witness = Witness(loaded, skills, scope := Scope())
-    with mock.patch.object(assembly, "Scope", lambda: scope):
+    witness = Witness(loaded, skills, scope := Blackboard())
+    with mock.patch.object(assembly, "Blackboard", lambda: scope):
         options = RunOptions(seed, wishes, kind=UnkindCell)
         run = assemble(loaded, skills, options, [witness])
     assert isinstance(run.workcell, UnkindCell)
@@ -139,7 +140,7 @@ def test_the_bases_of_the_mutants_pass_the_check(file: Path) -> None:
 def test_the_bases_of_the_mutants_use_every_control_node() -> None:
     files = [yaml.safe_load(file.read_text()) for file in OWN_BASES]
     words = {str(word) for container, key in places(files) for word in (key, container[key])}
-    assert set(CONTROL) - words == set()
+    assert {*control_nodes(), USE} - words == set()
 
 
 @pytest.mark.parametrize(

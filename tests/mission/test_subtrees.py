@@ -10,7 +10,7 @@ import pytest
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission
 from executive.mission.model.nodes import SkillNode
-from executive.mission.model.wiring import wires
+from executive.mission.model.wiring import variables, wires
 from executive.skill import Direction, Skill
 
 Load = Callable[..., LoadedMission]
@@ -103,8 +103,8 @@ def test_a_loop_in_a_closed_subtree_has_a_variable_of_its_own(load: Load) -> Non
         "    returns: [held]\n"
         "    do: [Look, {for_each: {each: kind, in: [cube], do: {Pick: {only: $kind}}}}]\n"
     )
-    loops = [node for node in loaded.tree.walk() if hasattr(node, "each")]
-    assert [loop.each.name for loop in loops] == ["get.kind"]
+    names = [variable.name for node in loaded.tree.walk() for _, variable in variables(node)]
+    assert names == ["get.kind"]
 
 
 def library(name: str, text: str) -> None:

@@ -12,7 +12,7 @@ from executive.mission.load import LoadedMission
 from executive.mission.model.nodes import SkillNode
 from executive.run.run import Run
 from executive.skill import EMPTY, HOLDING, Skill
-from executive.tree.blackboard import Scope
+from executive.tree.blackboard import Blackboard
 from tests.mission.unkind_cell import UnkindCell
 
 
@@ -28,7 +28,7 @@ class Witness:
         cell: The cell of the run, once there is one.
     """
 
-    def __init__(self, loaded: LoadedMission, skills: Mapping[str, type[Skill]], scope: Scope) -> None:
+    def __init__(self, loaded: LoadedMission, skills: Mapping[str, type[Skill]], scope: Blackboard) -> None:
         self._flow = Analysis(loaded.tree, skills)
         self._endings = {(f"{ending.source}.{ending.reason}", ending.node) for ending in loaded.endings}
         self._skills = {

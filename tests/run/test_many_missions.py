@@ -24,8 +24,8 @@ from executive.run.assembly import RunOptions, assemble
 from executive.run.planning_ahead import PlanningAhead
 from executive.run.run_context import RunContext
 from executive.skill import Skill
-from executive.tree.blackboard import Scope
-from executive.tree.skill_leaf import SkillNode
+from executive.tree.blackboard import Blackboard as Variables
+from executive.tree.skill_leaf import SkillLeaf
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 RUNS = [(name, seed) for seed in range(3) for name in ("sort_overhead", "sort_wrist")]
@@ -45,7 +45,7 @@ class Interleaved:
         self._fake = FakeCell(loaded.cell_config, seed=seed, routes=loaded.routes, emit=emit)
         self._context.connect(self._fake, PlanningAhead(self._fake.cell))
         self._context.begin_step(0)
-        self._root = build(loaded, skills(), self._context.cell, Scope(), emit)
+        self._root = build(loaded, skills(), self._context.cell, Variables(), emit)
 
     def tick(self) -> bool:
         """Go on by one tick; return whether there is more to do."""
@@ -82,7 +82,7 @@ def loaded(name: str) -> LoadedMission:
 
 def variables(root: Behaviour) -> list[dict[str, Any]]:
     """Return the variables of every scope of a tree."""
-    scopes = {id(node._scope): node._scope for node in root.iterate() if isinstance(node, SkillNode)}
+    scopes = {id(node._scope): node._scope for node in root.iterate() if isinstance(node, SkillLeaf)}
     return [plain(scope) for scope in scopes.values()]
 
 

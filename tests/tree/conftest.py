@@ -11,6 +11,7 @@ from py_trees.common import Status
 from scripted_leaf import Leaf
 
 from executive.events import Event
+from executive.tree.blackboard import Blackboard
 from executive.tree.node import Site
 
 
@@ -35,8 +36,13 @@ def events() -> list[Event]:
 
 
 @pytest.fixture
-def site(events: list[Event]) -> Callable[..., Site]:
-    return lambda path="node", label="": Site(path, label, events.append)
+def scope() -> Blackboard:
+    return Blackboard()
+
+
+@pytest.fixture
+def site(events: list[Event], clock: Clock, scope: Blackboard) -> Callable[..., Site]:
+    return lambda path="node", label="": Site(path, clock, scope, label, events.append)
 
 
 @pytest.fixture

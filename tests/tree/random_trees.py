@@ -6,6 +6,22 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from build_nodes import (
+    fallback,
+    for_each,
+    invert,
+    lead,
+    make_backoff,
+    make_site,
+    parallel,
+    repeat,
+    retry,
+    sequence,
+    succeed,
+    timeout,
+    try_catch,
+    while_loop,
+)
 from hand_set_clock import Clock
 from hypothesis import strategies as st
 from py_trees.behaviour import Behaviour
@@ -13,21 +29,8 @@ from py_trees.common import Status
 from scripted_leaf import Leaf
 
 from executive.events import BranchChosen, Event, NodeEnded, NodeStarted
-from executive.tree.backoff import Backoff
-from executive.tree.blackboard import Scope
-from executive.tree.fallback import Fallback
-from executive.tree.for_each import ForEach
-from executive.tree.invert import Invert
+from executive.tree.blackboard import Blackboard
 from executive.tree.node import Site
-from executive.tree.parallel import Parallel
-from executive.tree.parallel_lead import Beside
-from executive.tree.repeat import Repeat
-from executive.tree.retry import Retry
-from executive.tree.sequence import Sequence
-from executive.tree.succeed import Succeed
-from executive.tree.timeout import Timeout
-from executive.tree.try_catch import Try
-from executive.tree.while_loop import While
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,7 @@ class World:
     """What one tree runs in, and everything its nodes said, one text each."""
 
     clock: Clock = field(default_factory=Clock)
-    scope: Scope = field(default_factory=Scope)
+    scope: Blackboard = field(default_factory=Blackboard)
     log: list[str] = field(default_factory=list)
 
     def emit(self, event: Event) -> None:
@@ -66,7 +69,7 @@ def grow(plan: Plan, world: World, path: str = "root") -> Behaviour:
         leaf = Leaf(path, scripts, world.log)
         leaf.breaks = breaks
         return leaf
-    return _NODES[plan.word](Site(path, plan.label, world.emit), children, plan.options, world)
+    return _NODES[plan.word](make_site(path, plan.label, world.emit), children, plan.options, world)
 
 
 def run(root: Behaviour, world: World, ticks: int) -> Iterator[str]:
@@ -104,20 +107,24 @@ def bottom_up(node: Behaviour) -> Iterator[Behaviour]:
 _Make = Callable[[Site, list[Behaviour], tuple[Any, ...], World], Behaviour]
 
 _NODES: Mapping[str, _Make] = {
-    "sequence": lambda site, nodes, options, world: Sequence(site, nodes),
-    "fallback": lambda site, nodes, options, world: Fallback(site, nodes),
-    "parallel": lambda site, nodes, options, world: Parallel(site, nodes, *options),
-    "beside": lambda site, nodes, options, world: Beside(site, nodes),
-    "retry": lambda site, nodes, options, world: Retry(
+    "sequence": lambda site, nodes, options, world: sequence(site, nodes),
+    "fallback": lambda site, nodes, options, world: fallback(site, nodes),
+    "parallel": lambda site, nodes, options, world: parallel(site, nodes, *options),
+    "beside": lambda site, nodes, options, world: lead(site, nodes),
+    "retry": lambda site, nodes, options, world: retry(
         site, nodes[0], *options[:2], (*nodes, None)[1], options[2], world.clock
     ),
-    "repeat": lambda site, nodes, options, world: Repeat(site, nodes[0], *options),
-    "while": lambda site, nodes, options, world: While(site, *nodes),
-    "for_each": lambda site, nodes, options, world: ForEach(site, nodes[0], world.scope, site.path, *options),
-    "try": lambda site, nodes, options, world: Try(site, nodes[0], [(options[0], nodes[1])], *nodes[2:]),
-    "timeout": lambda site, nodes, options, world: Timeout(site, nodes[0], *options, world.clock),
-    "invert": lambda site, nodes, options, world: Invert(site, *nodes),
-    "succeed": lambda site, nodes, options, world: Succeed(site, *nodes),
+    "repeat": lambda site, nodes, options, world: repeat(site, nodes[0], *options),
+    "while": lambda site, nodes, options, world: while_loop(site, *nodes),
+    "for_each": lambda site, nodes, options, world: for_each(
+        site, nodes[0], world.scope, site.path, *options
+    ),
+    "try": lambda site, nodes, options, world: try_catch(
+        site, nodes[0], [(options[0], nodes[1])], *nodes[2:]
+    ),
+    "timeout": lambda site, nodes, options, world: timeout(site, nodes[0], *options, world.clock),
+    "invert": lambda site, nodes, options, world: invert(site, *nodes),
+    "succeed": lambda site, nodes, options, world: succeed(site, *nodes),
 }
 
 
@@ -137,7 +144,7 @@ def _parallel(child: Any) -> Any:
 
 def _above(child: Any) -> Any:
     some, one = st.sampled_from([(), (("x", "lost"),)]), st.just((("x", "lost"),))
-    backoff = st.none() | st.builds(Backoff, st.sampled_from([0.125, 0.25]), st.just(2.0), st.just(0.5))
+    backoff = st.none() | st.builds(make_backoff, st.sampled_from([0.125, 0.25]), st.just(2.0), st.just(0.5))
     elements = st.lists(st.none() | st.integers(0, 3), max_size=3)
     return st.one_of(
         _planned("sequence", child, 0, 3),

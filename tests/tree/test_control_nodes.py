@@ -6,18 +6,16 @@ from typing import Any
 
 import py_trees
 import pytest
+from build_nodes import names_of, sequence, timeout, try_catch
 from py_trees.common import Status
 
 from executive.errors import Fault
 from executive.events import NodeEnded, NodeStarted
 from executive.tree.halting import halt
-from executive.tree.sequence import Sequence
-from executive.tree.timeout import Timeout
-from executive.tree.try_catch import Try
 
 
 def test_finally_runs_neither_after_a_halt_nor_after_a_fault(leaf: Any, site: Any, log: Any) -> None:
-    node = Try(site(), leaf("A", "R S", "!"), [([("A", "lost")], leaf("rescue"))], leaf("finish"))
+    node = try_catch(site(), leaf("A", "R S", "!"), [([("A", "lost")], leaf("rescue"))], leaf("finish"))
     node.tick_once()
     assert halt(node) == []
     with pytest.raises(RuntimeError, match="broken"):
@@ -27,7 +25,7 @@ def test_finally_runs_neither_after_a_halt_nor_after_a_fault(leaf: Any, site: An
 
 
 def test_a_timeout_halts_its_body_and_says_timeout(leaf: Any, site: Any, clock: Any, log: Any) -> None:
-    node = Timeout(site("here"), leaf("A", "R R R R"), 0.3, clock)
+    node = timeout(site("here"), leaf("A", "R R R R"), 0.3, clock)
     for clock.now in (0.0, 0.1, 0.2, 0.1 + 0.2):
         node.tick_once()
     assert node.status is Status.FAILURE
@@ -43,7 +41,7 @@ def test_a_timeout_halts_its_body_and_says_timeout(leaf: Any, site: Any, clock: 
 def test_a_body_has_its_time(
     leaf: Any, site: Any, clock: Any, script: str, times: tuple[float, ...], status: Status
 ) -> None:
-    node = Timeout(site(), leaf("A", script), 0.3, clock)
+    node = timeout(site(), leaf("A", script), 0.3, clock)
     for clock.now in times:
         node.tick_once()
     assert node.status is status
@@ -52,7 +50,7 @@ def test_a_body_has_its_time(
 def test_a_body_that_cannot_be_halted_is_a_fault(leaf: Any, site: Any, clock: Any) -> None:
     body = leaf("A", "R R")
     body.breaks = True
-    node = Timeout(site("here"), body, 0.1, clock)
+    node = timeout(site("here"), body, 0.1, clock)
     node.tick_once()
     clock.now = 1.0
     with pytest.raises(Fault, match="A: cannot stop") as caught:
@@ -61,16 +59,16 @@ def test_a_body_that_cannot_be_halted_is_a_fault(leaf: Any, site: Any, clock: An
 
 
 def test_labels_gather_on_the_way_up(leaf: Any, site: Any, ticks: Any) -> None:
-    inner = Sequence(site("tree/inner", "inner"), [leaf("A", "lost")])
-    node = Sequence(site("tree", "outer"), [inner])
+    inner = sequence(site("tree/inner", "inner"), [leaf("A", "lost")])
+    node = sequence(site("tree", "outer"), [inner])
     ticks(node)
     for source in ("A", "inner", "outer"):
-        assert node.failure.matches([(source, "lost")])
-    assert not node.failure.matches([("B", "lost"), ("A", "stuck")])
+        assert node.failure.matches(names_of([(source, "lost")]))
+    assert not node.failure.matches(names_of([("B", "lost"), ("A", "stuck")]))
 
 
 def test_every_change_of_status_is_told_once(leaf: Any, site: Any, ticks: Any, events: Any) -> None:
-    ticks(Sequence(site("tree"), [leaf("A", "R R lost")]))
+    ticks(sequence(site("tree"), [leaf("A", "R R lost")]))
     assert events == [
         NodeStarted("tree"),
         NodeEnded("tree", "FAILURE", reason="A.lost", message="lost happened", origin="A"),
@@ -78,12 +76,12 @@ def test_every_change_of_status_is_told_once(leaf: Any, site: Any, ticks: Any, e
 
 
 def test_a_stock_behaviour_may_stand_in_a_tree(site: Any, ticks: Any) -> None:
-    node = Sequence(site("tree"), [py_trees.behaviours.Success("yes"), py_trees.behaviours.Failure("no")])
+    node = sequence(site("tree"), [py_trees.behaviours.Success("yes"), py_trees.behaviours.Failure("no")])
     assert (ticks(node), str(node.failure)) == ("F", "no.failed")
 
 
 def test_a_tree_may_stand_in_a_stock_tree(leaf: Any, site: Any, log: Any) -> None:
-    inner = Sequence(site("tree"), [leaf("A", "R S")])
+    inner = sequence(site("tree"), [leaf("A", "R S")])
     root = py_trees.composites.Sequence("root", True, [inner])
     root.tick_once()
     root.stop(Status.INVALID)

@@ -7,16 +7,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from build_nodes import for_each
 from py_trees.common import Status
 
 from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.events import BranchChosen
 from executive.skill import In, Skill
-from executive.tree.blackboard import Scope
+from executive.tree.blackboard import Blackboard
 from executive.tree.for_each import ForEach
 from executive.tree.halting import halt
-from executive.tree.skill_leaf import SkillNode, Wiring
+from executive.tree.skill_leaf import SkillLeaf, Wiring
 
 
 class Use(Skill):
@@ -37,17 +38,12 @@ def used() -> list[Any]:
 
 
 @pytest.fixture
-def scope() -> Scope:
-    return Scope()
-
-
-@pytest.fixture
-def make(site: Any, scope: Scope, used: list[Any]) -> Any:
+def make(site: Any, scope: Blackboard, used: list[Any]) -> Any:
     """Make a loop over a source whose body notes every element."""
 
     def make(source: Any) -> ForEach:
-        body = SkillNode(site("use"), "Use", Use, Wiring(inputs={"given": "it"}), used, scope)  # type: ignore[arg-type]
-        return ForEach(site("loop"), body, scope, "it", source)
+        body = SkillLeaf(site("use"), "Use", Use, Wiring(inputs={"given": "it"}), used)  # type: ignore[arg-type]
+        return for_each(site("loop"), body, scope, "it", source)
 
     return make
 
@@ -57,13 +53,13 @@ def told(events: Any) -> list[str]:
 
 
 def test_a_text_names_the_variable_that_holds_the_list(
-    make: Any, scope: Scope, ticks: Any, used: Any
+    make: Any, scope: Blackboard, ticks: Any, used: Any
 ) -> None:
     scope.write({"todo": ("a", 2)})
     assert (ticks(make("todo")), used) == ("RRS", ["a", 2])
 
 
-def test_the_list_is_the_one_of_the_start(make: Any, scope: Scope, ticks: Any, used: Any) -> None:
+def test_the_list_is_the_one_of_the_start(make: Any, scope: Blackboard, ticks: Any, used: Any) -> None:
     todo = ["a", "b"]
     scope.write({"todo": todo})
     node = make("todo")
@@ -84,7 +80,7 @@ def test_the_element_at_hand_is_told(make: Any, ticks: Any, events: Any) -> None
 
 
 @pytest.mark.parametrize("end", ["success", "halt", "fault"])
-def test_the_variable_is_gone_however_it_ends(end: str, make: Any, scope: Scope, ticks: Any) -> None:
+def test_the_variable_is_gone_however_it_ends(end: str, make: Any, scope: Blackboard, ticks: Any) -> None:
     scope.write({"other": 1})
     node = make(["a", "break" if end == "fault" else "b"])
     node.tick_once()
@@ -98,17 +94,19 @@ def test_the_variable_is_gone_however_it_ends(end: str, make: Any, scope: Scope,
     assert dict(scope) == {"other": 1}
 
 
-def test_the_variable_is_gone_when_the_body_cannot_be_halted(leaf: Any, site: Any, scope: Scope) -> None:
+def test_the_variable_is_gone_when_the_body_cannot_be_halted(leaf: Any, site: Any, scope: Blackboard) -> None:
     body = leaf("A", "R")
     body.breaks = True
-    node = ForEach(site(), body, scope, "it", [1])
+    node = for_each(site(), body, scope, "it", [1])
     node.tick_once()
     with pytest.raises(Fault, match="A: cannot stop"):
         node.stop()
     assert (node.status, dict(scope)) == (Status.INVALID, {})
 
 
-def test_a_loop_that_ended_does_not_touch_the_variable_again(make: Any, scope: Scope, ticks: Any) -> None:
+def test_a_loop_that_ended_does_not_touch_the_variable_again(
+    make: Any, scope: Blackboard, ticks: Any
+) -> None:
     node = make(["a"])
     ticks(node)
     scope.write({"it": "somebody else's"})
@@ -116,7 +114,7 @@ def test_a_loop_that_ended_does_not_touch_the_variable_again(make: Any, scope: S
     assert scope["it"] == "somebody else's"
 
 
-def test_a_list_that_nothing_wrote_is_a_fault(make: Any, scope: Scope) -> None:
+def test_a_list_that_nothing_wrote_is_a_fault(make: Any, scope: Blackboard) -> None:
     scope.write({"targets": []})
     with pytest.raises(Fault) as caught:
         make("todo").tick_once()
@@ -126,7 +124,7 @@ def test_a_list_that_nothing_wrote_is_a_fault(make: Any, scope: Scope) -> None:
 
 
 @pytest.mark.parametrize(("value", "kind"), [("abc", "str"), ({"a": 1}, "dict"), (None, "NoneType")])
-def test_what_is_no_list_is_a_fault(make: Any, scope: Scope, value: Any, kind: str) -> None:
+def test_what_is_no_list_is_a_fault(make: Any, scope: Blackboard, value: Any, kind: str) -> None:
     scope.write({"todo": value})
     node = make("todo")
     with pytest.raises(Fault) as caught:

@@ -6,23 +6,27 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from build_nodes import (
+    fallback,
+    for_each,
+    invert,
+    lead,
+    make_site,
+    parallel,
+    repeat,
+    retry,
+    sequence,
+    succeed,
+    try_catch,
+    while_loop,
+)
 from py_trees.behaviour import Behaviour
 from scripted_leaf import Leaf
 
 from executive.events import BranchChosen, Event
-from executive.tree.blackboard import Scope
-from executive.tree.fallback import Fallback
+from executive.tree.blackboard import Blackboard
 from executive.tree.for_each import ForEach
-from executive.tree.invert import Invert
-from executive.tree.node import Site
-from executive.tree.parallel import Parallel
-from executive.tree.parallel_lead import Beside
-from executive.tree.repeat import Repeat
-from executive.tree.retry import Retry
-from executive.tree.sequence import Sequence
-from executive.tree.succeed import Succeed
-from executive.tree.try_catch import Try
-from executive.tree.while_loop import While
+from executive.tree.try_catch import TryCatch
 
 LOST, EMPTY = [("A", "lost")], [("A", "empty")]
 
@@ -33,7 +37,7 @@ class Make:
     def __init__(self) -> None:
         self.log: list[str] = []
         self.choices: list[str] = []
-        self.site = Site("node", "", self._emit)
+        self.site = make_site("node", "", self._emit)
 
     def __call__(self, *texts: str) -> list[Leaf]:
         return [self.one(text) for text in texts]
@@ -43,11 +47,11 @@ class Make:
         return Leaf(name, tuple(scripts.split(" | ")) if scripts else ("S",), self.log)
 
     def each(self, elements: list[Any], text: str) -> ForEach:
-        return ForEach(self.site, self.one(text), Scope(), "it", elements)
+        return for_each(self.site, self.one(text), Blackboard(), "it", elements)
 
-    def caught(self, body: str, *catches: tuple[list[tuple[str, str]], str], last: str = "") -> Try:
+    def caught(self, body: str, *catches: tuple[list[tuple[str, str]], str], last: str = "") -> TryCatch:
         handlers = [(names, self.one(text)) for names, text in catches]
-        return Try(self.site, self.one(body), handlers, self.one(last) if last else None)
+        return try_catch(self.site, self.one(body), handlers, self.one(last) if last else None)
 
     def _emit(self, event: Event) -> None:
         if isinstance(event, BranchChosen):
@@ -57,16 +61,16 @@ class Make:
 @pytest.mark.parametrize(
     ("build", "ticks", "order", "failure"),
     [
-        (lambda m: Sequence(m.site, m("A: R S", "B", "C: R S")), "RRS", "A B C", None),
-        (lambda m: Sequence(m.site, m("A", "B: lost", "C")), "F", "A B", "B.lost"),
-        (lambda m: Sequence(m.site, m("A: lost | S")), "FS", "A A", None),
-        (lambda m: Fallback(m.site, m("A: lost", "B: stuck")), "F", "A B", "B.stuck"),
-        (lambda m: Fallback(m.site, m("A: lost", "B: R R R S", "C")), "RRRS", "A B", None),
-        (lambda m: Invert(m.site, m.one("A: R lost")), "RS", "A", None),
-        (lambda m: Invert(m.site, m.one("A: R S")), "RF", "A", "invert.inverted"),
-        (lambda m: Succeed(m.site, m.one("A: R lost")), "RS", "A", None),
-        (lambda m: Succeed(m.site, m.one("A")), "S", "A", None),
-        (lambda m: Succeed(m.site), "S", "", None),
+        (lambda m: sequence(m.site, m("A: R S", "B", "C: R S")), "RRS", "A B C", None),
+        (lambda m: sequence(m.site, m("A", "B: lost", "C")), "F", "A B", "B.lost"),
+        (lambda m: sequence(m.site, m("A: lost | S")), "FS", "A A", None),
+        (lambda m: fallback(m.site, m("A: lost", "B: stuck")), "F", "A B", "B.stuck"),
+        (lambda m: fallback(m.site, m("A: lost", "B: R R R S", "C")), "RRRS", "A B", None),
+        (lambda m: invert(m.site, m.one("A: R lost")), "RS", "A", None),
+        (lambda m: invert(m.site, m.one("A: R S")), "RF", "A", "invert.inverted"),
+        (lambda m: succeed(m.site, m.one("A: R lost")), "RS", "A", None),
+        (lambda m: succeed(m.site, m.one("A")), "S", "A", None),
+        (lambda m: succeed(m.site), "S", "", None),
         # try: the first catch that names the failure; finally after success and failure
         (lambda m: m.caught("A: stuck", ([("B", "stuck")], "B"), ([*LOST, ("A", "stuck")], "C: R S")),
          "RS", "A C", None),
@@ -79,51 +83,53 @@ class Make:
         (lambda m: m.caught("A", (LOST, "B"), last="Z: late"), "F", "A Z", "Z.late"),
         (lambda m: m.caught("A: other", (LOST, "B"), last="Z: late"), "F", "A Z", "A.other"),
         # retry: in the tick of the failure if time passed, else in the next
-        (lambda m: Retry(m.site, m.one("A: R lost | R lost | R S"), 3), "RRRS", "A A A", None),
-        (lambda m: Retry(m.site, m.one("A: R lost | R stuck"), 2), "RRF", "A A", "A.stuck"),
-        (lambda m: Retry(m.site, m.one("A: R lost"), 2), "RRFRRF", "A A A A", "A.lost"),
-        (lambda m: Retry(m.site, m.one("A: R lost | R stuck | S"), 5, LOST), "RRF", "A A", "A.stuck"),
-        (lambda m: Retry(m.site, m.one("A: R lost"), 3, LOST, m.one("B: R S")),
+        (lambda m: retry(m.site, m.one("A: R lost | R lost | R S"), 3), "RRRS", "A A A", None),
+        (lambda m: retry(m.site, m.one("A: R lost | R stuck"), 2), "RRF", "A A", "A.stuck"),
+        (lambda m: retry(m.site, m.one("A: R lost"), 2), "RRFRRF", "A A A A", "A.lost"),
+        (lambda m: retry(m.site, m.one("A: R lost | R stuck | S"), 5, LOST), "RRF", "A A", "A.stuck"),
+        (lambda m: retry(m.site, m.one("A: R lost"), 3, LOST, m.one("B: R S")),
          "RRRRRF", "A B A B A", "A.lost"),
-        (lambda m: Retry(m.site, m.one("A: lost"), 3), "RRF", "A A A", "A.lost"),
-        (lambda m: Retry(m.site, m.one("A: lost"), 3, [], m.one("B")), "RRF", "A B A B A", "A.lost"),
+        (lambda m: retry(m.site, m.one("A: lost"), 3), "RRF", "A A A", "A.lost"),
+        (lambda m: retry(m.site, m.one("A: lost"), 3, [], m.one("B")), "RRF", "A B A B A", "A.lost"),
         # repeat and while
-        (lambda m: Repeat(m.site, m.one("A: R S"), times=3), "RRRS", "A A A", None),
-        (lambda m: Repeat(m.site, m.one("A"), times=0), "S", "", None),
-        (lambda m: Repeat(m.site, m.one("A"), times=3), "RRS", "A A A", None),
-        (lambda m: Repeat(m.site, m.one("A: R S | R S | empty"), until=EMPTY), "RRS", "A A A", None),
-        (lambda m: Repeat(m.site, m.one("A: R S | empty"), times=3, until=EMPTY), "RS", "A A", None),
-        (lambda m: Repeat(m.site, m.one("A: R S"), times=3, until=EMPTY), "RRRS", "A A A", None),
-        (lambda m: Repeat(m.site, m.one("A: R S | R S | lost"), times=3, until=EMPTY),
+        (lambda m: repeat(m.site, m.one("A: R S"), times=3), "RRRS", "A A A", None),
+        (lambda m: repeat(m.site, m.one("A"), times=0), "S", "", None),
+        (lambda m: repeat(m.site, m.one("A"), times=3), "RRS", "A A A", None),
+        (lambda m: repeat(m.site, m.one("A: R S | R S | empty"), until=EMPTY), "RRS", "A A A", None),
+        (lambda m: repeat(m.site, m.one("A: R S | empty"), times=3, until=EMPTY), "RS", "A A", None),
+        (lambda m: repeat(m.site, m.one("A: R S"), times=3, until=EMPTY), "RRRS", "A A A", None),
+        (lambda m: repeat(m.site, m.one("A: R S | R S | lost"), times=3, until=EMPTY),
          "RRF", "A A A", "A.lost"),
-        (lambda m: Repeat(m.site, m.one("A"), until=EMPTY), "R" * 20, " ".join("A" * 20), None),
-        (lambda m: Repeat(m.site, Repeat(m.site, m.one("A"), times=2), times=2), "RRS", "A A A A", None),
-        (lambda m: While(m.site, m.one("B: R S | S | R no"), m.one("A: R S")), "RRRRS", "B A B A B", None),
-        (lambda m: While(m.site, m.one("B: S | S | S | no"), m.one("A: R S")), "RRRS", "B A B A B A B", None),
-        (lambda m: While(m.site, m.one("B"), m.one("A: R S | R lost")), "RRF", "B A B A", "A.lost"),
-        (lambda m: While(m.site, m.one("B"), m.one("A")), "RRRR", "B A B A B A B A", None),
-        (lambda m: While(m.site, m.one("B: R S | no"), m.one("A")), "RS", "B A B", None),
+        (lambda m: repeat(m.site, m.one("A"), until=EMPTY), "R" * 20, " ".join("A" * 20), None),
+        (lambda m: repeat(m.site, repeat(m.site, m.one("A"), times=2), times=2), "RRS", "A A A A", None),
+        (lambda m: while_loop(m.site, m.one("B: R S | S | R no"), m.one("A: R S")),
+         "RRRRS", "B A B A B", None),
+        (lambda m: while_loop(m.site, m.one("B: S | S | S | no"), m.one("A: R S")),
+         "RRRS", "B A B A B A B", None),
+        (lambda m: while_loop(m.site, m.one("B"), m.one("A: R S | R lost")), "RRF", "B A B A", "A.lost"),
+        (lambda m: while_loop(m.site, m.one("B"), m.one("A")), "RRRR", "B A B A B A B A", None),
+        (lambda m: while_loop(m.site, m.one("B: R S | no"), m.one("A")), "RS", "B A B", None),
         # for_each
         (lambda m: m.each([1, None, 3], "A: R S"), "RRRS", "A A A", None),
         (lambda m: m.each([1, 2, 3], "A"), "RRS", "A A A", None),
         (lambda m: m.each([1, 2, 3], "A: R S | R lost"), "RRF", "A A", "A.lost"),
         (lambda m: m.each([], "A"), "S", "", None),
         # parallel: children that ended are not run again; enough successes, or the first failure
-        (lambda m: Parallel(m.site, []), "S", "", None),
-        (lambda m: Parallel(m.site, m("A: R R S", "B", "C: R S")), "RRS", "A B C", None),
-        (lambda m: Parallel(m.site, m("A", "B: lost", "C: R R R S")), "RRRF", "A B C", "B.lost"),
-        (lambda m: Parallel(m.site, m("A: R S", "B: R R S", "C: R R R S"), 1), "RS", "A B C -B -C", None),
-        (lambda m: Parallel(m.site, m("A: R S", "B: R R S", "C: R R R S"), 2), "RRS", "A B C -C", None),
-        (lambda m: Parallel(m.site, m("A: R S", "B: R R S", "C: R R R S"), 3), "RRRS", "A B C", None),
-        (lambda m: Parallel(m.site, m("A: R R R S", "B: R lost")), "RRRF", "A B", "B.lost"),
-        (lambda m: Parallel(m.site, m("A: R R R S", "B: R lost"), halt=True), "RF", "A B -A", "B.lost"),
-        (lambda m: Parallel(m.site, m("A: lost", "B: lost", "C: R S", "D: R R S"), 3),
+        (lambda m: parallel(m.site, []), "S", "", None),
+        (lambda m: parallel(m.site, m("A: R R S", "B", "C: R S")), "RRS", "A B C", None),
+        (lambda m: parallel(m.site, m("A", "B: lost", "C: R R R S")), "RRRF", "A B C", "B.lost"),
+        (lambda m: parallel(m.site, m("A: R S", "B: R R S", "C: R R R S"), 1), "RS", "A B C -B -C", None),
+        (lambda m: parallel(m.site, m("A: R S", "B: R R S", "C: R R R S"), 2), "RRS", "A B C -C", None),
+        (lambda m: parallel(m.site, m("A: R S", "B: R R S", "C: R R R S"), 3), "RRRS", "A B C", None),
+        (lambda m: parallel(m.site, m("A: R R R S", "B: R lost")), "RRRF", "A B", "B.lost"),
+        (lambda m: parallel(m.site, m("A: R R R S", "B: R lost"), halt=True), "RF", "A B -A", "B.lost"),
+        (lambda m: parallel(m.site, m("A: lost", "B: lost", "C: R S", "D: R R S"), 3),
          "RRF", "A B C D", "A.lost"),
-        (lambda m: Parallel(m.site, m("A: lost | S", "B: R S")), "RFRS", "A B A B", None),
-        (lambda m: Beside(m.site, m("A: R R S", "B: R R R S", "C: R R R lost")), "RRS", "A B C -B -C", None),
-        (lambda m: Beside(m.site, m("A: R lost", "B: R R R S")), "RF", "A B -B", "A.lost"),
-        (lambda m: Beside(m.site, m("A: R R R S", "B: R S")), "RRRS", "A B", None),
-        (lambda m: Beside(m.site, m("A: R S", "B: R R R S")), "RSRS", "A B -B A B -B", None),
+        (lambda m: parallel(m.site, m("A: lost | S", "B: R S")), "RFRS", "A B A B", None),
+        (lambda m: lead(m.site, m("A: R R S", "B: R R R S", "C: R R R lost")), "RRS", "A B C -B -C", None),
+        (lambda m: lead(m.site, m("A: R lost", "B: R R R S")), "RF", "A B -B", "A.lost"),
+        (lambda m: lead(m.site, m("A: R R R S", "B: R S")), "RRRS", "A B", None),
+        (lambda m: lead(m.site, m("A: R S", "B: R R R S")), "RSRS", "A B -B A B -B", None),
     ],
 )  # fmt: skip
 def test_statuses_order_and_failure(
@@ -144,32 +150,32 @@ def test_statuses_order_and_failure(
 @pytest.mark.parametrize(
     ("build", "choices"),
     [
-        (lambda m: Fallback(m.site, m("A: lost", "B", "C")), ["choice 2 of 3, A.lost"]),
+        (lambda m: fallback(m.site, m("A: lost", "B", "C")), ["choice 2 of 3, A.lost"]),
         (lambda m: m.caught("A: lost", (LOST, "B")), ["catch, A.lost"]),
         (
-            lambda m: Retry(m.site, m.one("A: lost"), 3, [], m.one("B: broken")),
+            lambda m: retry(m.site, m.one("A: lost"), 3, [], m.one("B: broken")),
             ["attempt 2 of 3, A.lost", "give up: the recovery failed, B.broken"],
         ),
-        (lambda m: While(m.site, m.one("B: no"), m.one("A")), ["done, B.no"]),
-        (lambda m: Repeat(m.site, m.one("A: empty"), until=EMPTY), ["done, A.empty"]),
+        (lambda m: while_loop(m.site, m.one("B: no"), m.one("A")), ["done, B.no"]),
+        (lambda m: repeat(m.site, m.one("A: empty"), until=EMPTY), ["done, A.empty"]),
         (
-            lambda m: Parallel(m.site, m("A: lost", "B: R S", "C: R R R"), 1, halt=True),
+            lambda m: parallel(m.site, m("A: lost", "B: R S", "C: R R R"), 1, halt=True),
             ["go on with the others, A.lost"],
         ),
         (
-            lambda m: Parallel(m.site, m("A: R lost", "B: R stuck", "C: R S"), 1),
+            lambda m: parallel(m.site, m("A: R lost", "B: R stuck", "C: R S"), 1),
             ["enough others succeeded, A.lost", "enough others succeeded, B.stuck"],
         ),
         (
-            lambda m: Parallel(m.site, m("A: R R late", "B: R lost", "C: R stuck")),
+            lambda m: parallel(m.site, m("A: R R late", "B: R lost", "C: R stuck")),
             [
                 "let the others finish, then fail, B.lost",
                 "let the others finish, then fail, C.stuck",
                 "fail with B.lost, A.late",
             ],
         ),
-        (lambda m: Parallel(m.site, m("A", "B: lost", "C: stuck")), ["fail with B.lost, C.stuck"]),
-        (lambda m: Beside(m.site, m("A: R R S", "B: R stuck")), ["go on without it, B.stuck"]),
+        (lambda m: parallel(m.site, m("A", "B: lost", "C: stuck")), ["fail with B.lost, C.stuck"]),
+        (lambda m: lead(m.site, m("A: R R S", "B: R stuck")), ["go on without it, B.stuck"]),
     ],
 )
 def test_choices(build: Callable[[Make], Behaviour], choices: list[str]) -> None:

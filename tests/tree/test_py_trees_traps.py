@@ -6,19 +6,16 @@ import time
 from typing import Any
 
 import pytest
+from build_nodes import fallback, invert, make_backoff, retry, sequence, timeout
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from scripted_leaf import Leaf
 
 from executive.errors import Fault
-from executive.tree.backoff import Backoff
 from executive.tree.fallback import Fallback
 from executive.tree.halting import halt
-from executive.tree.invert import Invert
 from executive.tree.parallel import Parallel
-from executive.tree.retry import Retry
 from executive.tree.sequence import Sequence
-from executive.tree.timeout import Timeout
 
 
 class Terminated(Leaf):
@@ -43,7 +40,7 @@ class Returning(Behaviour):
 def test_children_that_finished_are_not_terminated_by_a_new_round_nor_by_a_halt(kind: Any, site: Any) -> None:
     log: list[str] = []
     end = "lost" if kind is Fallback else "S"
-    node = kind(site(), [Terminated("A", (end,), log), Terminated("B", ("S", "R R"), log)])
+    node = kind(site(), do=[Terminated("A", (end,), log), Terminated("B", ("S", "R R"), log)])
     node.tick_once()
     node.tick_once()
     halt(node)
@@ -56,7 +53,7 @@ def test_children_that_finished_are_not_terminated_by_a_new_round_nor_by_a_halt(
 def test_halting_does_not_reach_a_child_that_never_ran(leaf: Any, site: Any) -> None:
     log: list[str] = []
     never = Terminated("never", ("S",), log)
-    node = Sequence(site(), [leaf("A", "R"), Invert(site("invert"), never)])
+    node = sequence(site(), [leaf("A", "R"), invert(site("invert"), never)])
     node.tick_once()
     halt(node)
     node.stop(Status.INVALID)
@@ -66,9 +63,9 @@ def test_halting_does_not_reach_a_child_that_never_ran(leaf: Any, site: Any) -> 
 def test_the_old_status_of_a_child_that_was_not_ticked_decides_nothing_and_is_told_to_nobody(
     leaf: Any, site: Any, ticks: Any, events: Any
 ) -> None:
-    tried = Sequence(site("tried"), [leaf("A", "lost", "S", "lost")])
-    ghost = Sequence(site("ghost"), [leaf("B", "S", "lost")])
-    node = Fallback(site("root"), [tried, ghost])
+    tried = sequence(site("tried"), [leaf("A", "lost", "S", "lost")])
+    ghost = sequence(site("ghost"), [leaf("B", "S", "lost")])
+    node = fallback(site("root"), [tried, ghost])
     assert ticks(node) == "S"
     assert ghost.status is Status.SUCCESS
     events.clear()
@@ -86,8 +83,8 @@ def test_nothing_depends_on_the_clock_on_the_wall(
 
     for name in ("time", "monotonic", "perf_counter"):
         monkeypatch.setattr(time, name, forbidden)
-    late = Timeout(site(), leaf("A", "R R R"), 0.25, clock)
-    waits = Retry(site(), leaf("B", "lost", "S"), 2, [], None, Backoff(0.25), clock)
+    late = timeout(site(), leaf("A", "R R R"), 0.25, clock)
+    waits = retry(site(), leaf("B", "lost", "S"), 2, [], None, make_backoff(0.25), clock)
     for clock.now in (0.0, 0.125, 0.25):
         late.tick_once()
         waits.tick_once()
@@ -96,8 +93,8 @@ def test_nothing_depends_on_the_clock_on_the_wall(
 
 @pytest.mark.parametrize("value", [None, Status.INVALID, "SUCCESS"])
 def test_a_node_without_a_status_is_a_fault_and_not_an_interruption(value: Any, leaf: Any, site: Any) -> None:
-    sequence = Sequence(site("here"), [Returning(value), leaf("after")])
-    root = Fallback(site("root"), [sequence, leaf("instead")])
+    inner = sequence(site("here"), [Returning(value), leaf("after")])
+    root = fallback(site("root"), [inner, leaf("instead")])
     with pytest.raises(Fault, match="odd was ticked and has no status") as caught:
         root.tick_once()
     assert (caught.value.node, halt(root)) == ("here", [])

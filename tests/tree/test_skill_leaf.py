@@ -13,9 +13,9 @@ from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.events import NodeEnded, NodeStarted
 from executive.skill import In, Out, Skill, param, port
-from executive.tree.blackboard import Scope
+from executive.tree.blackboard import Blackboard
 from executive.tree.halting import halt
-from executive.tree.skill_leaf import SkillNode, Wiring
+from executive.tree.skill_leaf import SkillLeaf, Wiring
 
 
 class Worker(Skill):
@@ -57,26 +57,26 @@ class Worker(Skill):
 
 
 @pytest.fixture
-def scope() -> Scope:
-    scope = Scope()
+def scope() -> Blackboard:
+    scope = Blackboard()
     scope.write({"input": "stone"})
     return scope
 
 
 @pytest.fixture
-def make(site: Any, scope: Scope, monkeypatch: pytest.MonkeyPatch) -> Any:
+def make(site: Any, scope: Blackboard, monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(Worker, "cleaned", [])
 
-    def make(way: str = "ok", skill: type[Skill] = Worker) -> SkillNode:
+    def make(way: str = "ok", skill: type[Skill] = Worker) -> SkillLeaf:
         inputs, outputs = {"given": "input", "extra": "extra"}, {"made": "result"}
         wiring = Wiring({"way": way}, inputs, outputs) if skill is Worker else Wiring({}, {}, {})
-        return SkillNode(site("tree/Worker"), skill.__name__, skill, wiring, None, scope)  # type: ignore[arg-type]
+        return SkillLeaf(site("tree/Worker"), skill.__name__, skill, wiring, None)  # type: ignore[arg-type]
 
     return make
 
 
 def test_inputs_are_those_of_the_start_and_outputs_are_committed_on_success_only(
-    make: Any, scope: Scope
+    make: Any, scope: Blackboard
 ) -> None:
     node = make()
     node.tick_once()
@@ -87,7 +87,7 @@ def test_inputs_are_those_of_the_start_and_outputs_are_committed_on_success_only
     assert dict(scope) == {"input": "brick", "result": "stone None"}
 
 
-def test_a_failure_writes_nothing_and_says_why(make: Any, scope: Scope, ticks: Any) -> None:
+def test_a_failure_writes_nothing_and_says_why(make: Any, scope: Blackboard, ticks: Any) -> None:
     node = make("fail")
     assert ticks(node) == "RF"
     failure = node.failure
@@ -95,7 +95,7 @@ def test_a_failure_writes_nothing_and_says_why(make: Any, scope: Scope, ticks: A
     assert "result" not in scope
 
 
-def test_every_start_gets_a_fresh_instance_and_fresh_inputs(make: Any, scope: Scope, ticks: Any) -> None:
+def test_every_start_gets_a_fresh_instance_and_fresh_inputs(make: Any, scope: Blackboard, ticks: Any) -> None:
     node = make()
     ticks(node)
     scope.write({"input": "brick", "extra": "new"})
@@ -124,7 +124,7 @@ def test_a_bug_in_a_skill_is_a_fault(make: Any, way: str, sentence: str, events:
     assert (events[-1].status, events[-1].reason) == ("INVALID", "fault")
 
 
-def test_a_missing_input_is_a_fault_that_names_it(make: Any, scope: Scope) -> None:
+def test_a_missing_input_is_a_fault_that_names_it(make: Any, scope: Blackboard) -> None:
     scope.forget("input")
     with pytest.raises(Fault) as caught:
         make().tick_once()
@@ -180,10 +180,10 @@ def test_events_say_what_happened_to_which_item(site: Any, events: Any) -> None:
             yield
             self.held = self.target.item
 
-    scope = Scope()
+    scope = site().blackboard
     scope.write({"target": Target("cube-2", "cube", np.zeros(3), 0.9, 1, 0, 0.0)})
     wiring = Wiring({}, {"target": "target"}, {"held": "held"})
-    node = SkillNode(site("tree/Take"), "Take", Take, wiring, None, scope)  # type: ignore[arg-type]
+    node = SkillLeaf(site("tree/Take"), "Take", Take, wiring, None)  # type: ignore[arg-type]
     node.tick_once()
     node.tick_once()
     assert events == [
@@ -209,16 +209,16 @@ class Sort(Skill):
 def test_the_item_is_what_a_port_names_that_the_skill_always_has(
     colour: str, items: list[str], site: Any, ticks: Any, events: Any
 ) -> None:
-    scope = Scope()
+    scope = site().blackboard
     scope.write({"box": "box-1", "unlike": "cube-2", "colour": colour})
     inputs = {name: name for name in ("unlike", "colour", "box")}
     wiring = Wiring({}, inputs, {"found": "found"})
-    assert ticks(SkillNode(site(), "Sort", Sort, wiring, None, scope)) == "RS"  # type: ignore[arg-type]
+    assert ticks(SkillLeaf(site(), "Sort", Sort, wiring, None)) == "RS"  # type: ignore[arg-type]
     assert [event.item for event in events] == items
 
 
 def test_a_forgotten_variable_is_gone_and_need_not_have_been_there() -> None:
-    scope, other = Scope(), Scope()
+    scope, other = Blackboard(), Blackboard()
     scope.write({"a": 1, "b": 2})
     for _ in range(2):
         scope.forget("a")

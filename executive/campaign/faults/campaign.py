@@ -14,8 +14,8 @@ from executive.campaign.faults.trial import Numbered, empty_trial, try_out
 from executive.campaign.pool import do_all
 from executive.campaign.subject import Subject
 from executive.errors import InputError
-from executive.mission.model import nodes
-from executive.mission.model.nodes import Node
+from executive.mission.model.instance import model_of, node_of
+from executive.mission.model.nodes import InnerNode, Node, UseNode
 from executive.mission.source import Mark
 from executive.view.figures.fault import Branch, FaultFigures, Trial
 
@@ -175,21 +175,13 @@ def branches(tree: Node, trials: Iterable[Trial]) -> tuple[Branch, ...]:
 
 def _ways(tree: Node) -> Iterator[tuple[Mark, str, Node]]:
     for node in tree.walk():
-        if isinstance(node, nodes.TryNode):
-            for catch in node.catches:
-                on = ", ".join(map(str, catch.on))
-                yield catch.do.mark, f"catch on {on}", catch.do
-            if node.finish is not None:
-                yield node.finish.mark, "finally", node.finish
-        elif isinstance(node, nodes.RetryNode) and node.recover is not None:
-            yield node.recover.mark, "recover", node.recover
-        elif isinstance(node, nodes.FallbackNode):
-            for number, choice in enumerate(node.choices[1:], 2):
-                yield choice.mark, f"choice {number}", choice
+        if isinstance(node, InnerNode):
+            for what, child in model_of(node).contingencies():
+                yield node_of(child).mark, what, node_of(child)
 
 
 def _path(node: Node) -> str:
     """Return the path of the node that is built for one: a subtree without a label is what it consists of."""
-    while isinstance(node, nodes.UseNode) and not node.label and node.body is not None:
+    while isinstance(node, UseNode) and not node.label and node.body is not None:
         node = node.body
     return node.path

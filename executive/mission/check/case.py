@@ -11,10 +11,11 @@ from executive.cell.protocols import LeastTimes
 from executive.mission.findings import alternatives
 from executive.mission.flow.analysis import Analysis
 from executive.mission.model.mission import Mission
-from executive.mission.model.nodes import Node, SkillNode, UseNode
+from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
 from executive.mission.model.values import Reference
 from executive.mission.model.wiring import Wire, wires, written_below
 from executive.skill import Direction, Skill
+from executive.tree.registry import ControlNodes
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,7 @@ class Case:
         tree: The tree that runs, expanded, with paths; an unknown node where it could not be read.
         unused: Expanded subtrees that nothing uses.
         skills: Installed skills by name.
+        control: Installed control nodes by word.
         cell: The cell, or None where its file has findings of its own.
         labels: For every detector of the cell the classes its model knows, None where it cannot be known.
         least: Lower bounds of what things take in the cell, or None where they are not known.
@@ -35,6 +37,7 @@ class Case:
     tree: Node
     unused: tuple[Node, ...]
     skills: Mapping[str, type[Skill]]
+    control: ControlNodes
     cell: CellConfig | None
     labels: Mapping[str, tuple[str, ...] | None]
     least: LeastTimes | None
@@ -53,6 +56,10 @@ class Case:
         """Yield every node, also of the subtrees that nothing uses."""
         for root in (self.tree, *self.unused):
             yield from root.walk()
+
+    def inner_nodes(self) -> Iterator[InnerNode]:
+        """Yield every control node, also of the subtrees that nothing uses."""
+        return (node for node in self.nodes() if isinstance(node, InnerNode))
 
     def known_skills(self) -> Iterator[tuple[SkillNode, type[Skill]]]:
         """Yield every node that names an installed skill, with the skill."""

@@ -6,13 +6,12 @@ from collections.abc import Callable, Iterator
 from itertools import islice
 
 from executive.mission.check import (
-    constants,
+    inner_nodes,
     parallel,
     port_types,
     reach,
     reasons,
     skills,
-    timeouts,
     variables,
 )
 from executive.mission.check.case import Case
@@ -23,7 +22,7 @@ Check = Callable[[Case], Iterator[Finding]]
 CHECKS: tuple[Check, ...] = (
     skills.unknown_skills,
     skills.settings,
-    constants.constants,
+    inner_nodes.constants,
     reasons.labels,
     skills.routes,
     skills.known_classes,
@@ -37,14 +36,10 @@ CHECKS: tuple[Check, ...] = (
     reach.tool_states,
     reach.held_at_the_end,
     reach.unreachable,
-    reach.shadowed_catches,
-    reach.endless_loops,
-    reach.unchanging_retries,
-    reach.single_attempts,
+    inner_nodes.complaints,
     parallel.shared_resources,
     parallel.shared_variables,
     parallel.racing_reads,
-    timeouts.short_timeouts,
 )
 """Each holds whatever else is wrong: what is unknown in one place makes no findings in others."""
 

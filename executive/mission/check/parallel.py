@@ -7,16 +7,18 @@ from itertools import combinations, permutations
 
 from executive.mission.check.case import Case
 from executive.mission.findings import Finding, error
-from executive.mission.model import nodes
-from executive.mission.model.values import Reference
+from executive.mission.model.instance import model_of, node_of
+from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
+from executive.mission.model.paths import word_of
+from executive.mission.model.wiring import references, variables
 from executive.mission.source import Mark
 from executive.skill import Direction
 
 
 def shared_resources(case: Case) -> Iterator[Finding]:
-    """Find every two branches of a parallel that use the same part of the cell."""
-    for node in _parallels(case):
-        for first, second in combinations([_uses(case, branch) for branch in node.branches], 2):
+    """Find every two branches that run at the same time and use the same part of the cell."""
+    for branches in _concurrent(case):
+        for first, second in combinations([_uses(case, branch) for branch in branches], 2):
             # Two skills that share arm and tool clash once.
             clashes = {(first[part].mark, second[part].mark): part for part in second if part in first}
             for part in clashes.values():
@@ -33,9 +35,9 @@ def shared_resources(case: Case) -> Iterator[Finding]:
 
 
 def shared_variables(case: Case) -> Iterator[Finding]:
-    """Find every two branches of a parallel that write the same variable."""
-    for node in _parallels(case):
-        for first, second in combinations([_writes(case, branch) for branch in node.branches], 2):
+    """Find every two branches that run at the same time and write the same variable."""
+    for branches in _concurrent(case):
+        for first, second in combinations([_writes(case, branch) for branch in branches], 2):
             for variable, (other, mark, hint) in second.items():
                 if variable in first:
                     one, place, _ = first[variable]
@@ -47,13 +49,13 @@ def shared_variables(case: Case) -> Iterator[Finding]:
 
 
 def racing_reads(case: Case) -> Iterator[Finding]:
-    """Find every variable that one branch of a parallel reads while another may write it."""
-    for node in _parallels(case):
-        branches = [
+    """Find every variable that one branch reads while another may write it."""
+    for branches in _concurrent(case):
+        known = [
             (index, _first(branch), list(_reads(case, branch)), _writes(case, branch))
-            for index, branch in enumerate(node.branches)
+            for index, branch in enumerate(branches)
         ]
-        for (index, first, reads, own), (other_index, _, _, written) in permutations(branches, 2):
+        for (index, first, reads, own), (other_index, _, _, written) in permutations(known, 2):
             # A skill with which an earlier branch begins has read before anything else can write.
             begins = first if index < other_index else None
             for reader, what, variable, mark in reads:
@@ -67,38 +69,41 @@ def racing_reads(case: Case) -> Iterator[Finding]:
                     yield error(mark, "shared-variable", message, hint)
 
 
-def _parallels(case: Case) -> Iterator[nodes.ParallelNode]:
-    return (node for node in case.nodes() if isinstance(node, nodes.ParallelNode))
+def _concurrent(case: Case) -> Iterator[list[Node]]:
+    """Yield the children of each node that run at the same time."""
+    for node in case.inner_nodes():
+        if branches := model_of(node).concurrent:
+            yield [node_of(branch) for branch in branches]
 
 
-def _first(node: nodes.Node) -> nodes.Node:
+def _first(node: Node) -> Node:
     """Return the node with which another begins in its first tick."""
-    of_first_child = nodes.SequenceNode | nodes.UseNode | nodes.TryNode | nodes.TimeoutNode
-    if isinstance(node, of_first_child) and node.children:
-        return _first(node.children[0])
-    return node
+    if isinstance(node, UseNode):
+        return _first(node.body) if node.body else node
+    first = model_of(node).first_child if isinstance(node, InnerNode) else None
+    return _first(node_of(first)) if first else node
 
 
-def _reads(case: Case, branch: nodes.Node) -> Iterator[tuple[nodes.Node, str, str, Mark]]:
+def _reads(case: Case, branch: Node) -> Iterator[tuple[Node, str, str, Mark]]:
     """Yield everything below `branch` that reads a variable which is or may be written before it."""
     for node in branch.walk():
         entry = case.flow.entry.get(node.path)
         if entry is None:
             continue
-        if isinstance(node, nodes.ForEachNode) and isinstance(node.source, Reference):
-            yield node, "for_each", node.source.name, node.source.mark
+        for reference in references(node):
+            yield node, word_of(node), reference.name, reference.mark
         for wire in case.wires(node, Direction.IN):
             # What is surely not written yet is told as unwritten.
             if entry.written is None or wire.variable in entry.written or not wire.port.required:
                 yield node, str(wire), wire.variable, wire.mark
 
 
-def _uses(case: Case, branch: nodes.Node) -> dict[str, nodes.SkillNode]:
+def _uses(case: Case, branch: Node) -> dict[str, SkillNode]:
     """Return the first user of every part of the cell below `branch`."""
-    users: dict[str, nodes.SkillNode] = {}
+    users: dict[str, SkillNode] = {}
     on_wrist = case.cell is not None and any(c.mount == "wrist" for c in case.cell.cameras.values())
     for node in branch.walk():
-        if not isinstance(node, nodes.SkillNode) or node.skill not in case.skills:
+        if not isinstance(node, SkillNode) or node.skill not in case.skills:
             continue
         for resource in case.skills[node.skill].uses:
             # A camera on the wrist sees from where the arm is: to look is to use the arm.
@@ -107,13 +112,13 @@ def _uses(case: Case, branch: nodes.Node) -> dict[str, nodes.SkillNode]:
     return users
 
 
-def _writes(case: Case, branch: nodes.Node) -> dict[str, tuple[str, Mark, str]]:
+def _writes(case: Case, branch: Node) -> dict[str, tuple[str, Mark, str]]:
     """Return the first writer of every variable below `branch`, its place, and how to call it otherwise."""
     writers: dict[str, tuple[str, Mark, str]] = {}
     for node in branch.walk():
-        if isinstance(node, nodes.ForEachNode):
-            hint = "Write to another variable there, as each: other."
-            writers.setdefault(node.each.name, ("for_each", node.each.mark, hint))
+        for key, variable in variables(node):
+            hint = f"Write to another variable there, as {key.name}: other."
+            writers.setdefault(variable.name, (word_of(node), variable.mark, hint))
         for wire in case.wires(node, Direction.OUT):
             hint = f"Write to another variable there, as {wire.port.name}: $other."
             writers.setdefault(wire.variable, (wire.skill, wire.mark, hint))

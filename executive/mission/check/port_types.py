@@ -8,11 +8,12 @@ from typing import Any
 
 from executive.mission.check.case import Case
 from executive.mission.findings import Finding, alternatives, error
-from executive.mission.model.nodes import ForEachNode, Node
+from executive.mission.model.nodes import InnerNode, Node
+from executive.mission.model.paths import word_of
 from executive.mission.model.port_types import called, element_of, fits
 from executive.mission.model.typed import input_fault
 from executive.mission.model.values import Literal, Reference
-from executive.mission.model.wiring import Wire
+from executive.mission.model.wiring import Wire, variables
 from executive.mission.source import Mark
 from executive.mission.words import describe
 from executive.skill import Direction, Port
@@ -54,10 +55,10 @@ def port_types(case: Case) -> Iterator[Finding]:
             written.setdefault(wire.variable, []).append(writer)
 
     def walk(node: Node, loops: Loops) -> Iterator[Finding]:
-        if isinstance(node, ForEachNode):
-            sources = _sources(node, {**written, **loops})
-            yield from _no_lists(node, sources)
-            loops = {**loops, node.each.name: [element for s in sources for element in _elements(node, s)]}
+        for loop in _loops(node):
+            sources = loop.sources({**written, **loops})
+            yield from loop.no_lists(sources)
+            loops = {**loops, loop.variable: [element for s in sources for element in loop.elements(s)]}
         for wire in case.wires(node, Direction.IN):
             for writer in loops.get(wire.variable, written.get(wire.variable, ())):
                 yield from _misfits(case, wire, writer)
@@ -67,42 +68,63 @@ def port_types(case: Case) -> Iterator[Finding]:
     yield from walk(case.tree, {})
 
 
-def _sources(loop: ForEachNode, writers: Loops) -> Sequence[Writer]:
-    """Return what a loop's list may be: the one in the file, or what writes its variable."""
-    if isinstance(loop.source, Literal):
-        listed = loop.source.value, loop.source.mark
-        return [Writer("for_each", loop.mark, list[Any], "", (listed,))]
-    return writers.get(loop.source.name, ())
+@dataclass(frozen=True)
+class Loop:
+    """A control node that writes the elements of a list to a variable.
+
+    Attributes:
+        word: Its word.
+        key: Key of the list.
+        source: The list, or the variable that holds it.
+    """
+
+    word: str
+    mark: Mark
+    variable: str
+    key: str
+    source: Literal | Reference
+
+    def sources(self, writers: Loops) -> Sequence[Writer]:
+        """Return the possible lists: the one in the file, or those written to the variable."""
+        if isinstance(self.source, Literal):
+            listed = self.source.value, self.source.mark
+            return [Writer(self.word, self.mark, list[Any], "", (listed,))]
+        return writers.get(self.source.name, ())
+
+    def no_lists(self, sources: Iterable[Writer]) -> Iterator[Finding]:
+        """Find every source that is no list; one in the file has a check of its own."""
+        if not isinstance(self.source, Reference):
+            return
+        name, mark, what = self.source.name, self.source.mark, f"{self.word}.{self.key}"
+        for source in sources:
+            for value, place in source.values or ():
+                if not isinstance(value, list):
+                    message = f"{what} takes a list, but for ${name} stands {describe(value)} here"
+                    yield error(place, "port-type", message, f"It is read in {mark.place(place.source)}.")
+            if source.values is None and element_of(source.type) is None:
+                message = f"{what} takes a list, but ${name} holds {called(source.type)}"
+                yield error(mark, "port-type", message, f"It is written by {source.seen_from(mark)}.")
+
+    def elements(self, source: Writer) -> Iterator[Writer]:
+        """Yield the writers of the variable for a list."""
+        if source.values is not None:
+            literal = self.source if isinstance(self.source, Literal) else None
+            values = [
+                (element, literal.element_mark(index) if literal else mark)
+                for value, mark in source.values
+                if isinstance(value, list)
+                for index, element in enumerate(value)
+            ]
+            yield Writer(self.word, self.mark, Any, "", tuple(values))
+        elif (element := element_of(source.type)) is not None:
+            yield Writer(self.word, self.mark, element, source.refers)
 
 
-def _no_lists(loop: ForEachNode, sources: Iterable[Writer]) -> Iterator[Finding]:
-    """Find whatever a loop goes through and is no list; one in the file has a check of its own."""
-    if not isinstance(loop.source, Reference):
-        return
-    name, mark = loop.source.name, loop.source.mark
-    for source in sources:
-        for value, place in source.values or ():
-            if not isinstance(value, list):
-                message = f"for_each.in takes a list, but for ${name} stands {describe(value)} here"
-                yield error(place, "port-type", message, f"It is read in {mark.place(place.source)}.")
-        if source.values is None and element_of(source.type) is None:
-            message = f"for_each.in takes a list, but ${name} holds {called(source.type)}"
-            yield error(mark, "port-type", message, f"It is written by {source.seen_from(mark)}.")
-
-
-def _elements(loop: ForEachNode, source: Writer) -> Iterator[Writer]:
-    """Yield what a loop writes to its variable when it goes through such a list."""
-    if source.values is not None:
-        literal = loop.source if isinstance(loop.source, Literal) else None
-        values = [
-            (element, literal.element_mark(index) if literal else mark)
-            for value, mark in source.values
-            if isinstance(value, list)
-            for index, element in enumerate(value)
-        ]
-        yield Writer("for_each", loop.mark, Any, "", tuple(values))
-    elif (element := element_of(source.type)) is not None:
-        yield Writer("for_each", loop.mark, element, source.refers)
+def _loops(node: Node) -> Iterator[Loop]:
+    for key, variable in variables(node):
+        source = node.values.get(key.element_of) if isinstance(node, InnerNode) else None
+        if isinstance(source, Literal | Reference):
+            yield Loop(word_of(node), node.mark, variable.name, key.element_of, source)
 
 
 def _misfits(case: Case, wire: Wire, writer: Writer) -> Iterator[Finding]:

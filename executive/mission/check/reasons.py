@@ -7,27 +7,28 @@ from collections.abc import Iterator
 from executive.mission.check.case import Case
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.flow.analysis import Analysis
-from executive.mission.flow.state import ANYTHING, Raise
-from executive.mission.model import grammar, nodes
-from executive.mission.model.nodes import Node
+from executive.mission.model import grammar
+from executive.mission.model.nodes import InnerNode, Node, Section, SkillNode, nodes_of, parts
 from executive.mission.model.values import Match
 from executive.mission.source import Mark
-
-_OWN = {nodes.TimeoutNode: ("timeout", "timeout"), nodes.InvertNode: ("invert", "inverted")}
-"""Control nodes that fail for a reason of their own: their word, and the reason."""
-
-_SLOTS = ("do", "recover", "condition", "catch", "finally")
-"""Names of the slots of a parent node; paths contain these words, too."""
+from executive.tree.flow import ANYTHING, Raise
+from executive.tree.keys import Key, Kind
 
 
 def labels(case: Case) -> Iterator[Finding]:
     """Find every label that stands for two nodes, or is a word of the language."""
     first: dict[str, Mark] = {}
+    # Paths contain the words and the slots of all control nodes.
+    taken = {grammar.USE, *case.control}
+    for kind in case.control.values():
+        taken |= {
+            key.name for key in kind.keys.values() if key.kind in (Kind.NODE, Kind.NODES, Kind.SECTIONS)
+        }
     for node in case.nodes():
         if not node.label:
             continue
         mark = node.label_mark or node.mark
-        if node.label in grammar.CONTROL or node.label in _SLOTS:
+        if node.label in taken:
             message = f'"{node.label}" is a word of the language and cannot be a label'
             yield error(mark, "bad-label", message)
         # The same place twice is one node of a subtree that is used twice.
@@ -62,13 +63,22 @@ def matches(case: Case) -> Iterator[Finding]:
 
 
 def _expectations(node: Node) -> Iterator[tuple[Match, str, Node]]:
-    """Yield every failure a node waits for, the key it stands under, and the body it should come from."""
-    if isinstance(node, nodes.RetryNode):
-        yield from ((match, "retry", node.do) for match in node.on)
-    elif isinstance(node, nodes.RepeatNode):
-        yield from ((match, "repeat", node.do) for match in node.until)
-    elif isinstance(node, nodes.TryNode):
-        yield from ((match, "try", node.do) for catch in node.catches for match in catch.on)
+    """Yield every failure a node waits for, its word, and the body it should come from."""
+    if not isinstance(node, InnerNode):
+        return
+    for key, match in _matches(node):
+        for body in nodes_of(node.values[key.of]) if key.of in node.values else ():
+            yield match, node.kind.word, body
+
+
+def _matches(owner: InnerNode | Section) -> Iterator[tuple[Key, Match]]:
+    """Yield the names of failures in the keys of a node and of its sections."""
+    for key, value in parts(owner):
+        for item in value if isinstance(value, tuple) else (value,):
+            if isinstance(item, Match):
+                yield key, item
+            elif isinstance(item, Section):
+                yield from _matches(item)
 
 
 def _impossible(case: Case, flow: Analysis, match: Match, where: str, body: Node) -> Finding:
@@ -76,11 +86,12 @@ def _impossible(case: Case, flow: Analysis, match: Match, where: str, body: Node
     if match.source in inside:
         leaving = ", ".join(sorted({str(failure) for failure in flow.flows[body.path].failures}))
         message = f"{match} never leaves the body of this {where}"
-        rule = "A retry fails as its body does, a fallback as its last choice."
+        rule = "A loop fails as its body does, a choice as its last alternative."
         hint = f"What leaves it: {leaving or 'nothing'}. {rule}"
         return error(match.mark, "impossible-reason", message, hint)
     # Labels, and control nodes that fail for a reason of their own.
-    words = {node.label for node in case.nodes() if node.label} | {word for word, _ in _OWN.values()}
+    words = {node.label for node in case.nodes() if node.label}
+    words |= {word for word, kind in case.control.items() if kind.reasons}
     if match.source in (*case.skills, *words):
         message = f"{match.source} is not in the body of this {where}, so {match} cannot come from it"
         return error(match.mark, "impossible-reason", message, f"In the body: {', '.join(inside) or 'none'}.")
@@ -102,14 +113,11 @@ def _reasons(flow: Analysis, body: Node) -> dict[str, list[str]]:
     """Return the reasons of everything in `body` by skill, control word or label, caught inside or not."""
     reasons: dict[str, list[str]] = {}
     for node in body.walk():
-        own: list[str] = []
-        if isinstance(node, nodes.SkillNode):
+        if isinstance(node, SkillNode):
             skill = flow.skill(node.skill)
             reasons.setdefault(node.skill, []).extend(skill.reasons if skill else ())
-        elif type(node) in _OWN:
-            word, reason = _OWN[type(node)]
-            own = reasons.setdefault(word, [])
-            own.append(reason)
+        elif isinstance(node, InnerNode) and node.kind.reasons:
+            reasons.setdefault(node.kind.word, []).extend(node.kind.reasons)
         if node.label and node.path in flow.flows:
             passed = flow.flows[node.path].failures
             reasons.setdefault(node.label, []).extend(failure.reason for failure in passed)

@@ -6,9 +6,10 @@ from collections.abc import Iterator, Mapping
 
 from executive.mission.check.case import Case
 from executive.mission.findings import Finding, alternatives, error, suggest, warning
-from executive.mission.model.nodes import ForEachNode, Node, UseNode
+from executive.mission.model.nodes import Node, UseNode
+from executive.mission.model.paths import word_of
 from executive.mission.model.values import Named, Reference
-from executive.mission.model.wiring import wires, written_below
+from executive.mission.model.wiring import references, variables, wires, written_below
 from executive.mission.source import Mark
 from executive.skill import Direction, Skill
 
@@ -35,12 +36,12 @@ def unwritten_needs(case: Case) -> Iterator[Finding]:
     for node, what, variable, _ in _unwritten(case, libraries=True):
         lacking.setdefault(case.doors[node.path].path, {}).setdefault(variable, what)
     doors = {door.path: door for door in case.doors.values()}
-    for path, variables in lacking.items():
+    for path, missing in lacking.items():
         door = doors[path]
-        names = " and ".join(f"${name} (for {what})" for name, what in sorted(variables.items()))
-        are = "is" if len(variables) == 1 else "are"
+        names = " and ".join(f"${name} (for {what})" for name, what in sorted(missing.items()))
+        are = "is" if len(missing) == 1 else "are"
         message = f'the subtree "{door.name}" needs {names}, which {are} not written on every way to here'
-        hints = [f"${name} is written by {_who(case, name, door.mark)}." for name in sorted(variables)]
+        hints = [f"${name} is written by {_who(case, name, door.mark)}." for name in sorted(missing)]
         yield error(door.mark, "unwritten", message, " ".join(hints))
 
 
@@ -59,9 +60,10 @@ def unread_variables(case: Case) -> Iterator[Finding]:
     """Find every variable that the mission names for an output and that nothing reads."""
     read = {variable for _, _, variable, _ in _reads(case, case.tree, all_inputs=True)}
     for node in case.tree.walk():
-        if isinstance(node, ForEachNode) and node.each.name not in read | set(case.mission.params):
-            message = f"nothing in this for_each reads ${node.each.name}"
-            yield warning(node.each.mark, "unread", message, f"Write ${node.each.name} where it is meant.")
+        for _, variable in variables(node):
+            if variable.name not in read | set(case.mission.params):
+                message = f"nothing in this {word_of(node)} reads ${variable.name}"
+                yield warning(variable.mark, "unread", message, f"Write ${variable.name} where it is meant.")
         for wire in case.wires(node, Direction.OUT):
             if wire.explicit and wire.variable not in read:
                 message = f"{wire} writes ${wire.variable}, which nothing reads"
@@ -80,15 +82,13 @@ def taken_names(case: Case) -> Iterator[Finding]:
     writers = {wire.variable: wire for node in case.tree.walk() for wire in case.wires(node, Direction.OUT)}
 
     def walk(node: Node, around: Mapping[str, Named]) -> Iterator[Finding]:
-        if isinstance(node, ForEachNode):
-            each = node.each
+        for _, each in variables(node):
             other = writers.get(each.name)
             place = other.mark if other else around[each.name].mark if each.name in around else None
             if place is not None:
-                who = other or "another for_each"
-                message = (
-                    f"for_each writes ${each.name}, and so does {who} in {place.place(each.mark.source)}"
-                )
+                word = word_of(node)
+                who = other or f"another {word}"
+                message = f"{word} writes ${each.name}, and so does {who} in {place.place(each.mark.source)}"
                 yield error(each.mark, "shadowed-variable", message, "Call the loop's variable otherwise.")
             around = {**around, each.name: each}
         for child in node.children:
@@ -121,8 +121,8 @@ def broken_promises(case: Case) -> Iterator[Finding]:
 def _reads(case: Case, tree: Node, all_inputs: bool = False) -> Iterator[Read]:
     """Yield everything that needs a variable; with `all_inputs` also what can do without it."""
     for node in tree.walk():
-        if isinstance(node, ForEachNode) and isinstance(node.source, Reference):
-            yield node, "for_each", node.source.name, node.source.mark
+        for reference in references(node):
+            yield node, word_of(node), reference.name, reference.mark
         for wire in case.wires(node, Direction.IN):
             if all_inputs or wire.port.required or wire.explicit:
                 yield node, str(wire), wire.variable, wire.mark
@@ -134,7 +134,7 @@ def _writers(case: Case, variable: str, mark: Mark) -> str:
     for node, skill in sorted(case.known_skills(), key=lambda pair: pair[0].mark.line):
         if any(wire.variable == variable for wire in wires(node, skill, Direction.OUT)):
             found[f"{node.skill} in {node.mark.place(mark.source)}"] = None
-    return " and ".join(found) or "the for_each around its body alone"
+    return " and ".join(found) or "the loop around its body alone"
 
 
 def _who(case: Case, variable: str, mark: Mark) -> str:

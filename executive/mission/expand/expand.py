@@ -13,9 +13,10 @@ from typing import Any
 
 from executive.mission.findings import Finding, alternatives, error, suggest, warning
 from executive.mission.model.mission import Mission, Subtree
-from executive.mission.model.nodes import Backoff, Catch, ForEachNode, Node, SkillNode, UnknownNode, UseNode
-from executive.mission.model.values import Reference, Setting, Value
-from executive.mission.model.wiring import written_below
+from executive.mission.model.nodes import Node, Section, SkillNode, UnknownNode, UseNode
+from executive.mission.model.paths import word_of
+from executive.mission.model.values import Named, Reference, Setting, Value
+from executive.mission.model.wiring import variables, written_below
 from executive.mission.source import Mark
 from executive.skill import Direction, Skill
 
@@ -119,9 +120,12 @@ class _Expander:
 
     def _shadowed(self, node: Node, names: Names) -> Iterator[Finding]:
         """Find every variable that a node would write under the name of a param or argument."""
-        if isinstance(node, ForEachNode) and node.each.name in names:
-            message = f"for_each would write ${node.each.name}, but that is {self._sort(node.each.name)}"
-            yield error(node.each.mark, "shadowed-param", message, "Call one of them otherwise.")
+        for _, variable in variables(node):
+            if variable.name in names:
+                message = (
+                    f"{word_of(node)} would write ${variable.name}, but that is {self._sort(variable.name)}"
+                )
+                yield error(variable.mark, "shadowed-param", message, "Call one of them otherwise.")
         if not isinstance(node, SkillNode) or node.skill not in self.skills:
             return
         for name, port in self.skills[node.skill].ports.items():
@@ -193,11 +197,9 @@ class _Expander:
             return own + name if name in kept else name
 
         def renamed(part: Any) -> Any:
-            if isinstance(part, Reference):
+            if isinstance(part, Reference | Named):
                 return replace(part, name=rename(part.name))
             part = _with_parts(part, renamed)
-            if isinstance(part, ForEachNode):
-                return replace(part, each=replace(part.each, name=rename(part.each.name)))
             if isinstance(part, UseNode):
                 return replace(part, promised=tuple(map(rename, part.promised)))
             if isinstance(part, SkillNode) and part.skill in self.skills:
@@ -254,6 +256,6 @@ def _with_parts(part: Any, change: Callable[[Any], Any]) -> Any:
         return tuple([change(item) for item in part])
     if isinstance(part, dict):
         return {key: change(item) for key, item in part.items()}
-    if isinstance(part, Node | Setting | Catch | Backoff):
+    if isinstance(part, Node | Setting | Section):
         return replace(part, **{field.name: change(getattr(part, field.name)) for field in fields(part)})
     return part

@@ -1,16 +1,16 @@
-"""The nodes of a mission's tree, as the file says them."""
+"""Nodes of the tree of a mission, as the file says them."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TypeAlias
 
 from executive.mission.model.values import Match, Named, Setting, Value
 from executive.mission.source import Mark
-
-_LATER_CAPITAL = re.compile(r"(?<!^)(?=[A-Z])")
+from executive.tree.keys import Declared, Key
+from executive.tree.node import ControlNode
 
 
 @dataclass(frozen=True)
@@ -18,10 +18,10 @@ class Node:
     """Base of everything a tree is made of.
 
     Attributes:
-        mark: The word that names the node in the file.
-        label: What `as:` calls it, or "".
-        label_mark: Where that stands.
-        path: Unique path from the root of the tree that runs, given once that is known; else "".
+        mark: Place of the word that names the node in the file.
+        label: Value of `as:`, or "".
+        label_mark: Place of the label.
+        path: Unique path from the root of the expanded tree; "" before expansion.
     """
 
     mark: Mark
@@ -30,17 +30,9 @@ class Node:
     path: str = field(default="", kw_only=True)
 
     @property
-    def word(self) -> str:
-        """Word for it in the file, by the name of its class: `for_each` for a `ForEachNode`."""
-        return _LATER_CAPITAL.sub("_", type(self).__name__.removesuffix("Node")).lower()
-
-    @cached_property
     def children(self) -> tuple[Node, ...]:
-        """The nodes directly inside this one, in the order of the file."""
-        parts = [getattr(self, field.name) for field in fields(self)]
-        flat = [item for part in parts for item in (part if isinstance(part, tuple) else (part,))]
-        inner = [item.do if isinstance(item, Catch) else item for item in flat]
-        return tuple(item for item in inner if isinstance(item, Node))
+        """The nodes directly inside this one, in the order of their keys."""
+        return ()
 
     def walk(self) -> Iterator[Node]:
         """Yield this node and every node below it, top to bottom."""
@@ -54,7 +46,7 @@ class SkillNode(Node):
     """A skill and what the mission sets of it.
 
     Attributes:
-        names: Variables of ports that the mission does not wire, where they are not called as the port.
+        names: Variables of ports that the mission does not wire and that have another name than the port.
     """
 
     skill: str
@@ -64,131 +56,51 @@ class SkillNode(Node):
 
 @dataclass(frozen=True)
 class UnknownNode(Node):
-    """A node that could not be read; a finding says why. Anything may come of it.
+    """A node that could not be read; a finding says why.
 
     Attributes:
-        parts: What could be read of it.
+        parts: The nodes that could be read of it.
     """
 
     parts: tuple[Node, ...] = ()
 
-
-@dataclass(frozen=True)
-class SequenceNode(Node):
-    """One after the other, until one fails. `listed` is true for a bare list."""
-
-    steps: tuple[Node, ...]
-    listed: bool = True
+    @property
+    def children(self) -> tuple[Node, ...]:
+        """The parts."""
+        return self.parts
 
 
 @dataclass(frozen=True)
-class FallbackNode(Node):
-    """One after the other, until one succeeds."""
-
-    choices: tuple[Node, ...]
-
-
-@dataclass(frozen=True)
-class ParallelNode(Node):
-    """All at the same time.
+class Section:
+    """A mapping below a key of a control node: the values of its keys.
 
     Attributes:
-        wait_for: How many must succeed, or `all` or `any`, or `lead`.
-        halt: Whether a failure halts the others at once.
+        kind: Class that declares the keys.
     """
 
-    branches: tuple[Node, ...]
-    wait_for: Value
-    halt: Value
+    kind: type[Declared]
+    mark: Mark
+    values: Mapping[str, Part]
 
 
 @dataclass(frozen=True)
-class Backoff:
-    """Wait before a further attempt: `first` [s], then `factor` times longer each time, at most `most`."""
-
-    first: Value
-    factor: Value
-    most: Value | None
-
-
-@dataclass(frozen=True)
-class RetryNode(Node):
-    """Again after a failure, at most `attempts` times, after `recover` where there is one.
+class InnerNode(Node):
+    """A control node.
 
     Attributes:
-        on: What is worth another attempt; empty means every failure.
+        kind: Its class.
+        values: Values of its keys; a key that is missing in the file is missing here.
+        is_list: True for a bare list, which has no word.
     """
 
-    attempts: Value
-    on: tuple[Match, ...]
-    recover: Node | None
-    backoff: Backoff | None
-    do: Node
+    kind: type[ControlNode]
+    values: Mapping[str, Part]
+    is_list: bool = False
 
-
-@dataclass(frozen=True)
-class RepeatNode(Node):
-    """Again after a success: `times` times, or `until` the body fails in one of these ways."""
-
-    times: Value | None
-    until: tuple[Match, ...]
-    do: Node
-
-
-@dataclass(frozen=True)
-class WhileNode(Node):
-    """Again as long as the condition succeeds."""
-
-    condition: Node
-    do: Node
-
-
-@dataclass(frozen=True)
-class ForEachNode(Node):
-    """Once for every element of a list, which the variable `each` holds meanwhile."""
-
-    each: Named
-    source: Value
-    do: Node
-
-
-@dataclass(frozen=True)
-class Catch:
-    """What to do instead after a failure `on` one of these."""
-
-    on: tuple[Match, ...]
-    do: Node
-
-
-@dataclass(frozen=True)
-class TryNode(Node):
-    """A body, what to do when it fails, and what to do in the end either way."""
-
-    do: Node
-    catches: tuple[Catch, ...]
-    finish: Node | None
-
-
-@dataclass(frozen=True)
-class TimeoutNode(Node):
-    """A body that must end within `seconds` on the run's clock."""
-
-    seconds: Value
-    do: Node
-
-
-@dataclass(frozen=True)
-class InvertNode(Node):
-    """Success where the body fails, failure where it succeeds."""
-
-    do: Node
-
-
-@dataclass(frozen=True)
-class SucceedNode(Node):
-    """Success however the body ends; without a body, success at once."""
-
-    do: Node | None
+    @cached_property
+    def children(self) -> tuple[Node, ...]:
+        """The nodes under its keys, those in sections included."""
+        return tuple(node for _, value in parts(self) for node in nodes_of(value))
 
 
 @dataclass(frozen=True)
@@ -207,3 +119,28 @@ class UseNode(Node):
     returns: Mapping[str, Setting] = field(default_factory=dict)
     promised: tuple[str, ...] = ()
     body: Node | None = None
+
+    @property
+    def children(self) -> tuple[Node, ...]:
+        """The body."""
+        return () if self.body is None else (self.body,)
+
+
+Part: TypeAlias = "Value | Named | Node | Section | tuple[Node | Match | Section, ...]"
+"""Value of a key of a control node."""
+
+
+def parts(of: InnerNode | Section) -> Iterator[tuple[Key, Part]]:
+    """Yield the keys that are given, in the order of their declaration, with their values."""
+    for name, key in of.kind.keys.items():
+        if name in of.values:
+            yield key, of.values[name]
+
+
+def nodes_of(part: Part) -> list[Node]:
+    """Return the nodes in the value of a key."""
+    if isinstance(part, Section):
+        return [node for _, value in parts(part) for node in nodes_of(value)]
+    if isinstance(part, tuple):
+        return [node for item in part if not isinstance(item, Match) for node in nodes_of(item)]
+    return [part] if isinstance(part, Node) else []

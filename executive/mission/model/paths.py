@@ -1,18 +1,25 @@
-"""A unique, readable path for every node of the tree that runs.
+"""Unique, readable paths of the nodes of the expanded tree.
 
-A path names what is on the way: `tree/repeat/do/2:try/retry/do/Grasp`. A skill goes by its name or
-label; in a list, control nodes and whatever stands there twice carry their number.
+A path names the nodes on the way: `tree/repeat/do/2:try/retry/do/Grasp`. A skill has its name or label; in a
+list, control nodes and names that occur twice have a number.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import fields, replace
-from typing import Any
+from dataclasses import replace
 
-from executive.mission.model import nodes
-from executive.mission.model.nodes import Node
+from executive.mission.model.nodes import (
+    InnerNode,
+    Node,
+    Part,
+    Section,
+    SkillNode,
+    UnknownNode,
+    UseNode,
+    parts,
+)
+from executive.tree.keys import Kind
 
 
 def with_paths(root: Node) -> Node:
@@ -21,12 +28,20 @@ def with_paths(root: Node) -> Node:
 
 
 def name_of(node: Node) -> str:
-    """Return what a node is called in a path."""
-    if node.label:
-        return node.label
-    if isinstance(node, nodes.SkillNode):
-        return node.skill
-    return node.name if isinstance(node, nodes.UseNode) else node.word
+    """Return the name of a node in paths."""
+    return node.label or word_of(node)
+
+
+def word_of(node: Node) -> str:
+    """Return the name of the skill or subtree, or the word of the control node."""
+    match node:
+        case SkillNode():
+            return node.skill
+        case UseNode():
+            return node.name
+        case InnerNode():
+            return node.kind.word
+    return "unknown"
 
 
 def _placed(node: Node, parent: str, slot: str, name: str | None = None) -> Node:
@@ -35,50 +50,56 @@ def _placed(node: Node, parent: str, slot: str, name: str | None = None) -> Node
     A bare list is the slot itself; any other node adds its own name to the path.
     """
     path = _join(parent, slot)
-    if name is not None or not _is_bare(node):
+    if name is not None or not _is_list(node):
         path = _join(path, name or name_of(node))
-    changes: dict[str, Any] = {"path": path}
-    for field in fields(node):
-        part = getattr(node, field.name)
-        if isinstance(part, Node):
-            changes[field.name] = _placed(part, path, _slot(node, field.name))
-        elif isinstance(part, tuple) and any(isinstance(item, Node) for item in part):
-            changes[field.name] = _listed(part, path)
-    if isinstance(node, nodes.TryNode):
-        changes["catches"] = tuple(
-            replace(catch, do=_placed(catch.do, path, f"catch/{index}"))
-            for index, catch in enumerate(node.catches, 1)
-        )
-    return replace(node, **changes)
+    match node:
+        case InnerNode():
+            return replace(node, path=path, values=_parts(node, path))
+        case UseNode(body=Node() as body):
+            return replace(node, path=path, body=_placed(body, path, "do" if node.label else ""))
+        case UnknownNode():
+            return replace(node, path=path, parts=_listed(node.parts, path))
+    return replace(node, path=path)
 
 
-def _slot(parent: Node, field: str) -> str:
-    """Return what a child is called in the path of its parent.
+def _parts(owner: InnerNode | Section, path: str, prefix: str = "") -> dict[str, Part]:
+    """Return the values of an owner with their paths; `prefix` is the slot of a section in its node."""
+    placed: dict[str, Part] = {}
+    for key, value in parts(owner):
+        # The only child of a section has the name of the section.
+        name = prefix if prefix and key.name == "do" else _join(prefix, key.name)
+        if isinstance(value, Node):
+            value = _placed(value, path, name if key.is_in_path or _is_list(value) else "")
+        elif isinstance(value, Section):
+            value = replace(value, values=_parts(value, path, name))
+        elif isinstance(value, tuple) and key.kind is Kind.NODES:
+            value = _listed(tuple(item for item in value if isinstance(item, Node)), path)
+        elif isinstance(value, tuple):
+            value = tuple(
+                replace(item, values=_parts(item, path, f"{name}/{index}"))
+                if isinstance(item, Section)
+                else item
+                for index, item in enumerate(value, 1)
+            )
+        placed[key.name] = value
+    return placed
 
-    The body of a `try`, unless it is a bare list, and of a `use`, unless that has a label, is not named.
-    """
-    if isinstance(parent, nodes.TryNode) and field == "do":
-        return "do" if _is_bare(parent.do) else ""
-    if isinstance(parent, nodes.UseNode):
-        return "do" if parent.label else ""
-    return "finally" if field == "finish" else field
 
-
-def _listed(items: Sequence[Node], parent: str) -> tuple[Node, ...]:
+def _listed(items: tuple[Node, ...], parent: str) -> tuple[Node, ...]:
     """Return the nodes of a list, named so that no two have the same path."""
     names = [name_of(node) for node in items]
     count = Counter(names)
     placed = []
     for index, (node, name) in enumerate(zip(items, names, strict=True), 1):
-        named = bool(node.label) or isinstance(node, nodes.SkillNode | nodes.UseNode)
+        named = bool(node.label) or isinstance(node, SkillNode | UseNode)
         unique = name if named and count[name] == 1 else f"{index}:{name}"
         placed.append(_placed(node, parent, "", unique))
     return tuple(placed)
 
 
-def _is_bare(node: Node) -> bool:
-    return isinstance(node, nodes.SequenceNode) and node.listed
+def _is_list(node: Node) -> bool:
+    return isinstance(node, InnerNode) and node.is_list
 
 
-def _join(*parts: str) -> str:
-    return "/".join(part for part in parts if part)
+def _join(*names: str) -> str:
+    return "/".join(name for name in names if name)

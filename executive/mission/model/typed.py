@@ -14,13 +14,22 @@ from pydantic import TypeAdapter, ValidationError
 from executive.mission.model.port_types import fits
 from executive.mission.words import describe, violation
 from executive.skill import Port
+from executive.tree.keys import Key
 
 _SCALARS = (str, int, float, bool, type(None), Any)
 _CONTAINERS = (tuple, list, dict, frozenset, set)
 
 
 class WrongType(Exception):
-    """A value is not of the declared type; the text follows the value's name in a sentence."""
+    """A value is not of the declared type; the text follows the value's name in a sentence.
+
+    Attributes:
+        code: Code of the finding.
+    """
+
+    def __init__(self, text: str, code: str = "wrong-type") -> None:
+        super().__init__(text)
+        self.code = code
 
 
 def is_plain(declared: Any) -> bool:
@@ -57,13 +66,31 @@ def convert(value: Any, declared: Any) -> Any:
     """
     if not is_plain(declared):
         raise WrongType(f"takes a variable, not {describe(value)}")
+    return _read(_adapter(declared), value)
+
+
+def read_constant(key: Key, value: Any, most: int | None = None) -> Any:
+    """Return a plain value as a constant of a control node; `most` is the largest allowed number, or None.
+
+    Raises:
+        WrongType: The value does not fit, or is out of bounds.
+    """
+    return _read(key.adapter(most), value)
+
+
+def _read(adapter: TypeAdapter[Any], value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         raise WrongType(f"must be a finite number, not {value}")
     try:
-        return _adapter(declared).validate_json(json.dumps(value), strict=True)
+        return adapter.validate_json(json.dumps(value), strict=True)
     except ValidationError as problems:
-        first, *_ = problems.errors(include_url=False)
-        raise WrongType(violation(first)) from None
+        found = problems.errors(include_url=False)
+        # A number beyond a bound may also be no member of the alternatives.
+        first = next((one for one in found if "than" in one["type"]), found[0])
+        code = "out-of-range" if "than" in first["type"] else "wrong-type"
+        others = {one["type"] for one in found if one is not first}
+        also = " (a whole number is allowed, too)" if others == {"int_type"} else ""
+        raise WrongType(violation(first) + also, code) from None
 
 
 @functools.lru_cache(maxsize=256)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from executive.mission.source import Mark
+from executive.tree.failure import Reason
 
 
 @dataclass(frozen=True)
@@ -64,12 +65,7 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Match:
-    """`Skill.reason` or `label.reason` in an `on`, `catch` or `until`."""
+class Match(Reason):
+    """`Skill.reason` or `label.reason` in an `on`, `catch` or `until`, with its place."""
 
-    source: str
-    reason: str
     mark: Mark
-
-    def __str__(self) -> str:
-        return f"{self.source}.{self.reason}"

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from executive.mission.model.nodes import ForEachNode, Node, SkillNode
-from executive.mission.model.values import Literal, Reference
+from executive.mission.model.nodes import InnerNode, Node, SkillNode, parts
+from executive.mission.model.values import Literal, Named, Reference
 from executive.mission.source import Mark
 from executive.skill import Direction, Port, Skill
+from executive.tree.keys import Key, Kind
 
 
 @dataclass(frozen=True)
@@ -53,12 +54,27 @@ def literals(node: SkillNode) -> Iterator[tuple[str, Literal]]:
             yield name, setting.value
 
 
+def variables(node: Node) -> Iterator[tuple[Key, Named]]:
+    """Yield the keys of a control node that name a variable which it writes, with the variable."""
+    if isinstance(node, InnerNode):
+        for key, value in parts(node):
+            if isinstance(value, Named):
+                yield key, value
+
+
+def references(node: Node) -> Iterator[Reference]:
+    """Yield the variables that a control node reads."""
+    if isinstance(node, InnerNode):
+        for key, value in parts(node):
+            if key.kind is Kind.ELEMENTS and isinstance(value, Reference):
+                yield value
+
+
 def written_below(root: Node, skills: Mapping[str, type[Skill]]) -> set[str]:
     """Return the variables that something in the tree may write."""
     written = set()
     for node in root.walk():
-        if isinstance(node, ForEachNode):
-            written.add(node.each.name)
-        elif isinstance(node, SkillNode) and node.skill in skills:
+        written |= {variable.name for _, variable in variables(node)}
+        if isinstance(node, SkillNode) and node.skill in skills:
             written |= {wire.variable for wire in wires(node, skills[node.skill], Direction.OUT)}
     return written

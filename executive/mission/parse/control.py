@@ -1,30 +1,24 @@
-"""Control nodes, one function each: from the positioned nodes of a file to the nodes of a tree."""
+"""Control nodes, read by the keys that their classes declare."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from executive.mission.model import grammar
 from executive.mission.model import nodes as model
-from executive.mission.model.values import Literal, Named, Value
-from executive.mission.parse.fields import NAME, Fields, settings_of
+from executive.mission.model.nodes import Part
+from executive.mission.model.values import Named
+from executive.mission.parse.fields import NAME, Fields, value_of
 from executive.mission.source import Mark
-from executive.mission.text.yaml_text import Mapping, Node, Scalar, Sequence, plain
+from executive.mission.text import yaml_text as yaml
 from executive.mission.words import describe
+from executive.tree.keys import Key, Kind
+from executive.tree.keys import Section as DeclaredSection
+from executive.tree.node import ControlNode
 
 if TYPE_CHECKING:
     from executive.mission.parse.nodes import NodeParser
-
-MAX_BRANCHES = 200
-"""Largest number of branches of a parallel: every two of them are compared."""
-
-
-class Head:
-    """One control node in the file: the mapping it stands in, its word, its label, its value."""
-
-    def __init__(self, node: Mapping, word: str, mark: Mark, label: str, value: Node) -> None:
-        self.node, self.word, self.mark, self.label, self.value = node, word, mark, label, value
 
 
 def unread(mark: Mark) -> model.Node:
@@ -32,171 +26,150 @@ def unread(mark: Mark) -> model.Node:
     return model.UnknownNode(mark, "")
 
 
-def _fields(parser: NodeParser, head: Head) -> Fields:
-    return Fields(head.word, head.mark, head.value, grammar.CONTROL[head.word].keys, parser.findings)
+def bare_key(kind: type[ControlNode] | type[DeclaredSection]) -> Key | None:
+    """Return the key whose value may stand directly under the word of a node or section, or None."""
+    return next((key for key in kind.keys.values() if key.is_bare), None)
 
 
-def _sequence(parser: NodeParser, head: Head) -> model.Node:
-    steps = parser.nodes(head.value, "sequence")
-    return model.SequenceNode(head.mark, head.label, steps, listed=False) if steps else unread(head.mark)
+def inner_keys(kind: type[ControlNode] | type[DeclaredSection]) -> Mapping[str, Key]:
+    """Return the keys of the mapping under the word; none if no mapping may stand there."""
+    inner = {name: key for name, key in kind.keys.items() if not key.is_partner}
+    return {} if all(key.is_bare for key in inner.values()) else inner
 
 
-def _fallback(parser: NodeParser, head: Head) -> model.Node:
-    choices = parser.nodes(head.value, "fallback")
-    return model.FallbackNode(head.mark, head.label, choices) if choices else unread(head.mark)
+@dataclass(frozen=True)
+class Head:
+    """A control node in the file: its mapping, its word with its place, its label and its value."""
+
+    node: yaml.Mapping
+    word: str
+    mark: Mark
+    label: str
+    value: yaml.Node
 
 
-def _parallel(parser: NodeParser, head: Head) -> model.Node:
-    wait_for: Value = Literal("all", head.mark)
-    halt: Value = Literal(False, head.mark)
-    body: Node | None = head.value
-    if not isinstance(head.value, Sequence):
-        fields = _fields(parser, head)
-        wait_for, halt = fields.value("wait_for") or wait_for, fields.value("halt") or halt
-        body = fields.required("do")
-    branches = () if body is None else parser.nodes(body, "parallel")
-    if not branches:
+def read_control(parser: NodeParser, head: Head, kind: type[ControlNode]) -> model.Node:
+    """Return a control node with the values of its keys, or an unknown node."""
+    reader = _Reader(parser)
+    values = reader.read_inner(head.word, head.mark, head.value, kind)
+    beside = {name: key for name, key in kind.keys.items() if key.is_partner}
+    for name, key in beside.items():
+        if (value := head.node.get(name)) is not None:
+            fields = Fields(head.word, head.mark, head.node, head.node.keys, parser.findings)
+            reader.read(fields, key, value, value.mark, values)
+    if reader.is_sound and kind.one_of and not any(_is_given(head, name) for name in kind.one_of):
+        where = " beside it" if set(kind.one_of) <= set(beside) else ""
+        listed = " or ".join(f'"{name}"' for name in kind.one_of)
+        parser.refuse(head.mark, "missing-key", f"{head.word} needs {listed}{where}")
+    missing = [key.kind for name, key in kind.keys.items() if key.is_required and name not in values]
+    if Kind.NODES in missing:
         return unread(head.mark)
-    if len(branches) > MAX_BRANCHES:
-        message = f"a parallel has at most {MAX_BRANCHES} branches, not {len(branches)}"
-        parser.refuse(head.mark, "too-large", message)
-        return unread(head.mark)
-    return model.ParallelNode(head.mark, head.label, branches, wait_for, halt)
+    if Kind.VARIABLE in missing or Kind.ELEMENTS in missing:
+        children = [node for part in values.values() for node in model.nodes_of(part)]
+        return model.UnknownNode(head.mark, head.label, tuple(children))
+    return model.InnerNode(head.mark, head.label, kind, values)
 
 
-def _retry(parser: NodeParser, head: Head) -> model.Node:
-    fields = _fields(parser, head)
-    fields.required("attempts")
-    attempts = fields.value("attempts") or Literal(1, head.mark)
-    recover = fields.get("recover")
-    return model.RetryNode(
-        head.mark,
-        head.label,
-        attempts,
-        fields.matches("on"),
-        None if recover is None else parser.node(recover, fields.key_mark("recover")),
-        _backoff(parser, fields),
-        parser.node(fields.required("do"), fields.key_mark("do")),
-    )
+def _is_given(head: Head, name: str) -> bool:
+    inner = head.value.get(name) if isinstance(head.value, yaml.Mapping) else None
+    return inner is not None or head.node.get(name) is not None
 
 
-def _backoff(parser: NodeParser, fields: Fields) -> model.Backoff | None:
-    node = fields.get("backoff")
-    same: Value = Literal(1.0, fields.key_mark("backoff"))
-    if not isinstance(node, Mapping):
-        first = fields.value("backoff")
-        return None if first is None else model.Backoff(first, same, None)
-    inner = Fields("backoff", fields.key_mark("backoff"), node, grammar.BACKOFF, parser.findings)
-    inner.required("first")
-    first = inner.value("first")
-    if first is None:
-        return None
-    return model.Backoff(first, inner.value("factor") or same, inner.value("most"))
+class _Reader:
+    """Reads the keys of one control node.
 
+    Attributes:
+        is_sound: False if the value of the node is no mapping where it must be one.
+    """
 
-def _repeat(parser: NodeParser, head: Head) -> model.Node:
-    fields = _fields(parser, head)
-    times, until = fields.value("times"), fields.matches("until")
-    if fields.sound and fields.get("times") is None and fields.get("until") is None:
-        message = 'repeat needs one of "until" and "times", to know when it is done'
-        parser.refuse(head.mark, "missing-key", message)
-    body = parser.node(fields.required("do"), fields.key_mark("do"))
-    return model.RepeatNode(head.mark, head.label, times, until, body)
+    def __init__(self, parser: NodeParser) -> None:
+        self.parser = parser
+        self.is_sound = True
 
+    def read_inner(
+        self, owner: str, mark: Mark, value: yaml.Node, kind: type[ControlNode] | type[DeclaredSection]
+    ) -> dict[str, Part]:
+        """Return the values of the keys under the word of a node or section."""
+        values: dict[str, Part] = {}
+        bare, inner = bare_key(kind), inner_keys(kind)
+        is_short = isinstance(value, yaml.Sequence) if bare and bare.kind is Kind.NODES else bare is not None
+        if bare is not None and (not inner or (is_short and not isinstance(value, yaml.Mapping))):
+            root = yaml.Mapping(mark, (yaml.Entry(yaml.Scalar(mark, owner, bare.name), value),))
+            fields = Fields(owner, mark, root, [bare.name], self.parser.findings)
+            self.read(fields, bare, value, mark, values)
+            return values
+        fields = Fields(owner, mark, value, inner, self.parser.findings)
+        self.is_sound = self.is_sound and fields.sound
+        for name, key in inner.items():
+            found = fields.required(name) if key.is_required else fields.get(name)
+            if found is not None:
+                self.read(fields, key, found, fields.key_mark(name), values)
+            elif key.kind is Kind.NODE and key.is_required:
+                values[name] = unread(mark)
+        return values
 
-def _while(parser: NodeParser, head: Head) -> model.Node:
-    fields = _fields(parser, head)
-    condition = parser.node(fields.required("condition"), fields.key_mark("condition"))
-    body = parser.node(fields.required("do"), fields.key_mark("do"))
-    return model.WhileNode(head.mark, head.label, condition, body)
+    def read(self, fields: Fields, key: Key, value: yaml.Node, mark: Mark, values: dict[str, Part]) -> None:
+        """Read the value of a key into `values`; `mark` is the place of a node that is missing there."""
+        part = self._part(fields, key, value, mark)
+        if part is not None:
+            values[key.name] = part
 
+    def _part(self, fields: Fields, key: Key, value: yaml.Node, mark: Mark) -> Part | None:
+        match key.kind:
+            case Kind.NODE:
+                is_empty = isinstance(value, yaml.Scalar) and value.value is None
+                return (
+                    None
+                    if is_empty and key.is_bare and not key.is_required
+                    else self.parser.node(value, mark)
+                )
+            case Kind.NODES:
+                return self._nodes(fields, key, value)
+            case Kind.REASONS:
+                return fields.matches(key.name)
+            case Kind.VARIABLE:
+                return self._variable(fields, key.name)
+            case Kind.SECTION:
+                return self._section(key, value, mark)
+            case Kind.SECTIONS:
+                return tuple(self._sections(key, value))
+        return value_of(value, self.parser.findings)
 
-def _for_each(parser: NodeParser, head: Head) -> model.Node:
-    fields = _fields(parser, head)
-    for key in ("each", "in"):
-        fields.required(key)
-    each = Named(fields.text("each"), fields.value_mark("each"))
-    if fields.get("each") is not None and not NAME.fullmatch(each.name):
-        hint = "Write the bare name, for instance each: target; its value is $target."
-        parser.refuse(each.mark, "bad-name", f'"{each.name}" cannot name a variable', hint)
-        each = Named(each.name.removeprefix("$"), each.mark)
-    source = fields.value("in")
-    body = parser.node(fields.required("do"), fields.key_mark("do"))
-    if source is None or not NAME.fullmatch(each.name):
-        return model.UnknownNode(head.mark, head.label, (body,))
-    return model.ForEachNode(head.mark, head.label, each, source, body)
+    def _nodes(self, fields: Fields, key: Key, value: yaml.Node) -> tuple[model.Node, ...] | None:
+        found = self.parser.nodes(value, fields.owner)
+        if key.max_count is not None and len(found) > key.max_count:
+            message = f"a {fields.owner} has at most {key.max_count} branches, not {len(found)}"
+            self.parser.refuse(fields.mark, "too-large", message)
+            return None
+        return found or None
 
+    def _variable(self, fields: Fields, name: str) -> Named | None:
+        variable = Named(fields.text(name), fields.value_mark(name))
+        if NAME.fullmatch(variable.name):
+            return variable
+        hint = f"Write the bare name, for instance {name}: target; its value is $target."
+        self.parser.refuse(variable.mark, "bad-name", f'"{variable.name}" cannot name a variable', hint)
+        bare = variable.name.removeprefix("$")
+        return Named(bare, variable.mark) if NAME.fullmatch(bare) else None
 
-def _try(parser: NodeParser, head: Head) -> model.Node:
-    caught, finish = head.node.get("catch"), head.node.get("finally")
-    if caught is None and finish is None:
-        parser.refuse(head.mark, "missing-key", 'try needs a "catch" or a "finally" beside it')
-    return model.TryNode(
-        head.mark,
-        head.label,
-        parser.node(head.value, head.mark),
-        () if caught is None else tuple(_catches(parser, caught)),
-        None if finish is None else parser.node(finish, finish.mark),
-    )
+    def _section(self, key: Key, value: yaml.Node, mark: Mark) -> model.Section | None:
+        values = self.read_inner(key.name, mark, value, key.section)
+        required = (one for one in key.section.keys.values() if one.is_required and one.kind is Kind.CONSTANT)
+        return (
+            None
+            if any(one.name not in values for one in required)
+            else model.Section(key.section, mark, values)
+        )
 
-
-def _catches(parser: NodeParser, caught: Node) -> Iterator[model.Catch]:
-    """Yield what is caught: as with `on`, one needs no list."""
-    if not isinstance(caught, Sequence | Mapping):
-        message = f'catch takes "on" and "do", or a list of them, not {describe(plain(caught))}'
-        parser.refuse(caught.mark, "wrong-type", message)
-        return
-    if isinstance(caught, Sequence) and not caught.items:
-        parser.refuse(caught.mark, "empty-list", "catch needs at least one on and do")
-    for item in caught.items if isinstance(caught, Sequence) else (caught,):
-        fields = Fields("catch", item.mark, item, grammar.CATCH, parser.findings)
-        fields.required("on")
-        body = parser.node(fields.required("do"), fields.key_mark("do"))
-        yield model.Catch(fields.matches("on"), body)
-
-
-def _timeout(parser: NodeParser, head: Head) -> model.Node:
-    fields = _fields(parser, head)
-    fields.required("seconds")
-    seconds = fields.value("seconds") or Literal(1.0, head.mark)
-    body = parser.node(fields.required("do"), fields.key_mark("do"))
-    return model.TimeoutNode(head.mark, head.label, seconds, body)
-
-
-def _invert(parser: NodeParser, head: Head) -> model.Node:
-    return model.InvertNode(head.mark, head.label, parser.node(head.value, head.mark))
-
-
-def _succeed(parser: NodeParser, head: Head) -> model.Node:
-    empty = isinstance(head.value, Scalar) and head.value.value is None
-    body = None if empty else parser.node(head.value, head.mark)
-    return model.SucceedNode(head.mark, head.label, body)
-
-
-def _use(parser: NodeParser, head: Head) -> model.Node:
-    given = {key: head.node.get(key) for key in ("with", "returns")}
-    arguments, returns = (
-        {} if node is None else settings_of(node, key, parser.findings) for key, node in given.items()
-    )
-    if not (isinstance(head.value, Scalar) and isinstance(head.value.value, str)):
-        message = f"use takes the name of a subtree, not {describe(plain(head.value))}"
-        parser.refuse(head.value.mark, "wrong-type", message)
-        return unread(head.mark)
-    return model.UseNode(head.value.mark, head.label, head.value.text, arguments, returns)
-
-
-CONTROL: dict[str, Callable[[NodeParser, Head], model.Node]] = {
-    "sequence": _sequence,
-    "fallback": _fallback,
-    "parallel": _parallel,
-    "retry": _retry,
-    "repeat": _repeat,
-    "while": _while,
-    "for_each": _for_each,
-    "try": _try,
-    "timeout": _timeout,
-    "invert": _invert,
-    "succeed": _succeed,
-    "use": _use,
-}
-"""Every control node by its word in the file."""
+    def _sections(self, key: Key, value: yaml.Node) -> Iterable[model.Section]:
+        """Yield the sections of a list, or the only one."""
+        needed = " and ".join(f'"{name}"' for name in key.section.keys)
+        if not isinstance(value, yaml.Sequence | yaml.Mapping):
+            message = f"{key.name} takes {needed}, or a list of them, not {describe(yaml.plain(value))}"
+            self.parser.refuse(value.mark, "wrong-type", message)
+            return
+        if isinstance(value, yaml.Sequence) and not value.items:
+            self.parser.refuse(value.mark, "empty-list", f"{key.name} needs at least one {needed}")
+        for item in value.items if isinstance(value, yaml.Sequence) else (value,):
+            if (section := self._section(key, item, item.mark)) is not None:
+                yield section

@@ -17,18 +17,21 @@ from executive.mission.parse.params import parse_params
 from executive.mission.source import Mark
 from executive.mission.text.yaml_text import Mapping, Node, Scalar, Sequence, plain
 from executive.mission.words import describe
+from executive.tree.registry import ControlNodes
 
 _MISSION_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 
 
-def parse_mission(root: Node, overrides: Mapped[str, str], skills: Skills) -> tuple[Mission, list[Finding]]:
+def parse_mission(
+    root: Node, overrides: Mapped[str, str], skills: Skills, control: ControlNodes
+) -> tuple[Mission, list[Finding]]:
     """Return what the file says, as far as it can be read, and what is wrong with its form."""
     findings: list[Finding] = []
     start = replace(root.mark, length=1)
     fields = Fields("the mission", start, root, grammar.MISSION, findings)
     for key in ("mission", "cell", "tree"):
         fields.required(key)
-    parser = NodeParser(findings, skills)
+    parser = NodeParser(findings, skills, control)
     tree = fields.get("tree")
     mission = Mission(
         name=_name(fields),
@@ -85,7 +88,7 @@ def _names(items: Iterable[Node], takes: str, findings: list[Finding]) -> tuple[
     return tuple(named)
 
 
-def parse_library(root: Node, skills: Skills) -> tuple[Library, list[Finding]]:
+def parse_library(root: Node, skills: Skills, control: ControlNodes) -> tuple[Library, list[Finding]]:
     """Return what a library file says, as far as it can be read, and what is wrong with its form."""
     findings: list[Finding] = []
     start = replace(root.mark, length=1)
@@ -93,7 +96,7 @@ def parse_library(root: Node, skills: Skills) -> tuple[Library, list[Finding]]:
     for key in ("library", "trees"):
         fields.required(key)
     name = fields.text("library")
-    return Library(name, _trees(fields, NodeParser(findings, skills), name or "library")), findings
+    return Library(name, _trees(fields, NodeParser(findings, skills, control), name or "library")), findings
 
 
 def _trees(fields: Fields, parser: NodeParser, library: str = "") -> dict[str, Subtree]:

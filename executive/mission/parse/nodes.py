@@ -9,12 +9,13 @@ from dataclasses import replace
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.model import grammar
 from executive.mission.model import nodes as model
-from executive.mission.parse.control import CONTROL, Head, unread
+from executive.mission.parse.control import Head, bare_key, inner_keys, read_control, unread
 from executive.mission.parse.fields import settings_of
 from executive.mission.source import Mark
 from executive.mission.text.yaml_text import Entry, Mapping, Node, Scalar, Sequence, plain
 from executive.mission.words import describe
 from executive.skill import Skill
+from executive.tree.registry import ControlNodes
 
 Skills = SkillsByName[str, type[Skill]]
 _LABEL = re.compile(grammar.LABEL)
@@ -27,12 +28,13 @@ class NodeParser:
     A node that cannot be read becomes an unknown one, so that reading goes on.
     """
 
-    def __init__(self, findings: list[Finding], skills: Skills) -> None:
-        self.findings, self._skills = findings, skills
+    def __init__(self, findings: list[Finding], skills: Skills, control: ControlNodes) -> None:
+        self.findings, self._skills, self._control = findings, skills, control
+        self._words = [*control, grammar.USE]
 
     def silent(self) -> NodeParser:
         """Return a parser that keeps what is wrong to itself."""
-        return NodeParser([], self._skills)
+        return NodeParser([], self._skills, self._control)
 
     def node(self, node: Node | None, mark: Mark) -> model.Node:
         """Return the node that stands in the file, or an unknown one where there is none."""
@@ -63,15 +65,19 @@ class NodeParser:
 
     def _list(self, node: Sequence) -> model.Node:
         steps = self.nodes(node, "a list of steps")
-        return model.SequenceNode(node.mark, "", steps) if steps else unread(node.mark)
+        kind = self._control[grammar.SEQUENCE]
+        return (
+            model.InnerNode(node.mark, "", kind, {"do": steps}, is_list=True) if steps else unread(node.mark)
+        )
 
     def _word(self, node: Scalar) -> model.Node:
         word = node.text
-        if word == "succeed":
-            return model.SucceedNode(node.mark, "", None)
+        kind = self._control.get(word)
+        if kind is not None and (bare := bare_key(kind)) is not None and not bare.is_required:
+            return model.InnerNode(node.mark, "", kind, {})
         if isinstance(node.value, str) and _SKILL.fullmatch(word):
             return model.SkillNode(node.mark, "", word, {})
-        if word in CONTROL:
+        if word in self._words:
             self.refuse(node.mark, "missing-node", f'"{word}" needs a body: write {word}: ...')
         else:
             self._unknown(node.mark, word)
@@ -80,7 +86,7 @@ class NodeParser:
     def _mapping(self, node: Mapping) -> model.Node:
         label = self._label(node)
         words = [entry for entry in node.entries if entry.key.text != "as"]
-        heads = [e for e in words if e.key.text in CONTROL or _SKILL.fullmatch(e.key.text)]
+        heads = [e for e in words if e.key.text in self._words or _SKILL.fullmatch(e.key.text)]
         if not heads:
             for entry in words:
                 self._unknown(entry.key.mark, entry.key.text)
@@ -96,11 +102,12 @@ class NodeParser:
             parts = [self.silent()._head(node, other, "") for other in others]
             return model.UnknownNode(head.key.mark, label, (self._head(node, head, ""), *parts))
         name = head.key.text
-        partners = grammar.CONTROL[name].partners if name in grammar.CONTROL else ()
-        allowed = (name, "as", *partners)
+        kind = self._control.get(name)
+        partners = [key.name for key in kind.keys.values() if key.is_partner] if kind else []
+        allowed = (name, "as", *(grammar.USE_PARTNERS if name == grammar.USE else partners))
         for entry in words:
             if entry not in heads and entry.key.text not in allowed:
-                inside = name in grammar.CONTROL and entry.key.text in grammar.CONTROL[name].keys
+                inside = kind is not None and entry.key.text in inner_keys(kind)
                 hint = f"Indent it: it stands below {name}." if inside else ""
                 hint = hint or alternatives(entry.key.text, allowed[1:], f"Beside {name} may stand")
                 message = f'"{entry.key.text}" may not stand beside "{name}"'
@@ -111,11 +118,26 @@ class NodeParser:
     def _head(self, node: Mapping, head: Entry, label: str) -> model.Node:
         """Return the node of one word in a mapping, with the partners that stand beside it."""
         name = head.key.text
-        if name in CONTROL:
-            return CONTROL[name](self, Head(node, name, head.key.mark, label, head.value))
+        if name == grammar.USE:
+            return self._use(node, head, label)
+        if name in self._control:
+            control = Head(node, name, head.key.mark, label, head.value)
+            return read_control(self, control, self._control[name])
         known = self._skills[name].params if name in self._skills else {}
         settings = settings_of(head.value, name, self.findings, next(iter(known), "name"))
         return model.SkillNode(head.key.mark, label, name, settings)
+
+    def _use(self, node: Mapping, head: Entry, label: str) -> model.Node:
+        """Return the use of a subtree."""
+        arguments, returns = (
+            {} if (given := node.get(key)) is None else settings_of(given, key, self.findings)
+            for key in grammar.USE_PARTNERS
+        )
+        if not (isinstance(head.value, Scalar) and isinstance(head.value.value, str)):
+            message = f"use takes the name of a subtree, not {describe(plain(head.value))}"
+            self.refuse(head.value.mark, "wrong-type", message)
+            return unread(head.key.mark)
+        return model.UseNode(head.value.mark, label, head.value.text, arguments, returns)
 
     def _label(self, node: Mapping) -> str:
         written = node.get("as")
@@ -131,10 +153,13 @@ class NodeParser:
     def _unknown(self, mark: Mark, word: str) -> None:
         alike = {name.lower(): name for name in self._skills}
         skill = alike.get(word.replace("_", "").replace(" ", "").lower())
-        if word in grammar.ELSEWHERE:
-            hint = grammar.ELSEWHERE[word]
-        elif skill:
-            hint = f'Did you mean the skill "{skill}"?'
-        else:
-            hint = f"{alternatives(word, CONTROL, 'Control nodes are')} A subtree is written as use: NAME."
+        elsewhere = dict(grammar.ELSEWHERE)
+        for name, kind in self._control.items():
+            partners = [key.name for key in kind.keys.values() if key.is_partner]
+            elsewhere |= dict.fromkeys(partners, f"It stands beside {name}, not below it.")
+            elsewhere |= kind.elsewhere
+        hint = elsewhere.get(word) or (f'Did you mean the skill "{skill}"?' if skill else "")
+        if not hint:
+            known = alternatives(word, self._words, "Control nodes are")
+            hint = f"{known} A subtree is written as use: NAME."
         self.refuse(mark, "unknown-node", f'there is no control node "{word}"', hint)

@@ -17,6 +17,7 @@ from executive.mission.parse.nodes import Skills
 from executive.mission.source import Source
 from executive.mission.text.files import below, read_source
 from executive.mission.text.yaml_text import parse_yaml
+from executive.tree.registry import ControlNodes
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,11 @@ class GivenCell:
 
 
 def read_mission(
-    file: Path, overrides: Mapping[str, str], skills: Skills, given: GivenCell | None = None
+    file: Path,
+    overrides: Mapping[str, str],
+    skills: Skills,
+    control: ControlNodes,
+    given: GivenCell | None = None,
 ) -> MissionFiles:
     """Return a mission file and the files that it names; a cell that is `given` instead of its cell file.
 
@@ -66,11 +71,12 @@ def read_mission(
     root, findings = parse_yaml(source)
     if root is None:
         raise MissionError(in_file_order(findings, source.path))
-    mission, malformed = parse_mission(root, overrides, skills)
+    mission, malformed = parse_mission(root, overrides, skills, control)
     findings += malformed
     trees: dict[str, Subtree] = dict(mission.trees)
     read = {
-        named.name: _add_library(named, file.parent, skills, trees, findings) for named in mission.libraries
+        named.name: _add_library(named, file.parent, skills, control, trees, findings)
+        for named in mission.libraries
     }
     texts = {name: text for name, text in read.items() if text is not None}
     whole = len(texts) == len(read)
@@ -86,7 +92,12 @@ def read_mission(
 
 
 def _add_library(
-    named: Named, folder: Path, skills: Skills, trees: dict[str, Subtree], findings: list[Finding]
+    named: Named,
+    folder: Path,
+    skills: Skills,
+    control: ControlNodes,
+    trees: dict[str, Subtree],
+    findings: list[Finding],
 ) -> str | None:
     """Add the subtrees of a library to `trees` and return its text, or None where it cannot be read."""
     try:
@@ -98,7 +109,7 @@ def _add_library(
     findings += wrong
     if root is None:
         return None
-    library, malformed = parse_library(root, skills)
+    library, malformed = parse_library(root, skills, control)
     findings += malformed
     for name, subtree in library.trees.items():
         if name not in trees:

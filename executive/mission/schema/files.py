@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Mapping, Sequence
+from typing import TypeAlias
 
 from executive.mission.model import grammar
-from executive.mission.model.grammar import Form, Key
+from executive.mission.model.grammar import Key
+from executive.mission.parse.control import bare_key, inner_keys
 from executive.mission.parse.fields import NAME
 from executive.mission.parse.params import TYPES
 from executive.mission.schema.types import (
@@ -19,53 +22,69 @@ from executive.mission.schema.types import (
     words,
 )
 from executive.skill import Skill
+from executive.tree.keys import Key as DeclaredKey
+from executive.tree.keys import Kind
+from executive.tree.node import ControlNode
+from executive.tree.registry import ControlNodes
+
+Skills: TypeAlias = Mapping[str, type[Skill]]
 
 _NAME = NAME.pattern
 
 
-def mission_schema(skills: Mapping[str, type[Skill]]) -> Json:
-    """Return the schema of a mission file that may use these skills; `library` defines library files."""
-    return _file("A mission", grammar.MISSION, skills)
+def mission_schema(skills: Skills, control: ControlNodes) -> Json:
+    """Return the schema of a mission file that may use these skills and control nodes.
+
+    Its definition `library` is that of library files.
+    """
+    return _file("A mission", grammar.MISSION, skills, control)
 
 
-def library_schema(skills: Mapping[str, type[Skill]]) -> Json:
-    """Return the schema of a library file whose subtrees may use these skills."""
-    return _file("A library", grammar.LIBRARY, skills)
+def library_schema(skills: Skills, control: ControlNodes) -> Json:
+    """Return the schema of a library file whose subtrees may use these skills and control nodes."""
+    return _file("A library", grammar.LIBRARY, skills, control)
 
 
-def _file(title: str, keys: Mapping[str, Key], skills: Mapping[str, type[Skill]]) -> Json:
+def _file(title: str, keys: Mapping[str, Key], skills: Skills, control: ControlNodes) -> Json:
+    forms = {word: _form(kind) for word, kind in control.items()}
+    forms[grammar.USE] = {"title": grammar.USE, "description": "A subtree by its name.", **_KINDS["word"]}
     return {
         "$schema": DIALECT,
         "title": title,
         **_mapping(keys),
         "definitions": {
-            "node": _node([*skills, *grammar.CONTROL], skills),
+            "node": _node(skills, control),
             "tree": {"anyOf": [_ref("node"), {"title": "A subtree", **_mapping(grammar.SUBTREE)}]},
             "param": _param(),
             "library": _mapping(grammar.LIBRARY),
-            "catch": _mapping(grammar.CATCH),
             "reasons": _reasons(skills),
             "label": {"type": "string", "pattern": f"^{grammar.LABEL}$"},
             "reference": {"title": "$name", "type": "string", "pattern": rf"^\${_NAME}$"},
             **{name: settings(name, skill) for name, skill in skills.items()},
-            **{word: _form(word, form) for word, form in grammar.CONTROL.items()},
+            **forms,
         },
     }
 
 
-def _node(heads: list[str], skills: Mapping[str, type[Skill]]) -> Json:
+def _node(skills: Skills, control: ControlNodes) -> Json:
     """Return the schema of a node: a word, a list, or a mapping with one head and what belongs to it.
 
     A mapping is judged by the heads it has, never by trying one kind of node after the other, so an
     editor complains about the key that is wrong and completes the keys that fit.
     """
     label: Json = {**_ref("label"), "description": grammar.AS.doc}
+    heads = [*skills, *control, grammar.USE]
     bodiless = [
-        {"const": word, "title": word, "description": form.doc, **ALTERNATIVE}
-        for word, form in grammar.CONTROL.items()
-        if form.short == "node?"
+        {"const": word, "title": word, "description": _sentence(kind), **ALTERNATIVE}
+        for word, kind in control.items()
+        if (bare := bare_key(kind)) is not None and not bare.is_required
     ]
-    partners = {word: _properties(form.partners) for word, form in grammar.CONTROL.items()}
+    partners: dict[str, Json] = {grammar.USE: _properties(grammar.USE_PARTNERS)}
+    demands: dict[str, Json] = {}
+    for word, kind in control.items():
+        beside = {name: key for name, key in kind.keys.items() if key.is_partner}
+        partners[word] = {name: _key(key) for name, key in beside.items()}
+        demands[word] = _one_of(kind.one_of) if set(kind.one_of) & set(beside) else {}
     return {
         "title": "A node",
         "anyOf": [
@@ -79,7 +98,7 @@ def _node(heads: list[str], skills: Mapping[str, type[Skill]]) -> Json:
             head: {
                 "properties": {head: _ref(head), "as": label, **partners.get(head, {})},
                 "additionalProperties": False,
-                **_one_of(grammar.CONTROL[head].one_of if partners.get(head) else ()),
+                **demands.get(head, {}),
             }
             for head in heads
         },
@@ -93,10 +112,59 @@ def _node(heads: list[str], skills: Mapping[str, type[Skill]]) -> Json:
     }
 
 
-def _form(word: str, form: Form) -> Json:
-    shapes = [_KINDS[form.short]] if form.short else []
-    shapes += [{**_mapping(form.keys), **_one_of(form.one_of)}] if form.keys else []
-    return {"title": word, "description": form.doc, **(shapes[0] if len(shapes) == 1 else {"anyOf": shapes})}
+def _form(kind: type[ControlNode]) -> Json:
+    """Return the schema of the value under the word of a control node."""
+    bare, inner = bare_key(kind), inner_keys(kind)
+    shapes = [_value_of(bare)] if bare else []
+    if inner:
+        demand = _one_of(kind.one_of) if set(kind.one_of) <= set(inner) else {}
+        shapes.append({**_object(inner), **demand})
+    whole = shapes[0] if len(shapes) == 1 else {"anyOf": shapes}
+    return {"title": kind.word, "description": _sentence(kind), **whole}
+
+
+def _sentence(kind: type[ControlNode]) -> str:
+    return (inspect.getdoc(kind) or "").partition("\n")[0]
+
+
+def _object(keys: Mapping[str, DeclaredKey]) -> Json:
+    return {
+        "type": "object",
+        "properties": {name: _key(key) for name, key in keys.items()},
+        "required": [name for name, key in keys.items() if key.is_required],
+        "additionalProperties": False,
+    }
+
+
+def _key(key: DeclaredKey) -> Json:
+    return {"description": key.doc, **_value_of(key)}
+
+
+def _value_of(key: DeclaredKey) -> Json:
+    """Return the schema of the value of a key of a control node."""
+    match key.kind:
+        case Kind.NODE:
+            is_needed = key.is_required or not key.is_bare
+            return _ref("node") if is_needed else {"allOf": [{"anyOf": [_ref("node"), {"type": "null"}]}]}
+        case Kind.NODES:
+            return _KINDS["nodes"]
+        case Kind.REASONS:
+            return _ref("reasons")
+        case Kind.VARIABLE:
+            return _KINDS["word"]
+        case Kind.ELEMENTS:
+            return _KINDS["list"]
+        case Kind.SECTIONS:
+            section = _object(key.section.keys)
+            return {**section, "type": ["array", "object"], "items": section}
+        case Kind.SECTION:
+            section, bare = _object(key.section.keys), bare_key(key.section)
+            if bare is None:
+                return section
+            written = bare.adapter().json_schema()
+            return or_reference({**section, **written, "type": [written["type"], "object"]})
+    written = key.adapter().json_schema()
+    return or_reference(*written.get("anyOf", [written]))
 
 
 def _one_of(keys: Sequence[str]) -> Json:
@@ -104,7 +172,7 @@ def _one_of(keys: Sequence[str]) -> Json:
     return {"anyOf": [{"required": [key]} for key in keys]} if keys else {}
 
 
-def _reasons(skills: Mapping[str, type[Skill]]) -> Json:
+def _reasons(skills: Skills) -> Json:
     one = [
         {"title": "Skill.reason", "enum": failures(skills)},
         {"title": "label.reason", "type": "string", "pattern": rf"^{grammar.LABEL}\.{_NAME}$"},
@@ -129,21 +197,7 @@ def _mapping(keys: Mapping[str, Key]) -> Json:
 
 
 def _properties(keys: Mapping[str, Key]) -> Json:
-    return {name: {"description": key.doc, **_value(key)} for name, key in keys.items()}
-
-
-def _value(key: Key) -> Json:
-    given = {"minimum": key.minimum, "exclusiveMinimum": key.above}
-    bounds = {word: bound for word, bound in given.items() if bound is not None}
-    if key.kind in ("integer", "number", "boolean"):
-        return or_reference({"type": key.kind, **bounds})
-    if key.kind == "count":
-        return or_reference({"enum": ["all", "any", "lead"]}, {"type": "integer", **bounds})
-    if key.kind == "catches":
-        return {**_mapping(grammar.CATCH), "type": ["array", "object"], "items": _ref("catch")}
-    if key.kind == "backoff":
-        return or_reference({**_mapping(grammar.BACKOFF), "type": ["number", "object"], **bounds})
-    return _KINDS[key.kind]
+    return {name: {"description": key.doc, **_KINDS[key.kind]} for name, key in keys.items()}
 
 
 def _ref(name: str) -> Json:
@@ -167,9 +221,8 @@ _WORD: Json = {"pattern": "^[A-Za-z_][A-Za-z0-9_-]*$"}
 
 _KINDS: Mapping[str, Json] = {
     "node": _ref("node"),
-    "node?": {"allOf": [{"anyOf": [_ref("node"), {"type": "null"}]}]},
     "nodes": {"type": "array", "items": _ref("node"), "minItems": 1},
-    "reasons": _ref("reasons"),
+    "number": {"type": "number"},
     "text": {"type": ["string", "number", "boolean"]},
     "word": {"type": "string", **_WORD},
     "words": {**_one_or_several({"pattern": rf"^\$?{_NAME}$"}), "minItems": 0},
@@ -183,4 +236,4 @@ _KINDS: Mapping[str, Json] = {
     "trees": _named(_ref("tree")),
     "args": {**_named({}), "type": ["object", "array", "null"], "items": {"type": "string", **_WORD}},
 }
-"""What stands under a key, by its kind; kinds made of other keys are built in `_value`."""
+"""Content of a key, by its kind."""

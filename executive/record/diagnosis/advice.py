@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from executive.errors import Unavailable
-from executive.mission.model import nodes
-from executive.mission.model.nodes import Node
-from executive.mission.model.values import Value
+from executive.mission.model.instance import node_of
+from executive.mission.model.nodes import InnerNode
+from executive.mission.model.values import Literal
 from executive.record.diagnosis.case import Case
-from executive.record.diagnosis.chain import attempts, constant
+from executive.record.diagnosis.chain import Link
 from executive.record.timeline.activation import Reading
 from executive.record.timeline.items import ItemTimeline
+from executive.tree.inspection import Advice
+from executive.tree.registry import control_nodes
 
 REMEDIES: Mapping[str, str] = {
     "camera_moved": "mount camera and bins as the cell file says, or measure the pose again"
@@ -64,29 +66,29 @@ def _ways_on(case: Case) -> Iterator[str]:
     """Yield what the mission would have to say for this failure not to end it."""
     if not case.links:
         return
-    tries = [link for link in case.links if isinstance(link.node, nodes.TryNode)]
-    passed_by = [link.node for link in tries if link.below is getattr(link.node, "do", None)]
-    if passed_by:
-        yield f"catch it in the try at {case.place(passed_by[-1])}"
+    advice = [(link, one) for link in reversed(case.links) if link.model for one in _advice_of(link)]
+    handlers = [(link, one) for link, one in advice if link.model and link.model.remedy]
+    if handlers:
+        yield _located(case, *handlers[0])
     else:
-        yield f"put a try with a catch for it around {case.place(case.links[-1].node)}"
-    for link in reversed(case.links):
-        node = link.node
-        if isinstance(node, nodes.TimeoutNode) and link.below is None:
-            yield f"allow more than {constant(node.seconds):g} s {_where(case, node, node.seconds)}"
-        elif isinstance(node, nodes.RetryNode) and link.gave_up:
-            assert node.recover is not None
-            yield f"deal with {link.ran.last_handled} in the recovery at {case.place(node.recover)}"
-            return
-        elif isinstance(node, nodes.RetryNode) and (link.catches(node.on) or not node.on):
-            attempt, most = attempts(link)
-            if attempt == most:
-                yield f"allow more than {most} attempt{'s' * (most > 1)} {_where(case, node, node.attempts)}"
-            return
+        remedy = next(kind.remedy for kind in control_nodes().values() if kind.remedy)
+        yield f"{remedy} {case.place(case.links[-1].node)}"
+    for link, one in advice:
+        if (link, one) not in handlers:
+            yield _located(case, link, one)
+            if link.attempt:
+                return
 
 
-def _where(case: Case, node: Node, value: Value) -> str:
-    """Return where a number can be changed: on the command line if it is a param, else in the file."""
-    params = case.loaded.mission.params.items()
-    name = next((name for name, param in params if param.value.mark == value.mark), "")
-    return f"with --set {name}=..." if name else f"at {case.place(node)}"
+def _advice_of(link: Link) -> Iterator[Advice]:
+    if link.model:
+        yield from link.model.advise(link.failure)
+
+
+def _located(case: Case, link: Link, advice: Advice) -> str:
+    """Return an advice with the place to change: the command line if the value is a param, else the file."""
+    at = node_of(advice.child) if advice.child else link.node
+    value = link.node.values.get(advice.key) if isinstance(link.node, InnerNode) else None
+    params = case.loaded.mission.params.items() if isinstance(value, Literal) else ()
+    name = next((name for name, param in params if param.value.mark == getattr(value, "mark", None)), "")
+    return f"{advice.text} {f'with --set {name}=...' if name else f'at {case.place(at)}'}"

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 from executive.errors import RecordLost
 from executive.events import RunEnded
-from executive.mission.model import nodes
-from executive.mission.model.nodes import Node
-from executive.record.diagnosis.chain import attempts, chain, way
+from executive.mission.model.nodes import Node, SkillNode
+from executive.record.diagnosis.chain import chain, way
 from executive.record.timeline.activation import skill_name
 from executive.record.timeline.timeline import Timeline
 
@@ -81,18 +80,18 @@ def verdict(case: Case) -> str:
         return f"{len(case.lost)} {were} lost: {', '.join(list(case.lost)[:MOST])}{more}"
     if not case.links:
         return end.message
-    if isinstance(case.node, nodes.SkillNode):
+    if isinstance(case.node, SkillNode):
         reason = end.reason.rpartition(".")[2]
         return f"{case.named(end.node)} failed ({reason}){_tried(case)}: {end.message}"
     return f"{case.links[-1].name}{_tried(case)}: {end.message}{during}"
 
 
 def _tried(case: Case) -> str:
-    """Return the attempt that failed, as counted by the innermost retry; "" for the first."""
-    retry = next((link for link in reversed(case.links) if isinstance(link.node, nodes.RetryNode)), None)
-    if retry is None:
+    """Return the attempt that failed, as counted by the innermost node that counts; "" for the first."""
+    attempts = next((link.attempt for link in reversed(case.links) if link.attempt), None)
+    if attempts is None:
         return ""
-    attempt, most = attempts(retry)
+    attempt, most = attempts
     if attempt == 1:
         return ""
     return f" on the last of {most} attempts" if attempt == most else f" on attempt {attempt} of {most}"

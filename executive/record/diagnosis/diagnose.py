@@ -9,12 +9,10 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING
 
 from executive.events import RunEnded
-from executive.mission.model import nodes
-from executive.mission.model.nodes import Node
+from executive.mission.model.nodes import Node, SkillNode
 from executive.mission.model.paths import name_of
 from executive.record.diagnosis.advice import advice
 from executive.record.diagnosis.case import Case, verdict
-from executive.record.diagnosis.chain import why
 from executive.record.diagnosis.diagnosis import DecidingNode, Diagnosis, ItemFailure, LostItem, PassedNode
 from executive.record.frames import picture_of
 from executive.record.result import ENDED
@@ -75,9 +73,9 @@ def diagnose(
         node=_deciding_node(case),
         item=case.item,
         chain=[
-            PassedNode(link.node.path, link.name, _place(link.node), why(link))
+            PassedNode(link.node.path, link.name, _place(link.node), link.why)
             for link in case.links
-            if not isinstance(link.node, nodes.UseNode | nodes.SequenceNode)
+            if link.why or link is case.links[-1]
         ],
         reads=reads,
         look=_last_look(case),
@@ -97,7 +95,7 @@ def diagnose(
 def _deciding_reads(case: Case, skills: Mapping[str, type[Skill]]) -> Iterator[Reading]:
     """Yield the exceptions of the cell for the deciding skill, else its deciding inputs, the latest first."""
     node, ran = case.node, case.decided
-    if ran is None or not isinstance(node, nodes.SkillNode):
+    if ran is None or not isinstance(node, SkillNode):
         return
     refused = [reading for reading in ran.readings if reading.raised and reading.tick == ran.end_tick]
     names = [name for part in skills[node.skill].uses for name in DECIDING_INPUTS.get(part, ())]
@@ -109,7 +107,7 @@ def _deciding_node(case: Case) -> DecidingNode | None:
     node = case.node
     if node is None:
         return None
-    name = case.named(node.path) if isinstance(node, nodes.SkillNode) else name_of(node)
+    name = case.named(node.path) if isinstance(node, SkillNode) else name_of(node)
     return DecidingNode(node.path, name, _place(node))
 
 

@@ -2,31 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from executive.mission.outline import OutlineNode
+from executive.tree.node import ControlNode
 from executive.view.text import fitted
 from executive.view.tree.outline import reads, why, writes
-
-SYMBOLS: Mapping[str, str] = {
-    "sequence": "→",
-    "fallback": "?",
-    "parallel": "⇉",
-    "retry": "↻",
-    "repeat": "↻",
-    "while": "↺",
-    "for_each": "∀",
-    "try": "↯",
-    "timeout": "◷",
-    "invert": "¬",
-    "succeed": "✓",
-    "use": "…",
-}
-"""What stands beside the word of a control node."""
-
-UNKNOWN = "◇"
-"""What stands beside a word that has no symbol of its own."""
 
 COLUMNS = 28
 """Length of a node's lines [characters]."""
@@ -51,7 +32,7 @@ class Card:
 
 def card(node: OutlineNode) -> Card:
     """Return what a picture says of a node."""
-    symbol = "" if node.kind == "skill" else SYMBOLS.get(node.kind, UNKNOWN)
+    symbol = "" if node.kind == "skill" else node.symbol or ControlNode.symbol
     title = "".join(fitted(node.title, COLUMNS))
     lines = fitted(node.when, COLUMNS, 2) + fitted(node.detail, COLUMNS, 3 if symbol else 2)
     return Card(symbol, title, lines, "\n".join(_facts(node)))

@@ -2,20 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from executive.mission.outline import OutlineNode, children
+from executive.tree.node import ControlNode
 from executive.view.text import writable
 from executive.view.tree.card import card
-
-SHAPES: Mapping[str, str] = {
-    "skill": "box",
-    "sequence": "box",
-    "fallback": "octagon",
-    "parallel": "parallelogram",
-    **dict.fromkeys(("retry", "repeat", "while", "for_each"), "hexagon"),
-}
-"""Shapes by kind; others are ellipses."""
 
 
 def dot(nodes: Sequence[OutlineNode], name: str) -> str:
@@ -48,7 +40,7 @@ def _branch(index: int, nodes: Sequence[OutlineNode], below: Sequence[Sequence[i
 def _node(node: OutlineNode) -> str:
     shown = card(node)
     label = "\n".join([f"{shown.symbol} {shown.title}".strip(), *shown.lines])
-    shape = SHAPES.get(node.kind, "ellipse")
+    shape = "box" if node.kind == "skill" else node.shape or ControlNode.shape
     style = ', style="rounded"' if node.kind == "skill" else ""
     tooltip = _quoted(shown.tooltip)
     return f"{_quoted(node.path)} [label={_quoted(label)}, shape={shape}{style}, tooltip={tooltip}];"

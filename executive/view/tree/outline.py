@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Collection, Iterator, Sequence
 
+from executive.mission.model.grammar import USE
 from executive.mission.outline import Connection, OutlineNode, children
 
 WIDTH = 100
@@ -135,4 +136,7 @@ def _content(branch: Sequence[OutlineNode]) -> list[tuple[int, str, str]]:
 def _use(node: OutlineNode, subtree: str, detail: str) -> OutlineNode:
     """Return what stands for a subtree that begins with this node; those around it stay what they are."""
     around = node.subtrees[: node.subtrees.index(subtree)]
-    return OutlineNode(node.path, node.name, node.depth, detail, "use", subtree, node.slot, node.when, around)
+    return OutlineNode(
+        node.path, node.name, node.depth, detail, USE, subtree, node.slot, node.when, around, symbol="…",
+        shape="ellipse",
+    )  # fmt: skip

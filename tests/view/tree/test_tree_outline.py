@@ -9,15 +9,17 @@ from py_trees.behaviour import Behaviour
 
 from executive.mission.outline import Connection, OutlineNode, children, outline
 from executive.skill import In, Metres, Out, Skill, param, port
-from executive.tree.blackboard import Scope
+from executive.tree.blackboard import Blackboard
+from executive.tree.failure import Reason
 from executive.tree.node import Site
 from executive.tree.retry import Retry
 from executive.tree.sequence import Sequence
-from executive.tree.skill_leaf import SkillNode, Wiring
-from executive.tree.try_catch import Try
+from executive.tree.skill_leaf import SkillLeaf, Wiring
+from executive.tree.try_catch import Catch, TryCatch
 from executive.view.tree.outline import WIDTH, drawn, folded
 
 CELL: Any = SimpleNamespace()
+MISSED = (Reason("Pick", "missed"),)
 
 
 class Pick(Skill):
@@ -33,9 +35,13 @@ class Pick(Skill):
     reasons: ClassVar = ("missed", "blocked")
 
 
-def pick(path: str, label: str = "", wiring: Wiring | None = None) -> SkillNode:
+def make_site(path: str, label: str = "") -> Site:
+    return Site(path, CELL, Blackboard(), label)
+
+
+def pick(path: str, label: str = "", wiring: Wiring | None = None) -> SkillLeaf:
     wired = Wiring({"height": 0.2}, {"seen": "seen", "only": "item"}, {"held": "thing"})
-    return SkillNode(Site(path, label), "Pick", Pick, wiring or wired, CELL, Scope())
+    return SkillLeaf(make_site(path, label), "Pick", Pick, wiring or wired, CELL)
 
 
 def in_subtree(node: Behaviour, *subtrees: str) -> Behaviour:
@@ -45,17 +51,17 @@ def in_subtree(node: Behaviour, *subtrees: str) -> Behaviour:
 
 def look(path: str, height: float = 0.2) -> Behaviour:
     wiring = Wiring({"height": height})
-    return in_subtree(Sequence(Site(path), [pick(f"{path}/Pick", wiring=wiring)]), "look")
+    return in_subtree(Sequence(make_site(path), do=[pick(f"{path}/Pick", wiring=wiring)]), "look")
 
 
 def tree() -> Behaviour:
     """Return a retry in a try, whose catch and recovery use the subtree `look`."""
     retry = Retry(
-        Site("tree/try/retry"), pick("tree/try/retry/do/Pick"), 3, [("Pick", "missed")],
-        look("tree/try/retry/recover/look"),
+        make_site("tree/try/retry"), attempts=3, on=MISSED, do=pick("tree/try/retry/do/Pick"),
+        recover=look("tree/try/retry/recover/look"),
     )  # fmt: skip
-    handlers = [([("Pick", "missed")], look("tree/try/catch/1/look", 0.3))]
-    return Try(Site("tree/try"), retry, handlers, look("tree/try/finally/look"))
+    catch = [Catch(on=MISSED, do=look("tree/try/catch/1/look", 0.3))]
+    return TryCatch(make_site("tree/try"), do=retry, catch=catch, finally_=look("tree/try/finally/look"))
 
 
 def test_a_skill_tells_what_the_mission_connects_and_what_it_declares():
@@ -78,17 +84,13 @@ def test_every_node_knows_its_children_what_it_is_to_its_parent_and_which_subtre
 
 
 def test_a_node_knows_after_which_failures_it_runs():
-    class Says(Try):
-        def when(self, child: Behaviour) -> str:
-            return "on Pick.missed" if child.path.endswith("look") else ""
-
-    handlers = [([("Pick", "missed")], look("tree/try/catch/1/look"))]
-    root = Says(Site("tree/try"), pick("tree/try/Pick"), handlers)
+    catch = [Catch(on=MISSED, do=look("tree/try/catch/1/look"))]
+    root = TryCatch(make_site("tree/try"), do=pick("tree/try/Pick"), catch=catch)
     assert [node.when for node in outline(root)] == ["", "", "on Pick.missed", ""]
 
 
 def test_ports_and_reasons_stand_below_the_skill():
-    nodes = outline(Sequence(Site("tree"), [pick("tree/Pick"), pick("tree/other", "other")]))
+    nodes = outline(Sequence(make_site("tree"), do=[pick("tree/Pick"), pick("tree/other", "other")]))
     assert drawn(nodes, ports=True, reasons=True).splitlines() == [
         "tree",
         "├─ Pick  (height: 0.2, only: $item, held: $thing)",
@@ -114,8 +116,9 @@ def test_a_catch_tells_what_it_is_for_with_the_reasons():
 def test_long_lines_are_wrapped_under_their_node():
     wiring = Wiring(inputs={"seen": "a_rather_long_name"}, outputs={"held": "b" * 60})
     body = pick("tree/retry/do/Pick", wiring=wiring)
-    on = [("Pick", reason) for reason in ("missed", "blocked", "unreachable", "dropped", "slipped")]
-    lines = drawn(outline(Retry(Site("tree/retry"), body, 3, on)), ports=True).splitlines()
+    on = [Reason("Pick", reason) for reason in ("missed", "blocked", "unreachable", "dropped", "slipped")]
+    root = Retry(make_site("tree/retry"), attempts=3, on=on, do=body)
+    lines = drawn(outline(root), ports=True).splitlines()
     assert max(map(len, lines)) <= WIDTH
     assert lines[1] == "│    Pick.slipped)"
     assert lines[-1].startswith("        ") and lines[-1].endswith("b")
@@ -141,5 +144,5 @@ def test_a_folded_tree_shows_every_subtree_once():
 
 def test_a_folded_subtree_stays_within_those_around_it():
     first, second = look("tree/1:look"), look("tree/2:wide/look")
-    shown = folded(outline(Sequence(Site("tree"), [first, in_subtree(second, "wide", "look")])))
+    shown = folded(outline(Sequence(make_site("tree"), do=[first, in_subtree(second, "wide", "look")])))
     assert [(node.title, node.subtrees) for node in shown[2:]] == [("Pick", ()), ("look", ("wide",))]

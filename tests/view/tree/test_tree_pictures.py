@@ -8,8 +8,10 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from executive.mission.outline import Connection, OutlineNode
+from executive.tree.node import ControlNode
+from executive.tree.registry import control_nodes
 from executive.view.text import writable
-from executive.view.tree.card import UNKNOWN, card
+from executive.view.tree.card import card
 from executive.view.tree.dot import dot
 from executive.view.tree.svg import Note, identifier, svg
 
@@ -19,7 +21,9 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 
 def control(path: str, depth: int, word: str, **more) -> OutlineNode:
-    return OutlineNode(path, word, depth, more.pop("detail", ""), word, more.pop("title", word), **more)
+    kind = control_nodes().get(word, ControlNode)
+    detail, title = more.pop("detail", ""), more.pop("title", word)
+    return OutlineNode(path, word, depth, detail, word, title, symbol=kind.symbol, shape=kind.shape, **more)
 
 
 def skill(path: str, depth: int, name: str, **more) -> OutlineNode:
@@ -109,7 +113,7 @@ def test_the_title_of_a_node_says_everything():
 def test_a_word_that_nobody_knows_is_drawn_like_any_other():
     node = control("tree/dance", 0, "dance")
     (group,) = groups(parsed([node])).values()
-    assert (texts(group, "symbol"), texts(group, "title")) == ([UNKNOWN], ["dance"])
+    assert (texts(group, "symbol"), texts(group, "title")) == ([ControlNode.symbol], ["dance"])
     assert "shape=ellipse" in dot([node], "x")
 
 

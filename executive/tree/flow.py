@@ -1,13 +1,15 @@
-"""What is known at a place of the tree, whatever way led there: variables, the tool, failures under way."""
+"""Abstract execution of a tree: the facts that hold on every way to a node, and how a node may end."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import reduce
+from typing import TypeAlias
 
-from executive.mission.model.values import Match
 from executive.skill import ANY, EMPTY, HOLDING, ToolState
+from executive.tree.failure import Reason
+from executive.tree.keys import Child
 
 ANYTHING = "*"
 """Source or reason of a failure that nothing is known about."""
@@ -107,15 +109,15 @@ class Raise:
     origin: str
     labels: frozenset[str] = frozenset()
 
-    def may_match(self, matches: Iterable[Match]) -> bool:
+    def may_match(self, matches: Iterable[Reason]) -> bool:
         """Tell whether one of the names may mean this failure."""
         return any(self._is(match, unknown=True) for match in matches)
 
-    def must_match(self, matches: Iterable[Match]) -> bool:
+    def must_match(self, matches: Iterable[Reason]) -> bool:
         """Tell whether one of the names surely means this failure."""
         return any(self._is(match, unknown=False) for match in matches)
 
-    def _is(self, match: Match, unknown: bool) -> bool:
+    def _is(self, match: Reason, unknown: bool) -> bool:
         sources = {self.source, *self.labels}
         return (match.reason == self.reason or (unknown and self.reason == ANYTHING)) and (
             match.source in sources or (unknown and self.source == ANYTHING)
@@ -148,6 +150,27 @@ class Flow:
             named = replace(failure, labels=failure.labels | {label})
             failures[named] = state.join(failures.get(named, state))
         return replace(self, failures=failures)
+
+
+Enter: TypeAlias = Callable[[Child, State], Flow]
+"""Function that returns how a child may end if it is entered in a state."""
+
+
+def loop(
+    enter: Enter, child: Child, state: State, again: Callable[[Flow], State | None]
+) -> tuple[Flow, State]:
+    """Return how a child may end that is entered repeatedly, and the facts that hold at every entry.
+
+    `again` returns the state of the next entry, given how the child may end; None if there is no next entry.
+    """
+    entry = state
+    while True:
+        flow = enter(child, entry)
+        # Variables can only become fewer and grips more, so the loop ends.
+        widened = entry.join(again(flow) or entry)
+        if widened == entry:
+            return flow, entry
+        entry = widened
 
 
 def joined(states: Iterable[State | None]) -> State | None:

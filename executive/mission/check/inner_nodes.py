@@ -1,0 +1,123 @@
+"""Checks of control nodes by their declarations, and by the rules that their classes add."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import cast
+
+from executive.mission.check.case import Case
+from executive.mission.check.min_times import min_time
+from executive.mission.findings import Finding, error, warning
+from executive.mission.model.instance import count_in, model_of, node_of
+from executive.mission.model.nodes import InnerNode, Node, Part, Section, SkillNode, parts
+from executive.mission.model.paths import name_of
+from executive.mission.model.typed import WrongType, read_constant
+from executive.mission.model.values import Literal, Match, Reference
+from executive.mission.words import describe
+from executive.skill import Skill
+from executive.tree.failure import Reason
+from executive.tree.flow import Flow
+from executive.tree.inspection import Complaint
+from executive.tree.keys import Child, Key, Kind
+
+
+def constants(case: Case) -> Iterator[Finding]:
+    """Find every constant of a control node that is none, out of bounds, or not known before the run."""
+    for node in case.inner_nodes():
+        yield from _constants(case, node, node.kind.word)
+
+
+def _constants(case: Case, owner: InnerNode | Section, name: str) -> Iterator[Finding]:
+    for key, value in parts(owner):
+        if isinstance(value, Section):
+            yield from _constants(case, value, key.name)
+        elif isinstance(value, tuple):
+            for item in value:
+                if isinstance(item, Section):
+                    yield from _constants(case, item, key.name)
+        elif key.kind is Kind.CONSTANT:
+            yield from _constant(case, f"{name}.{key.name}", key, value, count_in(owner, key))
+        elif key.kind is Kind.ELEMENTS and isinstance(value, Literal) and not isinstance(value.value, list):
+            given = f"{describe(value.value)}{value.origin_note}"
+            message = f"{name}.{key.name} takes a list or a variable, not {given}"
+            is_word = isinstance(value.value, str) and not value.origin
+            hint = f"Write a list: [{value.value}]." if is_word else ""
+            yield error(value.mark, "wrong-type", message, hint)
+
+
+def _constant(case: Case, name: str, key: Key, value: Part, most: int | None) -> Iterator[Finding]:
+    if isinstance(value, Reference):
+        message = f"{name} is a constant, and ${value.name} is neither param nor argument here"
+        yield error(value.mark, "unknown-param", message, case.constant_hint(value))
+    elif isinstance(value, Literal):
+        try:
+            read_constant(key, value.value, most)
+        except WrongType as problem:
+            is_param = problem.code == "wrong-type" and value.value in [*case.mission.params]
+            hint = f"For the param write ${value.value}." if is_param else ""
+            yield error(value.mark, problem.code, f"{name} {problem}{value.origin_note}", hint)
+
+
+def complaints(case: Case) -> Iterator[Finding]:
+    """Find the mistakes that only the class of a control node knows."""
+    halted = {node.path for node in _halted(case)}
+    for node in case.inner_nodes():
+        for complaint in model_of(node).check(NodeFacts(case, node, node.path in halted)):
+            yield _finding(node, complaint)
+
+
+def _halted(case: Case) -> Iterator[Node]:
+    """Yield every node that is halted when a concurrent one has ended."""
+    for node in case.inner_nodes():
+        for child in model_of(node).halted:
+            yield from node_of(child).walk()
+
+
+def _finding(node: InnerNode, complaint: Complaint) -> Finding:
+    mark, note = node.mark, ""
+    if isinstance(complaint.at, Match):
+        mark = complaint.at.mark
+    elif isinstance(value := node.values.get(str(complaint.at)), Literal):
+        mark, note = value.mark, value.origin_note
+    report = warning if complaint.is_warning else error
+    return report(mark, complaint.code, complaint.message + note, complaint.hint)
+
+
+class NodeFacts:
+    """Knowledge of the checker about a control node; implements `Facts`."""
+
+    def __init__(self, case: Case, node: InnerNode, is_halted_by_sibling: bool) -> None:
+        self._case, self._node = case, node
+        self.is_halted_by_sibling = is_halted_by_sibling
+
+    def flow(self, child: Child) -> Flow | None:
+        """Return how a child may end; None if it never runs."""
+        return self._case.flow.flows.get(node_of(child).path)
+
+    def name(self, child: Child) -> str:
+        """Return the name of a child in paths."""
+        return name_of(node_of(child))
+
+    def place(self, reason: Reason, reader: Reason) -> str:
+        """Return the place of a name of a failure for the reader of another."""
+        return cast("Match", reason).mark.place(cast("Match", reader).mark.source)
+
+    def is_literal(self, key: str) -> bool:
+        """Return True if the mission file gives the value of a key there."""
+        value = self._node.values.get(key)
+        return isinstance(value, Literal) and not value.origin
+
+    def min_time(self, child: Child) -> float:
+        """Return a lower bound of the time in which a child can succeed [s]."""
+        return min_time(self._case, node_of(child))
+
+    def skill_times(self, child: Child) -> Sequence[tuple[str, float]]:
+        """Return the names and least times [s] of the skills in and below a child."""
+        skills = [node for node in node_of(child).walk() if isinstance(node, SkillNode)]
+        return [(node.skill, min_time(self._case, node)) for node in skills]
+
+    def skills(self) -> Sequence[type[Skill] | None]:
+        """Return the skills below the node; None stands for a skill that is not installed."""
+        return [
+            self._case.skills.get(node.skill) for node in self._node.walk() if isinstance(node, SkillNode)
+        ]

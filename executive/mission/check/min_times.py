@@ -1,0 +1,66 @@
+"""Lower bounds of the times in which nodes can succeed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from executive.cell.protocols import LeastTimes
+from executive.mission.check.case import Case
+from executive.mission.model.instance import is_sound, model_of, node_of
+from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
+from executive.mission.model.typed import WrongType, convert
+from executive.mission.model.wiring import literals
+from executive.skill import HOLDING, Param, Port
+
+
+def min_time(case: Case, node: Node) -> float:
+    """Return a lower bound of the time in which a node can succeed [s]; 0 if nothing is known."""
+    match node:
+        case SkillNode():
+            return _skill(case, node)
+        case UseNode(body=Node() as body):
+            return min_time(case, body)
+        case InnerNode() if is_sound(node):
+            return model_of(node).min_time(lambda child: min_time(case, node_of(child)))
+    return 0.0
+
+
+def _skill(case: Case, node: SkillNode) -> float:
+    skill = case.skills.get(node.skill)
+    if skill is None or case.least is None:
+        return 0.0
+    declared: Mapping[str, Param | Port] = {**skill.params, **skill.ports}
+    given = {name: param.default for name, param in skill.params.items() if not param.required}
+    for name, value in literals(node):
+        try:
+            given[name] = convert(value.value, declared[name].type)
+        except (KeyError, WrongType):
+            # Another check says so.
+            return 0.0
+    entry = case.flow.entry.get(node.path)
+    grips = entry.grips if entry else None
+    carries = skill.tool_state[0] is HOLDING
+    from_elsewhere = carries and (grips is None or any(grip.moved for grip in grips))
+    # How long a carry takes is known from where objects lie, not from wherever the arm went with its load.
+    return skill.shortest(_FromAnywhere(case.least) if from_elsewhere else case.least, given)
+
+
+class _FromAnywhere:
+    """Least times of a cell for an arm that may be anywhere with its load."""
+
+    def __init__(self, least: LeastTimes) -> None:
+        self._least = least
+
+    @property
+    def descent(self) -> float:
+        """The guarded last part of an approach [s]."""
+        return self._least.descent
+
+    def carry(self, bin: str | None) -> float:
+        """Nothing: it may be over the bin already."""
+        del bin
+        return 0.0
+
+    def answer(self, detector: str) -> float:
+        """From a frame to the answer of a detector [s]."""
+        return self._least.answer(detector)

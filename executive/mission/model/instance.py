@@ -1,0 +1,122 @@
+"""Instances of control nodes, made from the nodes of a mission."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Mapping
+from typing import cast, get_args
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from executive.cell.protocols import Clock
+from executive.mission.model.nodes import InnerNode, Node, Part, Section, nodes_of, parts
+from executive.mission.model.typed import WrongType, read_constant
+from executive.mission.model.values import Literal, Match, Named
+from executive.tree.blackboard import Blackboard
+from executive.tree.keys import Child, Key, Kind, Variable
+from executive.tree.node import ControlNode, Site
+
+Build = Callable[[Node], Child]
+"""Function that returns a child for a node of the mission."""
+
+
+class StandIn(Behaviour):
+    """Child of an instance that never runs: it stands for a node of the mission.
+
+    Attributes:
+        node: The node.
+    """
+
+    def __init__(self, node: Node) -> None:
+        super().__init__(node.path)
+        self.node = node
+
+    def update(self) -> Status:
+        """Do nothing."""
+        return Status.INVALID
+
+
+def node_of(child: Child) -> Node:
+    """Return the node for which a child of an instance stands."""
+    assert isinstance(child, StandIn)
+    return child.node
+
+
+def model_of(node: InnerNode) -> ControlNode:
+    """Return an instance that never runs: it answers questions about its node. Its children are `StandIn`s.
+
+    A wrong constant, about which another check complains, is replaced by a default or by a large number.
+    """
+    site = Site(node.path, cast("Clock", None), Blackboard(), node.label)
+    return instance(node, site, StandIn)
+
+
+def instance(node: InnerNode, site: Site, build: Build) -> ControlNode:
+    """Return the control node that a node of the mission describes; `build` makes its children."""
+    return node.kind(site, **_values(node, build))
+
+
+def is_sound(node: InnerNode) -> bool:
+    """Return True if all constants of a node have values that fit."""
+    for key in node.kind.keys.values():
+        part = node.values.get(key.name)
+        value = part.value if isinstance(part, Literal) else None
+        if key.kind is Kind.CONSTANT and (part is not None or key.is_required):
+            try:
+                read_constant(key, value, count_in(node, key))
+            except WrongType:
+                return False
+        elif key.kind is Kind.ELEMENTS and isinstance(part, Literal) and not isinstance(part.value, list):
+            return False
+    return True
+
+
+def count_in(owner: InnerNode | Section, key: Key) -> int | None:
+    """Return the largest allowed number of a constant, if it counts nodes under another key."""
+    return len(nodes_of(owner.values[key.max_of])) if key.max_of in owner.values else None
+
+
+def _values(owner: InnerNode | Section, build: Build) -> Mapping[str, object]:
+    return {key.attribute: _value(owner, key, part, build) for key, part in _given(owner)}
+
+
+def _given(owner: InnerNode | Section) -> list[tuple[Key, Part | None]]:
+    given = list(parts(owner))
+    missing = [key for key in owner.kind.keys.values() if key.is_required and key.name not in owner.values]
+    return [*given, *((key, None) for key in missing)]
+
+
+def _value(owner: InnerNode | Section, key: Key, part: Part | None, build: Build) -> object:
+    """Return the value of an attribute."""
+    if isinstance(part, Node):
+        return build(part)
+    if isinstance(part, Section):
+        return part.kind(**_values(part, build))
+    if isinstance(part, tuple):
+        return tuple(item if isinstance(item, Match) else _value(owner, key, item, build) for item in part)
+    if isinstance(part, Named):
+        return Variable(part.name)
+    if key.kind is Kind.ELEMENTS:
+        is_list = isinstance(part, Literal) and isinstance(part.value, list)
+        return (
+            tuple(part.value)
+            if isinstance(part, Literal) and is_list
+            else Variable(getattr(part, "name", ""))
+        )
+    if key.kind is not Kind.CONSTANT:
+        return ()
+    try:
+        return read_constant(key, part.value if isinstance(part, Literal) else None, count_in(owner, key))
+    except WrongType:
+        return _placeholder(key)
+
+
+def _placeholder(key: Key) -> object:
+    """Return a value instead of a wrong constant: the default, or a very large number."""
+    if key.type in (int, float):
+        return sys.maxsize if key.type is int else math.inf
+    if not key.is_required:
+        return key.default
+    return next(iter(get_args(key.type)), key.type() if key.type in (bool, str) else None)

@@ -1,0 +1,114 @@
+"""Questions that the checker and the diagnosis answer to control nodes, and the answers of the nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol, TypeAlias
+
+from executive.skill import Skill
+from executive.tree.failure import Reason
+from executive.tree.flow import Flow
+from executive.tree.keys import Child
+
+MinTimes: TypeAlias = Callable[[Child], float]
+"""Function that returns a lower bound of the time in which a child can succeed [s]."""
+
+
+@dataclass(frozen=True)
+class Complaint:
+    """A mistake in the mission.
+
+    Attributes:
+        at: Key or name of a failure at which it stands; "" for the node itself.
+        code: Code of the finding.
+        message: The mistake, one sentence.
+        hint: Remedy, or "".
+        is_warning: True if the mission can run nevertheless.
+    """
+
+    at: str | Reason
+    code: str
+    message: str
+    hint: str = ""
+    is_warning: bool = False
+
+
+class Facts(Protocol):
+    """The checker's knowledge of a node in a mission."""
+
+    @property
+    def is_halted_by_sibling(self) -> bool:
+        """True if the node is halted when a concurrent node has ended."""
+
+    def flow(self, child: Child) -> Flow | None:
+        """Return how a child may end; None if it never runs."""
+
+    def name(self, child: Child) -> str:
+        """Return the name of a child in paths."""
+
+    def place(self, reason: Reason, reader: Reason) -> str:
+        """Return the place of a name of a failure for the reader of another: `line 12`."""
+
+    def is_literal(self, key: str) -> bool:
+        """Return True if the mission file gives the value of a key there, not by a param or argument."""
+
+    def min_time(self, child: Child) -> float:
+        """Return a lower bound of the time in which a child can succeed [s]."""
+
+    def skill_times(self, child: Child) -> Sequence[tuple[str, float]]:
+        """Return the names and least times [s] of the skills in and below a child."""
+
+    def skills(self) -> Sequence[type[Skill] | None]:
+        """Return the skills below the node; None stands for a skill that is not installed."""
+
+
+@dataclass(frozen=True)
+class PassedFailure:
+    """A failure that ended a run, at a control node that it passed or in which it began.
+
+    Attributes:
+        child: The child that it came from; None if it began in the node.
+        reason: Its name: `Grasp.missed`.
+        names: All its names at this node: with the skill and with the labels below.
+        handled: The number of failures that the node handled before, by name.
+        messages: The last message of each handled failure, by name.
+        last: Name of the failure that it handled last, or "".
+        choice: Its last decision.
+        duration: Time from the start of the node to its end [s].
+        has_failed: Returns True if a child ran and failed in this activation of the node.
+    """
+
+    child: Child | None
+    reason: str
+    names: frozenset[Reason]
+    handled: Mapping[str, int]
+    messages: Mapping[str, str]
+    last: str
+    choice: str
+    duration: float
+    has_failed: Callable[[Child], bool]
+
+    def is_one_of(self, reasons: Sequence[Reason]) -> bool:
+        """Return True if one of the names means the failure."""
+        return any(Reason(name.source, name.reason) in self.names for name in reasons)
+
+
+@dataclass(frozen=True)
+class Advice:
+    """A change of the mission after which a failure would not end it.
+
+    Attributes:
+        text: The change, to be followed by its place.
+        key: Key to change, or "".
+        child: Child to change; None for the node itself.
+    """
+
+    text: str
+    key: str = ""
+    child: Child | None = None
+
+
+def listed(reasons: Sequence[Reason]) -> str:
+    """Return names of failures as a text: `Grasp.missed, look.unsure`."""
+    return ", ".join(map(str, reasons))

@@ -1,0 +1,106 @@
+"""Control nodes with short arguments; names of failures are pairs of source and reason."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from math import inf
+from typing import Any
+
+from hand_set_clock import Clock
+from py_trees.behaviour import Behaviour
+
+from executive.events import Emit, ignore
+from executive.tree.blackboard import Blackboard
+from executive.tree.failure import Reason
+from executive.tree.fallback import Fallback
+from executive.tree.for_each import ForEach
+from executive.tree.invert import Invert
+from executive.tree.keys import Variable
+from executive.tree.node import Site
+from executive.tree.parallel import Parallel
+from executive.tree.repeat import Repeat
+from executive.tree.retry import Backoff, Retry
+from executive.tree.sequence import Sequence as SequenceNode
+from executive.tree.succeed import Succeed
+from executive.tree.timeout import Timeout
+from executive.tree.try_catch import Catch, TryCatch
+from executive.tree.while_loop import While
+
+Names = Iterable[tuple[str, str]]
+
+
+def make_site(path: str = "node", label: str = "", emit: Emit = ignore, clock: Any = None) -> Site:
+    return Site(path, clock or Clock(), Blackboard(), label, emit)
+
+
+def names_of(pairs: Names) -> tuple[Reason, ...]:
+    return tuple(Reason(*pair) for pair in pairs)
+
+
+def sequence(site: Site, children: Sequence[Behaviour]) -> SequenceNode:
+    return SequenceNode(site, do=children)
+
+
+def fallback(site: Site, children: Sequence[Behaviour]) -> Fallback:
+    return Fallback(site, do=children)
+
+
+def parallel(site: Site, children: Sequence[Behaviour], wait_for: Any = None, halt: bool = False) -> Parallel:
+    return Parallel(site, do=children, wait_for="all" if wait_for is None else wait_for, halt=halt)
+
+
+def lead(site: Site, children: Sequence[Behaviour]) -> Parallel:
+    return Parallel(site, do=children, wait_for="lead")
+
+
+def make_backoff(first: float, factor: float = 1.0, most: float = inf) -> Backoff:
+    return Backoff(first=first, factor=factor, most=most)
+
+
+def retry(
+    site: Site,
+    body: Behaviour,
+    attempts: int,
+    on: Names = (),
+    recover: Behaviour | None = None,
+    backoff: Backoff | None = None,
+    clock: Any = None,
+) -> Retry:
+    site = replace(site, clock=clock or site.clock)
+    return Retry(site, attempts=attempts, on=names_of(on), recover=recover, backoff=backoff, do=body)
+
+
+def repeat(site: Site, body: Behaviour, times: int | None = None, until: Names = ()) -> Repeat:
+    return Repeat(site, times=times, until=names_of(until), do=body)
+
+
+def while_loop(site: Site, condition: Behaviour, body: Behaviour) -> While:
+    return While(site, condition=condition, do=body)
+
+
+def for_each(site: Site, body: Behaviour, blackboard: Blackboard, each: str, source: Any) -> ForEach:
+    elements = Variable(source) if isinstance(source, str) else tuple(source)
+    return ForEach(replace(site, blackboard=blackboard), each=Variable(each), in_=elements, do=body)
+
+
+def try_catch(
+    site: Site,
+    body: Behaviour,
+    handlers: Iterable[tuple[Names, Behaviour]] = (),
+    last: Behaviour | None = None,
+) -> TryCatch:
+    catch = tuple(Catch(on=names_of(names), do=do) for names, do in handlers)
+    return TryCatch(site, do=body, catch=catch, finally_=last)
+
+
+def timeout(site: Site, body: Behaviour, seconds: float, clock: Any) -> Timeout:
+    return Timeout(replace(site, clock=clock), seconds=seconds, do=body)
+
+
+def invert(site: Site, body: Behaviour) -> Invert:
+    return Invert(site, do=body)
+
+
+def succeed(site: Site, body: Behaviour | None = None) -> Succeed:
+    return Succeed(site, do=body)

@@ -1,0 +1,196 @@
+"""Control node of a third party: one file and one entry point in a project made by `executive init`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from executive.cli.main import main
+from executive.mission.findings import MissionError
+from executive.mission.load import load_mission
+from executive.plugins import cell_kind, discover
+from executive.testing.run_mission import MissionResult, run_mission
+
+RACE = '''
+"""Race of branches."""
+
+from collections.abc import Iterator
+
+from py_trees.common import Status
+
+from executive.skill import Seconds
+from executive.tree.flow import Enter, Flow, State, grips_at_end, joined, together
+from executive.tree.inspection import MinTimes, PassedFailure
+from executive.tree.keys import Children, key
+from executive.tree.node import ControlNode
+
+
+class Race(ControlNode):
+    """All at the same time; the first branch that succeeds halts the others."""
+
+    word = "race"
+    symbol = "⚑"
+
+    head_start: Seconds = key(default=0.0, ge=0, doc="Time before the other branches begin [s].")
+    do: Children = key(bare=True, doc="The branches.")
+
+    def start(self) -> None:
+        self._running = list(self.do)
+        self._begin = self.clock.now + self.head_start
+
+    def step(self) -> Status:
+        for child in list(self._running):
+            if child is not self.do[0] and self.clock.now < self._begin:
+                continue
+            status = self.run_child(child)
+            if status is Status.SUCCESS:
+                self.halt_children(other for other in self._running if other is not child)
+                return status
+            if status is Status.FAILURE:
+                self._running.remove(child)
+                if not self._running:
+                    return self.fail(self.failure_of(child))
+        return Status.RUNNING
+
+    def flow(self, enter: Enter, state: State) -> Flow:
+        flows = [enter(child, state) for child in self.do]
+        ends = [grips_at_end(flow, state, halts=True) for flow in flows]
+        grips = together(state.grips, ends)
+        success = joined(flow.success for flow in flows)
+        halted = joined(flow.halted for flow in flows)
+        failures = {one: after.gripping(grips) for flow in flows for one, after in flow.failures.items()}
+        return Flow(success and success.gripping(grips), failures, halted and halted.gripping(grips))
+
+    def min_time(self, times: MinTimes) -> float:
+        return min(times(child) for child in self.do)
+
+    @property
+    def concurrent(self) -> Children:
+        return self.do
+
+    def explain(self, failure: PassedFailure) -> str:
+        return f"none of the {len(self.do)} branches succeeded"
+'''
+
+MISSION = """
+mission: race
+cell: cells/table.yaml
+params: {{pause: 0.3}}
+tree: {tree}
+"""
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A new project with the control node `race`; it is the working directory."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    created = call("init", "arena")
+    assert created.exit_code == 0, created.output
+    folder = tmp_path / "arena"
+    (folder / "arena" / "race.py").write_text(RACE, encoding="utf-8")
+    with (folder / "pyproject.toml").open("a") as file:
+        file.write('\n[project.entry-points."executive.control_nodes"]\nrace = "arena.race:Race"\n')
+    monkeypatch.chdir(folder)
+    yield folder
+    for module in [name for name in sys.modules if name.partition(".")[0] == "arena"]:
+        del sys.modules[module]
+
+
+def write(tree: str) -> Path:
+    path = Path("race.yaml")
+    path.write_text(MISSION.format(tree=tree), encoding="utf-8")
+    return path
+
+
+def call(*words: str) -> Result:
+    return CliRunner().invoke(main, list(words))
+
+
+def run(tree: str) -> MissionResult:
+    return run_mission(write(tree))
+
+
+@pytest.mark.parametrize(
+    ("tree", "code"),
+    [
+        ("{race: {do: [Wait: {seconds: 1}], first: 1}}", "unknown-key"),
+        ("{race: {do: [Wait: {seconds: 1}], head_start: soon}}", "wrong-type"),
+        ("{race: {do: [Wait: {seconds: 1}], head_start: -1}}", "out-of-range"),
+        ("{race: {head_start: 1}}", "missing-key"),
+        ("{race: []}", "empty-list"),
+        ("[{race: [Wait: {seconds: 1}, {Detect: {view: table}}]}, Localize]", "unwritten"),
+        ("[{race: [{Approach: {target: $it}}, Wait: {seconds: 1}]}]", "unwritten"),
+        ("[{race: [Wait: {seconds: 1}, Wait: {seconds: 2}]}, Release]", "tool-state"),
+        ("{race: [{MoveToScan: {pose: scan}}, {MoveToScan: {pose: scan}}]}", "shared-resource"),
+        ("{timeout: {seconds: 1, do: {race: [Wait: {seconds: 2}, Wait: {seconds: 3}]}}}", "short-timeout"),
+    ],
+)
+def test_a_mission_that_uses_it_is_checked(project: Path, tree: str, code: str) -> None:
+    with pytest.raises(MissionError) as caught:
+        load_mission(write(tree), discover(), kinds=cell_kind)
+    assert code in {finding.code for finding in caught.value.findings}
+
+
+def test_it_is_in_the_schema_and_in_the_hints(project: Path) -> None:
+    definitions = json.loads(call("schema").stdout)["definitions"]
+    form = definitions["race"]
+    assert form["description"] == "All at the same time; the first branch that succeeds halts the others."
+    assert form["anyOf"][0]["items"] == {"$ref": "#/definitions/node"}
+    assert set(form["anyOf"][1]["properties"]) == {"head_start", "do"}
+    assert "race" in definitions["node"]["dependencies"]
+    assert 'Did you mean "race"?' in call("check", str(write("{rase: [Wait: {seconds: 1}]}"))).output
+
+
+def test_it_is_drawn(project: Path) -> None:
+    path = str(write("{race: {head_start: 0.5, do: [Wait: {seconds: 1}, Wait: {seconds: 2}]}}"))
+    assert call("tree", path).stdout.splitlines()[0] == "race  (head_start: 0.5)"
+    assert "⚑ race" in call("tree", path, "--dot").stdout
+    assert "⚑" in call("tree", path, "--svg").stdout
+
+
+def test_the_first_branch_that_succeeds_halts_the_others(project: Path) -> None:
+    result = run("{race: {head_start: $pause, do: [Wait: {seconds: 2}, Wait: {seconds: 0.5}]}}")
+    assert (result.status, round(result.robot_time, 1)) == ("SUCCESS", 0.8)
+    ends = {one.event.node: one.event.status for one in result.events if hasattr(one.event, "outputs")}
+    assert ends == {
+        "tree/race/1:Wait": "INVALID", "tree/race/2:Wait": "SUCCESS", "tree/race": "SUCCESS",
+    }  # fmt: skip
+
+
+def test_it_is_halted_with_its_branches(project: Path) -> None:
+    slow = "{race: [Wait: {seconds: 2}, Wait: {seconds: 3}]}"
+    result = run(f"{{race: [{slow}, Wait: {{seconds: 0.5}}]}}")
+    ends = {one.event.node: one.event.status for one in result.events if hasattr(one.event, "outputs")}
+    assert ends["tree/race/1:race"] == ends["tree/race/1:race/1:Wait"] == "INVALID"
+    assert result.status == "SUCCESS"
+
+
+def test_a_failure_that_it_passes_on_is_explained(project: Path) -> None:
+    path = write("{race: [{invert: {Wait: {seconds: 0.1}}}, {invert: {Wait: {seconds: 0.2}}}]}")
+    result = call("run", str(path), "--set", "cell.kind=fake", "--runs", "runs")
+    assert result.exit_code == 1, result.output
+    assert "none of the 2 branches succeeded" in result.output
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("class Race:\n    pass\n", "is not a ControlNode subclass"),
+        ("import nothing_of_this_name\n", "cannot be loaded: ModuleNotFoundError"),
+        (RACE.replace('word = "race"', 'word = "run"'), 'its class has the word "run"'),
+        (RACE.replace("def flow", "def flows"), "has no method flow"),
+        (RACE.replace("do: Children", "status: Children"), 'cannot have the key "status"'),
+        (RACE.replace("do: Children =", "do ="), "has no annotation"),
+    ],
+)
+def test_a_broken_class_is_one_clear_message(project: Path, source: str, message: str) -> None:
+    Path("arena/race.py").write_text(source, encoding="utf-8")
+    result = call("check", str(write("{Wait: {seconds: 1}}")))
+    assert result.exit_code == 2
+    assert message in result.output
