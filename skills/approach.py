@@ -9,8 +9,14 @@ from typing import Any, ClassVar
 from executive.cell.arm import Goal, Task
 from executive.cell.objects import ObjectClass, Target
 from executive.cell.protocols import Cell, LeastTimes, Steps, Tool
-from executive.manipulation.motions import follow, planned
-from executive.manipulation.tool_goals import OVERTRAVEL, PROBE_CLEARANCE, SPACING, approach, lowest_contact
+from executive.manipulation.motions import follow, plan
+from executive.manipulation.tool_goals import (
+    OVERTRAVEL,
+    PROBE_CLEARANCE,
+    SPIRAL_SPACING,
+    approach,
+    lowest_contact,
+)
 from executive.perception.evidence import describe_wrong_height, may_miss_top
 from executive.skill import EMPTY, In, Metres, Skill, param, port
 
@@ -36,7 +42,7 @@ class Approach(Skill):
 
     target: In[Target] = port(doc="the target to touch")
     overtravel: Metres = param(OVERTRAVEL, ge=0, le=0.03, doc="depth of the search below the surface")
-    offset: Metres = param(SPACING, ge=0, le=0.02, doc="spacing of the spiral of further attempts")
+    offset: Metres = param(SPIRAL_SPACING, ge=0, le=0.02, doc="spacing of the spiral of further attempts")
     reasons: ClassVar = ("stale", "unreachable", "blocked", "contradicted", "no_contact")
     uses: ClassVar = ("arm", "tool")
     moves: ClassVar = True
@@ -58,7 +64,7 @@ class Approach(Skill):
         def ask() -> tuple[Goal, Task]:
             return approach(cell, self.target, self.overtravel, self.offset)
 
-        motion = yield from planned(self, cell.arm, ask)
+        motion = yield from plan(self, cell.arm, ask)
         goal, _ = ask()
         yield from follow(self, cell, motion, until=_new_contact_check(tool))
         kind, middle = cell.classes[self.target.label], float(self.target.position[2])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from executive.cell.protocols import Cell, Steps
-from executive.manipulation.motions import follow, heeding, planned, settle
+from executive.manipulation.motions import follow, plan, task_of_moving, wait_for_rest
 from executive.skill import Skill, param
 
 
@@ -29,11 +29,11 @@ class MoveToScan(Skill):
 
     def run(self, cell: Cell) -> Steps:
         """Select the pose and move to it."""
-        yield from settle(cell.arm)
+        yield from wait_for_rest(cell.arm)
         if self.pose == "auto" and cell.camera.sees_table():
             return
         name = self._name(cell)
-        motion = yield from planned(self, cell.arm, lambda: (name, heeding(cell)))
+        motion = yield from plan(self, cell.arm, lambda: (name, task_of_moving(cell)))
         yield from follow(self, cell, motion)
 
     def _name(self, cell: Cell) -> str:

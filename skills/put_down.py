@@ -9,7 +9,7 @@ import numpy as np
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell, Steps
 from executive.manipulation.motions import carry, let_go
-from executive.manipulation.tool_goals import aside
+from executive.manipulation.tool_goals import goal_aside
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, SkillFailed, param, port
 
 MIN_LIFT_HEIGHT = 0.003
@@ -36,7 +36,7 @@ class PutDown(Skill):
     def run(self, cell: Cell) -> Steps:
         """Carry the item to the place, lower it, release it."""
         kind = cell.classes[cell.ledger.get_label(self.held)]
-        goal, height = aside(cell, kind, self.drop, self.held), kind.height
+        goal, height = goal_aside(cell, kind, self.drop, self.held), kind.height
         lying = float(cell.safe_place[2]) + height
         try:
             yield from carry(self, cell, self.held, goal, "the safe place")

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell
-from executive.manipulation.obstacles import slots_taken
+from executive.manipulation.obstacles import count_used_slots
 from executive.manipulation.tool_goals import nearest_first
 from executive.perception.evidence import describe_unknown
 from executive.skill import In, Out, Skill, SkillFailed, param, port
@@ -43,7 +43,7 @@ class SelectTarget(Skill):
             best = min(candidates, key=lambda t: (-t.confidence, t.item))
         self.target, self.item = best, best.item
         bins = cell.routes[cell.ledger.get_label(best.item)]
-        self.bin = min(bins, key=lambda bin: slots_taken(cell, bin))
+        self.bin = min(bins, key=lambda bin: count_used_slots(cell, bin))
         cell.decided(best, self.bin)
 
     def _is_sought(self, cell: Cell, item: Item) -> bool:

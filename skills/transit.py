@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell, LeastTimes, Steps
 from executive.manipulation.motions import carry
-from executive.manipulation.tool_goals import DROP, into
+from executive.manipulation.tool_goals import DROP_HEIGHT, goal_in_bin
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Skill, param, port
 
 
@@ -22,7 +22,7 @@ class Transit(Skill):
     held: In[Item] = port(refers="item", doc="the item in the tool")
     bin: In[str] = port(refers="bin", doc="the bin to carry it to")
     drop: Metres = param(
-        DROP,
+        DROP_HEIGHT,
         ge=0.005,
         le=0.1,
         doc="height of the item's underside above the floor, or the layer of objects there",
@@ -40,5 +40,5 @@ class Transit(Skill):
 
     def run(self, cell: Cell) -> Steps:
         """Plan the motion, then follow it while the seal holds."""
-        goal = into(cell, self.bin, self.held, self.drop)
+        goal = goal_in_bin(cell, self.bin, self.held, self.drop)
         yield from carry(self, cell, self.held, goal, self.bin)

@@ -13,7 +13,7 @@ from executive.cell.config import CellConfig, DetectorConfig
 from executive.cell.layout import object_class
 from executive.cell.protocols import Localizer
 from executive.cells.sim.scene_file import load_scene
-from executive.cells.sim.spawn import count_that_fits
+from executive.cells.sim.spawn import find_max_count
 from executive.errors import InputError, explained
 from executive.mission.findings import alternatives
 from executive.perception.detectors.registry import find_problems
@@ -188,7 +188,7 @@ def _images(
                 )  # fmt: skip
             yield Samples(Path(folder))
     else:
-        table = {"objects": (0, count_that_fits(config, MAX_OBJECTS))}
+        table = {"objects": (0, find_max_count(config, MAX_OBJECTS))}
         filled = config.model_copy(update={"table": config.table.model_copy(update=table)})
         with progress(f"rendering {config.cell}") as update:
             frames = run_frames(

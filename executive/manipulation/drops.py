@@ -10,11 +10,11 @@ from executive.cell.objects import Item
 from executive.cell.protocols import Cell
 from executive.geometry import GRAVITY, Array
 
-CALM = 0.2
+MAX_PREDICTABLE_SPEED = 0.2
 """Tool speed up to which one can tell where something comes down [m/s]; thrown faster, it rolls."""
 
 
-def slipped(cell: Cell, item: Item) -> bool:
+def record_drop(cell: Cell, item: Item) -> bool:
     """Tell whether the tool does not hold an item any more; to be asked at every tick of a carry.
 
     The ledger is told at once: a look taken while the arm still brakes shows the item where it lies now.
@@ -23,14 +23,14 @@ def slipped(cell: Cell, item: Item) -> bool:
         return False
     if cell.ledger.find_held_item() == item:
         velocity, height = cell.arm.tool_velocity, cell.classes[cell.ledger.get_label(item)].height
-        calm = float(np.linalg.norm(velocity)) <= CALM
+        calm = float(np.linalg.norm(velocity)) <= MAX_PREDICTABLE_SPEED
         cell.ledger.record_drop(
-            item, landing(cell.arm.tool_pose.position, velocity, height) if calm else None
+            item, predict_landing(cell.arm.tool_pose.position, velocity, height) if calm else None
         )
     return True
 
 
-def landing(place: Array, velocity: Array, height: float) -> Array:
+def predict_landing(place: Array, velocity: Array, height: float) -> Array:
     """Return where the middle of something comes to lie on the table `(3,)` [m], thrown and not rolling.
 
     Args:

@@ -8,23 +8,21 @@ from executive.cell.arm import Arm, Goal, Motion, Task
 from executive.cell.objects import Item, Load
 from executive.cell.protocols import Cell, Steps
 from executive.errors import Blocked, Unreachable
-from executive.manipulation.drops import slipped
-from executive.manipulation.obstacles import around
+from executive.manipulation.drops import record_drop
+from executive.manipulation.obstacles import list_obstacles
 from executive.skill import Skill, SkillFailed
 
-PLANS = 3
+MAX_PLANS = 3
 """Times that a motion is planned when what stands around changes meanwhile."""
 
 
-def settle(arm: Arm) -> Steps:
+def wait_for_rest(arm: Arm) -> Steps:
     """Yield until the arm is at rest: whoever uses it next waits for the braking of whoever used it last."""
     while not arm.at_rest:
         yield
 
 
-def planned(
-    skill: Skill, arm: Arm, ask: Callable[[], tuple[Goal | str, Task]]
-) -> Generator[None, None, Motion]:
+def plan(skill: Skill, arm: Arm, ask: Callable[[], tuple[Goal | str, Task]]) -> Generator[None, None, Motion]:
     """Yield until the arm rests and the motion that `ask` wants is planned, and return it.
 
     What is wanted is asked once more when the plan is there: if a look has shown something new meanwhile, it
@@ -33,8 +31,8 @@ def planned(
     Raises:
         SkillFailed: There is none; the reason is the skill's `unreachable` or `blocked`.
     """
-    yield from settle(arm)
-    for _ in range(PLANS):
+    yield from wait_for_rest(arm)
+    for _ in range(MAX_PLANS):
         goal, task = ask()
         planning = arm.plan(goal, task)
         while not planning.ready:
@@ -65,7 +63,7 @@ def follow(skill: Skill, cell: Cell, motion: Motion, until: Callable[[], bool] =
             yield
     finally:
         arm.stop()
-    yield from settle(arm)
+    yield from wait_for_rest(arm)
     if arm.met is not None:
         cell.ledger.invalidate_positions()
         raise skill.failed("blocked", arm.met)
@@ -87,13 +85,13 @@ def carry(skill: Skill, cell: Cell, item: Item, goal: Goal, whither: str) -> Ste
             arm is at rest, the tool open, the ledger told, and the reason is the skill's `dropped`.
     """
     try:
-        motion = yield from planned(skill, cell.arm, lambda: (goal, carrying(cell, item)))
-        yield from follow(skill, cell, motion, until=lambda: slipped(cell, item))
+        motion = yield from plan(skill, cell.arm, lambda: (goal, task_of_carrying(cell, item)))
+        yield from follow(skill, cell, motion, until=lambda: record_drop(cell, item))
     except SkillFailed:
         # Whatever else went wrong: what the tool no longer holds cannot be put down.
-        if not slipped(cell, item):
+        if not record_drop(cell, item):
             raise
-    if slipped(cell, item):
+    if record_drop(cell, item):
         x, y, z = cell.arm.tool_pose.position
         cell.tool.open()
         raise skill.failed(
@@ -120,13 +118,13 @@ def let_go(skill: Skill, cell: Cell, item: Item, wait: float, told: Callable[[],
         raise skill.failed("stuck", f"{item} hangs on the tool {wait:.2f} s after release")
 
 
-def heeding(cell: Cell) -> Task:
+def task_of_moving(cell: Cell) -> Task:
     """Return the task of going somewhere with whatever the tool holds."""
     held = cell.ledger.find_held_item()
-    return Task(around=around(cell)) if held is None else carrying(cell, held)
+    return Task(around=list_obstacles(cell)) if held is None else task_of_carrying(cell, held)
 
 
-def carrying(cell: Cell, item: Item) -> Task:
+def task_of_carrying(cell: Cell, item: Item) -> Task:
     """Return the task of carrying `item`, which the tool holds."""
     kind = cell.classes[cell.ledger.get_label(item)]
-    return Task(Load(kind, cell.tool.bears), around(cell, item))
+    return Task(Load(kind, cell.tool.bears), list_obstacles(cell, item))

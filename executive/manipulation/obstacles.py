@@ -11,18 +11,18 @@ from executive.cell.objects import Item, Obstacle, Target
 from executive.cell.protocols import Cell
 from executive.errors import NoDepth
 
-ROLLED = 0.002
+MAX_ROLL_DISTANCE = 0.002
 """How far an object in a bin may lie from where it was let go [m]."""
 
 
-def around(cell: Cell, but: Item | None = None) -> tuple[Obstacle, ...]:
+def list_obstacles(cell: Cell, but: Item | None = None) -> tuple[Obstacle, ...]:
     """Return what stands in the cell beyond what its file says, the item `but` left out.
 
-    That is what the ledger believes on the table, and what lies in the bins (`slots_taken`).
+    That is what the ledger believes on the table, and what lies in the bins (`count_used_slots`).
     """
     return (
         *(obstacle_of(cell, target) for target in cell.ledger.find_objects_on_table() if target.item != but),
-        *_filled(cell, but),
+        *_list_bin_contents(cell, but),
     )
 
 
@@ -35,7 +35,7 @@ def shows_bin_content(cell: Cell, detection: Detection, frame: Frame) -> bool:
     return any(bin.contains(position, BIN_THICKNESS) for bin in cell.bins.values())
 
 
-def slots_taken(cell: Cell, bin: str, but: Item | None = None) -> int:
+def count_used_slots(cell: Cell, bin: str, but: Item | None = None) -> int:
     """Return how many objects lie in `bin`, the item `but` not counted: the number of its next free slot.
 
     What the tool carries into the bin counts, so that a plan made meanwhile still holds when it was let go.
@@ -52,23 +52,27 @@ def obstacle_of(cell: Cell, target: Target) -> Obstacle:
     return Obstacle(x, y, kind.radius, middle + kind.height / 2, target.item)
 
 
-def tallest(cell: Cell) -> float:
+def max_object_height(cell: Cell) -> float:
     """Return the height of the tallest class of objects [m]."""
     return max(kind.height for kind in cell.classes.values())
 
 
-def level(bin: Bin, layer: int, tallest: float) -> float:
+def layer_height(bin: Bin, layer: int, max_object_height: float) -> float:
     """Return the height on which a layer of objects in a bin lies at most [m]; layer 0 is on the floor."""
-    return float(bin.position[2]) + BIN_THICKNESS + layer * tallest
+    return float(bin.position[2]) + BIN_THICKNESS + layer * max_object_height
 
 
-def _filled(cell: Cell, but: Item | None) -> Iterator[Obstacle]:
+def _list_bin_contents(cell: Cell, but: Item | None) -> Iterator[Obstacle]:
     """Yield what stands on the slots of bins that were used, the item `but` left out."""
-    widest, highest = max(kind.radius for kind in cell.classes.values()), tallest(cell)
+    widest, highest = max(kind.radius for kind in cell.classes.values()), max_object_height(cell)
     for name, box in cell.bins.items():
-        count, slots = slots_taken(cell, name, but), len(box.slots)
+        count, slots = count_used_slots(cell, name, but), len(box.slots)
         for number, (x, y) in enumerate(box.slots[:count]):
-            top = level(box, (count - 1 - number) // slots + 1, highest)
+            top = layer_height(box, (count - 1 - number) // slots + 1, highest)
             yield Obstacle(
-                float(x), float(y), widest + ROLLED, top, f"what lies in slot {number + 1} of {name}"
+                float(x),
+                float(y),
+                widest + MAX_ROLL_DISTANCE,
+                top,
+                f"what lies in slot {number + 1} of {name}",
             )

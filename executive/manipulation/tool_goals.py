@@ -13,9 +13,15 @@ from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.objects import Item, ObjectClass, Target
 from executive.cell.protocols import Cell
 from executive.geometry import Array
-from executive.manipulation.obstacles import around, level, obstacle_of, slots_taken, tallest
+from executive.manipulation.obstacles import (
+    count_used_slots,
+    layer_height,
+    list_obstacles,
+    max_object_height,
+    obstacle_of,
+)
 
-DROP = 0.01
+DROP_HEIGHT = 0.01
 """Height of an item's underside above a bin's floor, or the layer of objects there, when it is let go [m].
 
 A mission may say otherwise.
@@ -26,17 +32,17 @@ PROBE_CLEARANCE = 0.005
 """Height above the table down to which later attempts search for contact [m]."""
 ATTEMPTS_BEFORE_PROBE = 3
 """Number of failed attempts after which an approach goes down almost to the table."""
-SPACING = 0.0025
+SPIRAL_SPACING = 0.0025
 """Spacing of the spiral on which further attempts come down, unless a mission says otherwise [m]."""
-SIDE_BY_SIDE = 0.02
+MIN_GAP = 0.02
 """Room between the outlines of what is put down and what stands beside it [m]."""
-ROWS = 2
+PLACES_PER_SIDE = 2
 """How many places on each side of the safe one are considered for putting something down."""
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 
 
 def approach(
-    cell: Cell, target: Target, overtravel: float = OVERTRAVEL, spacing: float = SPACING
+    cell: Cell, target: Target, overtravel: float = OVERTRAVEL, spacing: float = SPIRAL_SPACING
 ) -> tuple[Goal, Task]:
     """Return goal and task of an approach to a point below the surface of `target`.
 
@@ -51,7 +57,7 @@ def approach(
             below the target's middle.
         spacing: Spacing of the spiral of further attempts [m].
     """
-    goal = onto(
+    goal = goal_on_object(
         cell.classes[target.label],
         target.position,
         cell.descent,
@@ -60,10 +66,10 @@ def approach(
         overtravel=overtravel,
         spacing=spacing,
     )
-    return goal, Task(around=around(cell, target.item), target=obstacle_of(cell, target))
+    return goal, Task(around=list_obstacles(cell, target.item), target=obstacle_of(cell, target))
 
 
-def onto(
+def goal_on_object(
     kind: ObjectClass,
     position: Array,
     descent: float,
@@ -71,7 +77,7 @@ def onto(
     *,
     attempt: int = 0,
     overtravel: float = OVERTRAVEL,
-    spacing: float = SPACING,
+    spacing: float = SPIRAL_SPACING,
 ) -> Goal:
     """Return the goal of an approach to an object.
 
@@ -85,7 +91,7 @@ def onto(
         spacing: See `approach`.
     """
     x, y, middle = (float(value) for value in position)
-    dx, dy = _off_middle(attempt, kind.ring, spacing)
+    dx, dy = _attempt_offset(attempt, kind.ring, spacing)
     surface = middle + kind.height / 2
     lowest = lowest_contact(kind, middle, overtravel)
     if attempt >= ATTEMPTS_BEFORE_PROBE:
@@ -122,40 +128,44 @@ def nearest_first(cell: Cell, targets: Sequence[Target]) -> list[Target]:
     return sorted(possible, key=lambda t: (float(np.linalg.norm(t.position[:2] - here)), t.item))
 
 
-def into(cell: Cell, bin: str, item: Item, drop: float = DROP) -> Goal:
+def goal_in_bin(cell: Cell, bin: str, item: Item, drop: float = DROP_HEIGHT) -> Goal:
     """Return the goal of a transit: over the next free slot of a bin, `drop` [m] above what is there."""
     height = cell.classes[cell.ledger.get_label(item)].height
-    return over(cell.bins[bin], slots_taken(cell, bin, item), height, tallest(cell), drop)
+    return goal_over_slot(
+        cell.bins[bin], count_used_slots(cell, bin, item), height, max_object_height(cell), drop
+    )
 
 
-def over(bin: Bin, number: int, height: float, tallest: float, drop: float = DROP) -> Goal:
+def goal_over_slot(
+    bin: Bin, number: int, height: float, max_object_height: float, drop: float = DROP_HEIGHT
+) -> Goal:
     """Return the goal of a transit over a slot of a bin.
 
     Args:
         bin: The bin.
         number: Of the slot; from the number of slots on, those of the next layer.
         height: Of what is carried [m].
-        tallest: Height of the tallest objects that may lie in a layer below [m].
+        max_object_height: Height of the tallest objects that may lie in a layer below [m].
         drop: Of the underside above that layer, or the floor [m].
     """
     layer, place = divmod(number, len(bin.slots))
     x, y = (float(value) for value in bin.slots[place])
-    return Goal((x, y, level(bin, layer, tallest) + height + drop))
+    return Goal((x, y, layer_height(bin, layer, max_object_height) + height + drop))
 
 
-def aside(cell: Cell, kind: ObjectClass, drop: float, item: Item | None = None) -> Goal:
+def goal_aside(cell: Cell, kind: ObjectClass, drop: float, item: Item | None = None) -> Goal:
     """Return the goal of putting an object down: `drop` [m] above the free place nearest the safe one.
 
     A place is free where nothing is believed to stand and no bin is; if none is far and wide, it is the safe
     place itself.
     """
-    apart = 2 * kind.radius + SIDE_BY_SIDE
+    apart = 2 * kind.radius + MIN_GAP
     x, y, floor = (float(value) for value in cell.safe_place)
-    steps = [step * apart for step in range(-ROWS, ROWS + 1)]
+    steps = [step * apart for step in range(-PLACES_PER_SIDE, PLACES_PER_SIDE + 1)]
     places = [
         (x + dx, y + dy) for dx, dy in sorted(product(steps, steps), key=lambda step: math.hypot(*step))
     ]
-    room = kind.radius + SIDE_BY_SIDE
+    room = kind.radius + MIN_GAP
     place = next((place for place in places if _is_free(cell, np.array(place), room, item)), (x, y))
     return Goal((*place, floor + kind.height + drop))
 
@@ -166,11 +176,11 @@ def _is_free(cell: Cell, place: Array, radius: float, but: Item | None) -> bool:
         return False
     return all(
         math.dist(place, (obstacle.x, obstacle.y)) > radius + obstacle.radius
-        for obstacle in around(cell, but)
+        for obstacle in list_obstacles(cell, but)
     )
 
 
-def _off_middle(attempt: int, ring: float, spacing: float) -> tuple[float, float]:
+def _attempt_offset(attempt: int, ring: float, spacing: float) -> tuple[float, float]:
     """Return the sideways step (x, y) [m] of an attempt: a point of the ring, or of Vogel's spiral.
 
     The turn of a part is not known, and any point of its ring is as good as another. The spiral begins in

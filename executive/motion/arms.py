@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 
 from executive.cell.config import CellConfig
 from executive.cell.workcell import KeyPath
-from executive.motion.clearance_model import BETWEEN
+from executive.motion.clearance_model import SAMPLING_MARGIN
 from executive.motion.iiwa14 import IIWA14_JOINT_COUNT, Iiwa14
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits, JointRange
@@ -47,4 +47,4 @@ def build_kinematics(config: CellConfig, link_distance: float | None = None) -> 
 
 def build_planner(config: CellConfig, check: Check | None = None) -> Planner:
     """Return the planner for the arm of a cell file; `check` as for `Planner`."""
-    return Planner(config, build_kinematics(config, config.motion.margin + BETWEEN), check)
+    return Planner(config, build_kinematics(config, config.motion.margin + SAMPLING_MARGIN), check)

@@ -18,9 +18,9 @@ from executive.geometry import Array
 from executive.motion.limits import JointLimits
 from executive.motion.trajectory import Trajectory
 
-SHORTEST, LONGEST = 0.02, 0.5
+MIN_BRAKING_TIME, MAX_BRAKING_TIME = 0.02, 0.5
 """Range of the time taken from full rate to rest [s]."""
-_DURATIONS = np.geomspace(SHORTEST, LONGEST, 18)
+_DURATIONS = np.geomspace(MIN_BRAKING_TIME, MAX_BRAKING_TIME, 18)
 _RAMPS = (1 / 2, 1 / 3)  # share of the duration in which the deceleration builds up, and again ebbs away
 
 
@@ -44,7 +44,7 @@ def brake(trajectory: Trajectory, s: float, limits: JointLimits, step: float) ->
 def _candidates(trajectory: Trajectory, s: float, step: float) -> Iterator[tuple[Array, Array, Array]]:
     """Yield path times, rates and their slopes `(N,)` of possible stops, shortest first."""
     remaining = max(0.0, trajectory.duration - s)
-    coasted = remaining > LONGEST
+    coasted = remaining > MAX_BRAKING_TIME
     for duration in _DURATIONS:
         if not coasted and remaining <= duration:
             coasted = True

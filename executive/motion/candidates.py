@@ -1,4 +1,4 @@
-"""The ways that may be worth flying from where the arm is to a goal, most promising first."""
+"""Candidate arrivals at a goal, the most promising first."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ import numpy as np
 
 from executive.cell.arm import Goal
 from executive.geometry import Array
-from executive.motion.cartesian_line import SAMPLES, Line
+from executive.motion.cartesian_line import CHAIN_LENGTH, CartesianLine
 from executive.motion.kinematics import Configuration, Kinematics
 from executive.motion.limits import JointLimits, min_time
 from executive.motion.postures import find_postures, solve_vertical_line
 from executive.motion.state import State
 
-UNLIKE = 0.2
-"""Joint difference from which two ends of a way are worth trying both [rad]."""
+MIN_JOINT_DIFFERENCE = 0.2
+"""Minimum difference of a joint between two candidates [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
-    """A way to arrive.
+class Candidate:
+    """A candidate for the end of a motion.
 
     Attributes:
-        estimate: Least time that it takes [s].
+        estimate: Minimum time of a motion to it [s].
         entry: State in which the free part ends.
         arrival: What follows it, straight down, or None.
         configuration: Configuration in which it ends, or None for a named pose.
@@ -32,7 +32,7 @@ class Way:
 
     estimate: float
     entry: State
-    arrival: Line | None
+    arrival: CartesianLine | None
     configuration: Configuration | None
 
     @property
@@ -41,10 +41,10 @@ class Way:
         return self.arrival.duration if self.arrival else 0.0
 
 
-def ways_down(
+def find_candidates(
     kinematics: Kinematics, limits: JointLimits, start: State, goal: Goal, length: float
-) -> Iterator[Way]:
-    """Yield ways from a state to a goal, the last `length` [m] straight, each unlike those before it.
+) -> Iterator[Candidate]:
+    """Yield candidates for motions to a goal, the last `length` [m] straight, each unlike those before it.
 
     Raises:
         Unreachable: There is no posture.
@@ -54,13 +54,13 @@ def ways_down(
     taken: list[Array] = []
     for number in np.argsort(estimates, kind="stable"):
         low = postures.low[number]
-        if any(np.max(np.abs(low - other)) <= UNLIKE for other in taken):
+        if any(np.max(np.abs(low - other)) <= MIN_JOINT_DIFFERENCE for other in taken):
             continue
         taken.append(low)
         configuration = postures.configurations[number]
         arrival, entry = None, State.rest(low)
         if length > 0:
-            chain = solve_vertical_line(kinematics, low, length, SAMPLES, configuration)[::-1]
-            arrival = Line(chain, length, limits, goal.speed, enters=True)
+            chain = solve_vertical_line(kinematics, low, length, CHAIN_LENGTH, configuration)[::-1]
+            arrival = CartesianLine(chain, length, limits, goal.speed, enters=True)
             entry = arrival.at(0.0)
-        yield Way(float(estimates[number]), entry, arrival, configuration)
+        yield Candidate(float(estimates[number]), entry, arrival, configuration)

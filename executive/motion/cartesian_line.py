@@ -22,14 +22,14 @@ from executive.geometry import Array
 from executive.motion.limits import JointLimits
 from executive.motion.state import State
 
-SAMPLES = 4
+CHAIN_LENGTH = 4
 """Places along a line that inverse kinematics is asked for."""
-SHARE = 0.5
+MAX_BEND_SHARE = 0.5
 """Share of a joint's acceleration and jerk left to the bend of its path, at most."""
 _FINE = np.linspace(0.0, 1.0, 33)
 
 
-class Line:
+class CartesianLine:
     """A straight way of the tool; implements `executive.motion.state.Piece`.
 
     An end at which it does not rest is passed at the largest speed that leaves room to rest at the other.
@@ -95,12 +95,12 @@ class Line:
             speed,
             math.sqrt(2 * length * straight),  # so short a way does not make it faster
             float(np.min(limits.velocity / (slope + tiny))),
-            float(np.min(np.sqrt(SHARE * limits.acceleration / (bend + tiny)))),
-            float(np.min(np.cbrt(SHARE / 2 * limits.jerk / (twist + tiny)))),
+            float(np.min(np.sqrt(MAX_BEND_SHARE * limits.acceleration / (bend + tiny)))),
+            float(np.min(np.cbrt(MAX_BEND_SHARE / 2 * limits.jerk / (twist + tiny)))),
         )
         acceleration = min(
             float(np.min((limits.acceleration - bend * velocity**2) / (slope + tiny))),
-            float(np.min(SHARE / 2 * limits.jerk / (3 * bend * velocity + tiny))),
+            float(np.min(MAX_BEND_SHARE / 2 * limits.jerk / (3 * bend * velocity + tiny))),
         )
         rest = limits.jerk - 3 * bend * velocity * acceleration - twist * velocity**3
         return velocity, acceleration, float(np.min(rest / (slope + tiny)))

@@ -1,4 +1,4 @@
-"""What stands in the cell, as prisms, and how far the tool and its load stay away from them.
+"""Distance model of the cell: obstacles as prisms, tool and load as discs.
 
 Everything in a cell stands upright on the table, so each thing is the ground it covers and the height of
 its top; and what hangs under the flange is taken as upright discs, one under another. The distance of a disc
@@ -25,21 +25,21 @@ from executive.cell.objects import Load, Obstacle
 from executive.errors import Blocked
 from executive.geometry import Array
 
-LOOKED_AT = 0.05
+OBSERVED_RADIUS = 0.05
 """Radius around the ends of a motion in which only known things count [m]."""
-STEEPNESS = 1.5
+UNKNOWN_SLOPE = 1.5
 """How much higher unknown things may be for every metre farther away than that."""
-TOLERANCE = 0.003
+POSITION_TOLERANCE = 0.003
 """How far what was seen may be from where it is believed, and a load from the tool's axis [m]."""
-BETWEEN = 0.001
+SAMPLING_MARGIN = 0.001
 """What is kept beyond the cell's margin, for what happens between the states that are looked at [m]."""
-PRESSED = 2e-4
+MAX_PENETRATION = 2e-4
 """How far a load may be pressed into what it lies on, in passing [m]."""
-SLANT = 0.1
+TILT_DISTANCE = 0.1
 """Metres of distance that a tool axis counts for whose cosine is by 1 too small."""
-TILTED = 0.003
+MAX_EXTRA_TILT = 0.003
 """How much farther than that, as a distance, the tool may tilt in passing [m]."""
-UPRIGHT, UPRIGHT_LOADED = 0.5, 0.8
+MIN_COSINE_DOWN, MIN_COSINE_DOWN_LOADED = 0.5, 0.8
 """Least cosine between the tool's axis and straight down, empty and with a load."""
 
 
@@ -57,14 +57,16 @@ class Discs(NamedTuple):
     upright: float
 
 
-def hanging(config: CellConfig, load: Load | None) -> Discs:
+def discs_below_flange(config: CellConfig, load: Load | None) -> Discs:
     """Return the discs of the tool and what it holds."""
     if load is None:
-        return Discs(np.array([0.0, -NECK_LENGTH]), np.array([config.tool.cup_radius, TOOL_RADIUS]), UPRIGHT)
-    reach = load.kind.radius + load.kind.ring + TOLERANCE
+        return Discs(
+            np.array([0.0, -NECK_LENGTH]), np.array([config.tool.cup_radius, TOOL_RADIUS]), MIN_COSINE_DOWN
+        )
+    reach = load.kind.radius + load.kind.ring + POSITION_TOLERANCE
     # The load's underside and its top, which is elsewhere where the tool leans.
     offsets = np.array([load.kind.height, 0.0, -NECK_LENGTH])
-    return Discs(offsets, np.array([reach, reach, TOOL_RADIUS]), UPRIGHT_LOADED)
+    return Discs(offsets, np.array([reach, reach, TOOL_RADIUS]), MIN_COSINE_DOWN_LOADED)
 
 
 class Prisms(NamedTuple):
@@ -94,8 +96,8 @@ class Prisms(NamedTuple):
         return Prisms(*sizes, self.open[at], self.flat[at], self.names)
 
 
-class Surroundings:
-    """The prisms of a cell, and how near a motion comes to them.
+class ClearanceModel:
+    """Prisms of a cell, and the distances of a motion to them.
 
     Args:
         config: The cell file.
@@ -104,7 +106,7 @@ class Surroundings:
     """
 
     def __init__(self, config: CellConfig, around: Sequence[Obstacle], ends: Array) -> None:
-        self._margin = config.motion.margin + BETWEEN
+        self._margin = config.motion.margin + SAMPLING_MARGIN
         self._prisms = _prisms(config, around)
         self._ends = ends
         self._allowed = np.full(len(self._prisms.names), self._margin)
@@ -152,12 +154,12 @@ class Surroundings:
         Raises:
             Blocked: One does not; the text names the thing and where.
         """
-        if (upright := _uprightness(axes, discs)).min() < -TILTED:
+        if (upright := _uprightness(axes, discs)).min() < -MAX_EXTRA_TILT:
             at = int(np.argmin(upright))
             raise Blocked(f"the motion would tilt the tool too far{_at(tips[at])}")
         # To what may be there the margin need not be kept; nothing may be pressed into table or floor.
-        spare = np.where(self._prisms.open, self._margin, TOLERANCE + BETWEEN)
-        spare = np.where(self._prisms.flat, PRESSED, spare)
+        spare = np.where(self._prisms.open, self._margin, POSITION_TOLERANCE + SAMPLING_MARGIN)
+        spare = np.where(self._prisms.flat, MAX_PENETRATION, spare)
         near = (self._distances(tips, axes, discs) - self._required(tips)[:, None] + spare).min(axis=1)
         at, number = (int(index) for index in np.unravel_index(np.argmin(near), near.shape))
         if near[at, number] < 0:
@@ -169,7 +171,7 @@ class Surroundings:
     def _required(self, tips: Array) -> Array:
         """Return the distance to be kept by each state from each prism `(N, K)` [m]."""
         away = np.linalg.norm(tips[:, None, :2] - self._ends, axis=-1).min(axis=1)
-        return np.where((away < LOOKED_AT)[:, None], self._allowed, self._margin)
+        return np.where((away < OBSERVED_RADIUS)[:, None], self._allowed, self._margin)
 
     def _distances(self, tips: Array, axes: Array, discs: Discs) -> Array:
         """Return the distance of each disc to each prism `(N, P, K)` [m], negative inside."""
@@ -183,7 +185,7 @@ class Surroundings:
         x, y = centres[..., 0], centres[..., 1]
         # What is not known to be empty is a funnel around the ends.
         away = np.sqrt(np.min([(x - ex) ** 2 + (y - ey) ** 2 for ex, ey in self._ends], axis=0))
-        funnel = np.clip(STEEPNESS * (away - LOOKED_AT), 0.0, prisms.top)
+        funnel = np.clip(UNKNOWN_SLOPE * (away - OBSERVED_RADIUS), 0.0, prisms.top)
         top = np.where(prisms.open, funnel, prisms.top)
         tilt = np.sqrt(np.maximum(0.0, 1 - axes[..., 2] ** 2))
         above = centres[..., 2] - discs.radius * tilt - top
@@ -201,7 +203,7 @@ def _at(tip: Array) -> str:
 
 def _uprightness(axes: Array, discs: Discs) -> Array:
     """Return by how much tool axes `(..., 3)` are more upright than they must be, as a distance [m]."""
-    return SLANT * (-axes[..., 2] - discs.upright)
+    return TILT_DISTANCE * (-axes[..., 2] - discs.upright)
 
 
 def _prisms(config: CellConfig, around: Sequence[Obstacle]) -> Prisms:
@@ -220,7 +222,7 @@ def _prisms(config: CellConfig, around: Sequence[Obstacle]) -> Prisms:
         ):  # fmt: skip
             rows.append((*wall, 0.0, top, False, False, name))
         rows.append((left, right, front, back, 0.0, floor + t, False, True, f"the floor of {name}"))
-    rows += [(o.x, o.x, o.y, o.y, o.radius + TOLERANCE, o.top, False, False, o.name) for o in around]
+    rows += [(o.x, o.x, o.y, o.y, o.radius + POSITION_TOLERANCE, o.top, False, False, o.name) for o in around]
     table, names = np.array([row[:8] for row in rows]), tuple(row[8] for row in rows)
     corners = table[:, [0, 2]], table[:, [1, 3]]
     return Prisms(*corners, table[:, 4], table[:, 5], table[:, 6] > 0, table[:, 7] > 0, names)

@@ -14,50 +14,57 @@ from itertools import pairwise
 import numpy as np
 
 from executive.geometry import Array
-from executive.motion.clearance_model import Discs, Surroundings
+from executive.motion.clearance_model import ClearanceModel, Discs
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
-from executive.motion.payload import Hold
-from executive.motion.point_to_point import Connector, Free, NoProfile
+from executive.motion.payload import PayloadLimit
+from executive.motion.point_to_point import Connector, NoProfile, PointToPoint
 from executive.motion.state import State
-from executive.motion.transcription import SAMPLES, STEPS, WEIGHT, Course, Demand, Transcription
+from executive.motion.transcription import (
+    SAMPLES_PER_STEP,
+    STEP_COUNT,
+    VIOLATION_COST,
+    Course,
+    Demand,
+    Transcription,
+)
 
-NEAR = 0.03
+MAX_DISTANCE = 0.03
 """Distance up to which a state is part of the program [m]."""
-TRUST, CALMER = 0.3, 0.9
+FIRST_TRUST, TRUST_DECAY = 0.3, 0.9
 """Share of the limits by which accelerations change in the first step; from step to step it gets less."""
-FIT = 0.8
+FIRST_DURATION_SHARE = 0.8
 """Share of the time of the way that stops at every corner which the first course takes."""
-INSIDE = 0.01
+LIMIT_MARGIN = 0.01
 """Distance from the joints' position limits [rad]."""
 _DIFFERENCE = 1e-4  # [rad]
 
 
 @dataclass(frozen=True, eq=False)
-class Gap:
-    """What lies between two states.
+class Problem:
+    """The optimization problem between two states.
 
     Attributes:
         start, end: The states.
         connector: Joins states.
         kinematics: The arm.
-        surroundings: What stands around.
+        clearance: Distances to all obstacles.
         discs: What hangs under the flange.
-        hold: What the seal of a load demands, or None.
+        payload: Acceleration limit due to the load, or None.
     """
 
     start: State
     end: State
     connector: Connector
     kinematics: Kinematics
-    surroundings: Surroundings
+    clearance: ClearanceModel
     discs: Discs
-    hold: Hold | None = None
+    payload: PayloadLimit | None = None
 
     def slack(self, qs: Array) -> Array:
         """Return by how much joint positions `(N, n)` keep their distance [m] and limits [rad] `(N,)`."""
         tips, axes = self.kinematics.tips(qs)
-        return np.minimum(self.surroundings.slack(tips, axes, self.discs), self._inside(qs).min(axis=1))
+        return np.minimum(self.clearance.slack(tips, axes, self.discs), self._inside(qs).min(axis=1))
 
     def slopes(self, qs: Array, slack: Array) -> Array:
         """Return how the slack `(N,)` at joint positions `(N, n)` depends on each joint `(N, n)` [m/rad]."""
@@ -65,7 +72,7 @@ class Gap:
         count = qs.shape[1]
         moved = self.kinematics.tips((qs[:, None] + _DIFFERENCE * np.eye(count)).reshape(-1, count))
         shaped = moved[0].reshape(-1, count, 3), moved[1].reshape(-1, count, 3)
-        slopes = self.surroundings.slopes(tips, axes, self.discs, shaped) / _DIFFERENCE
+        slopes = self.clearance.slopes(tips, axes, self.discs, shaped) / _DIFFERENCE
         inside = self._inside(qs)
         joint = np.argmin(inside, axis=1)
         number = np.arange(len(qs))
@@ -76,15 +83,15 @@ class Gap:
         return slopes
 
     def _inside(self, qs: Array) -> Array:
-        return -self.kinematics.joint_range.shrink(INSIDE).excess(qs)
+        return -self.kinematics.joint_range.shrink(LIMIT_MARGIN).excess(qs)
 
 
-class Detour:
-    """Looks for the fastest way over a gap, a few steps at a time.
+class Optimizer:
+    """Searches the fastest motion between two states, a few steps at a time.
 
     Args:
-        gap: The gap.
-        first: A way over it `(M, n)` [rad] at the places that a course is looked at, however slow.
+        problem: The states, and what limits a motion between them.
+        first: A motion between them `(M, n)` [rad] at the places that a course is looked at, however slow.
         duration: Of that way [s].
 
     Attributes:
@@ -94,42 +101,44 @@ class Detour:
         NoProfile: No course is anywhere near that way.
     """
 
-    def __init__(self, gap: Gap, first: Array, duration: float) -> None:
-        self._gap = gap
-        self._transcription = Transcription(gap.start, gap.end, gap.connector.limits)
-        course = self._transcription.fit(FIT * duration / STEPS, first)
+    def __init__(self, problem: Problem, first: Array, duration: float) -> None:
+        self._problem = problem
+        self._transcription = Transcription(problem.start, problem.end, problem.connector.limits)
+        course = self._transcription.fit(FIRST_DURATION_SHARE * duration / STEP_COUNT, first)
         if course is None:
             raise NoProfile("no motion follows the way that stops at every corner")
-        self._best, self.cost, self._trust = course, np.inf, TRUST
+        self._best, self.cost, self._trust = course, np.inf, FIRST_TRUST
         self._gentle: list[Demand] = []
         self._look(course)
 
     def improve(self, steps: int) -> None:
         """Take up to `steps` steps."""
         for _ in range(steps):
-            rows = np.nonzero(self._slack < NEAR)[0]
+            rows = np.nonzero(self._slack < MAX_DISTANCE)[0]
             slack = self._slack[rows]
-            slopes = self._gap.slopes(self._last.qs[rows], slack)
+            slopes = self._problem.slopes(self._last.qs[rows], slack)
             clear = Demand(slack, rows[:, None], slopes[:, None], np.zeros(len(rows)))
             course = self._transcription.shorten(self._last, [clear, *self._gentle], self._trust)
             if course is None:
                 return
-            self._trust *= CALMER
+            self._trust *= TRUST_DECAY
             self._look(course)
 
     def _look(self, course: Course) -> None:
         """Take `course` as the last one, and as the best one if it is."""
-        self._last, self._slack = course, self._gap.slack(course.qs)
+        self._last, self._slack = course, self._problem.slack(course.qs)
         lacks = [-float(self._slack.min())]
         self._gentle = []
-        if self._gap.hold is not None:
-            self._gentle = [self._gap.hold.demand(course.qs, course.step / SAMPLES, NEAR)]
-            lacks.append(-float(self._gentle[0].slack.min(initial=NEAR)))
-        cost = course.duration + WEIGHT * max(0.0, *lacks)
+        if self._problem.payload is not None:
+            self._gentle = [
+                self._problem.payload.demand(course.qs, course.step / SAMPLES_PER_STEP, MAX_DISTANCE)
+            ]
+            lacks.append(-float(self._gentle[0].slack.min(initial=MAX_DISTANCE)))
+        cost = course.duration + VIOLATION_COST * max(0.0, *lacks)
         if cost < self.cost:
             self._best, self.cost = course, cost
 
-    def fly(self, exactly: bool) -> tuple[Free, ...]:
+    def fly(self, exactly: bool) -> tuple[PointToPoint, ...]:
         """Return the best course as motions between states on it.
 
         `exactly`: between half steps, each as long as it takes on the course; else between whole steps, each
@@ -140,13 +149,13 @@ class Detour:
         """
         least = self._best.step / 2 if exactly else None
         states = [
-            _flyable(state, self._gap.connector.limits)
+            _limit_velocity(state, self._problem.connector.limits)
             for state in self._transcription.states(self._best)[:: 1 if exactly else 2]
         ]
-        return tuple(self._gap.connector.connect(a, b, least) for a, b in pairwise(states))
+        return tuple(self._problem.connector.connect(a, b, least) for a, b in pairwise(states))
 
 
-def _flyable(state: State, limits: JointLimits) -> State:
+def _limit_velocity(state: State, limits: JointLimits) -> State:
     """Return the nearest state that can be entered and left without exceeding a velocity limit.
 
     Whoever has an acceleration gains `a² / 2 j` before it is gone.

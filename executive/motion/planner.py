@@ -1,7 +1,7 @@
 """Planning one motion per intent: from rest to rest, as fast as the limits allow, clear of everything.
 
-The arm has choices: eight branches, the elbow's swivel and, for a round cup, the tool's yaw where it arrives,
-and the shape of the way between. The planner ranks the ends by the least time there can be, flies the direct
+The arm has choices: its configuration and, for a round cup, the yaw of the tool at the goal, and the shape of
+the path between. The planner ranks the ends by the least time there can be, flies the direct
 way where nothing is in between and looks for the fastest detour where something is. What it finds is checked
 in a planning world before it counts. Its budget is a number of steps, never a time: the same question always
 gets the same answer.
@@ -24,16 +24,16 @@ from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
 from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
-from executive.motion.payload import Hold
+from executive.motion.payload import PayloadLimit
 from executive.motion.point_to_point import NoProfile
 from executive.motion.postures import find_postures
 from executive.motion.search import Search
-from executive.motion.trajectory import Trajectory, thinned
+from executive.motion.trajectory import Trajectory, thin_out
 
 Check = Callable[[Array, Task], None]
 """Takes joint positions along a path `(N, n)` [rad] and what it has to heed; raises Blocked."""
 
-SPACING = math.radians(1.0)
+MAX_CHECK_SPACING = math.radians(1.0)
 """Largest joint move between the states whose clearance is checked [rad]."""
 
 
@@ -67,7 +67,7 @@ class Planner:
         start = np.asarray(q_start, dtype=float)
         end = goal if isinstance(goal, Goal) else np.asarray(goal, dtype=float)
         trajectory = self._plan(start, end, task)
-        return Hold(task.load, self.kinematics).gentle(trajectory) if task.load else trajectory
+        return PayloadLimit(task.load, self.kinematics).gentle(trajectory) if task.load else trajectory
 
     def require_reachable(self, goal: Goal) -> None:
         """Make sure that a goal and travel height above it can be reached from somewhere in one posture.
@@ -79,7 +79,7 @@ class Planner:
         find_postures(self.kinematics, goal, rise, np.zeros(self.limits.joint_count))
 
     def _plan(self, start: Array, end: Goal | Array, task: Task) -> Trajectory:
-        search = Search(self._config, self.kinematics, self.limits, start, end, _keeping_clear(task))
+        search = Search(self._config, self.kinematics, self.limits, start, end, _task_of_free_part(task))
         blocked: list[str] = []
         for motion in search.candidates():
             try:
@@ -103,11 +103,11 @@ class Planner:
         free = qs[: math.ceil(motion.guarded / STEP)] if guarded else qs
         search.require_clear(free)
         if self._check is not None:
-            self._check(thinned(free, SPACING), _keeping_clear(task))
+            self._check(thin_out(free, MAX_CHECK_SPACING), _task_of_free_part(task))
             if guarded:
-                self._check(thinned(qs[len(free) - 1 :], SPACING), task)
+                self._check(thin_out(qs[len(free) - 1 :], MAX_CHECK_SPACING), task)
 
 
-def _keeping_clear(task: Task) -> Task:
+def _task_of_free_part(task: Task) -> Task:
     """Return the task of the free part of a motion: what is to be touched in the end stands around, too."""
     return task if task.target is None else replace(task, around=(*task.around, task.target), target=None)

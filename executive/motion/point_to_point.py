@@ -24,7 +24,7 @@ class NoProfile(ValueError):
     """There is no motion inside the limits that begins and ends in the given states."""
 
 
-class Free:
+class PointToPoint:
     """A motion from state to state; implements `executive.motion.state.Piece`."""
 
     def __init__(self, profile: Profile) -> None:
@@ -52,7 +52,7 @@ class Connector:
         self._input.max_acceleration = limits.acceleration.tolist()
         self._input.max_jerk = limits.jerk.tolist()
 
-    def connect(self, start: State, end: State, least: float | None = None) -> Free:
+    def connect(self, start: State, end: State, least: float | None = None) -> PointToPoint:
         """Return the fastest motion from `start` to `end` that takes `least` [s] or longer.
 
         Positions are not limited: ruckig does not look at that.
@@ -82,7 +82,7 @@ class Connector:
             raise NoProfile(_text(start, end, result))
         if np.any(_fastest(profile) > (1 + _ROUNDING) * self.limits.velocity):
             raise NoProfile(_text(start, end, "the one it found exceeds a velocity limit"))
-        return Free(profile)
+        return PointToPoint(profile)
 
 
 def _fastest(profile: Profile) -> Array:

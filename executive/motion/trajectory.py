@@ -69,7 +69,9 @@ class Trajectory:
     @cached_property
     def samples(self) -> State:
         """Its states every 1/240 s, the last one included: each array of shape `(N, n)`."""
-        states = over(self._pieces, np.asarray(np.arange(0.0, self.duration, STEP), dtype=np.float64))
+        states = sample_pieces(
+            self._pieces, np.asarray(np.arange(0.0, self.duration, STEP), dtype=np.float64)
+        )
         return State(*(np.concatenate([a, b[None]]) for a, b in zip(states, self._last, strict=True)))
 
     def check(self, limits: JointLimits) -> State:
@@ -82,7 +84,7 @@ class Trajectory:
         states = self.samples
         # Ruckig's `position_extrema` are too small where a joint turns back (pantor/ruckig issue 215).
         _require_inside(states.q, limits)
-        for name, share in zip(("velocity", "acceleration", "jerk"), peaks(states, limits), strict=True):
+        for name, share in zip(("velocity", "acceleration", "jerk"), find_peaks(states, limits), strict=True):
             joint = int(np.argmax(share))
             if share[joint] > 1 + _ROUNDING:
                 raise NoProfile(
@@ -91,7 +93,7 @@ class Trajectory:
         return states
 
 
-def peaks(states: State, limits: JointLimits) -> Array:
+def find_peaks(states: State, limits: JointLimits) -> Array:
     """Return each joint's largest velocity, acceleration and jerk over its limit `(3, n)`.
 
     The states are a motion's samples, every `STEP`. The last one is not a whole step after the one before,
@@ -123,7 +125,7 @@ class _Slowed:
         return State(state.q, self.rate * state.qd, self.rate**2 * state.qdd)
 
 
-def thinned(qs: Array, spacing: float) -> Array:
+def thin_out(qs: Array, spacing: float) -> Array:
     """Return so few positions of a path `(N, n)` [rad] that no joint moves farther than `spacing`."""
     kept = [0]
     for number in range(1, len(qs) - 1):
@@ -132,7 +134,7 @@ def thinned(qs: Array, spacing: float) -> Array:
     return qs[[*kept, len(qs) - 1]]
 
 
-def over(pieces: Sequence[Piece], times: Array) -> State:
+def sample_pieces(pieces: Sequence[Piece], times: Array) -> State:
     """Return the states that `pieces`, one after the other, pass at rising `times` `(N,)` [s]."""
     count = len(pieces[0].at(0.0).q)
     parts, before = [State(*np.empty((3, 0, count)))], 0.0

@@ -24,24 +24,24 @@ from executive.geometry import Array
 from executive.motion.limits import JointLimits
 from executive.motion.state import State
 
-STEPS = 8
+STEP_COUNT = 8
 """Steps of time of a motion."""
-SAMPLES = 16
+SAMPLES_PER_STEP = 16
 """Places per step at which distances are looked at."""
-PLACES = np.arange(1, STEPS * SAMPLES) / (STEPS * SAMPLES)
+SAMPLE_SHARES = np.arange(1, STEP_COUNT * SAMPLES_PER_STEP) / (STEP_COUNT * SAMPLES_PER_STEP)
 """Shares of a motion's duration at which those are `(M,)`."""
-LESS = 0.98, 0.995, 0.995
+USED_LIMIT_SHARES = 0.98, 0.995, 0.995
 """Share of the velocity, acceleration, jerk limits that is used.
 
 Velocities are looked at every half step `h / 2`; between those one may be higher by `j (h / 2)² / 8`.
 """
-WEIGHT = 20.0
+VIOLATION_COST = 20.0
 """Seconds that a metre too near to something counts for."""
-SPARE = 1e-3
+EXTRA_DISTANCE = 1e-3
 """Distance more than needed that is aimed at, since the linear distance is not the true one [m]."""
-SMOOTHNESS = 1e-4
+SMOOTHNESS_WEIGHT = 1e-4
 """Weight of the squares of accelerations as shares of their limits: it settles what time leaves open [s]."""
-SHORTEST, LONGEST = 0.8, 1.6
+MIN_STEP_CHANGE, MAX_STEP_CHANGE = 0.8, 1.6
 """Change of the duration in one solution, at most."""
 _METRE = 0.01  # [m] what distances are shares of
 _UNBOUNDED = 1e30
@@ -64,7 +64,7 @@ class Course(NamedTuple):
     @property
     def duration(self) -> float:
         """Time it takes [s]."""
-        return STEPS * self.step
+        return STEP_COUNT * self.step
 
 
 class Demand(NamedTuple):
@@ -97,14 +97,16 @@ class Transcription:
     def __init__(self, start: State, end: State, limits: JointLimits) -> None:
         self._start, self._end = start, end
         self._grid = _grid(limits.joint_count)
-        self._inner = limits.joint_count * (STEPS - 1)
+        self._inner = limits.joint_count * (STEP_COUNT - 1)
         velocity, acceleration, jerk = (
             share * limit
-            for share, limit in zip(LESS, (limits.velocity, limits.acceleration, limits.jerk), strict=True)
+            for share, limit in zip(
+                USED_LIMIT_SHARES, (limits.velocity, limits.acceleration, limits.jerk), strict=True
+            )
         )
         self._acceleration = acceleration
         grid, halves = self._grid, len(self._grid.half)
-        ends = np.zeros((limits.joint_count, STEPS))
+        ends = np.zeros((limits.joint_count, STEP_COUNT))
         ends[:, 0] -= start.qdd
         ends[:, -1] += end.qdd
         given = np.outer(start.qdd, grid.half[:, 0]) + np.outer(end.qdd, grid.half[:, -1])
@@ -113,9 +115,9 @@ class Transcription:
         self._steady = np.concatenate([still, moving, np.zeros(len(grid.jerks))])
         self._bent = np.concatenate([still, given.ravel(), ends.ravel()])
         self._reach = np.zeros((3, len(self._bent)))
-        self._reach[1, : len(still)] = np.repeat(acceleration, STEPS - 1)
+        self._reach[1, : len(still)] = np.repeat(acceleration, STEP_COUNT - 1)
         self._reach[0, len(still) : -len(grid.jerks)] = np.repeat(velocity, halves)
-        self._reach[2, -len(grid.jerks) :] = np.repeat(jerk, STEPS)
+        self._reach[2, -len(grid.jerks) :] = np.repeat(jerk, STEP_COUNT)
 
     def states(self, course: Course) -> list[State]:
         """Return the states at every half step, the start and the end among them."""
@@ -123,9 +125,9 @@ class Transcription:
         y = course.accelerations * h**2
         qd = start.qd + (grid.half @ y.T) / h
         middle = (y[:, :-1] + y[:, 1:]) / 2
-        qdd = np.empty((2 * STEPS - 1, len(y)))
+        qdd = np.empty((2 * STEP_COUNT - 1, len(y)))
         qdd[::2], qdd[1::2] = middle.T / h**2, course.accelerations[:, 1:-1].T
-        inner = slice(SAMPLES // 2 - 1, None, SAMPLES // 2)
+        inner = slice(SAMPLES_PER_STEP // 2 - 1, None, SAMPLES_PER_STEP // 2)
         return [start, *map(State, course.qs[inner], qd, qdd), self._end]
 
     def fit(self, step: float, first: Array) -> Course | None:
@@ -148,7 +150,7 @@ class Transcription:
         """
         step, start = last.step, self._start
         program = self._program(step)
-        program.cost[self._inner :] = STEPS * step, WEIGHT * _METRE
+        program.cost[self._inner :] = STEP_COUNT * step, VIOLATION_COST * _METRE
         before = (last.accelerations[:, 1:-1] / self._acceleration[:, None]).ravel()
         program.low[: self._inner], program.high[: self._inner] = before - trust, before + trust
         rows, most = [], []
@@ -165,7 +167,7 @@ class Transcription:
             part[:, self._inner + 1] = -1.0
             off = np.einsum("rkj,rkj->r", slopes, start.q - last.qs[demand.rows])
             rows.append(part)
-            most.append(demand.slack - SPARE + off - step**2 * bent - step * demand.growth)
+            most.append(demand.slack - EXTRA_DISTANCE + off - step**2 * bent - step * demand.growth)
         return self._course(step, program, np.concatenate(rows), np.concatenate(most))
 
     def _program(self, step: float) -> _Program:
@@ -181,16 +183,16 @@ class Transcription:
         ways = np.outer(grid.position[-1, [0, -1]], np.ones(joints)) * (start.qdd, end.qdd)
         faster, farther = speeds.sum(axis=0), ways.sum(axis=0)
         rows[2 * limits : -joints, step_column] = start.qd - end.qd + 2 * step * faster
-        rows[-joints:, step_column] = STEPS * start.qd + 2 * step * farther
+        rows[-joints:, step_column] = STEP_COUNT * start.qd + 2 * step * farther
         least = np.full(len(rows), -_UNBOUNDED)
         most = np.concatenate(
             [turning + turn, turning - turn, step**2 * faster, end.q - start.q + step**2 * farther]
         )
         least[2 * limits :] = most[2 * limits :]
         low, high = np.full(step_column + 2, -_UNBOUNDED), np.full(step_column + 2, _UNBOUNDED)
-        low[step_column:], high[step_column] = (SHORTEST, 0.0), LONGEST
-        scale = np.concatenate([np.repeat(self._acceleration * step**2, STEPS - 1), [step, _METRE]])
-        square, cost = SMOOTHNESS * np.eye(step_column + 2), np.zeros(step_column + 2)
+        low[step_column:], high[step_column] = (MIN_STEP_CHANGE, 0.0), MAX_STEP_CHANGE
+        scale = np.concatenate([np.repeat(self._acceleration * step**2, STEP_COUNT - 1), [step, _METRE]])
+        square, cost = SMOOTHNESS_WEIGHT * np.eye(step_column + 2), np.zeros(step_column + 2)
         return _Program(scale, square, cost, rows, low, high, least, most, 2 * joints)
 
     def _given(self, step: float) -> Array:
@@ -207,7 +209,7 @@ class Transcription:
         if answer is None:
             return None
         h = step * float(answer[self._inner])
-        inner = (answer * program.scale)[: self._inner].reshape(-1, STEPS - 1)
+        inner = (answer * program.scale)[: self._inner].reshape(-1, STEP_COUNT - 1)
         y = np.column_stack([self._start.qdd * h**2, inner, self._end.qdd * h**2])
         qs = self._start.q + np.outer(self._grid.times, self._start.qd * h) + self._grid.place @ y.T
         return Course(h, y / h**2, qs)
@@ -272,26 +274,26 @@ class _Grid(NamedTuple):
 
 @lru_cache(maxsize=4)
 def _grid(joint_count: int) -> _Grid:
-    velocity, position = np.zeros((2, STEPS + 1, STEPS + 1))
-    for k in range(STEPS):
+    velocity, position = np.zeros((2, STEP_COUNT + 1, STEP_COUNT + 1))
+    for k in range(STEP_COUNT):
         velocity[k + 1], position[k + 1] = velocity[k], position[k] + velocity[k]
         velocity[k + 1, k : k + 2] += 1 / 2
         position[k + 1, k : k + 2] += 1 / 3, 1 / 6
-    times = np.asarray(STEPS * PLACES)
+    times = np.asarray(STEP_COUNT * SAMPLE_SHARES)
     before = times.astype(int)
     into = times - before
     place = position[before] + into[:, None] * velocity[before]
     number = np.arange(len(times))
     place[number, before] += into**2 / 2 - into**3 / 6
     place[number, before + 1] += into**3 / 6
-    half = np.empty((2 * STEPS - 1, STEPS + 1))
+    half = np.empty((2 * STEP_COUNT - 1, STEP_COUNT + 1))
     half[1::2] = velocity[1:-1]
     half[::2] = velocity[:-1]
-    for k in range(STEPS):
+    for k in range(STEP_COUNT):
         half[2 * k, k : k + 2] += 3 / 8, 1 / 8
     joints = np.eye(joint_count)
-    accelerations = np.asarray(np.kron(joints, np.eye(STEPS - 1)), dtype=np.float64)
-    jerks = np.asarray(np.kron(joints, np.diff(np.eye(STEPS + 1), axis=0)[:, 1:-1]), dtype=np.float64)
+    accelerations = np.asarray(np.kron(joints, np.eye(STEP_COUNT - 1)), dtype=np.float64)
+    jerks = np.asarray(np.kron(joints, np.diff(np.eye(STEP_COUNT + 1), axis=0)[:, 1:-1]), dtype=np.float64)
     limits = np.concatenate([accelerations, np.kron(joints, half[:, 1:-1]), jerks])
     ends = [np.kron(joints, velocity[-1, 1:-1]), np.kron(joints, position[-1, 1:-1])]
     rows = np.concatenate([limits, -limits, *ends])

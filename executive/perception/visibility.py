@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 
 from executive.geometry import Array, Pose
 
-LINK_SHADOW = 0.09
-"""Radius of the spheres that stand for a link: the circle around the iiwa 14's housing [m]."""
-
 TOOL_SHADOW = 0.02
 """Radius of the spheres that stand for the tool: its tube with fittings [m]."""
 
@@ -22,7 +19,9 @@ Bone = tuple[Sequence[Array], float]
 """Points `(3,)` [m] along a part of the arm, and the radius of the spheres that stand for it [m]."""
 
 
-def hidden(bones: Sequence[Bone], matrix: Array, X_WC: Pose, size: tuple[int, int]) -> NDArray[np.bool_]:
+def find_hidden_pixels(
+    bones: Sequence[Bone], matrix: Array, X_WC: Pose, size: tuple[int, int]
+) -> NDArray[np.bool_]:
     """Return which pixels `(H, W)` the arm may cover, as the shadow of spheres along its bones.
 
     Args:
@@ -47,7 +46,9 @@ def hidden(bones: Sequence[Bone], matrix: Array, X_WC: Pose, size: tuple[int, in
     return mask.astype(bool)
 
 
-def outline(corners: Array, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> NDArray[np.bool_] | None:
+def find_outline_pixels(
+    corners: Array, matrix: Array, X_WC: Pose, size: tuple[int, int]
+) -> NDArray[np.bool_] | None:
     """Return the pixels `(H, W)` inside the convex outline of world points `(N, 3)` [m].
 
     None where any of the points lies outside the image: the outline is not wholly in view.

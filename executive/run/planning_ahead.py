@@ -5,8 +5,8 @@ from __future__ import annotations
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell
 from executive.events import FrameSearched, MotionPlanned, TargetSelected, TimedEvent, ToolCommanded
-from executive.manipulation.motions import carrying
-from executive.manipulation.tool_goals import approach, into, nearest_first
+from executive.manipulation.motions import task_of_carrying
+from executive.manipulation.tool_goals import approach, goal_in_bin, nearest_first
 
 
 class PlanningAhead:
@@ -51,7 +51,7 @@ class PlanningAhead:
         if self._is_closing and self._selected and cell.ledger.find_held_item() is None and cell.tool.holding:
             self._is_closing = False
             item, bin = self._selected
-            cell.arm.plan_ahead(into(cell, bin, item), carrying(cell, item))
+            cell.arm.plan_ahead(goal_in_bin(cell, bin, item), task_of_carrying(cell, item))
         elif self._approach_is_outdated and self._is_delivering():
             self._approach_is_outdated = False
             for target in nearest_first(cell, cell.ledger.find_targets())[:1]:

@@ -9,8 +9,8 @@ from executive.cell.detection import Detections
 from executive.cell.objects import Load
 from executive.cell.protocols import Cell, Steps
 from executive.errors import Blocked, Fault, NoDepth, Unavailable, Unreachable
-from executive.manipulation.obstacles import around
-from executive.manipulation.tool_goals import DROP, aside
+from executive.manipulation.obstacles import list_obstacles
+from executive.manipulation.tool_goals import DROP_HEIGHT, goal_aside
 
 LOOKS_PER_POSE = 3
 """Number of looks from each scan pose of the camera."""
@@ -45,12 +45,12 @@ def recover_scene(cell: Cell) -> Steps:
 def _put_down(cell: Cell) -> Steps:
     """Carry the object in the tool, whose class is unknown, to a free place on the table."""
     kind = max(cell.classes.values(), key=lambda kind: kind.height)
-    goal = aside(cell, kind, DROP)
+    goal = goal_aside(cell, kind, DROP_HEIGHT)
     problems = []
     # In a bin or on the table, a load as high as the highest class may seem to be in collision.
     for load in (Load(kind, cell.tool.bears), None):
         try:
-            yield from _move(cell, goal, Task(load, around(cell)))
+            yield from _move(cell, goal, Task(load, list_obstacles(cell)))
         except (Unreachable, Blocked) as error:
             problems.append(str(error))
         else:
@@ -64,7 +64,7 @@ def _put_down(cell: Cell) -> Steps:
 def _look(cell: Cell, pose: str) -> Steps:
     """Observe everything that the camera sees from an arm pose, or from the present one if it is blocked."""
     with suppress(Unreachable, Blocked):
-        yield from _move(cell, pose, Task(around=around(cell)))
+        yield from _move(cell, pose, Task(around=list_obstacles(cell)))
     frame = cell.camera.capture()
     request = next(iter(cell.detectors.values())).request(frame, "full")
     while not request.ready:

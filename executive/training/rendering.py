@@ -14,9 +14,9 @@ import numpy as np
 
 from executive.cell.config import CellConfig
 from executive.cell.frame import Box
-from executive.cells.sim.models import missing_models
+from executive.cells.sim.models import find_missing_models
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig
-from executive.cells.sim.scenes import SIZE, Sample, SceneRenderer
+from executive.cells.sim.scenes import IMAGE_SIZE, Sample, SceneRenderer
 from executive.errors import InputError
 from executive.geometry import Array
 from executive.processes import Workers
@@ -65,7 +65,7 @@ def generate(
             + "; ".join(f"{name} has {', '.join(cell.objects)}" for name, cell in configs.items())
         )
     for name, cell in configs.items():
-        for key, sentence in missing_models(cell):
+        for key, sentence in find_missing_models(cell):
             raise InputError(f"{name}: {'.'.join(map(str, key))}: {sentence}")
     write_annotations(out, layout, [], classes)
     render = partial(_render_block, cells, out, layout, seed, images - round(images * valid))
@@ -162,7 +162,7 @@ def _entry(sample: Sample, split: str, file: str, camera: str) -> Entry:
     }
     boxes, ignored = _boxes(sample.boxes), _boxes(sample.ignored)
     truth = {**_truth(sample, camera, sample.part), **rounded}
-    return Entry(split, file, (SIZE, SIZE), sample.labels, boxes, ignored, truth)
+    return Entry(split, file, (IMAGE_SIZE, IMAGE_SIZE), sample.labels, boxes, ignored, truth)
 
 
 def as_labelled_frame(sample: Sample, camera: str, file: str) -> LabelledImage:
@@ -170,7 +170,7 @@ def as_labelled_frame(sample: Sample, camera: str, file: str) -> LabelledImage:
     assert sample.frame is not None
     height, width = sample.frame.shape[:2]
     left, top, right, _ = sample.part
-    scale, corner = (right - left) / SIZE, [left, top, left, top]
+    scale, corner = (right - left) / IMAGE_SIZE, [left, top, left, top]
     return LabelledImage(
         file=file,
         image=sample.frame,

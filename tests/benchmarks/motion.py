@@ -25,7 +25,7 @@ from executive.geometry import Array
 from executive.motion.braking import brake
 from executive.motion.planner import Planner
 from executive.motion.state import State
-from executive.motion.trajectory import Trajectory, peaks
+from executive.motion.trajectory import Trajectory, find_peaks
 from tests.benchmarks import motion_baselines as baselines
 from tests.benchmarks.motion_execution import execute_pairs
 from tests.benchmarks.motion_scenes import Scene, SceneGenerator, open_world
@@ -78,7 +78,7 @@ class _MethodComparison:
 
     def _add(self, method: str, duration: float, states: Sequence[State]) -> None:
         """Add the time [s] and the states of a pair."""
-        shares = [peaks(one, self._planner.limits).max(axis=1) for one in states]
+        shares = [find_peaks(one, self._planner.limits).max(axis=1) for one in states]
         self._durations[method].append(duration)
         self._peaks[method] = np.max([self._peaks[method], *shares], axis=0)
 

@@ -13,14 +13,14 @@ from executive.cell.config import CellConfig
 from executive.cell.layout import as_bin
 from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.cells.sim.collision import PathClearance
-from executive.cells.sim.models import load_mesh, weighed
+from executive.cells.sim.models import load_mesh, object_class_with_mass
 from executive.cells.sim.spawn import spawn
-from executive.cells.sim.suction import breakaway, measure
-from executive.cells.sim.tool import TOUCH
+from executive.cells.sim.suction import breakaway_force, measure_contact
+from executive.cells.sim.tool import TOUCH_DISTANCE
 from executive.cells.sim.world import World
 from executive.errors import InputError, Unreachable
 from executive.geometry import tool_down
-from executive.manipulation.tool_goals import onto, over
+from executive.manipulation.tool_goals import goal_on_object, goal_over_slot
 from executive.motion.arms import build_planner
 from executive.motion.planner import Planner
 
@@ -130,10 +130,10 @@ class SceneGenerator:
         kind = self._kind(first)
         target, *others = (self._make_obstacle(body, number) for number, body in enumerate(bodies, start=1))
         centre = np.array([target.x, target.y, target.top - kind.height / 2])
-        approach = onto(kind, centre, motion.descent, motion.descent_speed)
+        approach = goal_on_object(kind, centre, motion.descent, motion.descent_speed)
         surface, force = self._measure_seal(first, approach.position[:2], target.top)
-        drop = over(bin, slot, kind.height, self._tallest)
-        return Scene(first, kind, surface + TOUCH, force, target, tuple(others), approach, drop)
+        drop = goal_over_slot(bin, slot, kind.height, self._tallest)
+        return Scene(first, kind, surface + TOUCH_DISTANCE, force, target, tuple(others), approach, drop)
 
     def _make_obstacle(self, body: int, number: int) -> Obstacle:
         """Return an object as an obstacle at the centre of the bounding box of its outline from above."""
@@ -146,7 +146,7 @@ class SceneGenerator:
 
     def _kind(self, body: int) -> ObjectClass:
         label = self._world.bodies[body]
-        return weighed(label, self._cell.objects[label])
+        return object_class_with_mass(label, self._cell.objects[label])
 
     def _measure_seal(self, body: int, place: tuple[float, float], top: float) -> tuple[float, float]:
         """Return the surface height under a cup at `place` [m], and the breakaway force of a seal there [N].
@@ -159,8 +159,8 @@ class SceneGenerator:
         # Twice: the distance found by the rays depends a little on where they start.
         for _ in range(2):
             X_WT = tool_down((*place, surface))
-            seal = measure(self._world.client, X_WT, {body}, tool.cup_radius, tool.reach)
-            force = breakaway(seal, tool)
+            seal = measure_contact(self._world.client, X_WT, {body}, tool.cup_radius, tool.reach)
+            force = breakaway_force(seal, tool)
             surface -= seal.distance if seal else 0.0
         if force < tool.least_force:
             raise Unreachable(f"no seal holds the {self._world.bodies[body]} at its middle")

@@ -16,8 +16,8 @@ import numpy as np
 
 from executive.cell.config import CellConfig, ToolConfig
 from executive.cells.sim.models import load_mesh
-from executive.cells.sim.suction import breakaway
-from executive.cells.sim.suction import measure as measure_seal
+from executive.cells.sim.suction import breakaway_force
+from executive.cells.sim.suction import measure_contact as measure_seal
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose, about_z, tool_down
 from tests.benchmarks.report import CELL_OPTIONS, Figures, run_command
@@ -36,7 +36,7 @@ SETTLE_STEPS = 120
 """Physics steps in which an object comes to rest."""
 
 
-def measure(cell: CellConfig, out: Path | None = None) -> Figures:
+def measure_contact(cell: CellConfig, out: Path | None = None) -> Figures:
     """Measure the suction of cups on the objects of CELL, and write all rows to `--out` as CSV."""
     rows = measure_map(cell)
     if out is not None:
@@ -128,7 +128,7 @@ def _measure_places(world: World, body: int, tool: ToolConfig, places: Iterable[
             seal = measure_seal(world.client, landed, {body}, tool.cup_radius, tool.reach)
         gaps.append(math.inf if seal is None else seal.gap)
         tilts.append(math.pi / 2 if seal is None else seal.tilt)
-        forces.append(breakaway(seal, tool))
+        forces.append(breakaway_force(seal, tool))
     return {
         "placements": len(gaps),
         **_quantiles("gap", gaps, 6),
@@ -150,7 +150,7 @@ def _quantiles(name: str, values: Sequence[float], digits: int) -> Figures:
 
 if __name__ == "__main__":
     run_command(
-        measure,
+        measure_contact,
         *CELL_OPTIONS[:1],
         click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="CSV file to write."),
     )

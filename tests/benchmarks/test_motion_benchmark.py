@@ -14,7 +14,7 @@ from executive.geometry import Pose
 from executive.motion.arms import build_kinematics, build_planner
 from executive.motion.kinematics import Kinematics
 from executive.motion.postures import find_postures
-from executive.motion.trajectory import peaks
+from executive.motion.trajectory import find_peaks
 from tests.benchmarks import motion
 from tests.benchmarks import motion_baselines as baselines
 from tests.benchmarks.motion_execution import ClearanceMonitor
@@ -71,8 +71,8 @@ def test_the_methods_are_in_order_and_pass_the_waypoints(cell: CellConfig) -> No
     bound, states = baselines.find_lower_bound(arm, limits, start, touch, drop)
     assert 0.5 < bound < passing[0][0] + passing[1][0] < stopping[0][0] + stopping[1][0] < 6.5
     assert arm.forward(states[1].q[-1]).position == pytest.approx(drop.position, abs=1e-6)
-    assert peaks(stopping[0][1], limits).max() == pytest.approx(1.0, abs=1e-3)
-    assert peaks(passing[0][1], limits)[2].max() > 5.0
+    assert find_peaks(stopping[0][1], limits).max() == pytest.approx(1.0, abs=1e-3)
+    assert find_peaks(passing[0][1], limits)[2].max() > 5.0
     for corner in chains[0]:
         assert np.abs(passing[0][1].q - corner).max(axis=1).min() < 0.02
 

@@ -8,25 +8,25 @@ from at_hand import look, pick
 
 from executive.cells.fake.cell import FakeCell
 from executive.geometry import GRAVITY
-from executive.manipulation.drops import CALM, landing, slipped
+from executive.manipulation.drops import MAX_PREDICTABLE_SPEED, predict_landing, record_drop
 from executive.testing.run_skill import run_skill
 from skills.transit import Transit
 
 
 def test_from_rest_it_falls_straight_down() -> None:
-    assert np.allclose(landing(np.array((0.4, 0.1, 0.3)), np.zeros(3), 0.05), (0.4, 0.1, 0.025))
+    assert np.allclose(predict_landing(np.array((0.4, 0.1, 0.3)), np.zeros(3), 0.05), (0.4, 0.1, 0.025))
 
 
 def test_thrown_it_comes_down_farther_on() -> None:
     """A parabola: 0.2 m down take sqrt(2 * 0.2 / g)."""
-    x = landing(np.array((0.4, 0.1, 0.25)), np.array((1.0, 0.0, 0.0)), 0.05)[0]
+    x = predict_landing(np.array((0.4, 0.1, 0.25)), np.array((1.0, 0.0, 0.0)), 0.05)[0]
     assert x == pytest.approx(0.4 + np.sqrt(0.4 / GRAVITY))
 
 
 @pytest.mark.parametrize("up", [-0.5, 0.0, 0.5])
 def test_its_flight_begins_with_the_velocity_of_the_tool(up: float) -> None:
     place, velocity, height = np.array((0.0, 0.0, 0.4)), np.array((0.3, -0.2, up)), 0.06
-    x, y, z = landing(place, velocity, height)
+    x, y, z = predict_landing(place, velocity, height)
     time = x / 0.3
     assert y == pytest.approx(-0.2 * time)
     assert 0.4 + up * time - GRAVITY * time**2 / 2 == pytest.approx(height)
@@ -34,7 +34,9 @@ def test_its_flight_begins_with_the_velocity_of_the_tool(up: float) -> None:
 
 
 def test_what_touches_the_ground_already_stays_where_it_is() -> None:
-    assert np.allclose(landing(np.array((0.4, 0.1, 0.04)), np.array((1.0, 0, 0)), 0.05)[:2], (0.4, 0.1))
+    assert np.allclose(
+        predict_landing(np.array((0.4, 0.1, 0.04)), np.array((1.0, 0, 0)), 0.05)[:2], (0.4, 0.1)
+    )
 
 
 @pytest.fixture
@@ -46,16 +48,17 @@ def held(fake: FakeCell) -> str:
 
 
 def test_the_ledger_is_told_once(fake: FakeCell, held: str) -> None:
-    assert not slipped(fake.cell, held)
+    assert not record_drop(fake.cell, held)
     fake.tool.part()
-    assert slipped(fake.cell, held)
-    assert slipped(fake.cell, held)
+    assert record_drop(fake.cell, held)
+    assert record_drop(fake.cell, held)
     (row,) = fake.ledger.summaries()
     assert (row.state, row.attempts) == ("dropped", 1)
 
 
 @pytest.mark.parametrize(
-    ("speed", "state"), [(0.0, "placed"), (CALM - 0.01, "placed"), (CALM + 0.01, "lost")]
+    ("speed", "state"),
+    [(0.0, "placed"), (MAX_PREDICTABLE_SPEED - 0.01, "placed"), (MAX_PREDICTABLE_SPEED + 0.01, "lost")],
 )
 def test_what_slips_away_over_its_bin_is_believed_there_unless_it_was_thrown(
     fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch, speed: float, state: str
@@ -63,6 +66,6 @@ def test_what_slips_away_over_its_bin_is_believed_there_unless_it_was_thrown(
     run_skill(Transit(held=held, bin="red_bin"), fake)
     monkeypatch.setattr(type(fake.arm), "tool_velocity", np.array((0.0, speed, 0.0)))
     fake.tool.part()
-    assert slipped(fake.cell, held)
+    assert record_drop(fake.cell, held)
     fake.ledger.close(completed=True)
     assert [row.state for row in fake.ledger.summaries()] == [state]

@@ -7,7 +7,7 @@ import pytest
 from executive.cell.arm import Goal, Task
 from executive.cell.objects import Obstacle, Target
 from executive.cells.fake.cell import FakeCell
-from executive.manipulation.motions import planned
+from executive.manipulation.motions import plan
 from executive.testing.run_skill import run_skill
 from skills.move_to_scan import MoveToScan
 
@@ -31,7 +31,7 @@ def test_what_a_look_shows_while_a_motion_is_planned_is_heeded(fake: FakeCell) -
         asked.append(Task(around=stands))
         return Goal((0.5, -0.1, 0.1)), asked[-1]
 
-    steps = planned(MoveToScan(), fake.cell.arm, ask)
+    steps = plan(MoveToScan(), fake.cell.arm, ask)
     ticks = 0
     with pytest.raises(StopIteration):
         while True:

@@ -9,16 +9,16 @@ from at_hand import look, pick
 from executive.cell.bins import BIN_THICKNESS
 from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
-from executive.manipulation.motions import carrying, heeding
-from executive.manipulation.obstacles import around, slots_taken
-from executive.manipulation.tool_goals import approach, into
+from executive.manipulation.motions import task_of_carrying, task_of_moving
+from executive.manipulation.obstacles import count_used_slots, list_obstacles
+from executive.manipulation.tool_goals import approach, goal_in_bin
 from executive.testing.run_skill import run_skill
 from skills.release import Release
 from skills.transit import Transit
 
 
 def names(fake: FakeCell, but: str | None = None) -> list[str]:
-    return [obstacle.name for obstacle in around(fake.cell, but)]
+    return [obstacle.name for obstacle in list_obstacles(fake.cell, but)]
 
 
 def test_what_stands_on_the_table_is_in_the_way_but_for_what_is_to_be_touched(
@@ -34,10 +34,10 @@ def test_what_stands_on_the_table_is_in_the_way_but_for_what_is_to_be_touched(
 
 def test_what_is_to_be_touched_is_named_as_it_stands_there(fake: FakeCell, targets: list[Target]) -> None:
     _, task = approach(fake.cell, targets[0])
-    assert task.target == next(thing for thing in around(fake.cell) if thing.name == "cube-1")
-    assert heeding(fake.cell).target is None
+    assert task.target == next(thing for thing in list_obstacles(fake.cell) if thing.name == "cube-1")
+    assert task_of_moving(fake.cell).target is None
     pick(fake, targets[0])
-    assert carrying(fake.cell, "cube-1").target is None
+    assert task_of_carrying(fake.cell, "cube-1").target is None
 
 
 def test_a_rejected_item_stands_there_still(fake: FakeCell, targets: list[Target]) -> None:
@@ -46,15 +46,15 @@ def test_a_rejected_item_stands_there_still(fake: FakeCell, targets: list[Target
 
 
 def test_what_is_carried_is_the_load_and_in_nobodys_way(fake: FakeCell, targets: list[Target]) -> None:
-    assert heeding(fake.cell).load is None
+    assert task_of_moving(fake.cell).load is None
     pick(fake, targets[0])
-    task = heeding(fake.cell)
-    assert task == carrying(fake.cell, "cube-1")
+    task = task_of_moving(fake.cell)
+    assert task == task_of_carrying(fake.cell, "cube-1")
     assert task.load is not None
     assert (task.load.kind.label, task.load.bears) == ("cube", 7.9)
     assert [obstacle.name for obstacle in task.around] == ["duck-1"]
     fake.tool.strength = 3.0
-    assert heeding(fake.cell).load.bears == 3.0  # type: ignore[union-attr]
+    assert task_of_moving(fake.cell).load.bears == 3.0  # type: ignore[union-attr]
 
 
 def test_what_lies_in_a_bin_is_in_the_way_as_high_as_it_is_piled(fake: FakeCell) -> None:
@@ -64,10 +64,10 @@ def test_what_lies_in_a_bin_is_in_the_way_as_high_as_it_is_piled(fake: FakeCell)
         fake.world.put("cube", 0.5, 0.0)
         (target,) = look(fake)
         pick(fake, target)
-        assert len(around(fake.cell, target.item)) == min(number, len(box.slots)), "itself left out"
+        assert len(list_obstacles(fake.cell, target.item)) == min(number, len(box.slots)), "itself left out"
         run_skill(Transit(held=target.item, bin="red_bin"), fake)
         run_skill(Release(held=target.item, bin="red_bin"), fake)
-    tops = {(obstacle.x, obstacle.y): obstacle.top for obstacle in around(fake.cell)}
+    tops = {(obstacle.x, obstacle.y): obstacle.top for obstacle in list_obstacles(fake.cell)}
     assert [tops[(x, y)] for x, y in box.slots] == pytest.approx(
         [BIN_THICKNESS + 2 * height, *[BIN_THICKNESS + height] * (len(box.slots) - 1)]
     )
@@ -77,14 +77,14 @@ def test_what_hangs_over_a_bin_counts_as_let_go_there_but_for_its_own_way(
     fake: FakeCell, targets: list[Target]
 ) -> None:
     pick(fake, targets[0])
-    assert slots_taken(fake.cell, "red_bin") == 0, "it hangs over the table"
+    assert count_used_slots(fake.cell, "red_bin") == 0, "it hangs over the table"
     run_skill(Transit(held="cube-1", bin="red_bin"), fake)
     first, second = fake.cell.bins["red_bin"].slots[:2]
-    assert (slots_taken(fake.cell, "red_bin"), slots_taken(fake.cell, "blue_bin")) == (1, 0)
-    assert slots_taken(fake.cell, "red_bin", "cube-1") == 0
-    assert np.allclose(into(fake.cell, "red_bin", "cube-1").position[:2], first)
-    assert np.allclose(into(fake.cell, "red_bin", "duck-1").position[:2], second)
-    before = around(fake.cell)
+    assert (count_used_slots(fake.cell, "red_bin"), count_used_slots(fake.cell, "blue_bin")) == (1, 0)
+    assert count_used_slots(fake.cell, "red_bin", "cube-1") == 0
+    assert np.allclose(goal_in_bin(fake.cell, "red_bin", "cube-1").position[:2], first)
+    assert np.allclose(goal_in_bin(fake.cell, "red_bin", "duck-1").position[:2], second)
+    before = list_obstacles(fake.cell)
     run_skill(Release(held="cube-1", bin="red_bin"), fake)
-    assert around(fake.cell) == before
-    assert slots_taken(fake.cell, "red_bin") == 1
+    assert list_obstacles(fake.cell) == before
+    assert count_used_slots(fake.cell, "red_bin") == 1

@@ -11,7 +11,7 @@ from joint_states import LIMITS, SOONER, passed, peaks, tool_velocities
 
 from executive.cell.arm import Goal
 from executive.geometry import Array
-from executive.motion.cartesian_line import SAMPLES, Line
+from executive.motion.cartesian_line import CHAIN_LENGTH, CartesianLine
 from executive.motion.iiwa14 import Iiwa14
 from executive.motion.postures import find_postures, solve_vertical_line
 
@@ -34,14 +34,14 @@ def descents(draw: st.DrawFn) -> Descent:
     postures = find_postures(ARM, Goal(place), length, np.zeros(7))
     number = draw(st.integers(0, len(postures) - 1))
     configuration = postures.configurations[number]
-    chain = solve_vertical_line(ARM, postures.low[number], length, SAMPLES, configuration)[::-1]
+    chain = solve_vertical_line(ARM, postures.low[number], length, CHAIN_LENGTH, configuration)[::-1]
     return Descent(chain, length, draw(st.sampled_from([0.03, 0.2, math.inf])))
 
 
 @given(descents(), st.booleans())
 @settings(max_examples=20)
 def test_the_tool_goes_straight_down_inside_all_limits(descent: Descent, enters: bool) -> None:
-    line = Line(descent.chain, descent.length, LIMITS, descent.speed, enters=enters)
+    line = CartesianLine(descent.chain, descent.length, LIMITS, descent.speed, enters=enters)
     states = passed(line)
     tips, axes = ARM.tips(states.q)
     assert np.max(np.linalg.norm(tips[:, :2] - tips[-1, :2], axis=1)) < 1e-4
@@ -63,7 +63,7 @@ def test_the_tool_goes_straight_down_inside_all_limits(descent: Descent, enters:
 @given(descents())
 @settings(max_examples=20)
 def test_velocity_and_acceleration_are_the_derivatives_of_the_way(descent: Descent) -> None:
-    states = passed(Line(descent.chain, descent.length, LIMITS, descent.speed, enters=True))
+    states = passed(CartesianLine(descent.chain, descent.length, LIMITS, descent.speed, enters=True))
     middle = slice(1, -2)  # the last sample is not a whole step after the one before
     measured = (states.q[2:-1] - states.q[:-3]) / (2 * SOONER)
     assert np.allclose(measured, states.qd[middle], atol=1e-4)
@@ -74,10 +74,10 @@ def test_velocity_and_acceleration_are_the_derivatives_of_the_way(descent: Desce
 @given(descents())
 @settings(max_examples=20)
 def test_leaving_it_is_the_same_way_mirrored_in_time(descent: Descent) -> None:
-    down = Line(descent.chain, descent.length, LIMITS, descent.speed, enters=True)
-    up = Line(descent.chain[::-1], descent.length, LIMITS, descent.speed, leaves=True)
+    down = CartesianLine(descent.chain, descent.length, LIMITS, descent.speed, enters=True)
+    up = CartesianLine(descent.chain[::-1], descent.length, LIMITS, descent.speed, leaves=True)
     assert up.duration == pytest.approx(down.duration, abs=1e-6)
-    gentle = Line(descent.chain[::-1], descent.length, LIMITS, acceleration=0.5, leaves=True)
+    gentle = CartesianLine(descent.chain[::-1], descent.length, LIMITS, acceleration=0.5, leaves=True)
     assert gentle.acceleration == 0.5 < up.acceleration
     heights = ARM.tips(passed(gentle).q)[0][:-1, 2]
     # The spline through four places advances up to 5 % faster than its parameter.

@@ -15,13 +15,13 @@ from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.errors import Blocked
 from executive.geometry import Array
 from executive.motion.clearance_model import (
-    BETWEEN,
-    LOOKED_AT,
-    SLANT,
-    TOLERANCE,
+    OBSERVED_RADIUS,
+    POSITION_TOLERANCE,
+    SAMPLING_MARGIN,
+    TILT_DISTANCE,
+    ClearanceModel,
     Discs,
-    Surroundings,
-    hanging,
+    discs_below_flange,
 )
 
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -55,10 +55,10 @@ def to_box(points: Array, low: Array, high: Array) -> Array:
     return np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0.0), axis=1)
 
 
-def slack(surroundings: Surroundings, tip, axis=DOWN, discs: Discs | None = None) -> float:
+def slack(clearance: ClearanceModel, tip, axis=DOWN, discs: Discs | None = None) -> float:
     """Of one state."""
     assert discs is not None
-    return float(surroundings.slack(np.array([tip], dtype=float), np.array([axis], dtype=float), discs)[0])
+    return float(clearance.slack(np.array([tip], dtype=float), np.array([axis], dtype=float), discs)[0])
 
 
 near_the_post = st.tuples(st.floats(-0.15, 0.15), st.floats(-0.15, 0.15), st.floats(0.15, 0.42)).map(
@@ -69,22 +69,24 @@ near_the_post = st.tuples(st.floats(-0.15, 0.15), st.floats(-0.15, 0.15), st.flo
 @given(near_the_post, st.booleans())
 @settings(max_examples=60)
 def test_distances_from_a_cylinder_are_what_geometry_says(config: CellConfig, tip, loaded: bool) -> None:
-    discs = hanging(config, CUBE if loaded else None)
-    without = slack(Surroundings(config, (), AWAY), tip, discs=discs)
-    found = slack(Surroundings(config, (POST,), AWAY), tip, discs=discs)
+    discs = discs_below_flange(config, CUBE if loaded else None)
+    without = slack(ClearanceModel(config, (), AWAY), tip, discs=discs)
+    found = slack(ClearanceModel(config, (POST,), AWAY), tip, discs=discs)
     points = np.concatenate(discs_of(tip, DOWN, discs))
-    grown = Obstacle(POST.x, POST.y, POST.radius + TOLERANCE, POST.top, "")
+    grown = Obstacle(POST.x, POST.y, POST.radius + POSITION_TOLERANCE, POST.top, "")
     nearest = float(to_cylinder(points, grown).min())
     if nearest > 0:
-        assert found == pytest.approx(min(nearest - (config.motion.margin + BETWEEN), without), abs=5e-4)
+        assert found == pytest.approx(
+            min(nearest - (config.motion.margin + SAMPLING_MARGIN), without), abs=5e-4
+        )
     else:
-        assert found <= -(config.motion.margin + BETWEEN) + 1e-9
+        assert found <= -(config.motion.margin + SAMPLING_MARGIN) + 1e-9
 
 
 @given(st.tuples(st.floats(0.08, 0.38), st.floats(-0.66, -0.32), st.floats(0.01, 0.2)).map(np.array))
 @settings(max_examples=80)
 def test_distances_from_a_bin_are_what_geometry_says(config: CellConfig, tip) -> None:
-    discs = hanging(config, None)
+    discs = discs_below_flange(config, None)
     bin, t = config.bins["red_bin"], BIN_THICKNESS
     low, high = np.array(bin.position[:2]), np.array(bin.position[:2])
     low, high = low - np.array(bin.size[:2]) / 2, high + np.array(bin.size[:2]) / 2
@@ -100,19 +102,24 @@ def test_distances_from_a_bin_are_what_geometry_says(config: CellConfig, tip) ->
     points = np.concatenate(discs_of(tip, DOWN, discs))
     nearest = min(float(to_box(points, np.array(a), np.array(b)).min()) for a, b in boxes)
     # Its end is here, so that the workspace beside does not count.
-    found = slack(Surroundings(config, (), tip[None, :2]), tip, discs=discs)
+    found = slack(ClearanceModel(config, (), tip[None, :2]), tip, discs=discs)
     if nearest > 0:
-        spare = SLANT * (1 - discs.upright)
-        assert found == pytest.approx(min(nearest - (config.motion.margin + BETWEEN), spare), abs=5e-4)
+        spare = TILT_DISTANCE * (1 - discs.upright)
+        assert found == pytest.approx(
+            min(nearest - (config.motion.margin + SAMPLING_MARGIN), spare), abs=5e-4
+        )
     else:
-        assert found <= -(config.motion.margin + BETWEEN) + 1e-9
+        assert found <= -(config.motion.margin + SAMPLING_MARGIN) + 1e-9
 
 
 def test_a_load_hangs_below_the_tool_and_is_as_wide_as_its_ring_puts_it(config: CellConfig) -> None:
-    empty, washer = hanging(config, None), hanging(config, Load(ObjectClass("washer", 0.006, 0.02, 0.015)))
+    empty, washer = (
+        discs_below_flange(config, None),
+        discs_below_flange(config, Load(ObjectClass("washer", 0.006, 0.02, 0.015))),
+    )
     assert np.allclose(empty.offset, [0.0, -NECK_LENGTH])
     assert np.allclose(empty.radius, [config.tool.cup_radius, TOOL_RADIUS])
-    wide = 0.02 + 0.015 + TOLERANCE
+    wide = 0.02 + 0.015 + POSITION_TOLERANCE
     assert np.allclose(washer.offset, [0.006, 0.0, -NECK_LENGTH]), "its underside, its top, the tool above it"
     assert np.allclose(washer.radius, [wide, wide, TOOL_RADIUS])
     assert washer.upright > empty.upright
@@ -122,46 +129,48 @@ def test_a_load_hangs_below_the_tool_and_is_as_wide_as_its_ring_puts_it(config: 
 @settings(max_examples=60)
 def test_the_workspace_is_not_entered_low_but_where_it_was_looked_at(config, x, y, z) -> None:
     end = np.array([[0.53, 0.0]])
-    tip, discs = (x, y, min(z, pile_height(config))), hanging(config, None)
+    tip, discs = (x, y, min(z, pile_height(config))), discs_below_flange(config, None)
     away = math.hypot(x - end[0, 0], y - end[0, 1])
-    if away > LOOKED_AT + pile_height(config):
-        assert slack(Surroundings(config, (), end), tip, discs=discs) < 0
-    elif away < LOOKED_AT - 1e-9:
-        wanted = min(tip[2] - (config.motion.margin + BETWEEN), SLANT * (1 - discs.upright))
-        assert slack(Surroundings(config, (), end), tip, discs=discs) == pytest.approx(wanted, abs=1e-9)
+    if away > OBSERVED_RADIUS + pile_height(config):
+        assert slack(ClearanceModel(config, (), end), tip, discs=discs) < 0
+    elif away < OBSERVED_RADIUS - 1e-9:
+        wanted = min(tip[2] - (config.motion.margin + SAMPLING_MARGIN), TILT_DISTANCE * (1 - discs.upright))
+        assert slack(ClearanceModel(config, (), end), tip, discs=discs) == pytest.approx(wanted, abs=1e-9)
 
 
 def test_near_an_end_what_is_unavoidable_there_is_allowed_and_elsewhere_it_is_not(config) -> None:
-    discs = hanging(config, None)
-    beside = np.array([POST.x + POST.radius + TOLERANCE + TOOL_RADIUS + 0.002, POST.y, 0.1])
+    discs = discs_below_flange(config, None)
+    beside = np.array([POST.x + POST.radius + POSITION_TOLERANCE + TOOL_RADIUS + 0.002, POST.y, 0.1])
     opposite = np.array([2 * POST.x - beside[0], POST.y, 0.1])
-    surroundings = Surroundings(config, (POST,), beside[None, :2])
-    assert slack(surroundings, beside, discs=discs) == pytest.approx(0.002 - (config.motion.margin + BETWEEN))
-    surroundings.relax(beside[None], DOWN[None], discs)
-    assert slack(surroundings, beside, discs=discs) == pytest.approx(0.0, abs=1e-9)
-    assert slack(surroundings, beside - (0.001, 0, 0), discs=discs) == pytest.approx(-0.001, abs=1e-9)
-    assert np.linalg.norm(opposite - beside) > LOOKED_AT
-    assert slack(surroundings, opposite, discs=discs) == pytest.approx(
-        0.002 - (config.motion.margin + BETWEEN)
+    clearance = ClearanceModel(config, (POST,), beside[None, :2])
+    assert slack(clearance, beside, discs=discs) == pytest.approx(
+        0.002 - (config.motion.margin + SAMPLING_MARGIN)
+    )
+    clearance.relax(beside[None], DOWN[None], discs)
+    assert slack(clearance, beside, discs=discs) == pytest.approx(0.0, abs=1e-9)
+    assert slack(clearance, beside - (0.001, 0, 0), discs=discs) == pytest.approx(-0.001, abs=1e-9)
+    assert np.linalg.norm(opposite - beside) > OBSERVED_RADIUS
+    assert slack(clearance, opposite, discs=discs) == pytest.approx(
+        0.002 - (config.motion.margin + SAMPLING_MARGIN)
     )
     inside = np.array([[POST.x, POST.y, POST.top - 0.01]])
-    surroundings.relax(inside, DOWN[None], discs)
-    surroundings.require_clear(inside, DOWN[None], discs)  # what is entered already may be left
+    clearance.relax(inside, DOWN[None], discs)
+    clearance.require_clear(inside, DOWN[None], discs)  # what is entered already may be left
 
 
 def test_an_error_names_the_thing_the_lack_and_the_place(config: CellConfig) -> None:
-    discs, surroundings = hanging(config, None), Surroundings(config, (POST,), AWAY)
+    discs, clearance = discs_below_flange(config, None), ClearanceModel(config, (POST,), AWAY)
 
     def require(tip, axis=DOWN) -> None:
         tips = np.array([[-0.6, 0.0, 0.4], tip, [-0.6, 0.0, 0.4]])
-        surroundings.require_clear(tips, np.array([DOWN, axis, DOWN]), discs)
+        clearance.require_clear(tips, np.array([DOWN, axis, DOWN]), discs)
 
     require((-0.6, 0.0, 0.4))
     text = "would bring tool or load 16 mm too near to the post, with the tool at (-0.500, 0.100, 0.290) m"
     with pytest.raises(Blocked, match=re.escape(text)):
         require((POST.x, POST.y, 0.29))
     for more, passes in ((-1e-4, True), (1e-4, False)):  # what is known may be off by the tolerance
-        tip = (POST.x, POST.y, POST.top + config.motion.margin - TOLERANCE - more)
+        tip = (POST.x, POST.y, POST.top + config.motion.margin - POSITION_TOLERANCE - more)
         if passes:
             require(tip)
         else:
@@ -183,12 +192,15 @@ def test_an_error_names_the_thing_the_lack_and_the_place(config: CellConfig) -> 
 @settings(max_examples=80)
 def test_slopes_are_the_differences_of_slack(config, tip, tilt, turn, loaded: bool) -> None:
     axis = np.array([math.sin(tilt), math.cos(tilt) * math.sin(turn), -math.cos(tilt) * math.cos(turn)])
-    discs, surroundings = hanging(config, CUBE if loaded else None), Surroundings(config, (POST,), AWAY)
+    discs, clearance = (
+        discs_below_flange(config, CUBE if loaded else None),
+        ClearanceModel(config, (POST,), AWAY),
+    )
     h = 1e-5
     tips, axes = tip + h * np.eye(3), np.broadcast_to(axis, (3, 3))
-    found = surroundings.slopes(tip[None], axis[None], discs, (tips[None], axes[None]))[0] / h
-    here = slack(surroundings, tip, axis, discs)
-    forward = (surroundings.slack(tips, axes, discs) - here) / h
-    backward = (here - surroundings.slack(2 * tip - tips, axes, discs)) / h
+    found = clearance.slopes(tip[None], axis[None], discs, (tips[None], axes[None]))[0] / h
+    here = slack(clearance, tip, axis, discs)
+    forward = (clearance.slack(tips, axes, discs) - here) / h
+    backward = (here - clearance.slack(2 * tip - tips, axes, discs)) / h
     smooth = np.abs(forward - backward) < 1e-2  # no kink between
     assert np.allclose(found[smooth], forward[smooth], atol=1e-6)

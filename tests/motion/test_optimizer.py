@@ -10,13 +10,13 @@ from joint_states import LIMITS, passed, peaks, positions
 
 from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.geometry import Array, tool_down
-from executive.motion.clearance_model import Surroundings, hanging
-from executive.motion.optimizer import Detour, Gap
-from executive.motion.payload import Hold
+from executive.motion.clearance_model import ClearanceModel, discs_below_flange
+from executive.motion.optimizer import Optimizer, Problem
+from executive.motion.payload import PayloadLimit
 from executive.motion.point_to_point import NoProfile
 from executive.motion.state import State
-from executive.motion.trajectory import Trajectory, over
-from executive.motion.transcription import PLACES
+from executive.motion.trajectory import Trajectory, sample_pieces
+from executive.motion.transcription import SAMPLE_SHARES
 
 POST = Obstacle(0.5, 0.0, 0.04, 0.22, "the post")
 LEFT, RIGHT, HIGH = (0.5, -0.2, 0.12), (0.5, 0.2, 0.12), 0.32
@@ -28,72 +28,80 @@ CUBE = Load(KIND)
 def over_the_post(config, kinematics, connector):
     """The gap between two places with a post between them, and the way that stops at every corner."""
 
-    def given(load: Load | None = None) -> tuple[Gap, list]:
+    def given(load: Load | None = None) -> tuple[Problem, list]:
         branch, _ = kinematics.configuration(np.radians(config.arm.poses_deg["home"]))
 
         def state(x: float, y: float, z: float) -> State:
             return State.rest(kinematics.solve(tool_down((x, y, z)), (branch, 0.0)))
 
         corners = [state(*LEFT), state(*LEFT[:2], HIGH), state(*RIGHT[:2], HIGH), state(*RIGHT)]
-        surroundings = Surroundings(config, (POST,), np.array([LEFT[:2], RIGHT[:2]]))
-        hold = Hold(load, kinematics) if load else None
-        gap = Gap(corners[0], corners[-1], connector, kinematics, surroundings, hanging(config, load), hold)
-        return gap, [connector.connect(a, b) for a, b in pairwise(corners)]
+        clearance = ClearanceModel(config, (POST,), np.array([LEFT[:2], RIGHT[:2]]))
+        payload = PayloadLimit(load, kinematics) if load else None
+        problem = Problem(
+            corners[0],
+            corners[-1],
+            connector,
+            kinematics,
+            clearance,
+            discs_below_flange(config, load),
+            payload,
+        )
+        return problem, [connector.connect(a, b) for a, b in pairwise(corners)]
 
     return given
 
 
-def improved(gap: Gap, corners: list, steps: int = 12) -> Detour:
+def improved(problem: Problem, corners: list, steps: int = 12) -> Optimizer:
     """A detour after so many steps."""
     duration = sum(piece.duration for piece in corners)
-    detour = Detour(gap, over(corners, PLACES * duration).q, duration)
-    detour.improve(steps)
-    return detour
+    optimizer = Optimizer(problem, sample_pieces(corners, SAMPLE_SHARES * duration).q, duration)
+    optimizer.improve(steps)
+    return optimizer
 
 
 @pytest.mark.parametrize("load", [None, CUBE])
 def test_it_is_clear_and_much_faster_than_the_way_that_stops_at_every_corner(over_the_post, load) -> None:
-    gap, corners = over_the_post(load)
-    direct = gap.connector.connect(gap.start, gap.end)
-    assert gap.slack(direct.over(PLACES * direct.duration).q).min() < -0.01
-    detour = improved(gap, corners)
+    problem, corners = over_the_post(load)
+    direct = problem.connector.connect(problem.start, problem.end)
+    assert problem.slack(direct.over(SAMPLE_SHARES * direct.duration).q).min() < -0.01
+    optimizer = improved(problem, corners)
     stopping = sum(piece.duration for piece in corners)
     for exactly in (False, True):
-        flown = Trajectory(detour.fly(exactly))
+        flown = Trajectory(optimizer.fly(exactly))
         assert direct.duration < flown.duration < 0.8 * stopping
-        assert not exactly or flown.duration == pytest.approx(detour.cost, abs=0.01)
+        assert not exactly or flown.duration == pytest.approx(optimizer.cost, abs=0.01)
         qs = flown.check(LIMITS).q
-        assert gap.slack(qs).min() > -1e-3
+        assert problem.slack(qs).min() > -1e-3
         assert max(peaks(passed(flown), LIMITS)) <= 1 + 1e-6
-        assert np.array_equal(flown.start, gap.start.q)
-        assert np.allclose(flown.end, gap.end.q, atol=1e-9)
+        assert np.array_equal(flown.start, problem.start.q)
+        assert np.allclose(flown.end, problem.end.q, atol=1e-9)
 
 
 def test_no_detour_follows_a_way_in_no_time(over_the_post) -> None:
-    gap, corners = over_the_post()
-    first = over(corners, PLACES * sum(piece.duration for piece in corners)).q
+    problem, corners = over_the_post()
+    first = sample_pieces(corners, SAMPLE_SHARES * sum(piece.duration for piece in corners)).q
     with pytest.raises(NoProfile, match="no motion follows the way that stops at every corner"):
-        Detour(gap, first, 0.1)
+        Optimizer(problem, first, 0.1)
 
 
 @given(positions, st.floats(0, 1))
 @settings(max_examples=60)
 def test_slopes_are_the_derivatives_of_slack_by_the_joints(over_the_post, q: Array, share: float) -> None:
-    gap, _ = over_the_post()
-    qs = (gap.start.q + share * (q - gap.start.q))[None]
+    problem, _ = over_the_post()
+    qs = (problem.start.q + share * (q - problem.start.q))[None]
     h = 1e-5
-    here = gap.slack(qs)
-    found = gap.slopes(qs, here)[0]
-    forward = (gap.slack(qs + h * np.eye(7)) - here) / h
-    backward = (here - gap.slack(qs - h * np.eye(7))) / h
+    here = problem.slack(qs)
+    found = problem.slopes(qs, here)[0]
+    forward = (problem.slack(qs + h * np.eye(7)) - here) / h
+    backward = (here - problem.slack(qs - h * np.eye(7))) / h
     smooth = np.abs(forward - backward) < 1e-3  # no kink between
     assert np.allclose(found[smooth], forward[smooth], atol=2e-3)
 
 
 def test_near_a_joints_limit_that_is_what_slack_and_slopes_tell(over_the_post) -> None:
-    gap, _ = over_the_post()
-    qs = gap.start.q[None].copy()
+    problem, _ = over_the_post()
+    qs = problem.start.q[None].copy()
     qs[0, 6] = -LIMITS.position.upper[6] + 0.003
-    slack = gap.slack(qs)
+    slack = problem.slack(qs)
     assert slack[0] == pytest.approx(0.003 - 0.01)
-    assert np.array_equal(gap.slopes(qs, slack)[0], np.eye(7)[6])
+    assert np.array_equal(problem.slopes(qs, slack)[0], np.eye(7)[6])

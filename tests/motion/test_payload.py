@@ -9,13 +9,13 @@ import pytest
 
 from executive.cell.objects import Load, ObjectClass
 from executive.geometry import GRAVITY
-from executive.motion.payload import METRES, SAFETY, STRIDE, Hold
+from executive.motion.payload import DISTANCE_PER_ACCELERATION, POSITION_STRIDE, SAFETY_FACTOR, PayloadLimit
 from executive.motion.state import State
 from executive.motion.trajectory import Trajectory
-from executive.motion.transcription import PLACES, SAMPLES, STEPS
+from executive.motion.transcription import SAMPLE_SHARES, SAMPLES_PER_STEP, STEP_COUNT
 
 KIND = ObjectClass("cube", 0.05, 0.035, mass=0.1)
-LENGTH = 1.0 / STEPS
+LENGTH = 1.0 / STEP_COUNT
 """Of a step of a course that sways [s]."""
 
 
@@ -56,70 +56,75 @@ def strongest(trajectory: Trajectory, kinematics) -> float:
 
 
 def test_a_seal_affords_all_of_a_motion_or_nothing(sway, kinematics) -> None:
-    weight, most = SAFETY * KIND.mass * GRAVITY, strongest(sway, kinematics)
-    for bears, share in ((SAFETY * KIND.mass * math.hypot(GRAVITY, 1.01 * most), 1.0), (0.99 * weight, 0.0)):
-        assert Hold(Load(KIND, bears), kinematics).share(sway) == share
-    assert Hold(Load(KIND, 1.2 * weight), kinematics).lift == pytest.approx(0.2 * GRAVITY)
-    assert Hold(Load(KIND, weight), kinematics).lift == 0.5
+    weight, most = SAFETY_FACTOR * KIND.mass * GRAVITY, strongest(sway, kinematics)
+    for bears, share in (
+        (SAFETY_FACTOR * KIND.mass * math.hypot(GRAVITY, 1.01 * most), 1.0),
+        (0.99 * weight, 0.0),
+    ):
+        assert PayloadLimit(Load(KIND, bears), kinematics).share(sway) == share
+    assert PayloadLimit(Load(KIND, 1.2 * weight), kinematics).lift == pytest.approx(0.2 * GRAVITY)
+    assert PayloadLimit(Load(KIND, weight), kinematics).lift == 0.5
 
 
 @pytest.mark.parametrize("share", [0.25, 0.6, 0.9])
 def test_flown_at_the_root_of_the_share_a_motion_is_just_affordable(sway, kinematics, share: float) -> None:
-    bears = SAFETY * KIND.mass * math.hypot(GRAVITY, share * strongest(sway, kinematics))
+    bears = SAFETY_FACTOR * KIND.mass * math.hypot(GRAVITY, share * strongest(sway, kinematics))
     load = Load(KIND, bears)
-    hold = Hold(load, kinematics)
-    gentle = hold.gentle(sway)
+    payload = PayloadLimit(load, kinematics)
+    gentle = payload.gentle(sway)
     rate = sway.duration / gentle.duration
     assert rate == pytest.approx(math.sqrt(share), rel=0.01)
-    assert hold.share(gentle) == pytest.approx(1.0, abs=0.01)
-    assert hold.share(sway.slowed(1.1 * rate)) < 0.9
+    assert payload.share(gentle) == pytest.approx(1.0, abs=0.01)
+    assert payload.share(sway.slowed(1.1 * rate)) < 0.9
 
 
 def test_a_motion_too_short_to_pull_at_anything_is_affordable(kinematics, connector, home) -> None:
     still = Trajectory([connector.connect(State.rest(home), State.rest(home))])
-    assert Hold(Load(KIND, 0.5), kinematics).share(still) == 1.0
+    assert PayloadLimit(Load(KIND, 0.5), kinematics).share(still) == 1.0
 
 
 def test_a_demand_is_what_the_seal_bears_beyond_weight_and_hold(sway, kinematics) -> None:
     """Of places STRIDE apart on a course, in centimetres for each metre per second squared."""
     bears = 3.0
-    qs = np.array([sway.at(place).q for place in PLACES])
-    demand = Hold(Load(KIND, bears), kinematics).demand(qs, LENGTH / SAMPLES, math.inf)
+    qs = np.array([sway.at(place).q for place in SAMPLE_SHARES])
+    demand = PayloadLimit(Load(KIND, bears), kinematics).demand(qs, LENGTH / SAMPLES_PER_STEP, math.inf)
     middle = demand.rows[:, 1]
-    assert np.array_equal(np.diff(middle), np.full(len(middle) - 1, STRIDE))
-    assert middle[0] < 2 * STRIDE
-    assert middle[-1] > len(qs) - 2 * STRIDE
+    assert np.array_equal(np.diff(middle), np.full(len(middle) - 1, POSITION_STRIDE))
+    assert middle[0] < 2 * POSITION_STRIDE
+    assert middle[-1] > len(qs) - 2 * POSITION_STRIDE
     radius = math.hypot(*kinematics.tips(qs[:1])[0][0, :2])
-    states = [sway.at(place) for place in PLACES[middle]]
+    states = [sway.at(place) for place in SAMPLE_SHARES[middle]]
     level = radius * np.array([math.hypot(state.qdd[0], state.qd[0] ** 2) for state in states])
-    wanted = METRES * (bears / SAFETY / KIND.mass - np.hypot(level, GRAVITY))
-    assert demand.slack == pytest.approx(wanted, abs=METRES * 0.05)
-    near = Hold(Load(KIND, bears), kinematics).demand(qs, LENGTH / SAMPLES, 0.096)
+    wanted = DISTANCE_PER_ACCELERATION * (bears / SAFETY_FACTOR / KIND.mass - np.hypot(level, GRAVITY))
+    assert demand.slack == pytest.approx(wanted, abs=DISTANCE_PER_ACCELERATION * 0.05)
+    near = PayloadLimit(Load(KIND, bears), kinematics).demand(qs, LENGTH / SAMPLES_PER_STEP, 0.096)
     assert 0 < len(near.slack) < len(demand.slack)
     for values, every in zip(near, demand, strict=True):
         assert np.array_equal(values, every[demand.slack < 0.096]), "what is far from its bounds is left out"
 
 
 def test_slopes_are_the_derivatives_of_a_demand_by_the_positions(sway, kinematics) -> None:
-    qs = np.array([sway.at(place).q for place in PLACES])
-    hold, h = Hold(Load(KIND, 3.0), kinematics), 1e-6
-    demand = hold.demand(qs, LENGTH / SAMPLES, math.inf)
+    qs = np.array([sway.at(place).q for place in SAMPLE_SHARES])
+    payload, h = PayloadLimit(Load(KIND, 3.0), kinematics), 1e-6
+    demand = payload.demand(qs, LENGTH / SAMPLES_PER_STEP, math.inf)
     for row in range(0, len(demand.slack), 5):
         for k, joint in np.ndindex(3, 7):
             there = [qs.copy(), qs.copy()]
             for moved, sign in zip(there, (1, -1), strict=True):
                 moved[demand.rows[row, k], joint] += sign * h
-            after, before = (hold.demand(moved, LENGTH / SAMPLES, math.inf).slack[row] for moved in there)
+            after, before = (
+                payload.demand(moved, LENGTH / SAMPLES_PER_STEP, math.inf).slack[row] for moved in there
+            )
             assert demand.slopes[row, k, joint] == pytest.approx(
                 (after - before) / (2 * h), rel=1e-2, abs=0.02
             )
 
 
 def test_growth_is_the_derivative_of_a_demand_by_the_length_of_a_step(sway, kinematics) -> None:
-    qs = np.array([sway.at(place).q for place in PLACES])
-    hold, h = Hold(Load(KIND, 3.0), kinematics), 1e-6
+    qs = np.array([sway.at(place).q for place in SAMPLE_SHARES])
+    payload, h = PayloadLimit(Load(KIND, 3.0), kinematics), 1e-6
     demand, after, before = (
-        hold.demand(qs, (LENGTH + change) / SAMPLES, math.inf) for change in (0.0, h, -h)
+        payload.demand(qs, (LENGTH + change) / SAMPLES_PER_STEP, math.inf) for change in (0.0, h, -h)
     )
     assert demand.growth.max() > 0.1
     assert demand.growth == pytest.approx((after.slack - before.slack) / (2 * h), rel=1e-4)

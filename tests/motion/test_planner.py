@@ -16,7 +16,7 @@ from executive.geometry import Array
 from executive.motion.arms import build_planner
 from executive.motion.iiwa14 import max_wrist_angle
 from executive.motion.payload import GRAVITY
-from executive.motion.planner import SPACING, Planner
+from executive.motion.planner import MAX_CHECK_SPACING, Planner
 from executive.motion.trajectory import Trajectory
 
 CUBE = ObjectClass("cube", 0.05, 0.0354)
@@ -120,7 +120,7 @@ def test_the_check_gets_the_whole_path_without_gaps_and_what_has_to_be_heeded(co
     ((path, task),) = asked
     assert task == CARRYING
     assert np.array_equal(path[[0, -1]], [motion.start, motion.end])
-    assert np.max(np.abs(np.diff(path, axis=0))) < SPACING + 1e-9
+    assert np.max(np.abs(np.diff(path, axis=0))) < MAX_CHECK_SPACING + 1e-9
     assert np.array_equal(path, path[np.isin(path[:, 0], motion.samples.q[:, 0])])
 
 

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from joint_states import LIMITS, positions, states
 
 from executive.cell.clock import STEP
-from executive.cells.sim.rebuild import sampled
+from executive.cells.sim.rebuild import join_samples
 from executive.errors import Fault, Unreachable
 from executive.motion.point_to_point import Connector, NoProfile
 from executive.motion.state import State
-from executive.motion.trajectory import Trajectory, peaks, thinned
+from executive.motion.trajectory import Trajectory, find_peaks, thin_out
 
 CONNECTOR = Connector(LIMITS)
 A, B, C = np.radians([[0, 20, 0, -90, 0, 70, 0], [40, 40, 20, -60, 10, 60, 90], [40, 45, 20, -60, 0, 60, 90]])
@@ -80,7 +80,7 @@ def test_slowed_it_takes_the_same_path_in_more_time(between: State, rate: float)
 def test_a_motion_to_where_the_arm_is_takes_no_time() -> None:
     trajectory = Trajectory([CONNECTOR.connect(State.rest(A), State.rest(A))])
     assert trajectory.duration == 0
-    assert np.array_equal(sampled(trajectory.samples, 0.0).at(1.0).q, A)
+    assert np.array_equal(join_samples(trajectory.samples, 0.0).at(1.0).q, A)
     assert np.array_equal(trajectory.at(0.5).q, A)
     assert np.array_equal(trajectory.check(LIMITS).q, [A])
 
@@ -104,7 +104,7 @@ def test_leaving_a_joints_range_between_two_states_inside_it_is_seen(joint: int,
 def test_a_motion_outside_a_limit_cannot_be_flown_and_the_text_names_the_joint(limit: str) -> None:
     motion = by_way_of(MOVING)
     assert np.array_equal(motion.check(LIMITS).q, motion.samples.q)
-    most = peaks(motion.samples, LIMITS)[("velocity", "acceleration", "jerk").index(limit), 4]
+    most = find_peaks(motion.samples, LIMITS)[("velocity", "acceleration", "jerk").index(limit), 4]
     less = getattr(LIMITS, limit).copy()
     less[4] *= most / 1.01
     with pytest.raises(NoProfile, match=rf"the {limit} of joint 5 would be 1\.010 times its limit"):
@@ -115,7 +115,7 @@ def test_a_motion_outside_a_limit_cannot_be_flown_and_the_text_names_the_joint(l
 @settings(max_examples=30)
 def test_a_thinned_path_has_no_gaps_and_no_more_points_than_it_needs(end, spacing: float) -> None:
     qs = Trajectory([CONNECTOR.connect(State.rest(A), State.rest(end))]).samples.q
-    kept = thinned(qs, spacing)
+    kept = thin_out(qs, spacing)
     step = np.max(np.abs(np.diff(qs, axis=0)), initial=0.0)
     assert np.array_equal(kept[[0, -1]], qs[[0, -1]])
     assert np.max(np.abs(np.diff(kept, axis=0))) <= max(spacing, step) + 1e-12

@@ -9,10 +9,10 @@ from joint_states import LIMITS, positions, shares
 from executive.geometry import Array
 from executive.motion.point_to_point import Connector
 from executive.motion.state import State
-from executive.motion.transcription import SAMPLES, STEPS, Course, Demand, Transcription
+from executive.motion.transcription import SAMPLES_PER_STEP, STEP_COUNT, Course, Demand, Transcription
 
 CONNECTOR = Connector(LIMITS)
-PLACES = np.arange(1, STEPS * SAMPLES) / (STEPS * SAMPLES)
+PLACES = np.arange(1, STEP_COUNT * SAMPLES_PER_STEP) / (STEP_COUNT * SAMPLES_PER_STEP)
 WIDE = 0.5
 FINE = 40
 
@@ -53,7 +53,7 @@ def fitted(start: State, end: State, slower: float = 1.6) -> tuple[Transcription
     """A course that takes so much longer than the fastest motion."""
     program = Transcription(start, end, LIMITS)
     duration, first = direct(start, end)
-    course = program.fit(slower * duration / STEPS, first)
+    course = program.fit(slower * duration / STEP_COUNT, first)
     assert course is not None
     return program, course
 

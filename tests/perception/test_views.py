@@ -9,7 +9,13 @@ from hypothesis import strategies as st
 
 from executive.cell.detection import Detection
 from executive.errors import InputError
-from executive.perception.detectors.views import Finding, merge, parts_of, search_parts, without_duplicates
+from executive.perception.detectors.views import (
+    Finding,
+    merge_findings,
+    parts_of,
+    remove_duplicates,
+    search_parts,
+)
 
 TABLE = (192, 100, 448, 356)
 SIZE = (640, 480)
@@ -77,8 +83,8 @@ OTHER = (192, 0, 448, 256)
 )
 def test_an_object_in_two_tiles_is_reported_once(one, other, kept):
     expected = [(one, other)[number].detection for number in kept]
-    assert merge([one, other], SIZE) == expected
-    assert merge([other, one], SIZE) == expected
+    assert merge_findings([one, other], SIZE) == expected
+    assert merge_findings([other, one], SIZE) == expected
 
 
 def test_of_boxes_that_overlap_by_more_than_seven_tenths_the_most_confident_is_kept():
@@ -88,8 +94,8 @@ def test_of_boxes_that_overlap_by_more_than_seven_tenths_the_most_confident_is_k
         Detection("beside", 0.7, (0, 0, 10, 15)),
         Detection("far", 0.6, (50, 0, 60, 9)),
     ]
-    assert [one.label for one in without_duplicates(detections)] == ["first", "beside", "far"]
-    assert [one.label for one in without_duplicates(detections[1:])] == ["again", "far"]
+    assert [one.label for one in remove_duplicates(detections)] == ["first", "beside", "far"]
+    assert [one.label for one in remove_duplicates(detections[1:])] == ["again", "far"]
     equals = [Detection(label, 0.9, (0, 0, 10, 10)) for label in "abc"]
-    assert without_duplicates(equals) == equals[:1]
-    assert without_duplicates([]) == merge([], SIZE) == []
+    assert remove_duplicates(equals) == equals[:1]
+    assert remove_duplicates([]) == merge_findings([], SIZE) == []

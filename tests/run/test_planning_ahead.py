@@ -188,7 +188,7 @@ def test_what_cannot_be_picked_is_not_planned(bench: Bench, planned: list[Goal])
 def test_a_target_out_of_reach_fails_in_its_approach_only(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("executive.cells.fake.arm.REACH", 0.62)
+    monkeypatch.setattr("executive.cells.fake.arm.MAX_REACH", 0.62)
     bench.fake.world.put("duck", 0.6, 0.2)
     cube, duck = bench.look()
     bench.carry([cube])

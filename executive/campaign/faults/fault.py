@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from executive.cell.protocols import Cell, Steps
-from executive.manipulation.drops import slipped
+from executive.manipulation.drops import record_drop
 from executive.skill import EMPTY, Skill
 from executive.testing.faults.script import ScheduledFault
 from executive.testing.substitutes import in_place_of, raising, raising_when_halted
@@ -116,7 +116,7 @@ def _failing(skill: type[Skill], reason: str) -> type[Skill]:
                 yield from skill.run(self, cell) or ()
                 return
             if (item := cell.ledger.find_held_item()) is not None:
-                slipped(cell, item)
+                record_drop(cell, item)
         raise self.failed(reason, INJECTED_FAILURE)
 
     return in_place_of(skill, "Failing", body)

@@ -67,7 +67,8 @@ class ArmConfig(Section):
     """The arm, its limits and its named poses."""
 
     urdf: str = "kuka_iiwa/model.urdf"
-    """Model of the arm, in pybullet_data; one of the supported arms in `executive/motion/arms.py`."""
+    """Model of the arm, in pybullet_data. Another arm needs kinematics in `executive/motion/arms.py` and a
+    model in `executive/cells/sim/robot_models.py`; supported: `kuka_iiwa/model.urdf` (KUKA LBR iiwa 14)."""
     limits: LimitsConfig
     """Joint limits of the arm."""
     poses_deg: dict[Name, tuple[Angle, ...]] = Field(min_length=1)

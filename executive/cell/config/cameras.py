@@ -7,16 +7,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from executive.cell.config.section import (
-    Distance,
-    GreyLevels,
-    Length,
-    Name,
-    Natural,
-    Section,
-    Share,
-    Vector,
-)
+from executive.cell.config.section import Distance, GreyLevels, Length, Name, Natural, Section, Share, Vector
 
 Pixels = Annotated[float, Field(ge=-1e5, le=1e5)]
 """An entry of a camera matrix [pixel]; with 100,000 pixels, a frame 640 pixels wide spans 0.4 degrees."""

@@ -23,13 +23,13 @@ from executive.geometry import Array, Pose, tool_down
 from executive.motion.arms import build_kinematics
 from executive.motion.plans import Plan, Plans
 
-REACH = 0.85
+MAX_REACH = 0.85
 """Largest distance of the fake tool from the base [m]."""
 
-SPEED = 1.0
+TOOL_SPEED = 1.0
 """Tool speed of the fake arm where a goal does not say otherwise [m/s]."""
 
-BEARS = 7.9
+SEAL_STRENGTH = 7.9
 """The pull that a fake seal bears, unless a test says otherwise [N]."""
 
 
@@ -69,6 +69,7 @@ class FakeArm:
         self.commanded: list[str] = []
         self._world = world
         self._height = travel_height(config)
+        self._joint_count = config.arm.joint_count
         self._obstacles = FakeObstacles(config)
         self._plans = Plans(self._solve, clock, config.motion.planning, emit)
         self._tool = self.poses["home"]
@@ -78,8 +79,8 @@ class FakeArm:
 
     @property
     def q(self) -> Array:
-        """The tool position, padded to seven numbers."""
-        return np.concatenate([self._tool.position, np.zeros(4)])
+        """The tool position, padded with zeros to the number of joints."""
+        return np.concatenate([self._tool.position, np.zeros(self._joint_count - 3)])
 
     @property
     def tool_pose(self) -> Pose:
@@ -109,7 +110,7 @@ class FakeArm:
     def plan(self, goal: Goal | str, task: Task = Task()) -> Plan[FakeMotion]:
         """Begin to plan a motion to a goal or a named pose; what was planned ahead is known at once.
 
-        The result raises Unreachable for what is farther than `REACH` from the base, and Blocked where the
+        The result raises Unreachable beyond `MAX_REACH` from the base, and Blocked where the
         tool tip, or the load of the task, would enter the table or a bin, as the simulated arm's does: also
         on the guarded part.
         """
@@ -192,16 +193,18 @@ class FakeArm:
         if isinstance(goal, str):
             end = self.poses[goal]
             place = above = end.position
-            rotation, speed = end.rotation, SPEED
-            yield [*_line(start, place, rotation, SPEED)[:-1], end]
+            rotation, speed = end.rotation, TOOL_SPEED
+            yield [*_line(start, place, rotation, TOOL_SPEED)[:-1], end]
         else:
             place = np.array(goal.position)
-            require_reachable(place)
+            check_reachable(place)
             above = np.array([*place[:2], place[2] + goal.guarded])
-            rotation, speed = tool_down(place, goal.yaw or 0.0).rotation, min(goal.speed, SPEED)
+            rotation, speed = tool_down(place, goal.yaw or 0.0).rotation, min(goal.speed, TOOL_SPEED)
         over = np.array([*place[:2], max(above[2], self._height)])
         fast = [
-            pose for a, b in pairwise([start, raised, over, above]) for pose in _line(a, b, rotation, SPEED)
+            pose
+            for a, b in pairwise([start, raised, over, above])
+            for pose in _line(a, b, rotation, TOOL_SPEED)
         ]
         yield [*fast, *_line(above, place, rotation, speed)]
 
@@ -218,7 +221,7 @@ class FakeTool:
         self._world = world
         self._tip = tip
         self.seals: Callable[[], bool] = lambda: True
-        self.strength = BEARS
+        self.strength = SEAL_STRENGTH
 
     @property
     def touching(self) -> bool:
@@ -269,21 +272,21 @@ def named_poses(config: CellConfig) -> dict[str, Pose]:
     return {name: kinematics.forward(np.radians(pose)) for name, pose in config.arm.poses_deg.items()}
 
 
-def require_reachable(place: Array) -> None:
+def check_reachable(place: Array) -> None:
     """Return if the fake tool gets to a place `(3,)` [m].
 
     Raises:
-        Unreachable: It is farther than `REACH` from the base.
+        Unreachable: It is farther than `MAX_REACH` from the base.
     """
     distance = float(np.linalg.norm(place))
-    if distance > REACH:
-        raise Unreachable(f"{distance:.2f} m from the base is more than the arm's {REACH:.2f} m")
+    if distance > MAX_REACH:
+        raise Unreachable(f"{distance:.2f} m from the base is more than the arm's {MAX_REACH:.2f} m")
 
 
-def out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield a key of the cell file and a sentence for every bin, and the safe place, beyond `REACH`."""
+def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Yield a key of the cell file and a sentence for every bin, and the safe place, beyond `MAX_REACH`."""
     high = travel_height(config)
-    return places_out_of_reach(config, lambda place, _: require_reachable(np.array([*place, high])))
+    return places_out_of_reach(config, lambda place, _: check_reachable(np.array([*place, high])))
 
 
 def _line(start: Array, end: Array, rotation: Array, speed: float) -> list[Pose]:

@@ -18,7 +18,7 @@ from executive.errors import Unavailable
 from executive.geometry import Pose
 from executive.perception.mounted_camera import MountedCamera
 
-CONFIDENCE = 0.9
+MIN_CONFIDENCE = 0.9
 """What a fake detector says of what it sees, or its threshold where that is more."""
 
 
@@ -149,4 +149,4 @@ class FakeDetector:
         """Return the box around an object whose centre is at a pixel, at a `scale` [pixel/m]."""
         size = scale * self.world.classes[label].radius
         box = (column - size, row - size, column + size, row + size)
-        return Detection(label, max(CONFIDENCE, self.config.threshold), box)
+        return Detection(label, max(MIN_CONFIDENCE, self.config.threshold), box)

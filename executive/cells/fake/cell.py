@@ -14,7 +14,7 @@ from executive.cell.config import CellConfig
 from executive.cell.protocols import LeastTimes, Routes
 from executive.cell.workcell import CellOptions, KeyPath
 from executive.cells.audit import FinalObject, audit_objects
-from executive.cells.fake.arm import FakeArm, FakeTool, out_of_reach
+from executive.cells.fake.arm import FakeArm, FakeTool, find_places_out_of_reach
 from executive.cells.fake.camera import FakeCamera, FakeDetector
 from executive.cells.fake.command_log import FakeLog, restore
 from executive.cells.fake.least_times import FakeTimes
@@ -124,7 +124,7 @@ class FakeCell(CellWithoutHardware):
         if unsupported := tuple(find_unsupported_arm(config)):
             return unsupported
         problem = _find_lack_of_room(config, config.table.objects[1])
-        return (*out_of_reach(config), *([(("table", "objects"), problem)] if problem else []))
+        return (*find_places_out_of_reach(config), *([(("table", "objects"), problem)] if problem else []))
 
     @staticmethod
     def labels(config: CellConfig, base: Path) -> Mapping[str, tuple[str, ...] | None]:

@@ -12,13 +12,13 @@ from executive.cell.config import DetectorConfig, Section
 from executive.cell.detection import Answer, Detection
 from executive.cell.frame import Frame
 from executive.cell.protocols import Detector
-from executive.perception.detectors.options import OptionFaults, read_options, wrong_options
+from executive.perception.detectors.options import OptionFaults, find_wrong_options, read_options
 from executive.perception.detectors.requests import ChangedRequest
 from executive.perception.detectors.setting import Setting
 
-LOW = 0.75
+MAX_CONFUSED_CONFIDENCE = 0.75
 """Highest confidence of a detection that is given a wrong class."""
-SIDES = (15.0, 40.0)
+INVENTED_SIDE_RANGE = (15.0, 40.0)
 """Shortest and longest side of an invented box [pixel]."""
 
 
@@ -64,7 +64,7 @@ class NoisyDetector:
     def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionFaults:
         """Yield every option because of which it could not be built, with a sentence."""
         del base
-        wrong = list(wrong_options(NoisyOptions, config))
+        wrong = list(find_wrong_options(NoisyOptions, config))
         yield from wrong
         if not wrong and config.options["of"] not in others:
             yield "of", f'the cell has no detector "{config.options["of"]}"; it has: {", ".join(others)}'
@@ -90,7 +90,11 @@ class NoisyDetector:
         if random.random() >= self._config.confused:
             return detection
         wrong = [label for label in self._options.classes if label != detection.label]
-        return replace(detection, label=str(random.choice(wrong)), confidence=self._confidence(LOW, random))
+        return replace(
+            detection,
+            label=str(random.choice(wrong)),
+            confidence=self._confidence(MAX_CONFUSED_CONFIDENCE, random),
+        )
 
     def _moved(self, detection: Detection, random: np.random.Generator) -> Detection:
         right, down = random.normal(0.0, self._config.jitter, 2)
@@ -103,7 +107,7 @@ class NoisyDetector:
             self._setting.camera.table_view if view == "table" else (0, 0, width, height)
         )
         x, y = random.uniform((left, top), (right, bottom))
-        half_width, half_height = random.uniform(*SIDES, 2) / 2
+        half_width, half_height = random.uniform(*INVENTED_SIDE_RANGE, 2) / 2
         box = (x - half_width, y - half_height, x + half_width, y + half_height)
         return Detection(str(random.choice(self._options.classes)), self._confidence(1.0, random), box)
 

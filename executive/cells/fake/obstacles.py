@@ -10,7 +10,7 @@ from executive.cell.config import CellConfig
 from executive.cell.layout import bin_walls
 from executive.cell.objects import ObjectClass
 from executive.geometry import Array
-from executive.motion.clearance_model import PRESSED
+from executive.motion.clearance_model import MAX_PENETRATION
 
 
 class Collision(NamedTuple):
@@ -62,7 +62,7 @@ class FakeObstacles:
         beside = np.maximum(self._low - x_y, x_y - self._high)
         distance = np.linalg.norm(np.maximum(beside, 0.0), axis=2) + np.minimum(beside.max(axis=2), 0.0)
         depth = np.minimum(radius - distance, self._top - (tips[:, 2:] - height))
-        excess = depth - np.maximum(depth[0], PRESSED)
+        excess = depth - np.maximum(depth[0], MAX_PENETRATION)
         at, number = (int(index) for index in np.unravel_index(np.argmax(excess), excess.shape))
         if excess[at, number] <= 0:
             return None

@@ -16,7 +16,7 @@ TOOL, TOOL_COLOUR = "tool", (0.25, 0.28, 0.32)
 TABLE_COLOUR = (0.86, 0.78, 0.66)
 TABLE_THICKNESS = 0.02
 """What lies under the workspace, for the eye only [m]."""
-MARGIN = 0.12
+TABLE_MARGIN = 0.12
 """How far the table goes on beyond the workspace [m]."""
 
 
@@ -57,7 +57,7 @@ class FakeVisuals:
 def _fixed(config: CellConfig) -> Iterator[Shape]:
     """Yield the table and the bins."""
     (left, right), (near, far) = config.table.x, config.table.y
-    size = (right - left + 2 * MARGIN, far - near + 2 * MARGIN, TABLE_THICKNESS)
+    size = (right - left + 2 * TABLE_MARGIN, far - near + 2 * TABLE_MARGIN, TABLE_THICKNESS)
     middle = Pose.of(((left + right) / 2, (near + far) / 2, -TABLE_THICKNESS / 2))
     yield Shape("", "box", size, middle, TABLE_COLOUR)
     for bin in config.bins.values():

@@ -13,10 +13,10 @@ from executive.errors import InputError
 from executive.geometry import Array
 from executive.mission.findings import alternatives
 
-CUP = 0.012
+MAX_SEAL_OFFSET = 0.012
 """How far beside an object's centre the fake cup still seals [m]."""
 
-TOUCH = 0.002
+TOUCH_DISTANCE = 0.002
 """How far above or below an object's upper side the fake cup is on it [m]."""
 
 
@@ -122,7 +122,7 @@ class FakeWorld:
         for thing in self.objects:
             beside = float(np.linalg.norm(thing.position[:2] - tip[:2]))
             off = abs(beside - self.classes[thing.label].ring)
-            near = off <= CUP and abs(self.top(thing) - tip[2]) <= TOUCH
+            near = off <= MAX_SEAL_OFFSET and abs(self.top(thing) - tip[2]) <= TOUCH_DISTANCE
             if near and thing is not self.held:
                 return thing
         return None

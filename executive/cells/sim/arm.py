@@ -23,7 +23,7 @@ from executive.motion.planner import Planner
 from executive.motion.plans import Plan, Plans
 from executive.motion.trajectory import Trajectory
 
-MOMENT = 1e-4
+VELOCITY_INTERVAL = 1e-4
 """Time over which a tool velocity is taken [s]: too short for the arm to bend the way."""
 START_TOLERANCE = math.radians(0.2)
 """Largest joint difference between the arm and the start of a motion [rad]."""
@@ -96,9 +96,9 @@ class SimArm:
     def tool_velocity(self) -> Array:
         """Velocity of the tool centre point in the world `(3,)` [m/s], from the measured joint velocities."""
         states = self._world.client.getJointStates(self._world.arm, range(self._world.robot.joint_count))
-        q, turned = np.array([(state[0], state[1] * MOMENT) for state in states]).T
+        q, turned = np.array([(state[0], state[1] * VELOCITY_INTERVAL) for state in states]).T
         forward = self.planner.kinematics.forward
-        return (forward(q + turned).position - forward(q).position) / MOMENT
+        return (forward(q + turned).position - forward(q).position) / VELOCITY_INTERVAL
 
     @property
     def destination(self) -> Array:

@@ -75,7 +75,7 @@ def move_arm(world: World, camera: CameraConfig, rng: Generator) -> bool:
     # The inverse kinematics starts from a forward posture, nearer to all targets than a scan pose.
     position = rng.uniform((0.25, -0.50, 0.05), (0.72, 0.50, 0.40))
     bearing = math.atan2(position[1], position[0])
-    world.set_arm([bearing, math.radians(30), 0, math.radians(-85), 0, math.radians(65), 0])
+    world.set_arm([bearing, *map(math.radians, world.robot.forward_pose_deg)])
     _move_tool(world, tool_down(position, bearing + rng.uniform(-1.2, 1.2)))
     return bool(rng.random() < 0.3)
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import cv2
 import numpy as np
 import pybullet
 from numpy.typing import NDArray
+from pydantic import Field
 
 from executive.cell.bins import Bin
-from executive.cell.config import CameraConfig, DepthConfig, NoiseConfig
+from executive.cell.config import CameraConfig, Colour, DepthConfig, NoiseConfig, Section
 from executive.cell.frame import Frame
 from executive.cell.protocols import Clock
 from executive.cells.sim.view import ArmShadow
@@ -25,23 +27,24 @@ Image = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class Light:
-    """One distant lamp and the light that comes from everywhere.
+Reflection = Annotated[float, Field(ge=0, le=3)]
 
-    Attributes:
-        direction: Towards the lamp, in the world.
-        colour: Red, green and blue, 0 to 1.
-        ambient, diffuse, specular: Shares of the three terms of Phong's reflection model.
-        shadow: Whether things cast shadows.
-    """
 
-    direction: tuple[float, float, float] = (0.3, 0.2, 1.0)
-    colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    ambient: float = 0.6
-    diffuse: float = 0.35
-    specular: float = 0.05
+class Light(Section):
+    """A distant lamp and the ambient light; the defaults apply to every simulated cell."""
+
+    direction: tuple[float, float, Annotated[float, Field(gt=0)]] = (0.3, 0.2, 1.0)
+    """Direction x, y, z in the world from the table to the lamp; z is above 0, the length is ignored."""
+    colour: Colour = (1.0, 1.0, 1.0)
+    """Colour of the lamp's light: r, g, b, each 0 to 1."""
+    ambient: Reflection = 0.6
+    """Ambient coefficient of the Phong model, 0 to 3."""
+    diffuse: Reflection = 0.35
+    """Diffuse coefficient of the Phong model, 0 to 3."""
+    specular: Reflection = 0.05
+    """Specular coefficient of the Phong model, 0 to 3."""
     shadow: bool = False
+    """True if objects cast shadows."""
 
 
 CELL_LIGHT = Light()
@@ -113,7 +116,7 @@ def add_noise(image: Image, noise: NoiseConfig, rng: np.random.Generator) -> Ima
     return np.asarray(np.clip(image * np.float32(gain) + read + 0.5, 0, 255).astype(np.uint8))
 
 
-def sense(true: Array, config: DepthConfig, rng: np.random.Generator) -> Array:
+def add_depth_noise(true: Array, config: DepthConfig, rng: np.random.Generator) -> Array:
     """Return what the sensor measures of distances `(H, W)` [m]: NaN where it measures nothing.
 
     Neighbours err alike, for stereo matches windows and not pixels. Beside an edge one of its two cameras
@@ -208,7 +211,7 @@ class SimCamera(MountedCamera):
         if self.config.depth is None:
             return image, None
         rng = np.random.default_rng([self._seed, self._frames, DEPTH_STREAM])
-        return image, sense(clean.depth, self.config.depth, rng)
+        return image, add_depth_noise(clean.depth, self.config.depth, rng)
 
     def _find_visible(self, X_WC: Pose) -> Mask:
         if self._shadow is None:

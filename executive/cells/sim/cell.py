@@ -15,8 +15,8 @@ from executive.cells.sim.camera import SimCamera
 from executive.cells.sim.collision import PathClearance
 from executive.cells.sim.command_log import CommandLog, read_commands
 from executive.cells.sim.least_times import SimLeastTimes
-from executive.cells.sim.models import missing_models, weighed
-from executive.cells.sim.poses import out_of_reach, unfit_poses
+from executive.cells.sim.models import find_missing_models, object_class_with_mass
+from executive.cells.sim.poses import find_places_out_of_reach, find_unfit_poses
 from executive.cells.sim.rebuild import UnderWay, rebuild
 from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.scene_world import build_light
@@ -91,7 +91,7 @@ class SimCell(CellWithoutHardware):
         )
         if options.resume is not None:
             self._camera.skip(options.resume.frames, options.resume.turns)
-        classes = {label: weighed(label, kind) for label, kind in config.objects.items()}
+        classes = {label: object_class_with_mass(label, kind) for label, kind in config.objects.items()}
         localizer = build_localizer(config.localization, classes, bins, self._world.cast_ray)
         # Last of all: some detectors start processes, which nobody would end if a later statement failed.
         folders = (options.base, shipped_folder() / "cells")
@@ -117,15 +117,15 @@ class SimCell(CellWithoutHardware):
         """
         if unsupported := tuple(find_unsupported_arm(config)):
             return unsupported
-        missing = tuple(missing_models(config))
+        missing = tuple(find_missing_models(config))
         return (
             *missing,
             *_find_lack_of_depth(config),
             *find_problems(config.detectors, base),
-            *out_of_reach(config),
+            *find_places_out_of_reach(config),
             *find_lack_of_room(config),
             # A world cannot be made without its models.
-            *(() if missing else unfit_poses(config)),
+            *(() if missing else find_unfit_poses(config)),
         )
 
     @staticmethod

@@ -20,9 +20,9 @@ from executive.cells.sim.world import World, held_part
 from executive.errors import Blocked
 from executive.geometry import Array, Pose
 
-SLACK = 1e-5
+ROUNDING_ERROR = 1e-5
 """Difference of distances that is rounding [m]."""
-FAR_AWAY = (0.0, 0.0, 50.0)
+PARKING_POSITION = (0.0, 0.0, 50.0)
 
 
 class Approach(NamedTuple):
@@ -72,7 +72,7 @@ class PathClearance:
             nearest = self._nearest(q, carrying)
             for pair, near in nearest.items():
                 allowed = min(near.allowed, spared[pair].distance) if pair in spared else near.allowed
-                if near.distance < allowed - SLACK:
+                if near.distance < allowed - ROUNDING_ERROR:
                     raise Blocked(self._text(near))
             spared = {pair: near for pair, near in spared.items() if pair in nearest}
 
@@ -88,7 +88,7 @@ class PathClearance:
     def too_near(self, q: Array) -> Approach | None:
         """Return what an empty arm at `q` `(n,)` [rad] brings nearest, if nearer than the margin, or None."""
         nearest = min(self._near(q, None), key=lambda near: near.distance, default=None)
-        return nearest if nearest and nearest.distance < nearest.allowed - SLACK else None
+        return nearest if nearest and nearest.distance < nearest.allowed - ROUNDING_ERROR else None
 
     def close(self) -> None:
         """Give the planning world back."""
@@ -132,7 +132,7 @@ class PathClearance:
         for point in near(held, self.world.arm, self._margin):
             if self.world.robot.first_moving_link <= point[4] < self.world.robot.wrist_link:
                 yield Approach(part, self.world.part_of(point[4]), point[8], self._margin)
-        self.world.client.resetBasePositionAndOrientation(held, FAR_AWAY, [0, 0, 0, 1])
+        self.world.client.resetBasePositionAndOrientation(held, PARKING_POSITION, [0, 0, 0, 1])
 
     @contextmanager
     def _standing(self, around: Sequence[Obstacle]) -> Iterator[None]:
@@ -143,7 +143,7 @@ class PathClearance:
             bodies = self._cylinders.setdefault(size, [])
             if len(bodies) == used[size]:
                 shape = client.createCollisionShape(pybullet.GEOM_CYLINDER, radius=size[0], height=size[1])
-                bodies.append(int(client.createMultiBody(0, shape, basePosition=FAR_AWAY)))
+                bodies.append(int(client.createMultiBody(0, shape, basePosition=PARKING_POSITION)))
             body = bodies[used[size]]
             used[size] += 1
             client.resetBasePositionAndOrientation(
@@ -155,7 +155,7 @@ class PathClearance:
         finally:
             for there in self._around.values():
                 for body in there:
-                    client.resetBasePositionAndOrientation(body, FAR_AWAY, [0, 0, 0, 1])
+                    client.resetBasePositionAndOrientation(body, PARKING_POSITION, [0, 0, 0, 1])
             self._around = {}
 
     def _floor(self, body: str) -> float:
@@ -168,5 +168,5 @@ class PathClearance:
             shape = client.createCollisionShape(
                 pybullet.GEOM_CYLINDER, radius=carrying.radius + carrying.ring, height=carrying.height
             )
-            self._held[carrying] = int(client.createMultiBody(0, shape, basePosition=FAR_AWAY))
+            self._held[carrying] = int(client.createMultiBody(0, shape, basePosition=PARKING_POSITION))
         return self._held[carrying]

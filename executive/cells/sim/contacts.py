@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
-from executive.cells.sim.tool import LIP
+from executive.cells.sim.tool import LIP_LENGTH
 from executive.cells.sim.world import World, held_part
 
-PRESSING = 2.0
+MIN_CONTACT_FORCE = 2.0
 """Force from which a new contact is felt [N]: assumed of joint torque sensors; a graze is not felt."""
-APART = 12
+SEPARATION_STEPS = 12
 """Steps without touching after which two bodies have parted: a load that is lifted may graze once more."""
 
 
@@ -36,11 +36,11 @@ class Contacts:
         `feeling`: the tool's lip is meant to touch something now.
         """
         now = self._world.steps
-        self._known = {pair: step for pair, step in self._known.items() if now - step <= APART}
+        self._known = {pair: step for pair, step in self._known.items() if now - step <= SEPARATION_STEPS}
         for part, body, place, force in self._touching():
             if (part, body) in self._known:
                 self._known[part, body] = now
-            elif force > PRESSING and not (feeling and part == "the tool" and self._is_lip(place)):
+            elif force > MIN_CONTACT_FORCE and not (feeling and part == "the tool" and self._is_lip(place)):
                 x, y, z = self._world.tool_pose().position
                 name = self._world.name_of(body)
                 return f"{part} ran into {name}, with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m"
@@ -48,7 +48,7 @@ class Contacts:
 
     def _is_lip(self, place: Sequence[float]) -> bool:
         """Tell whether a place of the tool [m] belongs to its lip."""
-        return bool(self._world.tool_pose().inverse().apply(place)[2] > -LIP)
+        return bool(self._world.tool_pose().inverse().apply(place)[2] > -LIP_LENGTH)
 
     def _touching(self) -> Iterator[tuple[str, int, Sequence[float], float]]:
         """Yield what touches which body, where on it [m], and how hard [N]."""

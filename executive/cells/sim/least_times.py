@@ -1,4 +1,4 @@
-"""What things take in the simulated cell at the very least, from limits and inverse kinematics alone."""
+"""Minimum times in a simulated cell, from limits and inverse kinematics alone."""
 
 from __future__ import annotations
 
@@ -6,19 +6,20 @@ import numpy as np
 
 from executive.cell.config import CellConfig
 from executive.cell.layout import as_bin, pile_height
-from executive.cells.sim.tool import TOUCH
+from executive.cells.least_times import CellLeastTimes
+from executive.cells.sim.tool import TOUCH_DISTANCE
 from executive.errors import Unreachable
 from executive.geometry import Array, tool_down
 from executive.motion.arms import build_kinematics
 from executive.motion.limits import JointLimits, min_time
 
-SPACING = np.radians(20.0)
+ANGLE_SPACING = np.radians(20.0)
 """Distance between the redundancy angles that are tried [rad]."""
-SAFETY = 0.8
+SAFETY_FACTOR = 0.8
 """Share of the minimum time found for a carry; other configurations and heights may take less time."""
 
 
-class SimLeastTimes:
+class SimLeastTimes(CellLeastTimes):
     """Bounds that hold however a motion is planned; implements `executive.cell.protocols.LeastTimes`.
 
     A carry begins at rest on an object and ends at rest over the bin: no joint makes its part of that sooner
@@ -30,32 +31,12 @@ class SimLeastTimes:
     """
 
     def __init__(self, config: CellConfig) -> None:
-        self._config = config
+        self._highest = pile_height(config)
+        lowest = min(kind.height for kind in config.objects.values())
+        super().__init__(config, TOUCH_DISTANCE, self._highest - lowest)
         self._limits = JointLimits.of(config.arm.limits)
         self._kinematics = build_kinematics(config)
-        self._highest = pile_height(config)
         self._carries: dict[str, float] = {}
-
-    @property
-    def descent(self) -> float:
-        """The guarded last part of an approach, to the highest object where the lowest was expected [s]."""
-        motion = self._config.motion
-        lowest = min(kind.height for kind in self._config.objects.values())
-        return max(0.0, motion.descent - (self._highest - lowest) - TOUCH) / motion.descent_speed
-
-    def carry(self, bin: str | None) -> float:
-        """From the nearest place where objects lie to over a bin, or over the nearest bin [s].
-
-        0 for a bin that the cell does not have, and where the arm does not reach one of the two.
-        """
-        names = self._config.bins if bin is None else {bin} & set(self._config.bins)
-        return min(map(self._carry, names), default=0.0)
-
-    def answer(self, detector: str) -> float:
-        """From a frame to the answer of a detector; "": the first [s]. 0 for one that the cell lacks."""
-        detectors = self._config.detectors
-        config = detectors.get(detector or next(iter(detectors)))
-        return config.latency if config else 0.0
 
     def _carry(self, bin: str) -> float:
         if bin not in self._carries:
@@ -63,7 +44,7 @@ class SimLeastTimes:
             low, high = np.transpose([self._config.table.x, self._config.table.y])
             places = np.clip(slots, low, high), np.broadcast_to(self._config.safe_place[:2], slots.shape)
             try:
-                self._carries[bin] = SAFETY * min(self._shortest(place, slots) for place in places)
+                self._carries[bin] = SAFETY_FACTOR * min(self._shortest(place, slots) for place in places)
             except Unreachable:
                 self._carries[bin] = 0.0
         return self._carries[bin]
@@ -81,7 +62,7 @@ class SimLeastTimes:
             Unreachable: There are none.
         """
         pose = tool_down(np.array([*place, height]))
-        found = self._kinematics.solve_all(pose, np.zeros(self._limits.joint_count), SPACING).qs
+        found = self._kinematics.solve_all(pose, np.zeros(self._limits.joint_count), ANGLE_SPACING).qs
         found[:, -1] = 0.0
         inside = found[self._limits.position.contains(found)]
         if not len(inside):

@@ -20,7 +20,7 @@ from executive.cells.sim.model_files import find_mesh, find_model, read_numbers,
 from executive.errors import InputError
 from executive.geometry import Array, Pose
 
-TOLERANCE = 0.003
+SIZE_TOLERANCE = 0.003
 """Difference between a cell file's figure and the model's own from which it counts as wrong [m]."""
 FRICTION = 0.0005
 """Rolling and spinning friction: without it a ball at rest creeps, and a released one never stops."""
@@ -118,12 +118,12 @@ def mass_of(config: ObjectConfig) -> float:
     return sum(sum(read_numbers(mass.get("value"), (0.0,))) for mass in masses)
 
 
-def weighed(label: str, config: ObjectConfig) -> ObjectClass:
+def object_class_with_mass(label: str, config: ObjectConfig) -> ObjectClass:
     """Return what skills know of a class of objects of a cell file, with what it weighs in simulation."""
     return replace(object_class(label, config), mass=mass_of(config))
 
 
-def missing_models(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+def find_missing_models(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield the key of every model of a cell file that is missing or not as the file says, and a sentence."""
     for label, kind in config.objects.items():
         key: KeyPath = ("objects", label)
@@ -135,10 +135,10 @@ def missing_models(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
         except InputError as error:
             yield (*key, "mesh" if kind.mesh else "urdf"), str(error)
         else:
-            yield from (((*key, name), sentence) for name, sentence in _wrong_sizes(label, kind))
+            yield from (((*key, name), sentence) for name, sentence in _find_wrong_sizes(label, kind))
 
 
-def _wrong_sizes(label: str, kind: ObjectConfig) -> Iterator[tuple[str, str]]:
+def _find_wrong_sizes(label: str, kind: ObjectConfig) -> Iterator[tuple[str, str]]:
     """Yield height and radius where they are not the model's, with a sentence.
 
     Everything that is known of an object's place hangs on them: where its middle is, where its surface,
@@ -150,7 +150,7 @@ def _wrong_sizes(label: str, kind: ObjectConfig) -> Iterator[tuple[str, str]]:
         return
     for name, actual in (("height", mesh.top - mesh.bottom), ("radius", mesh.radius)):
         stated = getattr(kind, name)
-        if not abs(stated - actual) <= TOLERANCE:  # True if the size is not a number
+        if not abs(stated - actual) <= SIZE_TOLERANCE:  # True if the size is not a number
             yield (
                 name,
                 f"the model of {label} has a {name} of {actual:.4f} m, not {stated:g} m; "

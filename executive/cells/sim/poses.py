@@ -25,7 +25,7 @@ POINTS_PER_SIDE = 9
 """Number of places along each side of the workspace where every camera must see an object."""
 
 
-def out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield a key of the cell file and a sentence for every place the tool has to go to and cannot.
 
     Asked for are every drop slot of every bin and the safe place, from travel height down to where a load is
@@ -49,7 +49,7 @@ def out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     yield from places_out_of_reach(config, require)
 
 
-def unfit_poses(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+def find_unfit_poses(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield a key of the cell file and a sentence for every pose that cannot serve.
 
     No named pose may bring arm or tool nearer to table, bins or the arm itself than the margin, for there
@@ -63,10 +63,10 @@ def unfit_poses(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
                     ("arm", "poses_deg", name),
                     f'the pose "{name}" brings {near}; {config.motion.margin:.3f} m must stay free',
                 )
-        yield from _blind_poses(config, clearance.world)
+        yield from _find_blind_poses(config, clearance.world)
 
 
-def _blind_poses(config: CellConfig, world: World) -> Iterator[tuple[KeyPath, str]]:
+def _find_blind_poses(config: CellConfig, world: World) -> Iterator[tuple[KeyPath, str]]:
     """Yield the scan poses and the bins that keep a camera from seeing the whole workspace."""
     planner = build_planner(config)
     shadow = ArmShadow(SimArm(world, planner, config, StepClock(lambda: 0.0)), planner.kinematics, config)

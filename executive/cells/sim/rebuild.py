@@ -88,7 +88,7 @@ class Rebuilding:
             world.command_arm(self._command, self._time)
         elif kind == log.MOTION:
             duration, guarded, _ = numbers
-            self._motion, self._time = sampled(states_of(command), duration, guarded), 0.0
+            self._motion, self._time = join_samples(states_of(command), duration, guarded), 0.0
         elif kind == log.DONE:
             self._motion = None
         elif kind == log.PLACE:
@@ -107,7 +107,7 @@ def rebuild(world: World, tool: SuctionTool, commands: Iterable[Command]) -> Und
     return rebuilding.under_way
 
 
-class Sampled:
+class SampledPiece:
     """A piece between given states: polynomials of fifth degree that agree with them; implements `Piece`.
 
     Args:
@@ -137,6 +137,6 @@ class Sampled:
         return q, q.derivative(), q.derivative(2)
 
 
-def sampled(states: State, duration: float, guarded: float = math.inf) -> Trajectory:
+def join_samples(states: State, duration: float, guarded: float = math.inf) -> Trajectory:
     """Return the motion that `Trajectory.samples` gave these states of."""
-    return Trajectory([Sampled(states, duration)], guarded)
+    return Trajectory([SampledPiece(states, duration)], guarded)

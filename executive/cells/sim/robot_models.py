@@ -21,6 +21,9 @@ class RobotModel:
         first_moving_link: Lowest link that can approach other bodies.
         wrist_link: Lowest link that a held object may touch, because the object hangs there.
         self_pairs: Pairs of links that can collide with each other.
+        link_radius: Radius of the circle around the housing of each link [m].
+        forward_pose_deg: Joint positions, after the first, of a posture from which the inverse kinematics
+            reaches all places on the table [degree].
     """
 
     flange_link: str
@@ -29,6 +32,8 @@ class RobotModel:
     first_moving_link: int
     wrist_link: int
     self_pairs: tuple[tuple[int, int], ...]
+    link_radius: float
+    forward_pose_deg: tuple[float, ...]
 
     @property
     def joint_count(self) -> int:
@@ -48,6 +53,8 @@ ROBOT_MODELS: Mapping[str, RobotModel] = {
         # In 1500 random poses, 121 of 131 self-collisions were between links 5 and 7 (indices 4 and 6).
         # Longer tools also collide with the base and with links 1 and 2, most often with the base.
         self_pairs=((4, 6), (7, 0), (7, 1), (7, 2)),
+        link_radius=0.09,
+        forward_pose_deg=(30, 0, -85, 0, 65, 0),
     )
 }
 """Model of each supported arm, by the value of `arm.urdf` in a cell file."""

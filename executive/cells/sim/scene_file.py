@@ -9,8 +9,9 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 
 from executive.cell.config import CameraConfig, CellConfig, Colour, NoiseConfig, Section
-from executive.cell.config.section import Natural, check_ascending
+from executive.cell.config.section import Natural, Share, check_ascending
 from executive.cells.sim.arrangements import DAMAGED_MODEL, UNKNOWN_COUNT
+from executive.cells.sim.camera import Light
 from executive.cells.sim.table_top import PATTERN_COUNT, PLAIN, TEXTURES, WOOD
 from executive.errors import InputError
 from executive.mission.findings import Finding, MissionError, alternatives, error, in_file_order
@@ -59,40 +60,25 @@ def check_palette(colours: tuple[Colour, ...]) -> tuple[Colour, ...]:
     return colours
 
 
-Share = Annotated[float, Field(ge=0, le=1)]
-RgbColour = tuple[Share, Share, Share]
-Reflection = Annotated[float, Field(ge=0, le=3)]
 Shift = Annotated[float, Field(ge=-1, le=1)]
 AngleDeg = Annotated[float, Field(ge=-90, le=90)]
 Counts = Annotated[tuple[Natural, Natural], AfterValidator(check_ascending)]
 ModelId = Annotated[int, Field(ge=0, lt=UNKNOWN_COUNT)]
 Models = Annotated[tuple[ModelId, ModelId], AfterValidator(check_ascending), AfterValidator(check_models)]
-Palette = Annotated[tuple[RgbColour, ...], AfterValidator(check_palette)]
+Palette = Annotated[tuple[Colour, ...], AfterValidator(check_palette)]
 
 
-class LightConfig(Section):
+class LightConfig(Light):
     """The lamp and the ambient light; the defaults apply to every simulated cell."""
 
     brightness: float = Field(1.0, ge=0, le=5)
     """Factor on `ambient`, `diffuse` and `specular`."""
-    direction: tuple[float, float, Annotated[float, Field(gt=0)]] = (0.3, 0.2, 1.0)
-    """Direction x, y, z in the world from the table to the lamp; z is above 0, the length is ignored."""
-    colour: RgbColour = (1.0, 1.0, 1.0)
-    """Colour of the lamp's light: r, g, b, each 0 to 1."""
-    ambient: Reflection = 0.6
-    """Ambient coefficient of the Phong model, 0 to 3."""
-    diffuse: Reflection = 0.35
-    """Diffuse coefficient of the Phong model, 0 to 3."""
-    specular: Reflection = 0.05
-    """Specular coefficient of the Phong model, 0 to 3."""
-    shadow: bool = False
-    """True if objects cast shadows."""
 
 
 class SceneTableConfig(Section):
     """The surface of the table and the arrangement of the objects; None: the value of the cell file."""
 
-    colour: RgbColour = (1.0, 1.0, 1.0)
+    colour: Colour = (1.0, 1.0, 1.0)
     """Factor on the brightness of the texture: r, g, b, each 0 to 1."""
     texture: Annotated[str, AfterValidator(check_texture)] = WOOD
     """`wood`, `plain` (white), or a generated texture, `pattern 0` to `pattern 23`."""

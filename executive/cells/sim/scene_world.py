@@ -43,14 +43,8 @@ def true_cell(config: CellConfig, scene: SceneConfig) -> CellConfig:
 
 def build_light(light: LightConfig) -> Light:
     """Return the lamp and the ambient light of a scene."""
-    return Light(
-        direction=light.direction,
-        colour=light.colour,
-        ambient=light.brightness * light.ambient,
-        diffuse=light.brightness * light.diffuse,
-        specular=light.brightness * light.specular,
-        shadow=light.shadow,
-    )
+    scaled = {key: light.brightness * getattr(light, key) for key in ("ambient", "diffuse", "specular")}
+    return Light.model_construct(**{**light.model_dump(exclude={"brightness"}), **scaled})
 
 
 def paint_table(world: World, scene: SceneConfig) -> None:

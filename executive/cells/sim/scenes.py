@@ -6,7 +6,8 @@ of an object's whole silhouette, computed from its mesh, also where something hi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import cv2
@@ -16,14 +17,8 @@ from numpy.typing import NDArray
 from executive.cell.config import CellConfig, NoiseConfig
 from executive.cell.frame import Box
 from executive.cells.audit import UNKNOWN
-from executive.cells.sim.arrangements import (
-    SceneObject,
-    arrange,
-    make_held_object,
-    move_arm,
-    random_part,
-)
-from executive.cells.sim.camera import CELL_LIGHT, Image, add_noise, camera_pose, render, sense
+from executive.cells.sim.arrangements import SceneObject, arrange, make_held_object, move_arm, random_part
+from executive.cells.sim.camera import CELL_LIGHT, Image, add_depth_noise, add_noise, camera_pose, render
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig
 from executive.cells.sim.scene_world import build_light, paint_table, true_cell
@@ -42,19 +37,19 @@ from executive.errors import InputError
 from executive.geometry import Array, Pose
 from executive.perception.camera_model import calibrated, intersect_plane, project
 
-SIZE = 256
+IMAGE_SIZE = 256
 """Side of a sample's image [pixel]: what a detector is given."""
-LABELLED = 0.5
+MIN_LABELLED_SHARE = 0.5
 """Share of its silhouette that must be visible for an object to be labelled."""
-UNNOTICED = 0.15
+MAX_HIDDEN_SHARE = 0.15
 """Share under which an object counts as hidden; in between it is neither labelled nor background."""
-IGNORED_SHARE = 1 / 6
+MAX_IGNORED_SHARE = 1 / 6
 """Share of the objects that may lie between the two, but always one: more would confuse training."""
 MAX_ATTEMPTS = 50
 """Number of random scenes after which a lack of room for the objects is an error."""
 DECLARED_SHARE = 0.2
 """Share of the scenes with table, lamp, camera and noise as in the cell file."""
-VISIBLE_CONTRAST = 5
+MIN_CONTRAST = 5
 """Contrast to its surroundings under which an object is ignored [standard deviation of the noise]."""
 
 
@@ -175,12 +170,9 @@ class SceneRenderer:
         if holds:
             items.append(make_held_object(world.tool_pose(), self._config, rng))
         bodies = [world.add_object(item.label, item.X_WO, item.colour, item.model) for item in items]
-        try:
+        with _removing(world, bodies):
             world.table_top.paint(colour, texture)
             shot = render(world, matrix, X_WC, part, light)
-        finally:
-            for body in bodies:
-                world.remove_object(body)
         view = View(shot.image, shot.bodies, part, matrix, X_WC, noise)
         sample = self._label(view, bodies, items)
         return None if sample is None else replace(sample, image=_resized(add_noise(shot.image, noise, rng)))
@@ -191,7 +183,7 @@ class SceneRenderer:
         world.set_arm(pose)
         bodies = spawn(world, self._config, int(rng.integers(2**32)), unknown=self._scene.unknown)
         world.set_arm(pose)  # settling may have let it sag
-        try:
+        with _removing(world, bodies):
             X_WC, declared = camera_pose(world, camera), camera_pose(world, self._declared)
             items = [
                 SceneObject(world.bodies[body], world.models[body], world.object_pose(body), (0.0, 0.0, 0.0))
@@ -199,11 +191,8 @@ class SceneRenderer:
             ]
             whole, light = (0, 0, camera.width, camera.height), build_light(self._scene.light)
             shot = render(world, self._matrix, X_WC, whole, light)
-        finally:
-            for body in bodies:
-                world.remove_object(body)
         frame = add_noise(shot.image, camera.noise, rng)
-        depth = None if camera.depth is None else sense(shot.depth, camera.depth, rng)
+        depth = None if camera.depth is None else add_depth_noise(shot.depth, camera.depth, rng)
         second = add_noise(shot.image, camera.noise, rng)
         left, top, right, bottom = part = camera.table_view
         clean, seen = shot.image[top:bottom, left:right], shot.bodies[top:bottom, left:right]
@@ -219,8 +208,9 @@ class SceneRenderer:
 
     def _label(self, view: View, bodies: Sequence[int], items: Sequence[SceneObject]) -> Sample | None:
         """Label a render, or return None if too many objects are half hidden."""
-        labels, boxes, shares, positions, centres, ignored, half_hidden = [], [], [], [], [], [], 0
-        corner, scale = np.array(view.part[:2], dtype=float), SIZE / (view.part[2] - view.part[0])
+        labelled: list[tuple[str, list[float], float, Array, Array]] = []
+        ignored, half_hidden = [], 0
+        corner, scale = np.array(view.part[:2], dtype=float), IMAGE_SIZE / (view.part[2] - view.part[0])
         for body, item in zip(bodies, items, strict=True):
             mine = view.bodies == body
             if item.label == UNKNOWN or not mine.any():
@@ -231,28 +221,28 @@ class SceneRenderer:
             share = visible_share(mesh, pixels, mine)
             whole = outline_box(pixels)
             box = _clipped(whole, corner, scale)
-            if share < UNNOTICED:
+            if share < MAX_HIDDEN_SHARE:
                 continue
-            half_hidden += share < LABELLED
-            if share < LABELLED or contrast(view.image, mine) < VISIBLE_CONTRAST * view.noise.read:
+            half_hidden += share < MIN_LABELLED_SHARE
+            if (
+                share < MIN_LABELLED_SHARE
+                or measure_contrast(view.image, mine) < MIN_CONTRAST * view.noise.read
+            ):
                 ignored.append(box)
                 continue
             centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
             middle = ((whole[0] + whole[2]) / 2, (whole[1] + whole[3]) / 2)
-            labels.append(item.label)
-            boxes.append(box)
-            shares.append(share)
-            positions.append(intersect_plane(view.matrix, view.X_WC, middle, float(centre[2])))
-            centres.append(centre)
-        if half_hidden > max(1, len(items) * IGNORED_SHARE):
+            position = intersect_plane(view.matrix, view.X_WC, middle, float(centre[2]))
+            labelled.append((item.label, box, share, position, centre))
+        if half_hidden > max(1, len(items) * MAX_IGNORED_SHARE):
             return None
         return Sample(
             image=view.image,
-            labels=tuple(labels),
-            boxes=np.array(boxes).reshape(-1, 4),
-            visible_fraction=np.array(shares),
-            positions=np.array(positions).reshape(-1, 3),
-            centres=np.array(centres).reshape(-1, 3),
+            labels=tuple(label for label, *_ in labelled),
+            boxes=np.array([box for _, box, *_ in labelled]).reshape(-1, 4),
+            visible_fraction=np.array([share for *_, share, _, _ in labelled]),
+            positions=np.array([position for *_, position, _ in labelled]).reshape(-1, 3),
+            centres=np.array([centre for *_, centre in labelled]).reshape(-1, 3),
             ignored=np.array(ignored).reshape(-1, 4),
             part=view.part,
             matrix=view.matrix,
@@ -260,7 +250,17 @@ class SceneRenderer:
         )
 
 
-def contrast(image: Image, mask: NDArray[np.bool_]) -> float:
+@contextmanager
+def _removing(world: World, bodies: Sequence[int]) -> Iterator[None]:
+    """Remove bodies from the world at the end of the context."""
+    try:
+        yield
+    finally:
+        for body in bodies:
+            world.remove_object(body)
+
+
+def measure_contrast(image: Image, mask: NDArray[np.bool_]) -> float:
     """Return the difference between an object and a ring of two pixels around it [grey level].
 
     It is the largest of the three colours, and the median over the pixels of the object.
@@ -279,10 +279,12 @@ def contrast(image: Image, mask: NDArray[np.bool_]) -> float:
 def _clipped(box: Box, corner: Array, scale: float) -> list[float]:
     """Return a box of the whole image in a sample's pixels, cut at its edges."""
     points = (np.array(box).reshape(2, 2) - corner) * scale
-    return [float(value) for value in points.clip(0, SIZE).ravel()]
+    return [float(value) for value in points.clip(0, IMAGE_SIZE).ravel()]
 
 
 def _resized(image: Image) -> Image:
-    if image.shape[0] == SIZE:
+    if image.shape[0] == IMAGE_SIZE:
         return image
-    return np.asarray(cv2.resize(image, (SIZE, SIZE), interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    return np.asarray(
+        cv2.resize(image, (IMAGE_SIZE, IMAGE_SIZE), interpolation=cv2.INTER_AREA), dtype=np.uint8
+    )

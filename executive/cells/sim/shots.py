@@ -21,13 +21,13 @@ from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.viewpoint import Viewpoint
 from executive.processes import Workers
 
-LIGHT = Light(direction=(0.5, -0.6, 1.2), ambient=0.6, diffuse=0.4, shadow=True)
+FILM_LIGHT = Light(direction=(0.5, -0.6, 1.2), ambient=0.6, diffuse=0.4, shadow=True)
 """A lamp that lets things stand out from each other: from the right, and with shadows."""
 SKY, GROUND = (226, 231, 237), (172, 182, 194)
 """Colours at the top and at the bottom of what is behind the cell, RGB."""
-EDGE = 24
+MIN_EDGE_CONTRAST = 24
 """Difference of brightness between neighbours from which there is an edge, of 255."""
-BLOCK = 24
+PICTURES_PER_BLOCK = 24
 """Pictures that a process takes in one world; each block does again what was done before it."""
 
 
@@ -50,7 +50,7 @@ class Shoot:
     scene: Path | None = None
 
 
-def steps_in(log: Path) -> int:
+def count_steps(log: Path) -> int:
     """Return how many control steps of a run the log of its world tells of.
 
     Raises:
@@ -59,7 +59,7 @@ def steps_in(log: Path) -> int:
     return sum(command.kind == STEP for command in read_commands(log))
 
 
-def shots(shoot: Shoot, steps: Sequence[int], workers: int) -> Generator[Image, None, None]:
+def take_pictures(shoot: Shoot, steps: Sequence[int], workers: int) -> Generator[Image, None, None]:
     """Yield pictures `(h, w, 3)` uint8 RGB of the world after so many control steps of the run, in order.
 
     Args:
@@ -67,7 +67,7 @@ def shots(shoot: Shoot, steps: Sequence[int], workers: int) -> Generator[Image, 
         steps: After how many steps, ascending.
         workers: Processes that take them.
     """
-    blocks = [steps[first : first + BLOCK] for first in range(0, len(steps), BLOCK)]
+    blocks = [steps[first : first + PICTURES_PER_BLOCK] for first in range(0, len(steps), PICTURES_PER_BLOCK)]
     with Workers(workers) as pool:
         under_way: deque[Future[list[Image]]] = deque()
         # No more at a time than keeps everybody busy: pictures that nobody fetches yet fill the memory.
@@ -81,11 +81,11 @@ def shots(shoot: Shoot, steps: Sequence[int], workers: int) -> Generator[Image, 
 
 def _take(shoot: Shoot, steps: Sequence[int]) -> list[Image]:
     """Take the pictures after these steps; runs in a process of its own."""
-    return list(pictures(shoot, steps))
+    return list(take_pictures_in_order(shoot, steps))
 
 
-def pictures(shoot: Shoot, steps: Sequence[int]) -> Iterator[Image]:
-    """Yield the pictures of `shots`, taken in one world in this process."""
+def take_pictures_in_order(shoot: Shoot, steps: Sequence[int]) -> Iterator[Image]:
+    """Yield the pictures of `take_pictures`, taken in one world in this process."""
     scene = load_scene(shoot.scene, shoot.config)
     world, viewpoint = first_world(shoot.config, shoot.seed, scene=scene), shoot.viewpoint
     try:
@@ -99,7 +99,9 @@ def pictures(shoot: Shoot, steps: Sequence[int]) -> Iterator[Image]:
                 command = next(commands)
                 rebuilding.do(command)
                 done += command.kind == STEP
-            yield _picture(render(world, viewpoint.matrix, viewpoint.X_WC, (0, 0, *viewpoint.size), LIGHT))
+            yield _picture(
+                render(world, viewpoint.matrix, viewpoint.X_WC, (0, 0, *viewpoint.size), FILM_LIGHT)
+            )
     finally:
         world.close()
 
@@ -113,5 +115,5 @@ def _picture(rendered: Render) -> Image:
     image = np.where(empty[..., None], np.rint(backdrop).astype(np.uint8), rendered.image)
     grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
     square = np.ones((3, 3), np.uint8)
-    edge = cv2.dilate(grey, square).astype(np.int16) - cv2.erode(grey, square) > EDGE
+    edge = cv2.dilate(grey, square).astype(np.int16) - cv2.erode(grey, square) > MIN_EDGE_CONTRAST
     return np.asarray(np.where(edge[..., None], cv2.GaussianBlur(image, (3, 3), 0), image))

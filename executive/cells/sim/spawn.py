@@ -18,21 +18,21 @@ from executive.cells.sim.world import World
 from executive.errors import InputError
 from executive.geometry import Array, Pose, about_z
 
-TRIES = 2000
+MAX_PLACE_ATTEMPTS = 2000
 """Places tried for one set of objects before the workspace counts as too small for it."""
-LAYOUTS = 5
+LAYOUT_COUNT = 5
 """Number of random sets of objects tried before `find_lack_of_room` reports a lack of room."""
-DROP = 0.002
+DROP_HEIGHT = 0.002
 """Height over what carries it at which an object is let go [m]."""
-STILL = 0.002
+MAX_REST_SPEED = 0.002
 """Speed under which an object counts as still [m/s]."""
-LEAST, MOST = 60, 480
+MIN_SETTLING_STEPS, MAX_SETTLING_STEPS = 60, 480
 """Physics steps given to settle: at least, for nothing moves in the first ones, and at most."""
-OFFSET = 0.004
+MAX_STACK_OFFSET = 0.004
 """Largest distance of an object's axis from that of the one it is put on, along x and y [m]."""
-NUDGE = 0.1
+NUDGE_SPEED = 0.1
 """Speed at which it is pushed aside to see whether it stays [m/s]; friction stops that within 1 mm."""
-MOVED = 0.005
+MAX_SHIFT = 0.005
 """Distance beyond which an object counts as moved [m]."""
 
 
@@ -103,7 +103,7 @@ def spawn(
     places = _places(config, [model.radius for _, model in kinds], rng)
     bodies = []
     for (label, model), place in zip(kinds, places, strict=True):
-        height = DROP - load_mesh(model).bottom
+        height = DROP_HEIGHT - load_mesh(model).bottom
         X_WO = Pose(about_z(rng.uniform(0, math.tau)), np.array([*place, height]))
         colour = model.colours[int(rng.integers(len(model.colours)))]
         bodies.append(world.add_object(label, X_WO, colour, model))
@@ -114,9 +114,9 @@ def spawn(
 
 
 def find_lack_of_room(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield a finding if none of `LAYOUTS` random sets of the maximum size fits the workspace."""
+    """Yield a finding if none of `LAYOUT_COUNT` random sets of the maximum size fits the workspace."""
     problem = ""
-    for seed in range(LAYOUTS):
+    for seed in range(LAYOUT_COUNT):
         rng = np.random.default_rng(seed)
         labels = [str(label) for label in rng.choice(list(config.objects), config.table.objects[1])]
         try:
@@ -128,7 +128,7 @@ def find_lack_of_room(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     yield ("table", "objects"), problem
 
 
-def count_that_fits(config: CellConfig, most: int) -> int:
+def find_max_count(config: CellConfig, most: int) -> int:
     """Return the largest number of objects, up to `most`, for which the workspace has room."""
     for count in range(most, 0, -1):
         table = config.table.model_copy(update={"objects": (0, count)})
@@ -144,7 +144,7 @@ def _places(config: CellConfig, radii: Sequence[float], rng: np.random.Generator
     """
     low, high = np.array([config.table.x, config.table.y]).T
     places: list[Array] = []
-    for _ in range(TRIES):
+    for _ in range(MAX_PLACE_ATTEMPTS):
         if len(places) == len(radii):
             return places
         place, radius = rng.uniform(low, high), radii[len(places)]
@@ -188,33 +188,35 @@ def _put_on(world: World, upper: int, lower: int, rng: np.random.Generator) -> b
     before = {body: world.object_pose(body) for body in world.bodies}
     base = before[lower].position
     below, above = (load_mesh(world.models[body]) for body in (lower, upper))
-    height = base[2] + below.top - above.bottom + DROP
-    place = np.array([*(base[:2] + rng.uniform(-OFFSET, OFFSET, 2)), height])
+    height = base[2] + below.top - above.bottom + DROP_HEIGHT
+    place = np.array([*(base[:2] + rng.uniform(-MAX_STACK_OFFSET, MAX_STACK_OFFSET, 2)), height])
     goal = {**before, upper: Pose(about_z(rng.uniform(0, math.tau)), place)}
     world.place_object(upper, goal[upper])
-    _come_to_rest(world, list(goal), lambda: _moved(world, goal))
+    _come_to_rest(world, list(goal), lambda: _has_moved(world, goal))
     heading = rng.uniform(0, math.tau)
-    world.client.resetBaseVelocity(upper, [NUDGE * math.cos(heading), NUDGE * math.sin(heading), 0.0])
-    _come_to_rest(world, list(goal), lambda: _moved(world, goal))
-    if not _moved(world, goal):
+    world.client.resetBaseVelocity(
+        upper, [NUDGE_SPEED * math.cos(heading), NUDGE_SPEED * math.sin(heading), 0.0]
+    )
+    _come_to_rest(world, list(goal), lambda: _has_moved(world, goal))
+    if not _has_moved(world, goal):
         return True
     for body, X_WO in before.items():
         world.place_object(body, X_WO)
     return False
 
 
-def _moved(world: World, goal: Mapping[int, Pose]) -> bool:
+def _has_moved(world: World, goal: Mapping[int, Pose]) -> bool:
     """Tell whether any body is far from where it should be."""
     return any(
-        float(np.linalg.norm(world.object_pose(body).position - X_WO.position)) > MOVED
+        float(np.linalg.norm(world.object_pose(body).position - X_WO.position)) > MAX_SHIFT
         for body, X_WO in goal.items()
     )
 
 
 def _come_to_rest(world: World, bodies: Sequence[int], enough: Callable[[], bool] = lambda: False) -> None:
     """Step until every body has come to rest, or for two seconds, or until `enough` holds."""
-    for step in range(MOST):
+    for step in range(MAX_SETTLING_STEPS):
         world.step()
         speeds = [np.linalg.norm(world.client.getBaseVelocity(body)[0]) for body in bodies]
-        if (step >= LEAST and max(speeds, default=0.0) < STILL) or enough():
+        if (step >= MIN_SETTLING_STEPS and max(speeds, default=0.0) < MAX_REST_SPEED) or enough():
             return

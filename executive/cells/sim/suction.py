@@ -13,12 +13,12 @@ import numpy as np
 from executive.cell.config import ToolConfig
 from executive.geometry import Array, Pose
 
-RIM = 16
+RIM_RAY_COUNT = 16
 """Rays around the lip; half as many on a ring at half its radius, one at the centre."""
 
 
 @dataclass(frozen=True)
-class Seal:
+class CupContact:
     """How a cup meets the surface under it.
 
     Attributes:
@@ -37,7 +37,9 @@ class Seal:
     tilt: float
 
 
-def measure(client: Any, X_WT: Pose, bodies: Collection[int], cup_radius: float, reach: float) -> Seal | None:
+def measure_contact(
+    client: Any, X_WT: Pose, bodies: Collection[int], cup_radius: float, reach: float
+) -> CupContact | None:
     """Return how a cup at `X_WT` would seal on the nearest of `bodies`, or None over none of them.
 
     Rays run along the tool axis against the collision shapes, through every other body. They start
@@ -64,11 +66,11 @@ def measure(client: Any, X_WT: Pose, bodies: Collection[int], cup_radius: float,
     gap = math.inf
     if met.all():
         residual = (heights - points @ (slope_x, slope_y, level)) * math.cos(tilt)
-        gap = float(residual[-RIM:].max() - residual.min())
-    return Seal(body, float(heights[nearest]), gap, tilt)
+        gap = float(residual[-RIM_RAY_COUNT:].max() - residual.min())
+    return CupContact(body, float(heights[nearest]), gap, tilt)
 
 
-def breakaway(seal: Seal | None, tool: ToolConfig) -> float:
+def breakaway_force(seal: CupContact | None, tool: ToolConfig) -> float:
     """Return the pull at which the seal lets go [N]; 0 where none forms.
 
     `force * (1 - gap / gap_max) * (1 - tilt / tilt_max)`, clipped at zero. The full force is vacuum
@@ -94,7 +96,9 @@ def _face(cup_radius: float) -> Array:
         angle = 2 * np.pi * np.arange(count) / count
         return radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
-    return np.vstack([np.zeros((1, 2)), ring(cup_radius / 2, RIM // 2), ring(cup_radius, RIM)])
+    return np.vstack(
+        [np.zeros((1, 2)), ring(cup_radius / 2, RIM_RAY_COUNT // 2), ring(cup_radius, RIM_RAY_COUNT)]
+    )
 
 
 def _cast(

@@ -10,15 +10,15 @@ import pybullet
 
 from executive.cell.config import ToolConfig
 from executive.cells.sim import command_log
-from executive.cells.sim.suction import breakaway, measure
+from executive.cells.sim.suction import breakaway_force, measure_contact
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
 
-TOUCH = 0.001
+TOUCH_DISTANCE = 0.001
 """Distance at which the soft lip already feels a surface [m]."""
-LIP = 0.002
+LIP_LENGTH = 0.002
 """Length of the tool's end that is lip: contact further back is the shaft's [m]."""
-SMOOTHING = 0.25
+PULL_SMOOTHING = 0.25
 """Weight of the newest step in the pull on the seal.
 
 A time constant of 3.5 steps or 14 ms: a seal gives way over milliseconds, while the solver's impact
@@ -62,7 +62,7 @@ class SuctionTool:
         """True while the lip is within 1 mm of anything, as of the last physics step."""
         step, felt = self._felt
         if step != self._world.steps:
-            felt = any(True for _ in self._near(TOUCH))
+            felt = any(True for _ in self._near(TOUCH_DISTANCE))
             self._felt = (self._world.steps, felt)
         return felt
 
@@ -121,7 +121,7 @@ class SuctionTool:
     def _bear(self, grip: _Grip) -> None:
         """Low-pass the pull on the seal, and part when it is more than the seal bears."""
         force = np.array(self._world.client.getConstraintState(grip.constraint)[:3])
-        grip.pull += SMOOTHING * (force - grip.pull)
+        grip.pull += PULL_SMOOTHING * (force - grip.pull)
         if float(np.linalg.norm(grip.pull)) > grip.bears:
             self.part()
 
@@ -134,8 +134,8 @@ class SuctionTool:
         if not movable:
             return
         world, config = self._world, self._config
-        seal = measure(world.client, world.tool_pose(), movable, config.cup_radius, config.reach)
-        bears = breakaway(seal, config)
+        seal = measure_contact(world.client, world.tool_pose(), movable, config.cup_radius, config.reach)
+        bears = breakaway_force(seal, config)
         if seal is not None and bears >= config.least_force:
             self.fallen.discard(seal.body)
             self._grip = _Grip(seal.body, self._attach(seal.body), bears)
@@ -180,5 +180,5 @@ class SuctionTool:
         X_TW = world.tool_pose().inverse()
         for body in bodies:
             points = world.client.getClosestPoints(world.arm, body, distance, linkIndexA=world.tool)
-            if any(X_TW.apply(point[5])[2] > -LIP for point in points):
+            if any(X_TW.apply(point[5])[2] > -LIP_LENGTH for point in points):
                 yield body

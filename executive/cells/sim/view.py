@@ -10,11 +10,17 @@ from numpy.typing import NDArray
 from executive.cell.config import CellConfig
 from executive.cell.layout import pile_height
 from executive.cells.sim.arm import SimArm
+from executive.cells.sim.robot_models import ROBOT_MODELS
 from executive.geometry import Array, Pose
 from executive.motion.kinematics import Kinematics
-from executive.perception.visibility import LINK_SHADOW, TOOL_SHADOW, Bone, hidden, outline
+from executive.perception.visibility import (
+    TOOL_SHADOW,
+    Bone,
+    find_hidden_pixels,
+    find_outline_pixels,
+)
 
-OFF_CENTRE = 0.015
+MAX_LOAD_OFFSET = 0.015
 """How far beside the cup's axis the middle of what it holds may hang [m]."""
 
 
@@ -38,7 +44,8 @@ class ArmShadow:
         self._arm = arm
         self._kinematics = kinematics
         self._loaded = loaded
-        self._load = max(kind.radius for kind in config.objects.values()) + OFF_CENTRE
+        self._link_radius = ROBOT_MODELS[config.arm.urdf].link_radius
+        self._load = max(kind.radius for kind in config.objects.values()) + MAX_LOAD_OFFSET
         self._top = max(kind.height for kind in config.objects.values())
         top = pile_height(config)
         self._corners = np.array(
@@ -50,12 +57,12 @@ class ArmShadow:
         q = self._arm.q
         flange, X_WT = self._kinematics.flange(q).position, self._kinematics.forward(q)
         joints = [np.zeros(3), *(frame.position for frame in self._kinematics.joint_frames(q)), flange]
-        bones: list[Bone] = [(joints, LINK_SHADOW), ([flange, X_WT.position], TOOL_SHADOW)]
+        bones: list[Bone] = [(joints, self._link_radius), ([flange, X_WT.position], TOOL_SHADOW)]
         if self._loaded():
             bones.append(([X_WT.position, X_WT.apply(np.array([0.0, 0.0, self._top]))], self._load))
-        return ~hidden(bones, matrix, X_WC, size)
+        return ~find_hidden_pixels(bones, matrix, X_WC, size)
 
     def sees_table(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> bool:
         """Tell whether the whole workspace is in view and the arm not in front of it."""
-        table = outline(self._corners, matrix, X_WC, size)
+        table = find_outline_pixels(self._corners, matrix, X_WC, size)
         return table is not None and bool(np.all(self.visible(matrix, X_WC, size)[table]))

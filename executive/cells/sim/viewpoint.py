@@ -14,7 +14,7 @@ from executive.perception.camera_model import camera_matrix, looking_at
 
 AZIMUTH, ELEVATION = math.radians(-37), math.radians(29)
 """From where, seen from the cell: in front of the arm, to its right, and above."""
-FIELD = 33.0
+FIELD_OF_VIEW_DEG = 33.0
 """Vertical field of view [degree]: narrow, as that of a camera that stands back."""
 ARM_HEIGHT = 0.8
 """How high over its foot the arm may bend [m]."""
@@ -43,7 +43,7 @@ def overview(config: CellConfig, size: tuple[int, int], part: Box) -> Viewpoint:
         size: Width and height of the image [pixel].
         part: Left, top, right and bottom of what they are to fill [pixel].
     """
-    matrix = camera_matrix(*size, FIELD)
+    matrix = camera_matrix(*size, FIELD_OF_VIEW_DEG)
     away = [
         math.cos(ELEVATION) * math.cos(AZIMUTH),
         math.cos(ELEVATION) * math.sin(AZIMUTH),

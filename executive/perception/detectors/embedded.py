@@ -7,7 +7,7 @@ from pathlib import Path
 
 from executive.cell.config import DetectorConfig, Section
 from executive.perception.detectors.onnx_model import OnnxModel, read_labels
-from executive.perception.detectors.options import OptionFaults, read_options, wrong_options
+from executive.perception.detectors.options import OptionFaults, find_wrong_options, read_options
 from executive.perception.detectors.rfdetr import RfdetrDetector
 from executive.perception.detectors.setting import Setting
 
@@ -33,7 +33,7 @@ class EmbeddedDetector(RfdetrDetector):
     def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionFaults:
         """Yield every option that was given, with a sentence: there are none."""
         del base, others
-        yield from wrong_options(Section, config)
+        yield from find_wrong_options(Section, config)
 
     @staticmethod
     def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:

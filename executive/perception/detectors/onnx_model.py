@@ -18,7 +18,7 @@ from executive.cell.detection import Detection
 from executive.cell.frame import Box
 from executive.errors import InputError, Unavailable
 from executive.geometry import Array
-from executive.perception.detectors.views import without_duplicates
+from executive.perception.detectors.views import remove_duplicates
 
 MEAN = np.array([0.485, 0.456, 0.406], dtype=np.float32)
 DEVIATION = np.array([0.229, 0.224, 0.225], dtype=np.float32)
@@ -69,7 +69,7 @@ class OnnxModel:
             raise Unavailable(f"onnxruntime failed: {error}") from error
         confidences = 1 / (1 + np.exp(-logits[0, :, :-1].astype(np.float64)))
         found = self._decode(boxes[0].astype(np.float64), confidences, image.shape[1], image.shape[0], floor)
-        return without_duplicates(found)
+        return remove_duplicates(found)
 
     def _prepare(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
         if image.shape[:2] != (self.size, self.size):

@@ -15,7 +15,7 @@ OptionFaults = Iterator[tuple[str, str]]
 OptionsT = TypeVar("OptionsT", bound=Section)
 
 
-def wrong_options(options: type[Section], config: DetectorConfig) -> OptionFaults:
+def find_wrong_options(options: type[Section], config: DetectorConfig) -> OptionFaults:
     """Yield every option of a kind of detector that is missing, unknown or wrong, with a sentence."""
     try:
         options.model_validate(config.options)
@@ -41,12 +41,12 @@ def read_options(options: type[OptionsT], config: DetectorConfig) -> OptionsT:
     Raises:
         InputError: An option is missing, unknown or wrong.
     """
-    for _, sentence in wrong_options(options, config):
+    for _, sentence in find_wrong_options(options, config):
         raise InputError(sentence)
     return options.model_validate(config.options)
 
 
-def wrong_class_map(
+def find_wrong_class_map(
     config: DetectorConfig, class_map: Mapping[str, str], labels: Collection[str]
 ) -> OptionFaults:
     """Yield the option `class_map` and a sentence if it names a class that the model does not know."""

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,13 +13,17 @@ from pydantic import Field
 
 from executive.cell.config import DetectorConfig, Section
 from executive.cell.detection import Detection
-from executive.cell.frame import Frame
 from executive.errors import InputError
 from executive.perception.detectors.onnx_model import OnnxModel, no_model, read_labels
-from executive.perception.detectors.options import OptionFaults, read_options, wrong_class_map, wrong_options
-from executive.perception.detectors.requests import Pending
+from executive.perception.detectors.options import (
+    OptionFaults,
+    find_wrong_class_map,
+    find_wrong_options,
+    read_options,
+)
+from executive.perception.detectors.requests import ThreadedDetector
 from executive.perception.detectors.setting import Setting
-from executive.perception.detectors.views import parts_of, search_parts
+from executive.perception.detectors.views import Part, search_parts
 
 
 class RfdetrOptions(Section):
@@ -44,7 +47,7 @@ class RfdetrOptions(Section):
         return read_labels(base / self.labels) if isinstance(self.labels, str) else self.labels
 
 
-class RfdetrDetector:
+class RfdetrDetector(ThreadedDetector):
     """Runs a model over parts of a frame, beside the tick loop; implements `cell.protocols.Detector`.
 
     Args:
@@ -61,11 +64,9 @@ class RfdetrDetector:
         setting: Setting,
         class_map: Mapping[str, str] | None = None,
     ) -> None:
+        super().__init__(config, setting)
         self._model = model
-        self._config = config
-        self._setting = setting
         self._class_map = dict(class_map or {})
-        self._thread = ThreadPoolExecutor(1, f"detector-{setting.name}")
 
     @classmethod
     def from_config(cls, config: DetectorConfig, setting: Setting) -> RfdetrDetector:
@@ -87,7 +88,7 @@ class RfdetrDetector:
         The model is not loaded.
         """
         del others
-        wrong = list(wrong_options(RfdetrOptions, config))
+        wrong = list(find_wrong_options(RfdetrOptions, config))
         yield from wrong
         if wrong:
             return
@@ -99,7 +100,7 @@ class RfdetrDetector:
         except InputError as error:
             yield "labels", str(error)
             return
-        yield from wrong_class_map(config, options.class_map, names)
+        yield from find_wrong_class_map(config, options.class_map, names)
 
     @staticmethod
     def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
@@ -118,18 +119,8 @@ class RfdetrDetector:
         except InputError:
             return None
 
-    def request(self, frame: Frame, view: str) -> Pending:
-        """Start to search `frame`: the `table` part or the `full` image."""
-        height, width = frame.image.shape[:2]
-        parts = parts_of(view, self._setting.camera.table_view, (width, height))
-        work = self._thread.submit(lambda: search_parts(frame.image, parts, self._find, self._class_map))
-        clock = self._setting.clock
-        due = clock.now + self._config.latency
-        return Pending(work, due, clock, self._setting.name, self._config.error_rates)
-
-    def close(self) -> None:
-        """End the thread after the search under way; those not begun are dropped."""
-        self._thread.shutdown(cancel_futures=True)
+    def _search(self, image: NDArray[np.uint8], parts: Sequence[Part]) -> list[Detection]:
+        return search_parts(image, parts, self._find, self._class_map)
 
     def _find(self, crop: NDArray[np.uint8]) -> list[Detection]:
         """Return what the model finds in a part of a frame, in that part's pixels."""

@@ -16,13 +16,13 @@ from executive.errors import InputError
 Part = tuple[int, int, int, int]
 """Left, top, right, bottom [pixel] of a part of an image."""
 
-OVERLAP = 0.25
+TILE_OVERLAP = 0.25
 """Share of its side that a tile shares with the next: more than an object, so each is whole in one tile."""
-CUT = 0.01
+MAX_CUT_DISTANCE = 0.01
 """A box closer than this share of the tile's side to the next tile may be cut off there."""
-DUPLICATE = 0.7
+MIN_DUPLICATE_IOU = 0.7
 """Intersection over union above which two boxes are one object seen twice; objects that touch stay below."""
-SAME, CONTAINED = 0.5, 0.7
+MIN_SAME_IOU, MIN_CONTAINED_SHARE = 0.5, 0.7
 """Intersection over union, or over the smaller box, above which boxes of two tiles show one object."""
 
 
@@ -83,10 +83,10 @@ def search_parts(
             box = left + x0, top + y0, left + x1, top + y1
             label = class_map.get(found.label, found.label)
             findings.append(Finding(replace(found, label=label, box=box), part))
-    return merge(findings, (image.shape[1], image.shape[0]))
+    return merge_findings(findings, (image.shape[1], image.shape[0]))
 
 
-def merge(findings: Sequence[Finding], size: tuple[int, int]) -> list[Detection]:
+def merge_findings(findings: Sequence[Finding], size: tuple[int, int]) -> list[Detection]:
     """Return every object once, most confident first.
 
     Where parts overlap, the box that is whole in its part wins over one that the part's border cuts off,
@@ -105,7 +105,7 @@ def merge(findings: Sequence[Finding], size: tuple[int, int]) -> list[Detection]
     return sorted((ranked[number].detection for number in kept), key=lambda found: -found.confidence)
 
 
-def without_duplicates(found: Sequence[Detection]) -> list[Detection]:
+def remove_duplicates(found: Sequence[Detection]) -> list[Detection]:
     """Return `found`, most confident first, without boxes that lie on a more confident one."""
     if len(found) < 2:
         return list(found)
@@ -113,7 +113,7 @@ def without_duplicates(found: Sequence[Detection]) -> list[Detection]:
 
     # The rank instead of the confidence, so that of equally confident ones the first is kept.
     ranked = np.array([(*detection.box, -rank) for rank, detection in enumerate(found)])
-    keep = box_non_max_suppression(ranked, DUPLICATE)
+    keep = box_non_max_suppression(ranked, MIN_DUPLICATE_IOU)
     return [detection for detection, is_kept in zip(found, keep, strict=True) if is_kept]
 
 
@@ -124,15 +124,15 @@ def _is_same_object(boxes: Sequence[Box]) -> NDArray[np.bool_]:
     from supervision import OverlapMetric, box_iou_batch
 
     corners = np.array(boxes)
-    contained = box_iou_batch(corners, corners, OverlapMetric.IOS) > CONTAINED
-    return np.asarray((box_iou_batch(corners, corners) > SAME) | contained)
+    contained = box_iou_batch(corners, corners, OverlapMetric.IOS) > MIN_CONTAINED_SHARE
+    return np.asarray((box_iou_batch(corners, corners) > MIN_SAME_IOU) | contained)
 
 
 def _is_cut(finding: Finding, size: tuple[int, int]) -> bool:
     """Tell whether a box reaches a border of its part beyond which the frame goes on."""
     left, top, right, bottom = finding.detection.box
     part = finding.part
-    margin = CUT * (part[2] - part[0])
+    margin = MAX_CUT_DISTANCE * (part[2] - part[0])
     return (
         (part[0] > 0 and left - part[0] < margin)
         or (part[1] > 0 and top - part[1] < margin)
@@ -145,5 +145,5 @@ def _starts(length: int, side: int) -> list[int]:
     """Return where tiles of `side` begin so that they cover `length` evenly, neighbours overlapping."""
     if length <= side:
         return [0]
-    count = math.ceil((length - OVERLAP * side) / (side * (1 - OVERLAP)))
+    count = math.ceil((length - TILE_OVERLAP * side) / (side * (1 - TILE_OVERLAP)))
     return [round(index * (length - side) / (count - 1)) for index in range(count)]

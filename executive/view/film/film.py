@@ -9,7 +9,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from executive.cells.sim.shots import Shoot, shots, steps_in
+from executive.cells.sim.shots import Shoot, count_steps, take_pictures
 from executive.cells.sim.viewpoint import overview
 from executive.view.film.course import Course
 from executive.view.film.formats import Format
@@ -39,7 +39,7 @@ def film(
         progress: Takes the number of frames that are done, and of all frames.
     """
     each = speed / format.rate / source.start.step
-    steps = shown_steps(steps_in(source.directory.world), each)
+    steps = shown_steps(count_steps(source.directory.world), each)
     held = round(HOLD * format.rate)
 
     def counted() -> Generator[Image.Image, None, None]:
@@ -67,7 +67,7 @@ def _pages(
     course = Course(source.events, source.nodes, list(directory.frames.glob("*.jpg")))
     view = overview(source.config, STAGE, SHOWN)
     shoot = Shoot(source.config, start.seed, directory.world, view, directory.scene)
-    with closing(shots(shoot, steps, workers)) as pictures:
+    with closing(take_pictures(shoot, steps, workers)) as pictures:
         for step, picture in zip(steps, pictures, strict=True):
             course.go_to(step, step * start.step)
             yield draw_page(source, picture, course, note, length)

@@ -11,7 +11,7 @@ from executive.cell.arm import Goal, Motion, Task
 from executive.cell.bins import BIN_THICKNESS
 from executive.cell.clock import STEP
 from executive.cell.objects import Load, Obstacle
-from executive.cells.fake.arm import SPEED
+from executive.cells.fake.arm import TOOL_SPEED
 from executive.cells.fake.cell import FakeCell, bare_table
 from executive.errors import Blocked, Fault, Unreachable
 from executive.geometry import Array, tool_down
@@ -46,8 +46,8 @@ def test_it_goes_up_across_and_down_and_the_last_part_slowly(fake: FakeCell) -> 
     assert places[across & beside, 2] == pytest.approx(0.16), "load over wall, with clearance"
     speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) / STEP
     guarded = places[1:, 2] < 0.05 - 1e-9
-    assert speeds.max() <= SPEED + 1e-9
-    assert speeds[~guarded].max() > 0.9 * SPEED
+    assert speeds.max() <= TOOL_SPEED + 1e-9
+    assert speeds[~guarded].max() > 0.9 * TOOL_SPEED
     assert speeds[guarded] == pytest.approx(0.05, rel=0.02)
 
 
@@ -144,7 +144,7 @@ def test_a_load_that_the_plan_did_not_know_of_stops_the_arm_where_it_touches(fak
     places = go(fake, Goal((0.5, 0.0, 0.02)))
     assert fake.arm.met is not None
     assert fake.arm.met.startswith("the held cube ran into the table, with the tool at (0.500, 0.000, 0.04")
-    assert places[:, 2].min() == pytest.approx(0.05, abs=SPEED * STEP)
+    assert places[:, 2].min() == pytest.approx(0.05, abs=TOOL_SPEED * STEP)
     assert places[:, 2].min() >= 0.05
     assert fake.arm.commanded == ["start", "stop"]
     go(fake, Goal((0.5, 0.0, 0.1)))

@@ -14,9 +14,10 @@ import pytest
 from executive.cell.config import ArmConfig, CellConfig
 from executive.cells.fake.cell import FakeCell
 from executive.cells.sim.cell import SimCell
-from executive.cells.sim.poses import out_of_reach, unfit_poses
+from executive.cells.sim.poses import find_places_out_of_reach, find_unfit_poses
+from executive.cells.sim.robot_models import ROBOT_MODELS
 from executive.mission.parse.cell_file import load_cell
-from executive.motion.arms import build_kinematics
+from executive.motion.arms import ARMS, build_kinematics
 from tests.cells.sim.conftest import shipped_cell
 from tests.motion.joint_states import reach
 
@@ -102,7 +103,7 @@ def test_a_check_loads_no_model_and_none_of_what_runs_one(missions: Path) -> Non
 def test_a_pose_too_near_to_something_is_named_with_the_distance(overhead: CellConfig) -> None:
     near, inside, fit = (reaching(overhead, 0.5, 0.0, z) for z in (0.003, -0.01, 0.0055))
     folded = (0, -40, 0, -120, 0, -120, 0)
-    found = dict(unfit_poses(posed(overhead, near=near, inside=inside, fit=fit, folded=folded)))
+    found = dict(find_unfit_poses(posed(overhead, near=near, inside=inside, fit=fit, folded=folded)))
     free = "0.005 m must stay free"
     assert found == {
         ("arm", "poses_deg", "near"): f'the pose "near" brings the tool 0.003 m from the table; {free}',
@@ -112,7 +113,7 @@ def test_a_pose_too_near_to_something_is_named_with_the_distance(overhead: CellC
 
 
 def test_a_scan_pose_without_a_view_of_it_all_is_found(overhead: CellConfig, wrist: CellConfig) -> None:
-    assert list(unfit_poses(posed(overhead, aside=reaching(overhead, 0.53, 0.0, 0.2)))) == [
+    assert list(find_unfit_poses(posed(overhead, aside=reaching(overhead, 0.53, 0.0, 0.2)))) == [
         (
             ("cameras", "overhead", "scan_poses", 1),
             'from the pose "aside" the camera overhead does not see the whole workspace: a part of it is '
@@ -120,7 +121,7 @@ def test_a_scan_pose_without_a_view_of_it_all_is_found(overhead: CellConfig, wri
         )
     ]
     turned = (40.0, *wrist.arm.poses_deg["scan"][1:])
-    assert [key for key, _ in unfit_poses(posed(wrist, scan=turned))] == [
+    assert [key for key, _ in find_unfit_poses(posed(wrist, scan=turned))] == [
         ("cameras", "wrist", "scan_poses", 0)
     ]
 
@@ -159,7 +160,7 @@ def test_limits_of_another_number_of_joints_are_a_finding(overhead: CellConfig) 
 def test_a_bin_with_one_slot_out_of_reach_is_named_with_the_distance(
     overhead: CellConfig, position: tuple[float, float, float], why: str
 ) -> None:
-    ((keys, sentence),) = out_of_reach(moved(overhead, "red_bin", *position))
+    ((keys, sentence),) = find_places_out_of_reach(moved(overhead, "red_bin", *position))
     assert keys == ("bins", "red_bin", "position")
     assert sentence.startswith('the bin "red_bin" is out of reach: the tool cannot reach (')
     assert sentence.endswith(why)
@@ -169,8 +170,14 @@ def test_the_safe_place_and_poses_must_be_within_reach(overhead: CellConfig) -> 
     config = posed(overhead, turned=(0, 33, 0, -88, 0, 59, 180)).model_copy(
         update={"safe_place": (0.9, 0.0, 0.0)}
     )
-    pose, (keys, sentence) = out_of_reach(config)
+    pose, (keys, sentence) = find_places_out_of_reach(config)
     text = 'joint 7 of the pose "turned" is at 180 degrees; its limit is 175'
     assert pose == (("arm", "poses_deg", "turned"), text)
     assert keys == ("safe_place",)
     assert sentence.startswith("the safe place is out of reach: the tool cannot reach (0.900, 0.000, ")
+
+
+def test_every_arm_with_kinematics_has_a_model_with_as_many_joints() -> None:
+    assert {name: model.joint_count for name, model in ROBOT_MODELS.items()} == {
+        name: joint_count for name, (joint_count, _) in ARMS.items()
+    }

@@ -10,7 +10,7 @@ import pytest
 
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cells.sim.model_files import read_obj
-from executive.cells.sim.models import load_mesh, missing_models
+from executive.cells.sim.models import find_missing_models, load_mesh
 from executive.cells.sim.world import World
 from executive.errors import InputError
 from executive.geometry import Pose, about_z
@@ -130,7 +130,7 @@ def test_missing_and_broken_meshes_and_wrong_sizes_are_named_with_their_keys(
         flat=wedge.model_copy(update={"height": 0.02, "radius": 0.03}),
         cube=overhead.objects["cube"].model_copy(update={"scale": 0.5}),
     )
-    found = {".".join(map(str, key[1:])): sentence for key, sentence in missing_models(config)}
+    found = {".".join(map(str, key[1:])): sentence for key, sentence in find_missing_models(config)}
     assert found == {
         "gone.mesh": "there is no model gone.obj, neither beside the cell file nor in pybullet_data",
         "empty.mesh": "the model empty.obj is no Wavefront mesh: it has no faces (lines beginning with f)",

@@ -21,7 +21,7 @@ from executive.cells.sim.arrangements import (
     settle,
 )
 from executive.cells.sim.models import load_mesh
-from executive.cells.sim.scenes import SIZE, Sample, SceneRenderer
+from executive.cells.sim.scenes import IMAGE_SIZE, Sample, SceneRenderer
 from executive.cells.sim.silhouette import outline_area
 from executive.errors import InputError
 from executive.geometry import Pose
@@ -62,8 +62,8 @@ def test_samples_are_labelled_inside_the_image_and_localize_near_the_object(over
     sums = [sum(float(getattr(one, name).sum()) for one in made) for name in names]
     assert sums == pytest.approx([45820.016, 84.188, 52.06, 420870682.0], rel=1e-4)
     for sample in made:
-        assert (sample.image.shape, sample.boxes.clip(0, SIZE).tolist()) == (
-            (SIZE, SIZE, 3),
+        assert (sample.image.shape, sample.boxes.clip(0, IMAGE_SIZE).tolist()) == (
+            (IMAGE_SIZE, IMAGE_SIZE, 3),
             sample.boxes.tolist(),
         )
         assert min(sample.visible_fraction, default=1.0) >= 0.5

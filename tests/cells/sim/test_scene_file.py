@@ -278,7 +278,7 @@ WRONG = {
         scene.yaml:2:9: error[unknown-key]: light has no key "brightnes"
            2 | light: {brightnes: 0.3}
              |         ^^^^^^^^^
-          Did you mean "brightness"? light takes: brightness, direction, colour, ambient, diffuse, specular, shadow.
+          Did you mean "brightness"? light takes: direction, colour, ambient, diffuse, specular, shadow, brightness.
         """,
     ),
     "a key of a section that may be missing": (

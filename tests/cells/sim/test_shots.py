@@ -14,7 +14,7 @@ from executive.cells.sim import command_log as log
 from executive.cells.sim import shots as module
 from executive.cells.sim.camera import Image
 from executive.cells.sim.command_log import CommandLog
-from executive.cells.sim.shots import GROUND, SKY, Shoot, pictures, shots, steps_in
+from executive.cells.sim.shots import GROUND, SKY, Shoot, count_steps, take_pictures, take_pictures_in_order
 from executive.cells.sim.viewpoint import overview
 from executive.errors import InputError
 
@@ -47,14 +47,14 @@ def changed(one: Image, other: Image) -> int:
 
 
 def test_each_picture_is_of_its_moment(shoot: Shoot, tmp_path: Path) -> None:
-    assert steps_in(shoot.log) == STEPS
+    assert count_steps(shoot.log) == STEPS
     with pytest.raises(InputError, match="can neither be taken up again nor filmed"):
-        steps_in(tmp_path / "none")
-    first, same, middle, last = pictures(shoot, [0, 0, 18, STEPS])
+        count_steps(tmp_path / "none")
+    first, same, middle, last = take_pictures_in_order(shoot, [0, 0, 18, STEPS])
     assert first.shape == (SIZE[1], SIZE[0], 3)
     assert (first == same).all()
     assert 0 < changed(first, middle) < changed(first, last)
-    (alone,) = pictures(shoot, [18])
+    (alone,) = take_pictures_in_order(shoot, [18])
     assert (alone == middle).all()
     image = first.astype(int)  # without the floor
     assert np.abs(image[0] - SKY).max() <= 1
@@ -65,11 +65,11 @@ def test_each_picture_is_of_its_moment(shoot: Shoot, tmp_path: Path) -> None:
 def test_several_processes_take_the_same_pictures_in_the_same_order(
     shoot: Shoot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "BLOCK", 4)
+    monkeypatch.setattr(module, "PICTURES_PER_BLOCK", 4)
     steps = [0, 3, 6, 9, 12, 15, 24, 30, STEPS]
-    with closing(shots(shoot, steps, workers=2)) as taken:
+    with closing(take_pictures(shoot, steps, workers=2)) as taken:
         together = list(taken)
-    for here, there in zip(pictures(shoot, steps), together, strict=True):
+    for here, there in zip(take_pictures_in_order(shoot, steps), together, strict=True):
         assert (here == there).all()
 
 
@@ -83,6 +83,6 @@ def test_a_viewpoint_has_arm_workspace_and_bins_in_the_given_part_of_the_image(o
 def test_a_picture_is_of_the_world_of_the_scene(shoot: Shoot, tmp_path: Path) -> None:
     scene = tmp_path / "scene.yaml"
     scene.write_text("scene: green\ntable: {colour: [0.2, 0.9, 0.2]}\nlight: {brightness: 0.1}\n")
-    (usual,), (other,) = (pictures(each, [0]) for each in (shoot, replace(shoot, scene=scene)))
+    (usual,), (other,) = (take_pictures_in_order(each, [0]) for each in (shoot, replace(shoot, scene=scene)))
     greener = (other[..., 1] > 1.5 * other[..., 0]) & (usual[..., 1] <= usual[..., 0])
     assert greener.mean() > 0.1

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CalibrationConfig, CameraConfig, CellConfig, DepthConfig, NoiseConfig
-from executive.cells.sim.camera import CELL_LIGHT, SimCamera, camera_pose, render, sense
+from executive.cells.sim.camera import CELL_LIGHT, SimCamera, add_depth_noise, camera_pose, render
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.world import World
 from executive.geometry import Pose, about_z
@@ -140,7 +140,7 @@ def flat(distance: float) -> np.ndarray:
 def test_a_perfect_sensor_measures_the_truth_and_nothing_of_the_sky() -> None:
     true = flat(1.2)
     true[:, 200:] = np.inf
-    measured = sense(true, PERFECT, np.random.default_rng(1))
+    measured = add_depth_noise(true, PERFECT, np.random.default_rng(1))
     assert (measured[:, :200] == 1.2).all()
     assert np.isnan(measured[:, 200:]).all()
 
@@ -149,14 +149,14 @@ def test_a_perfect_sensor_measures_the_truth_and_nothing_of_the_sky() -> None:
 @pytest.mark.parametrize("distance", [0.5, 1.0, 2.0])
 def test_noise_is_a_floor_and_grows_with_the_square_of_the_distance(grain: float, distance: float) -> None:
     config = changed(floor=0.001, growth=0.004, grain=grain)
-    error = sense(flat(distance), config, np.random.default_rng(1)) - distance
+    error = add_depth_noise(flat(distance), config, np.random.default_rng(1)) - distance
     assert error.std() == pytest.approx(0.001 + 0.004 * distance**2, rel=0.02)
     assert abs(error.mean()) < error.std() / 10
 
 
 def test_neighbours_err_alike_where_there_is_grain() -> None:
     def alike(grain: float) -> float:
-        error = sense(flat(1.0), changed(floor=0.005, grain=grain), np.random.default_rng(1)) - 1.0
+        error = add_depth_noise(flat(1.0), changed(floor=0.005, grain=grain), np.random.default_rng(1)) - 1.0
         return float(np.corrcoef(error[:, 1:].ravel(), error[:, :-1].ravel())[0, 1])
 
     assert abs(alike(0.0)) < 0.02
@@ -165,7 +165,7 @@ def test_neighbours_err_alike_where_there_is_grain() -> None:
 
 
 def test_distances_are_whole_multiples_of_the_step() -> None:
-    measured = sense(flat(1.0), changed(floor=0.005, step=0.002), np.random.default_rng(1))
+    measured = add_depth_noise(flat(1.0), changed(floor=0.005, step=0.002), np.random.default_rng(1))
     assert np.unique(np.round(measured / 0.002, 6) % 1).tolist() == [0.0]
 
 
@@ -173,9 +173,11 @@ def test_pixels_drop_out_beside_edges_and_a_few_anywhere() -> None:
     true = flat(1.2)
     true[:, 150:] = 1.15
     config = changed(edge=0.02, edge_width=2, edge_dropout=0.7, dropout=0.01)
-    lost = np.isnan(sense(true, config, np.random.default_rng(1)))
+    lost = np.isnan(add_depth_noise(true, config, np.random.default_rng(1)))
     assert lost[:, 147:153].mean() == pytest.approx(0.7, abs=0.05)
     assert lost[:, :147].mean() == pytest.approx(0.01, abs=0.005)
     assert lost[:, 153:].mean() == pytest.approx(0.01, abs=0.005)
     smaller = np.where(true < 1.2, 1.19, true)
-    assert np.isnan(sense(smaller, config, np.random.default_rng(1))).mean() == pytest.approx(0.01, abs=0.005)
+    assert np.isnan(add_depth_noise(smaller, config, np.random.default_rng(1))).mean() == pytest.approx(
+        0.01, abs=0.005
+    )

@@ -8,7 +8,12 @@ from hypothesis import strategies as st
 
 from executive.cell.detection import Detection
 from executive.perception.detectors.roboflow.answers import read_answer, read_output
-from executive.perception.detectors.roboflow.complaints import failed, late, plain, unbelievable
+from executive.perception.detectors.roboflow.complaints import (
+    describe_delay,
+    describe_failure,
+    describe_invalid_answer,
+    one_line,
+)
 from executive.perception.detectors.roboflow.options import RoboflowOptions
 
 CUBE = {"x": 50.0, "y": 40.0, "width": 20, "height": 10.0, "confidence": 0.9, "class": "cube", "class_id": 0}
@@ -139,17 +144,17 @@ WORKFLOW = RoboflowOptions(api="workflow", workspace="acme", workflow_id="sortin
 
 
 def test_somebody_elses_words_become_one_short_line():
-    assert plain("<html>\n\x1b[31m  red\x00 </html>") == "<html> [31m red </html>"
-    assert plain("a" * 1000) == "a" * 100 + "..."
+    assert one_line("<html>\n\x1b[31m  red\x00 </html>") == "<html> [31m red </html>"
+    assert one_line("a" * 1000) == "a" * 100 + "..."
 
 
 def test_a_sentence_says_what_where_and_what_to_look_at():
     refused = {"failure": "status", "status": 404, "said": "no such\nmodel"}
-    assert failed(refused, OPTIONS) == (
+    assert describe_failure(refused, OPTIONS) == (
         f"{HOST} has no model shapes/1 (404: no such model); check model_id and url"
     )
     unknown = {"failure": "status", "status": 599, "said": ""}
-    assert failed(unknown, OPTIONS) == f"{HOST} gave no answer (599); look at its log"
+    assert describe_failure(unknown, OPTIONS) == f"{HOST} gave no answer (599); look at its log"
 
 
 @pytest.mark.parametrize(
@@ -171,14 +176,16 @@ def test_a_sentence_says_what_where_and_what_to_look_at():
     ],
 )
 def test_a_sentence_about_a_workflow_names_its_options(failure, sentence):
-    assert failed(failure, WORKFLOW) == f"{HOST} {sentence}"
+    assert describe_failure(failure, WORKFLOW) == f"{HOST} {sentence}"
 
 
 def test_an_answer_that_cannot_be_right_is_told_with_what_to_check():
     beginning = f"{HOST} gave an answer that cannot be right: no box; "
-    assert unbelievable("no box", OPTIONS) == f"{beginning}is shapes/1 a model that detects objects?"
+    assert (
+        describe_invalid_answer("no box", OPTIONS) == f"{beginning}is shapes/1 a model that detects objects?"
+    )
     question = 'is "boxes" the predictions of a model that detects objects?'
-    assert unbelievable("no box", WORKFLOW) == beginning + question
+    assert describe_invalid_answer("no box", WORKFLOW) == beginning + question
 
 
 def test_a_deadline_that_has_passed_is_told_with_what_the_server_said_meanwhile():
@@ -191,4 +198,4 @@ def test_a_deadline_that_has_passed_is_told_with_what_the_server_said_meanwhile(
         ((599,), ", which gave no answer (599); look at its log"),
         ((None,), ", to which there was no connection; is it running, and is url right?"),
     ):
-        assert late(repeats, OPTIONS) == f"no answer within 1.0 s from {HOST}{end}"
+        assert describe_delay(repeats, OPTIONS) == f"no answer within 1.0 s from {HOST}{end}"

@@ -9,7 +9,7 @@ from typing import ClassVar
 from executive.cell.arm import Goal
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell, Steps
-from executive.manipulation.motions import carry, follow, heeding, planned
+from executive.manipulation.motions import carry, follow, plan, task_of_moving
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Out, Seconds, Skill, SkillFailed, param, port
 
 
@@ -25,7 +25,9 @@ class Push(Skill):
 
     def run(self, cell: Cell) -> Steps:
         x, y, z = (float(value) for value in self.target.position)
-        motion = yield from planned(self, cell.arm, lambda: (Goal((x, y, z + self.height)), heeding(cell)))
+        motion = yield from plan(
+            self, cell.arm, lambda: (Goal((x, y, z + self.height)), task_of_moving(cell))
+        )
         yield from follow(self, cell, motion)
 
 
@@ -101,7 +103,7 @@ class BadResources(Pause):
 
 class StepsNotTaken(Push):
     def run(self, cell: Cell) -> Steps:
-        motion = yield from planned(self, cell.arm, lambda: ("aside", heeding(cell)))
+        motion = yield from plan(self, cell.arm, lambda: ("aside", task_of_moving(cell)))
         follow(self, cell, motion)
         steps = follow(self, cell, motion)  # noqa: F841
         cell.clock.sleep(1.0)
@@ -255,7 +257,7 @@ class HoldsOnWhenHalted(GraspTarget):
 
 class RunsOnWhenHalted(Push):
     def run(self, cell: Cell) -> Steps:
-        motion = yield from planned(self, cell.arm, lambda: ("aside", heeding(cell)))
+        motion = yield from plan(self, cell.arm, lambda: ("aside", task_of_moving(cell)))
         cell.arm.start(motion)
         while not cell.arm.at_rest:
             yield

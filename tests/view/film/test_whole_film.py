@@ -12,7 +12,7 @@ import pytest
 
 from executive.cells.sim.command_log import STEP, read_commands
 from executive.cells.sim.rebuild import Rebuilding
-from executive.cells.sim.shots import steps_in
+from executive.cells.sim.shots import count_steps
 from executive.cells.sim.spawn import first_world
 from executive.cells.sim.tool import SuctionTool
 from executive.errors import InputError
@@ -78,7 +78,7 @@ def test_picture_and_tree_are_in_step(filmed_run: RunDirectory) -> None:
     assert holds[grasped]
     assert not any(holds[: closed + 1])
     # The last thing that the journal tells of happened after the last step.
-    assert events[-1].tick == steps_in(filmed_run.world) == len(holds) - 1
+    assert events[-1].tick == count_steps(filmed_run.world) == len(holds) - 1
 
 
 def test_the_source_is_the_record_and_may_be_cut_off(copy: RunDirectory) -> None:

@@ -12,9 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from executive.cell.detection import Detection
 
-MOST = 300
+MAX_PREDICTIONS = 300
 """Predictions in one answer; RF-DETR has 300 queries."""
-OVERHANG = 0.1
+MAX_OVERHANG = 0.1
 """Share of the image's side that a box may stick out by; it is cut off there."""
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -40,7 +40,7 @@ class _Size(BaseModel):
 
 
 class _Answer(BaseModel):
-    predictions: list[_Prediction] = Field(max_length=MOST)
+    predictions: list[_Prediction] = Field(max_length=MAX_PREDICTIONS)
     image: _Size | None = None
 
 
@@ -97,8 +97,8 @@ def _detections(predictions: list[_Prediction], size: tuple[int, int]) -> Iterat
         left, right = found.x - found.width / 2, found.x + found.width / 2
         top, bottom = found.y - found.height / 2, found.y + found.height / 2
         if (
-            min(left / width, top / height) < -OVERHANG
-            or max(right / width, bottom / height) > 1 + OVERHANG
+            min(left / width, top / height) < -MAX_OVERHANG
+            or max(right / width, bottom / height) > 1 + MAX_OVERHANG
             or not (0 <= found.x <= width and 0 <= found.y <= height)
         ):
             raise ValueError(

@@ -8,7 +8,7 @@ from typing import Any
 from executive.perception.detectors.roboflow.key import VARIABLE
 from executive.perception.detectors.roboflow.options import RoboflowOptions
 
-LONGEST = 100
+MAX_QUOTED = 100
 """Characters of a server's own words that are repeated."""
 
 _KEY = f"set {VARIABLE} to a key that may use it"
@@ -39,9 +39,9 @@ _BY_KIND: Mapping[str, tuple[str, str]] = {
 }
 
 
-def failed(failure: Mapping[str, Any], options: RoboflowOptions) -> str:
+def describe_failure(failure: Mapping[str, Any], options: RoboflowOptions) -> str:
     """Return the sentence about a failure that the helper tells of."""
-    said = plain(str(failure.get("said", "")))
+    said = one_line(str(failure.get("said", "")))
     status = failure.get("status")
     if status is None:
         what, advice = _worded(_BY_KIND[failure["failure"]], options)
@@ -51,7 +51,7 @@ def failed(failure: Mapping[str, Any], options: RoboflowOptions) -> str:
     return f"{options.host} {what}{f' ({said})' if said else ''}; {advice}"
 
 
-def late(repeats: Sequence[int | None], options: RoboflowOptions) -> str:
+def describe_delay(repeats: Sequence[int | None], options: RoboflowOptions) -> str:
     """Return the sentence about a deadline that has passed."""
     sentence = f"no answer within {options.deadline} s from {options.host}"
     if not repeats:
@@ -64,12 +64,12 @@ def late(repeats: Sequence[int | None], options: RoboflowOptions) -> str:
     return f"{sentence}, which {what} ({status}); {advice}"
 
 
-def unbelievable(problem: str, options: RoboflowOptions) -> str:
+def describe_invalid_answer(problem: str, options: RoboflowOptions) -> str:
     """Return the sentence about an answer that cannot be right."""
     question = f"is {options.model_id} a model that detects objects?"
     if options.api == "workflow":
         question = f'is "{options.workflow_output}" the predictions of a model that detects objects?'
-    return f"{options.host} gave an answer that cannot be right: {plain(problem)}; {question}"
+    return f"{options.host} gave an answer that cannot be right: {one_line(problem)}; {question}"
 
 
 def _worded(sentence: tuple[str, str], options: RoboflowOptions) -> tuple[str, str]:
@@ -79,7 +79,7 @@ def _worded(sentence: tuple[str, str], options: RoboflowOptions) -> tuple[str, s
     return what, advice.format(options=options.subject_options)
 
 
-def plain(text: str) -> str:
+def one_line(text: str) -> str:
     """Return somebody else's words as one short line of printable characters."""
-    line = " ".join("".join(c if c.isprintable() else " " for c in text[: 10 * LONGEST]).split())
-    return line if len(line) <= LONGEST else f"{line[:LONGEST]}..."
+    line = " ".join("".join(c if c.isprintable() else " " for c in text[: 10 * MAX_QUOTED]).split())
+    return line if len(line) <= MAX_QUOTED else f"{line[:MAX_QUOTED]}..."

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 VARIABLE = "ROBOFLOW_API_KEY"
 """The environment variable that holds it; it is read from nowhere else."""
-SHORTEST = 8
+MIN_KEY_LENGTH = 8
 """Shorter ones are stand-ins for servers that want some key, whatever it is; no secrets."""
 HIDDEN = "***"
 
@@ -28,7 +28,7 @@ class ApiKey:
 
     def hidden_in(self, text: str) -> str:
         """Return `text`, plain or JSON, without the key."""
-        if len(self._key) < SHORTEST:
+        if len(self._key) < MIN_KEY_LENGTH:
             return text
         return text.replace(self._key, HIDDEN).replace(json.dumps(self._key)[1:-1], HIDDEN)
 

@@ -8,16 +8,16 @@ from urllib.parse import urlsplit
 from pydantic import Field
 
 from executive.cell.config import DetectorConfig, Section
-from executive.perception.detectors.options import OptionFaults, wrong_class_map, wrong_options
+from executive.perception.detectors.options import OptionFaults, find_wrong_class_map, find_wrong_options
 from executive.perception.detectors.roboflow.key import VARIABLE
 
 HOSTED = "https://serverless.roboflow.com"
 """Where Roboflow serves models itself."""
-SECRETS = ("key", "token", "secret", "password", "authorization")
+SECRET_WORDS = ("key", "token", "secret", "password", "authorization")
 """Parts of the names of options that somebody may have put a secret into."""
-WORKFLOW = ("workspace", "workflow_id", "workflow_input", "workflow_output")
+WORKFLOW_OPTIONS = ("workspace", "workflow_id", "workflow_input", "workflow_output")
 """Options that are used by `api: workflow` alone."""
-MARKS = "?&#= "
+FORBIDDEN_CHARACTERS = "?&#= "
 """Characters that would change the address of a request."""
 
 
@@ -73,11 +73,11 @@ class RoboflowOptions(Section):
         return "workspace and workflow_id" if self.api == "workflow" else "model_id"
 
 
-def wrong_roboflow(config: DetectorConfig) -> OptionFaults:
+def find_wrong_roboflow_options(config: DetectorConfig) -> OptionFaults:
     """Yield every option because of which the detector could not be built, with a sentence."""
-    wrong = list(wrong_options(RoboflowOptions, config))
+    wrong = list(find_wrong_options(RoboflowOptions, config))
     for option, sentence in wrong:
-        if any(part in option.lower() for part in SECRETS):
+        if any(part in option.lower() for part in SECRET_WORDS):
             sentence = (
                 f'"{option}" does not belong in a cell file, where everybody may read it; '
                 f"delete it there and set the environment variable {VARIABLE}"
@@ -89,19 +89,19 @@ def wrong_roboflow(config: DetectorConfig) -> OptionFaults:
     yield from _wrong_url(options.url)
     yield from _wrong_workflow(options) if options.api == "workflow" else _wrong_model(options)
     if options.labels:
-        yield from wrong_class_map(config, options.class_map, options.labels)
+        yield from find_wrong_class_map(config, options.class_map, options.labels)
 
 
 def _wrong_model(options: RoboflowOptions) -> OptionFaults:
     """Yield the option because of which no model can be asked, with a sentence."""
-    given = [name for name in WORKFLOW if name in options.model_fields_set]
+    given = [name for name in WORKFLOW_OPTIONS if name in options.model_fields_set]
     parts = options.model_id.split("/")
     if given:
         names = ", ".join(given)
         yield given[0], f"api: {options.api} does not use {names}; write api: workflow, or delete {names}"
     elif not options.model_id:
         yield "model_id", f"api: {options.api} needs model_id: project/version, or a name such as rfdetr-nano"
-    elif any(mark in options.model_id for mark in MARKS):
+    elif any(mark in options.model_id for mark in FORBIDDEN_CHARACTERS):
         yield "model_id", "model_id must be a name or project/version alone, without ?, &, #, = or a space"
     elif options.api == "v0" and (len(parts) > 2 or not all(parts)):
         yield (
@@ -117,7 +117,7 @@ def _wrong_workflow(options: RoboflowOptions) -> OptionFaults:
     for option, name in names.items():
         if not name:
             yield option, f"api: workflow needs workspace and workflow_id; {option} is missing"
-        elif any(mark in name for mark in f"{MARKS}/"):
+        elif any(mark in name for mark in f"{FORBIDDEN_CHARACTERS}/"):
             yield option, f"{option} must be a name alone, without /, ?, &, #, = or a space"
 
 
