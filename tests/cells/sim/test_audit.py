@@ -70,7 +70,7 @@ def test_a_body_that_was_taken_out_of_a_bin_counts_as_if_it_still_lay_there(
 ) -> None:
     world = OneBody()
     world.removed[7] = (world.bodies.pop(7), np.array(place))
-    item = SimpleNamespace(state=None, first=np.array(ON_TABLE))
+    item = SimpleNamespace(state=None, first_position=np.array(ON_TABLE))
     assert counted(bins, world, records=[item], **more) == {**dict.fromkeys(PLACES, 0), end: 1}
     assert counted(bins, world, **more) == dict.fromkeys(PLACES, 0), "nobody had seen it"
 
@@ -89,6 +89,6 @@ def test_a_body_that_was_taken_out_of_a_bin_counts_as_if_it_still_lay_there(
 def test_an_unknown_object_counts_if_an_item_stands_for_it_or_if_it_is_in_a_bin(
     place: Sequence[float], claimed: bool, end: dict[str, int]
 ) -> None:
-    items = [SimpleNamespace(state=None, first=np.array(ON_TABLE))] if claimed else []
+    items = [SimpleNamespace(state=None, first_position=np.array(ON_TABLE))] if claimed else []
     none = dict.fromkeys(PLACES, 0)
     assert counted(("red_bin",), OneBody(UNKNOWN, place), records=items) == {**none, **end}
