@@ -60,8 +60,6 @@ class Key:
         attribute: Name in the class.
         kind: Content.
         type: Type of a constant, or class of a section.
-        unit: SI unit, or "".
-        is_optional: True if the key may be left empty.
     """
 
     doc: str
@@ -79,17 +77,11 @@ class Key:
     attribute: str = ""
     kind: Kind = Kind.CONSTANT
     type: Any = None
-    unit: str = ""
 
     @property
     def is_required(self) -> bool:
         """True if the mission must give a value."""
         return self.default is ...
-
-    @property
-    def has_nodes(self) -> bool:
-        """True if nodes stand directly under the key."""
-        return self.kind in (Kind.NODE, Kind.NODES)
 
     @property
     def section(self) -> type[Section]:
@@ -175,8 +167,7 @@ def _complete(declared: Key, attribute: str, hint: Any) -> Key:
     """Return a key with everything that follows from its attribute and its annotation."""
     if get_origin(hint) in (Union, types.UnionType) and types.NoneType in get_args(hint):
         hint = Union[tuple(part for part in get_args(hint) if part is not types.NoneType)]  # noqa: UP007
-    base, *marks = get_args(hint) if get_origin(hint) is Annotated else (hint,)
-    unit = next((mark for mark in marks if isinstance(mark, str)), "")
+    base = get_args(hint)[0] if get_origin(hint) is Annotated else hint
     listed = get_args(base)[0] if get_origin(base) is tuple else None
     simple = {Child: Kind.NODE, Children: Kind.NODES, Reasons: Kind.REASONS, Variable: Kind.VARIABLE}
     kind = Kind.ELEMENTS if base == Elements else simple.get(base, Kind.CONSTANT)
@@ -184,7 +175,7 @@ def _complete(declared: Key, attribute: str, hint: Any) -> Key:
         kind = Kind.SECTION
     elif isinstance(listed, type) and issubclass(listed, Section):
         kind, base = Kind.SECTIONS, listed
-    return replace(declared, name=attribute.rstrip("_"), attribute=attribute, kind=kind, type=base, unit=unit)
+    return replace(declared, name=attribute.rstrip("_"), attribute=attribute, kind=kind, type=base)
 
 
 @cache

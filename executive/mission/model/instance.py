@@ -11,7 +11,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.cell.protocols import Clock
-from executive.mission.model.nodes import InnerNode, Node, Part, Section, nodes_of, parts
+from executive.mission.model.nodes import InnerNode, Node, Part, Section, nodes_of
 from executive.mission.model.typed import WrongType, read_constant
 from executive.mission.model.values import Literal, Match, Named
 from executive.tree.blackboard import Blackboard
@@ -79,13 +79,8 @@ def count_in(owner: InnerNode | Section, key: Key) -> int | None:
 
 
 def _values(owner: InnerNode | Section, build: Build) -> Mapping[str, object]:
-    return {key.attribute: _value(owner, key, part, build) for key, part in _given(owner)}
-
-
-def _given(owner: InnerNode | Section) -> list[tuple[Key, Part | None]]:
-    given = list(parts(owner))
-    missing = [key for key in owner.kind.keys.values() if key.is_required and key.name not in owner.values]
-    return [*given, *((key, None) for key in missing)]
+    keys = (key for key in owner.kind.keys.values() if key.is_required or key.name in owner.values)
+    return {key.attribute: _value(owner, key, owner.values.get(key.name), build) for key in keys}
 
 
 def _value(owner: InnerNode | Section, key: Key, part: Part | None, build: Build) -> object:
@@ -99,12 +94,8 @@ def _value(owner: InnerNode | Section, key: Key, part: Part | None, build: Build
     if isinstance(part, Named):
         return Variable(part.name)
     if key.kind is Kind.ELEMENTS:
-        is_list = isinstance(part, Literal) and isinstance(part.value, list)
-        return (
-            tuple(part.value)
-            if isinstance(part, Literal) and is_list
-            else Variable(getattr(part, "name", ""))
-        )
+        elements = part.value if isinstance(part, Literal) else None
+        return tuple(elements) if isinstance(elements, list) else Variable(getattr(part, "name", ""))
     if key.kind is not Kind.CONSTANT:
         return ()
     try:
