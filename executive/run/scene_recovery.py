@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from contextlib import suppress
+
+import numpy as np
 
 from executive.cell.arm import Goal, Task
 from executive.cell.detection import Detections
+from executive.cell.frame import Frame
 from executive.cell.objects import Load
 from executive.cell.protocols import Cell, Steps
 from executive.errors import Blocked, Fault, NoDepth, Unavailable, Unreachable
 from executive.manipulation.obstacles import list_obstacles
 from executive.manipulation.tool_goals import DROP_HEIGHT, goal_aside
 
-LOOKS_PER_POSE = 3
-"""Number of looks from each scan pose of the camera."""
+LOOKS_PER_PLACE = 3
+"""Number of looks from each place of the camera."""
 MIN_LOOKS = 5
-"""Number of looks, at least."""
+"""Smallest number of looks from the scan poses."""
 RELEASE_TIME = 0.1
 """Time allowed for the vacuum to vanish [s]."""
 
@@ -23,8 +27,9 @@ RELEASE_TIME = 0.1
 def recover_scene(cell: Cell) -> Steps:
     """Empty the tool, then look at everything that the camera sees, bins included.
 
-    Afterwards the ledger knows every item that a look has shown, on the table or in a bin. It searches the
-    other items; they are rejected unless the mission finds them.
+    A camera on the arm looks into each bin from above. Afterwards the ledger knows every item that a look has
+    shown, on the table or in a bin. It searches the other items; they are rejected unless the mission finds
+    them.
 
     Raises:
         Fault: The tool holds an object that cannot be put down.
@@ -35,10 +40,18 @@ def recover_scene(cell: Cell) -> Steps:
     cell.tool.open()
     yield from cell.clock.sleep(RELEASE_TIME)
     poses = cell.camera.scan_poses
-    for number in range(max(MIN_LOOKS, LOOKS_PER_POSE * len(poses))):
-        yield from _look(cell, poses[number % len(poses)])
+    before, height = cell.camera.capture().X_WC.position, 0.0
+    is_on_arm = False
+    for number in range(max(MIN_LOOKS, LOOKS_PER_PLACE * len(poses))):
+        frame = yield from _look(cell, poses[number % len(poses)])
+        is_on_arm |= not np.allclose(before, frame.X_WC.position)
+        height = max(height, float(cell.arm.tool_pose.position[2]))
         if number == 0:
             cell.ledger.search_unseen()
+    for bin in cell.bins.values() if is_on_arm else ():
+        x, y, _ = map(float, bin.position)
+        for _ in range(LOOKS_PER_PLACE):
+            yield from _look(cell, Goal((x, y, height)))
     cell.ledger.count_bins()
 
 
@@ -61,10 +74,14 @@ def _put_down(cell: Cell) -> Steps:
     )
 
 
-def _look(cell: Cell, pose: str) -> Steps:
-    """Observe everything that the camera sees from an arm pose, or from the present one if it is blocked."""
+def _look(cell: Cell, goal: Goal | str) -> Generator[None, None, Frame]:
+    """Observe everything that the camera sees when the arm is at a goal, or here if there is no motion.
+
+    Returns:
+        The frame.
+    """
     with suppress(Unreachable, Blocked):
-        yield from _move(cell, pose, Task(around=list_obstacles(cell)))
+        yield from _move(cell, goal, Task(around=list_obstacles(cell)))
     frame = cell.camera.capture()
     request = next(iter(cell.detectors.values())).request(frame, "full")
     while not request.ready:
@@ -74,10 +91,11 @@ def _look(cell: Cell, pose: str) -> Steps:
         detections = Detections(**vars(answer), frame=frame, view="full", area=cell.camera.area("full"))
         observations = cell.localizer.localize(detections)
     except (Unavailable, NoDepth):
-        return
+        return frame
     # The skills report a camera that was moved.
     if not cell.camera.displacement(frame):
         cell.ledger.observe(detections, observations)
+    return frame
 
 
 def _move(cell: Cell, goal: Goal | str, task: Task) -> Steps:

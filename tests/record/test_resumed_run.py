@@ -252,10 +252,11 @@ def truncate(path: Path, share: float) -> None:
 
 
 @pytest.mark.parametrize("share", [0.15, 0.6, pytest.param(0.9, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["sort_overhead", pytest.param("sort_wrist", marks=pytest.mark.slow)])
 def test_a_scene_is_observed_if_the_journal_lacks_actions_of_the_tool(
-    missions: Path, tmp_path: Path, share: float
+    missions: Path, tmp_path: Path, name: str, share: float
 ) -> None:
-    path = Path(run_of(load(missions, "sort_overhead"), tmp_path, frames=True).run)
+    path = Path(run_of(load(missions, name), tmp_path, frames=True).run)
     truncate(path, share)
     watcher = Watcher()
     result = resumed(path, views=[watcher])
