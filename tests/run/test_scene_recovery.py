@@ -64,7 +64,7 @@ def test_an_object_that_cannot_be_put_down_stays_in_the_tool(
     fake: FakeCell, targets: list[Target], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pick(fake, targets[0])
-    monkeypatch.setattr("executive.cells.fake.arm.REACH", 0.0)
+    monkeypatch.setattr("executive.cells.fake.arm.MAX_REACH", 0.0)
     with pytest.raises(Fault, match=r"cannot be put down: .* take it out of the tool and resume the run"):
         recover(fake)
     assert fake.tool.holding
