@@ -81,8 +81,9 @@ def loaded(name: str) -> LoadedMission:
 
 
 def variables(root: Behaviour) -> list[dict[str, Any]]:
-    """Return the variables of every scope of a tree."""
-    scopes = {id(node._scope): node._scope for node in root.iterate() if isinstance(node, SkillLeaf)}
+    """Return the variables of every blackboard of a tree."""
+    leaves = (node for node in root.iterate() if isinstance(node, SkillLeaf))
+    scopes = {id(leaf._blackboard): leaf._blackboard for leaf in leaves}
     return [plain(scope) for scope in scopes.values()]
 
 
