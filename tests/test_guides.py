@@ -233,6 +233,14 @@ def test_every_file_and_folder_that_a_guide_links_to_exists() -> None:
         assert not [link for link in missing if not link.endswith(".png")], guide
 
 
+@pytest.mark.parametrize("guide", ["executive/README.md", "CONTRIBUTING.md"])
+def test_every_file_that_a_guide_to_the_code_names_exists(guide: str) -> None:
+    named = set(re.findall(r"`((?:\w+/)+(?:[\w.]+)?)`", read(guide)))
+    roots = (ROOT, ROOT / "executive", ROOT / "executive/cells")
+    assert named
+    assert not {name for name in named if not any((root / name).exists() for root in roots)}
+
+
 def test_the_authors_guide_names_every_control_node_with_its_keys() -> None:
     told = rows("### Control nodes")
     assert {cell.strip("`"): set(in_code(keys)) for cell, (keys, *_) in told.items() if "`" in cell} == {
