@@ -29,9 +29,9 @@ from executive.ledger.bins import Bins, find_believed_bin
 from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage
 from executive.ledger.item import LYING, Record, State
+from executive.ledger.look import Update
 from executive.ledger.look_event import describe_look
 from executive.ledger.staleness import Staleness
-from executive.ledger.update import Update
 
 
 class Tracker:

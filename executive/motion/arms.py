@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator, Mapping
 
 from executive.cell.config import CellConfig
 from executive.cell.workcell import KeyPath
+from executive.motion.arm_model import Kinematics
 from executive.motion.clearance_model import SAMPLING_MARGIN
-from executive.motion.iiwa14 import IIWA14_JOINT_COUNT, Iiwa14
-from executive.motion.kinematics import Kinematics
+from executive.motion.iiwa14_kinematics import IIWA14_JOINT_COUNT, Iiwa14
 from executive.motion.limits import JointLimits, JointRange
 from executive.motion.planner import Check, Planner
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from executive.cell.arm import Goal
 from executive.geometry import Array
+from executive.motion.arm_model import Configuration, Kinematics
 from executive.motion.cartesian_line import CHAIN_LENGTH, CartesianLine
-from executive.motion.kinematics import Configuration, Kinematics
 from executive.motion.limits import JointLimits, min_time
 from executive.motion.postures import find_postures, solve_vertical_line
 from executive.motion.state import State

@@ -14,8 +14,8 @@ from itertools import pairwise
 import numpy as np
 
 from executive.geometry import Array
+from executive.motion.arm_model import Kinematics
 from executive.motion.clearance_model import ClearanceModel, Discs
-from executive.motion.kinematics import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.payload import PayloadLimit
 from executive.motion.point_to_point import Connector, NoProfile, PointToPoint

@@ -22,7 +22,7 @@ from executive.cell.config import CellConfig
 from executive.cell.layout import travel_height
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
-from executive.motion.kinematics import Kinematics
+from executive.motion.arm_model import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.payload import PayloadLimit
 from executive.motion.point_to_point import NoProfile

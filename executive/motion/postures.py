@@ -10,7 +10,7 @@ import numpy as np
 from executive.cell.arm import Goal
 from executive.errors import Unreachable
 from executive.geometry import Array, Pose, tool_down
-from executive.motion.kinematics import Configuration, Kinematics, Solutions, wrap_angles
+from executive.motion.arm_model import Configuration, Kinematics, Solutions, wrap_angles
 
 LIMIT_MARGIN = math.radians(1.0)
 """Preferred minimum distance of joint positions from their limits [rad]."""

@@ -14,10 +14,10 @@ from executive.cell.config import CellConfig
 from executive.cell.layout import travel_height
 from executive.errors import Unreachable
 from executive.geometry import Array, tool_down
+from executive.motion.arm_model import Configuration, Kinematics
 from executive.motion.candidates import Candidate, find_candidates
 from executive.motion.cartesian_line import CHAIN_LENGTH, CartesianLine
 from executive.motion.clearance_model import ClearanceModel, discs_below_flange
-from executive.motion.kinematics import Configuration, Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.optimizer import Optimizer, Problem
 from executive.motion.payload import PayloadLimit

@@ -18,7 +18,7 @@ from toppra.constraint import JointAccelerationConstraint, JointVelocityConstrai
 from executive.cell.arm import Goal
 from executive.cell.clock import STEP
 from executive.geometry import Array
-from executive.motion.kinematics import Kinematics
+from executive.motion.arm_model import Kinematics
 from executive.motion.limits import JointLimits, min_time
 from executive.motion.point_to_point import Connector
 from executive.motion.postures import find_postures, find_vertical_line

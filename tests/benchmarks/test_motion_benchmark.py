@@ -11,8 +11,8 @@ from executive.cell.layout import travel_height
 from executive.cells.sim.world import World
 from executive.cli.cells import load_cells
 from executive.geometry import Pose
+from executive.motion.arm_model import Kinematics
 from executive.motion.arms import build_kinematics, build_planner
-from executive.motion.kinematics import Kinematics
 from executive.motion.postures import find_postures
 from executive.motion.trajectory import find_peaks
 from tests.benchmarks import motion

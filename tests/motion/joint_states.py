@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from executive.cell.arm import Goal
 from executive.geometry import Array
-from executive.motion.kinematics import Kinematics
+from executive.motion.arm_model import Kinematics
 from executive.motion.limits import JointLimits, JointRange
 from executive.motion.postures import find_postures
 from executive.motion.state import Piece, State

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from executive.errors import Unreachable
 from executive.geometry import Array, Pose
-from executive.motion.kinematics import Configuration, Solutions, wrap_angles
+from executive.motion.arm_model import Configuration, Solutions, wrap_angles
 from executive.motion.limits import JointRange
 
 HEIGHT, UPPER_ARM, FOREARM, WRIST_TO_FLANGE = 0.30, 0.45, 0.42, 0.10  # [m]
@@ -23,7 +23,7 @@ FLIPS = tuple(product((1, -1), repeat=3))
 
 
 class SixJointArm:
-    """Implements `executive.motion.kinematics.Kinematics`."""
+    """Implements `executive.motion.arm_model.Kinematics`."""
 
     def __init__(self, tool_length: float, joint_range: JointRange) -> None:
         self.joint_range = joint_range

@@ -12,7 +12,7 @@ from joint_states import LIMITS, SOONER, passed, peaks, tool_velocities
 from executive.cell.arm import Goal
 from executive.geometry import Array
 from executive.motion.cartesian_line import CHAIN_LENGTH, CartesianLine
-from executive.motion.iiwa14 import Iiwa14
+from executive.motion.iiwa14_kinematics import Iiwa14
 from executive.motion.postures import find_postures, solve_vertical_line
 
 ARM = Iiwa14(0.12, LIMITS.position)

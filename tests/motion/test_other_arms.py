@@ -14,7 +14,7 @@ from executive.cell.arm import Goal, Task
 from executive.cell.config import ArmConfig, CellConfig, LimitsConfig
 from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.errors import Blocked, Unreachable
-from executive.motion.kinematics import Kinematics
+from executive.motion.arm_model import Kinematics
 from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
 from executive.motion.postures import find_postures

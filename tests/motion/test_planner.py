@@ -14,7 +14,7 @@ from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
 from executive.motion.arms import build_planner
-from executive.motion.iiwa14 import max_wrist_angle
+from executive.motion.iiwa14_kinematics import max_wrist_angle
 from executive.motion.payload import GRAVITY
 from executive.motion.planner import MAX_CHECK_SPACING, Planner
 from executive.motion.trajectory import Trajectory

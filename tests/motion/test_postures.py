@@ -12,7 +12,7 @@ from joint_states import LIMITS
 from executive.cell.arm import Goal
 from executive.errors import Unreachable
 from executive.geometry import Array
-from executive.motion.iiwa14 import Iiwa14
+from executive.motion.iiwa14_kinematics import Iiwa14
 from executive.motion.limits import JointRange
 from executive.motion.postures import find_postures, find_vertical_line
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from executive.motion.iiwa14 import FLANGE_OFFSET
+from executive.motion.iiwa14_kinematics import FLANGE_OFFSET
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from executive.cell.layout import pile_height
 from executive.cells.sim.arm import SimArm
 from executive.cells.sim.robot_models import ROBOT_MODELS
 from executive.geometry import Array, Pose
-from executive.motion.kinematics import Kinematics
+from executive.motion.arm_model import Kinematics
 from executive.perception.visibility import (
     TOOL_SHADOW,
     Bone,

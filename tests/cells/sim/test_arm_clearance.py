@@ -12,7 +12,7 @@ from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.cells.sim.collision import PathClearance
 from executive.errors import Blocked
 from executive.motion.arms import build_kinematics
-from executive.motion.iiwa14 import Iiwa14, max_wrist_angle
+from executive.motion.iiwa14_kinematics import Iiwa14, max_wrist_angle
 from tests.motion.joint_states import reach
 
 DUCK = Task(Load(ObjectClass("duck", 0.05, 0.04)))

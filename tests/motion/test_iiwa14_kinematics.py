@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pybullet_utils.bullet_client import BulletClient
 
 from executive.geometry import Pose
-from executive.motion.iiwa14 import Iiwa14
+from executive.motion.iiwa14_kinematics import Iiwa14
 from executive.motion.limits import JointRange
 
 LIMIT = np.radians([170, 120, 170, 120, 170, 120, 175])

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from executive.errors import Unreachable
 from executive.geometry import Array, Pose
-from executive.motion.kinematics import Configuration, Solutions, wrap_angles
+from executive.motion.arm_model import Configuration, Solutions, wrap_angles
 from executive.motion.limits import JointRange
 
 IIWA14_JOINT_COUNT = 7
@@ -57,7 +57,7 @@ def max_wrist_angle(link_distance: float) -> float:
 
 
 class Iiwa14:
-    """Kinematics of an iiwa 14; implements `executive.motion.kinematics.Kinematics`.
+    """Kinematics of an iiwa 14; implements `executive.motion.arm_model.Kinematics`.
 
     Args:
         tool_length: Distance from the flange to the tool centre point [m].
