@@ -143,13 +143,13 @@ class DetectedObject:
 
 @dataclass(frozen=True)
 class FrameSearched(Event):
-    """The detections in a frame were passed to the ledger.
+    """A detector searched a frame, and the ledger received its detections.
 
     Attributes:
         frame: Number of the frame.
         camera: Name of the camera.
         detector: Name of the detector.
-        view: Name of the camera pose, or "".
+        view: Searched part of the frame: `table` or `full`.
         found: Confident detections.
         unsure: Detections of low confidence.
         unknown: Labels that the cell file does not declare, one for each detection.
@@ -306,7 +306,7 @@ class RunResumed(Event):
     """An interrupted run was resumed.
 
     Attributes:
-        ticked: Number of control steps before the interruption that count.
+        ticked: Number of control steps before the interruption that remain valid.
         intent: Last action of the tool before the interruption, `open` or `close`; "" if there was none;
             `unknown` if arm or tool did more than the journal knows.
         versions: Versions of this project, Python, the machine and the required packages.
@@ -336,8 +336,8 @@ class RunEnded(Event):
         status: `SUCCESS`; `INCOMPLETE` if the tree succeeded and items were rejected; `FAILURE`, `FAULT` or
             `HALTED`.
         reason: Reason of the failure, for instance `Transit.dropped`; "" on success.
-        message: One sentence with numbers, or "".
-        node: Path of the deciding node, or "".
+        message: One sentence with the measured values that explain the status, or "".
+        node: Path of the node that determined the status, or "".
         empty: True if the ledger believed that no object with a route was left, and no look had shown a label
             that the cell does not know.
         holds: Item that the tool holds, `something` if the ledger knows no such item, or "".

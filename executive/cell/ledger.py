@@ -114,13 +114,13 @@ class Ledger(Protocol):
     def lose_track(self) -> None:
         """Record that the tool may have moved any item that is not in a bin."""
 
-    def search_unseen(self) -> None:
+    def mark_unseen_as_dropped(self) -> None:
         """Search every item that no look has shown since `lose_track`, on the table and in the bins.
 
         An item that is not found is rejected at the end of the run, because its place is unknown.
         """
 
-    def count_bins(self) -> None:
+    def record_bin_contents(self) -> None:
         """Place an item for each object that most full looks since `lose_track` have shown in a bin.
 
         Objects that the ledger knows to be in the bin do not count. The items are searched ones or new ones.

@@ -22,9 +22,9 @@ MAX_STANDARD_DEVIATIONS = 3.5
 AMBIGUITY_FACTOR = 1.5
 """Factor on the allowed distance up to which an observation may still show an item."""
 MAX_PUSH_DISTANCE = 0.12
-"""Distance over which a person may push an item that counts as the same item afterwards [m]."""
+"""Largest distance by which a person may push an item so that it still counts as the same item [m]."""
 MAX_MISS_PROBABILITY_OF_MOVED = 0.05
-"""Probability that looks missed an item below which the item may have been moved elsewhere."""
+"""An item may have been moved elsewhere if the probability that looks missed it is at most this."""
 MIN_PROBABILITY = 0.9
 """Probability of existence from which an item is picked, and may be a moved item."""
 
@@ -70,7 +70,7 @@ def max_distance(record: Record, std: float, gate: float) -> float:
 
 
 def may_show(one: Observation, record: Record, gate: float) -> bool:
-    """Return True if an observation may show an item, whose position it measured with a large error."""
+    """Return True if an observation may show an item, even with a large error of the measured position."""
     return record.distance_to(one.position) <= AMBIGUITY_FACTOR * max_distance(record, one.std, gate)
 
 
@@ -79,7 +79,8 @@ def find_moved(
 ) -> Record | None:
     """Return the nearest item that was dropped or moved, and is the new item; None if there is none.
 
-    The class of the new item must be certain: before, it may be another object that fell nearby.
+    The class of the new item must be certain: until then, the new item may be another object that fell
+    nearby.
     """
     is_candidate = new.state is State.SEEN and not new.attempts and new.belief.probability >= MIN_PROBABILITY
     if not is_candidate or new.belief.class_error > config.misjudged:

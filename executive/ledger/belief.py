@@ -1,4 +1,4 @@
-"""Bayes update of the existence and the class of one item, in log odds.
+"""Bayesian update of the existence and the class of one item, in log odds.
 
 Looks from one viewpoint are not independent: a detector repeats a share of its errors.
 """
@@ -17,7 +17,7 @@ VIEWPOINT_PITCH = 0.02
 ITEM_AREA_SHARE = 0.02
 """Share of the searched area in which a false detection is assigned to a given item."""
 MAX_LOG_ODDS_OF_ALTERNATIVE = math.log(0.1)
-"""Largest log odds of existence of a new item that may be a known item, localized beside its position."""
+"""Largest log odds of existence of a new item that may be a false localization of a known item nearby."""
 LOG_ODDS_OF_PROOF = math.log(1e4)
 """Log odds of existence from which an item is known to exist: two looks of a good detector agree."""
 MAX_ABS_LOG_ODDS = 100.0
@@ -49,7 +49,8 @@ class Belief:
         log_odds: Log odds that the item exists and is no false detection.
         is_proved: True if the item exists for certain: enough looks agree, or the tool has touched it.
         miss_probability: Probability that all looks at its position since the last detection missed it.
-        uncertain_looks: Number of looks with a low-confidence detection of it only, since a certain look.
+        uncertain_looks: Number of looks since the last confident detection that showed it with low
+            confidence.
         answers: Last detected class by viewpoint, since the item may have been moved.
         repeats: Number of looks that repeated the answer of an earlier look from the same viewpoint.
         log_likelihoods: Log likelihood of each detected class, up to a common constant.
@@ -118,7 +119,8 @@ class Belief:
     ) -> None:
         """Update class and existence with a detection.
 
-        An answer that the detector repeats from a viewpoint counts with the independent share of its errors.
+        If the detector repeats its answer from a viewpoint, only the independent share of its errors is
+        evidence.
 
         Args:
             label: Detected class.

@@ -69,7 +69,7 @@ class Tracker:
         self._records: dict[Item, Record] = {}
         self._names: Counter[str] = Counter()
         self._bin_contents: BinContents | None = None
-        """Contents of the bins since `lose_track`, until `count_bins`."""
+        """Contents of the bins since `lose_track`, until `record_bin_contents`."""
         self._frame = 0
         self.unknown: Counter[str] = Counter()
         self.doubts: list[str] = []
@@ -88,7 +88,8 @@ class Tracker:
         """Update all items with one search of a frame, and return the targets."""
         frame = detections.frame
         self.unknown |= Counter(detection.label for detection in detections.unknown)
-        # The numbers after the colon differ from frame to frame; the first text is kept.
+        # The text of a doubt ends with a colon and numbers that differ from frame to frame; one text per kind
+        # is kept.
         kind = detections.error_rates.doubt.partition(":")[0]
         if kind and not any(doubt.startswith(kind) for doubt in self.doubts):
             self.doubts.append(detections.error_rates.doubt)
@@ -257,7 +258,7 @@ class Tracker:
         self._bin_contents = BinContents(self._bins)
         self._search_everywhere([one for one in self.records if one.state in (State.HELD, State.DROPPED)])
 
-    def search_unseen(self) -> None:
+    def mark_unseen_as_dropped(self) -> None:
         """Search every item that no look has shown since `lose_track`, on the table and in the bins."""
         self._search_everywhere(
             [
@@ -269,7 +270,7 @@ class Tracker:
             ]
         )
 
-    def count_bins(self) -> None:
+    def record_bin_contents(self) -> None:
         """Place an item for each object that most full looks since `lose_track` have shown in a bin."""
         contents, self._bin_contents = self._bin_contents, None
         assert contents is not None, "bins are counted after `lose_track`"

@@ -22,7 +22,7 @@ from executive.tree.registry import ControlNodes, control_nodes
 from executive.tree.skill_leaf import SkillLeaf, Wiring
 
 TreeNode = ControlNode | SkillLeaf
-"""What a mission's tree is made of: py_trees behaviours that know their `path` and their `failure`."""
+"""Node of the tree that runs: a py_trees behaviour with a `path` and a `failure`."""
 
 
 def build(
@@ -35,8 +35,8 @@ def build(
 ) -> TreeNode:
     """Return the root of a fresh tree of py_trees behaviours; every node has a unique, readable `path`.
 
-    `substitutes` run instead of the skills of nodes, by a pattern of their paths as a shell knows them: `*`
-    stands for anything, `/` included. The first one that fits is taken.
+    `substitutes` maps patterns of node paths to the skills that run there
+    instead; `*` matches any characters, including `/`. The first one that fits is taken.
 
     Raises:
         InputError: A pattern fits no node that runs a skill.

@@ -159,10 +159,10 @@ def _describe_old_format(line: bytes) -> str:
 
 
 def _as_json(value: object) -> object:
-    """Return a value that the JSON encoder does not know as one that it knows.
+    """Convert a value to a type that the JSON encoder supports.
 
     Raises:
-        TypeError: There is none.
+        TypeError: JSON has no equivalent of the value.
     """
     if isinstance(value, Mapping):
         return dict(value)

@@ -39,7 +39,7 @@ class Interruption:
     """Time between the end of a process that executed a run, and the resumption of the run.
 
     Attributes:
-        complete: Number of control steps before the interruption that count.
+        complete_steps: Number of control steps before the interruption that remain valid.
         last_action: Last action of the tool before the interruption, `open` or `close`; "" if there was none;
             `UNKNOWN_ACTION` if arm or tool did more than the journal knows.
         reopens: True if the run had ended as INCOMPLETE, so that the tree starts again.
@@ -64,7 +64,7 @@ class InputLog:
     """Inputs and interruptions of a run so far.
 
     Attributes:
-        events: Events of the journal that count, in order.
+        events: Events of the journal that no resumption made void, in order.
         inputs: Recorded answers by name of the input, in order; repeated answers are left out.
         interruptions: Interruptions by `Interruption.complete`.
         halt: The last halt, or None.
@@ -79,7 +79,7 @@ class InputLog:
     def of(events: Iterable[TimedEvent]) -> InputLog:
         """Return the log of a journal.
 
-        A resumption makes everything void that happened in the incomplete control step before it, and later.
+        A resumption voids all earlier events from the first incomplete control step on.
         """
         kept: list[TimedEvent] = []
         for timed in events:
@@ -133,7 +133,8 @@ class InputLog:
 
         Args:
             steps: Number of control steps that the world of the cell has made.
-            last_command: Control step in which the arm or the tool was last commanded, by the world.
+            last_command: Control step in which, according to the world, the arm or the tool was last
+                commanded.
             is_complete: True if the log holds all events of its last control step.
         """
         if self.last_tick in _incomplete_ends(self.events):

@@ -140,7 +140,7 @@ def require_rest(brake: Callable[[], str]) -> None:
 def restart_skills(root: Behaviour) -> None:
     """Halt every running skill, so that it starts again at the next tick.
 
-    Control nodes keep their state: attempts are counted on, and variables keep their values.
+    Control nodes keep their state: the count of attempts continues, and variables keep their values.
 
     Raises:
         Fault: The clean-up of a skill failed; all the others were halted none the less.
@@ -153,7 +153,7 @@ def restart_skills(root: Behaviour) -> None:
 
 
 def reconcile(cell: Cell, last_action: str) -> None:
-    """Correct the ledger by the sensor of the tool, and doubt every position on the table.
+    """Correct the ledger by the sensor of the tool, and invalidate every position on the table.
 
     Nothing observed the cell during the interruption: objects may have been moved, and the tool may have lost
     its item.

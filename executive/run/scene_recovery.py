@@ -47,12 +47,12 @@ def recover_scene(cell: Cell) -> Steps:
         is_on_arm |= not np.allclose(before, frame.X_WC.position)
         height = max(height, float(cell.arm.tool_pose.position[2]))
         if number == 0:
-            cell.ledger.search_unseen()
+            cell.ledger.mark_unseen_as_dropped()
     for bin in cell.bins.values() if is_on_arm else ():
         x, y, _ = map(float, bin.position)
         for _ in range(LOOKS_PER_PLACE):
             yield from _look(cell, Goal((x, y, height)))
-    cell.ledger.count_bins()
+    cell.ledger.record_bin_contents()
 
 
 def _put_down(cell: Cell) -> Steps:

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from py_trees.common import Status
 
-from executive.tree.flow import Enter, Flow, Raise, State, joined
+from executive.tree.flow import Enter, Flow, PossibleFailure, State, joined
 from executive.tree.inspection import MinTimes, PassedFailure
 from executive.tree.keys import Child, Children, key
 from executive.tree.node import ControlNode
@@ -45,7 +45,7 @@ class Fallback(ControlNode):
     def flow(self, enter: Enter, state: State) -> Flow:
         """Enter each child in the states after the failures of the one before it."""
         success = halted = None
-        failures: Mapping[Raise, State] = {}
+        failures: Mapping[PossibleFailure, State] = {}
         here: State | None = state
         for choice in self.do:
             if here is None:
@@ -53,7 +53,7 @@ class Fallback(ControlNode):
             flow = enter(choice, here)
             success, halted = joined((success, flow.success)), joined((halted, flow.halted))
             failures = flow.failures
-            here = joined(after.dealt_with(failure) for failure, after in failures.items())
+            here = joined(after.after_handling(failure) for failure, after in failures.items())
         return Flow(success, failures, halted)
 
     def min_time(self, times: MinTimes) -> float:

@@ -1,4 +1,4 @@
-"""Abstract execution of a tree: the facts that hold on every way to a node, and how a node may end."""
+"""Abstract interpretation of a tree: the states in which a node may be entered, and how it may end."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from executive.skill import ANY, EMPTY, HOLDING, ToolState
 from executive.tree.failure import Reason
 from executive.tree.keys import Child
 
-ANYTHING = "*"
+UNKNOWN_NAME = "*"
 """Source or reason of a failure that nothing is known about."""
 
 
 @dataclass(frozen=True)
-class Grip:
-    """What the tool may be, and since when.
+class PossibleTool:
+    """A possible state of the tool, and how it came about.
 
     Attributes:
         tool: EMPTY or HOLDING.
-        since: Path of the skill that made it so, or "" for the beginning of the run.
-        after: The last failure since then that something dealt with, or "".
+        since: Path of the skill that caused this state; "" for the beginning of the run.
+        after: Last failure that was handled since then, or "".
         moved: Whether the arm may have been moved since then.
     """
 
@@ -32,69 +32,69 @@ class Grip:
     moved: bool = False
 
 
-Grips = frozenset[Grip] | None
+PossibleTools = frozenset[PossibleTool] | None
 """Everything the tool may be; None where that cannot be known."""
 
 
 @dataclass(frozen=True)
 class State:
-    """What is true on every way to a place.
+    """Facts that hold on every execution path to a point in the tree.
 
     Attributes:
-        written: Variables that surely are written; None where that cannot be known, which counts as all.
-        grips: Everything the tool may be; None where that cannot be known.
+        written: Variables that are certainly written; None if unknown, which is treated as all variables.
+        tools: Everything the tool may be; None where that cannot be known.
     """
 
     written: frozenset[str] | None
-    grips: Grips
+    tools: PossibleTools
 
     def join(self, other: State) -> State:
-        """Return what is true where two ways meet."""
+        """Return the facts that hold after either of two states."""
         if self == other:
             return self
         written = self.written if other.written is None else other.written
         if self.written is not None and other.written is not None:
             written = self.written & other.written
-        known = self.grips is not None and other.grips is not None
-        return State(written, (self.grips or frozenset()) | (other.grips or frozenset()) if known else None)
+        known = self.tools is not None and other.tools is not None
+        return State(written, (self.tools or frozenset()) | (other.tools or frozenset()) if known else None)
 
     def writing(self, names: Iterable[str]) -> State:
         """Return the state once these variables are written."""
         return self if self.written is None else replace(self, written=self.written.union(names))
 
-    def forgetting(self, name: str) -> State:
+    def without_variable(self, name: str) -> State:
         """Return the state once a variable is gone."""
         return self if self.written is None else replace(self, written=self.written - {name})
 
-    def gripping(self, grips: Grips) -> State:
+    def with_tools(self, tools: PossibleTools) -> State:
         """Return the state with the tool as given."""
-        return replace(self, grips=grips)
+        return replace(self, tools=tools)
 
-    def dealt_with(self, failure: Raise) -> State:
-        """Return the state where something deals with a failure that led here."""
-        grips = [replace(grip, after=str(failure)) for grip in self.grips or ()]
-        return self if self.grips is None else self.gripping(frozenset(grips))
+    def after_handling(self, failure: PossibleFailure) -> State:
+        """Return the state after a control node handled the failure that led to it."""
+        tools = [replace(grip, after=str(failure)) for grip in self.tools or ()]
+        return self if self.tools is None else self.with_tools(frozenset(tools))
 
     def moved(self) -> State:
         """Return the state once the arm has been moved."""
-        moved = [replace(grip, moved=True) for grip in self.grips or ()]
-        return self if self.grips is None else self.gripping(frozenset(moved))
+        moved = [replace(grip, moved=True) for grip in self.tools or ()]
+        return self if self.tools is None else self.with_tools(frozenset(moved))
 
-    def may_be(self, tool: ToolState) -> Grip | None:
-        """Return how the tool may have become so, or None where it cannot be so."""
-        found = [grip for grip in self.grips or () if grip.tool is tool]
+    def find_tool(self, tool: ToolState) -> PossibleTool | None:
+        """Return one way in which the tool may have got into this state; None if it cannot be in it."""
+        found = [grip for grip in self.tools or () if grip.tool is tool]
         return min(found, key=lambda grip: (grip.since, grip.after)) if found else None
 
 
-BEGINNING = State(frozenset(), frozenset({Grip(ToolState.EMPTY)}))
+INITIAL_STATE = State(frozenset(), frozenset({PossibleTool(ToolState.EMPTY)}))
 """A run begins without variables and with an empty tool."""
 
 UNKNOWN = State(None, None)
-"""What follows a part of the tree that nothing is known about."""
+"""State after a part of the tree whose effects are unknown."""
 
 
 @dataclass(frozen=True)
-class Raise:
+class PossibleFailure:
     """A failure that a node may pass on.
 
     Attributes:
@@ -110,17 +110,17 @@ class Raise:
     labels: frozenset[str] = frozenset()
 
     def may_match(self, matches: Iterable[Reason]) -> bool:
-        """Tell whether one of the names may mean this failure."""
+        """Return True if one of the names may mean this failure."""
         return any(self._is(match, unknown=True) for match in matches)
 
     def must_match(self, matches: Iterable[Reason]) -> bool:
-        """Tell whether one of the names surely means this failure."""
+        """Return True if one of the names certainly means this failure."""
         return any(self._is(match, unknown=False) for match in matches)
 
     def _is(self, match: Reason, unknown: bool) -> bool:
         sources = {self.source, *self.labels}
-        return (match.reason == self.reason or (unknown and self.reason == ANYTHING)) and (
-            match.source in sources or (unknown and self.source == ANYTHING)
+        return (match.reason == self.reason or (unknown and self.reason == UNKNOWN_NAME)) and (
+            match.source in sources or (unknown and self.source == UNKNOWN_NAME)
         )
 
     def __str__(self) -> str:
@@ -132,20 +132,20 @@ class Flow:
     """How a node may end when it is entered in a certain state.
 
     Attributes:
-        success: What is true after its success; None where it cannot succeed.
-        failures: What is true after each of its failures.
-        halted: What is true when it is taken away while it runs; None where it never waits.
+        success: State after its success; None if it cannot succeed.
+        failures: State after each possible failure.
+        halted: State after it was halted; None if it always ends in its first tick.
     """
 
     success: State | None
-    failures: Mapping[Raise, State]
+    failures: Mapping[PossibleFailure, State]
     halted: State | None
 
     def labelled(self, label: str) -> Flow:
         """Return the flow of the same node under a label."""
         if not label:
             return self
-        failures: dict[Raise, State] = {}
+        failures: dict[PossibleFailure, State] = {}
         for failure, state in self.failures.items():
             named = replace(failure, labels=failure.labels | {label})
             failures[named] = state.join(failures.get(named, state))
@@ -159,14 +159,14 @@ Enter: TypeAlias = Callable[[Child, State], Flow]
 def loop(
     enter: Enter, child: Child, state: State, again: Callable[[Flow], State | None]
 ) -> tuple[Flow, State]:
-    """Return how a child may end that is entered repeatedly, and the facts that hold at every entry.
+    """Return how a repeatedly entered child may end, and the state that holds at every entry.
 
     `again` returns the state of the next entry, given how the child may end; None if there is no next entry.
     """
     entry = state
     while True:
         flow = enter(child, entry)
-        # Variables can only become fewer and grips more, so the loop ends.
+        # Variables can only become fewer and tools more, so the loop ends.
         widened = entry.join(again(flow) or entry)
         if widened == entry:
             return flow, entry
@@ -179,43 +179,43 @@ def joined(states: Iterable[State | None]) -> State | None:
     return reduce(State.join, reached) if reached else None
 
 
-def required(grips: Grips, before: ToolState, path: str) -> Grips:
+def required(tools: PossibleTools, before: ToolState, path: str) -> PossibleTools:
     """Return what the tool may be once a skill has what it needs: one mistake is told once."""
-    if before is ANY or grips is None:
-        return grips
-    return frozenset(grip for grip in grips if grip.tool is before) or frozenset({Grip(before, path)})
+    if before is ANY or tools is None:
+        return tools
+    return frozenset(grip for grip in tools if grip.tool is before) or frozenset({PossibleTool(before, path)})
 
 
-def left_after(grips: Grips, after: ToolState, path: str) -> Grips:
+def tools_after_success(tools: PossibleTools, after: ToolState, path: str) -> PossibleTools:
     """Return what the tool is after a skill's success; ANY: as before."""
-    if after is ANY or (grips is not None and all(grip.tool is after for grip in grips)):
-        return grips
-    return frozenset({Grip(after, path)})
+    if after is ANY or (tools is not None and all(grip.tool is after for grip in tools)):
+        return tools
+    return frozenset({PossibleTool(after, path)})
 
 
-def left_after_failure(grips: Grips, left: ToolState | None, path: str) -> Grips:
+def tools_after_failure(tools: PossibleTools, left: ToolState | None, path: str) -> PossibleTools:
     """Return what the tool is after a skill's failure; None: as before, ANY: one or the other."""
-    if left is None or grips is None:
-        return grips
+    if left is None or tools is None:
+        return tools
     if left is ANY:
-        return grips | {Grip(EMPTY, path), Grip(HOLDING, path)}
-    return frozenset({Grip(left, path)})
+        return tools | {PossibleTool(EMPTY, path), PossibleTool(HOLDING, path)}
+    return frozenset({PossibleTool(left, path)})
 
 
-def grips_at_end(flow: Flow, state: State, halts: bool) -> Grips:
+def grips_at_end(flow: Flow, state: State, halts: bool) -> PossibleTools:
     """Return what the tool may be once a branch of a parallel is over, halted or not."""
     ends = joined((flow.success, *flow.failures.values(), *((flow.halted, state) if halts else ())))
-    return state.grips if ends is None else ends.grips
+    return state.tools if ends is None else ends.tools
 
 
-def together(before: Grips, ends: Iterable[Grips]) -> Grips:
-    """Return what the tool may be after branches of which one at most has used it."""
+def combine_branches(before: PossibleTools, ends: Iterable[PossibleTools]) -> PossibleTools:
+    """Return the possible states of the tool after parallel branches, at most one of which uses it."""
     changed = [end for end in ends if _holds(end) != _holds(before)]
     if any(end is None for end in changed):
         return None
     return frozenset(grip for end in changed for grip in end or ()) if changed else before
 
 
-def _holds(grips: Grips) -> frozenset[tuple[ToolState, str]] | None:
+def _holds(tools: PossibleTools) -> frozenset[tuple[ToolState, str]] | None:
     """Return what the tool may hold since when; what was dealt with since then leaves it as it is."""
-    return None if grips is None else frozenset((grip.tool, grip.since) for grip in grips)
+    return None if tools is None else frozenset((grip.tool, grip.since) for grip in tools)

@@ -98,11 +98,13 @@ class ForEach(Loop):
         is_known = not isinstance(self.in_, Variable)
         body, entry = loop(enter, self.do, state.writing([self.each]), lambda flow: flow.success)
         success = joined((body.success, None if is_known else state))
-        failures = {failure: after.forgetting(self.each) for failure, after in body.failures.items()}
+        failures = {failure: after.without_variable(self.each) for failure, after in body.failures.items()}
         # A round that takes no time is followed by a wait for the next tick.
         halted = joined((body.halted, entry))
         return Flow(
-            success and success.forgetting(self.each), failures, halted and halted.forgetting(self.each)
+            success and success.without_variable(self.each),
+            failures,
+            halted and halted.without_variable(self.each),
         )
 
     def min_time(self, times: MinTimes) -> float:

@@ -1,4 +1,4 @@
-"""Questions that the checker and the diagnosis answer to control nodes, and the answers of the nodes."""
+"""Types with which control nodes, checker and diagnosis exchange facts, failures, complaints and advice."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ MinTimes: TypeAlias = Callable[[Child], float]
 
 
 @dataclass(frozen=True)
-class Complaint:
+class NodeFinding:
     """A mistake in the mission.
 
     Attributes:
-        at: Key or name of a failure at which it stands; "" for the node itself.
+        at: place: Key, or name of a failure, that contains the mistake; "" for the node itself.
         code: Code of the finding.
         message: The mistake, one sentence.
         hint: Remedy, or "".
@@ -51,13 +51,13 @@ class Facts(Protocol):
         """Return the place of a name of a failure for the reader of another: `line 12`."""
 
     def is_literal(self, key: str) -> bool:
-        """Return True if the mission file gives the value of a key there, not by a param or argument."""
+        """Return True if the node gives the value of a key literally, not through a param or an argument."""
 
     def min_time(self, child: Child) -> float:
         """Return a lower bound of the time in which a child can succeed [s]."""
 
     def skill_times(self, child: Child) -> Sequence[tuple[str, float]]:
-        """Return the names and least times [s] of the skills in and below a child."""
+        """Return the names and minimum times [s] of the skills in and below a child."""
 
     def skills(self) -> Sequence[type[Skill] | None]:
         """Return the skills below the node; None stands for a skill that is not installed."""
@@ -70,11 +70,11 @@ class PassedFailure:
     Attributes:
         child: The child that it came from; None if it began in the node.
         reason: Its name: `Grasp.missed`.
-        names: All its names at this node: with the skill and with the labels below.
+        names: All its names at this node: `Skill.reason`, and `label.reason` for each label that it passed.
         handled: The number of failures that the node handled before, by name.
         messages: The last message of each handled failure, by name.
         last: Name of the failure that it handled last, or "".
-        choice: Its last decision.
+        last: Name of the failure that the node handled last, or ""." and "choice: Last decision of the node.
         duration: Time from the start of the node to its end [s].
         has_failed: Returns True if a child ran and failed in this activation of the node.
     """
@@ -96,7 +96,7 @@ class PassedFailure:
 
 @dataclass(frozen=True)
 class Advice:
-    """A change of the mission after which a failure would not end it.
+    """A change of the mission after which a failure would not end the run.
 
     Attributes:
         text: The change, to be followed by its place.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from executive.tree.flow import Enter, Flow, Raise, State, joined
+from executive.tree.flow import Enter, Flow, PossibleFailure, State, joined
 from executive.tree.keys import Child, key
 from executive.tree.node import ControlNode
 
@@ -28,6 +28,6 @@ class Invert(ControlNode):
     def flow(self, enter: Enter, state: State) -> Flow:
         """Exchange the ends of the body."""
         body = enter(self.do, state)
-        inverted = Raise(self.word, "inverted", self.path)
+        inverted = PossibleFailure(self.word, "inverted", self.path)
         failures = {} if body.success is None else {inverted: body.success}
         return Flow(joined(body.failures.values()), failures, body.halted)

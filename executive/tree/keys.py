@@ -15,7 +15,7 @@ from pydantic import Field, TypeAdapter
 from executive.tree.failure import Reason
 
 Child: TypeAlias = Behaviour
-"""A node below a control node; in the checker and the diagnosis a node of the mission stands for it."""
+"""Child of a control node. In the checker and the diagnosis it is a `StandIn` for a node of the mission."""
 
 
 class Variable(str):
@@ -49,13 +49,13 @@ class Key:
         doc: Its meaning, one sentence.
         default: Value if the key is missing; `...` for a required key.
         ge, gt: Inclusive and exclusive lower bound of a number, or None.
-        max_of: Key with children whose number is the upper bound, or "".
+        max_of: Name of the key whose number of nodes is the upper bound of this number, or "".
         max_count: Largest number of nodes in a list, or None.
         is_bare: True if the value may stand directly under the word of the node (or the key of the section).
-        is_partner: True if the key stands beside the word of the node.
+        is_partner: True if the key stands at the same level as the word of the node, as `catch` beside `try`.
         is_in_path: False if the key is left out of the paths of its nodes.
-        of: Key whose nodes raise the failures that a key of reasons names.
-        element_of: Key with the list of which a variable holds one element after the other, or "".
+        raised_under: For a list of reasons: key that holds the nodes which raise these failures.
+        element_of: For a variable: key with the list whose elements the variable takes in turn; or "".
         name: Name in the mission file.
         attribute: Name in the class.
         kind: Content.
@@ -110,12 +110,12 @@ def key(
 ) -> Any:
     """Declare a key; see `Key` for the meaning of the arguments.
 
-    The key has the name of the attribute without the underscore that may follow it.
+    The key has the name of the attribute, without a trailing underscore.
     """
     return Key(doc, default, ge, gt, max_of, max_count, bare, partner, in_path, of, element_of)
 
 
-class Declared:
+class KeyOwner:
     """Base of classes that declare keys.
 
     Attributes:
@@ -156,7 +156,7 @@ class Declared:
             raise TypeError(f"{type(self).__name__} has no key {', '.join(left)}")
 
 
-class Section(Declared):
+class Section(KeyOwner):
     """Mapping below a key of a control node: a subclass declares its keys."""
 
     def __init__(self, **values: object) -> None:
@@ -164,7 +164,7 @@ class Section(Declared):
 
 
 def _complete(declared: Key, attribute: str, hint: Any) -> Key:
-    """Return a key with everything that follows from its attribute and its annotation."""
+    """Return a key with name, attribute, kind and type, as its attribute and annotation declare them."""
     if get_origin(hint) in (Union, types.UnionType) and types.NoneType in get_args(hint):
         hint = Union[tuple(part for part in get_args(hint) if part is not types.NoneType)]  # noqa: UP007
     base = get_args(hint)[0] if get_origin(hint) is Annotated else hint

@@ -22,8 +22,8 @@ from executive.tree.blackboard import Blackboard
 from executive.tree.failure import Failure
 from executive.tree.flow import Enter, Flow, State
 from executive.tree.halting import halt
-from executive.tree.inspection import Advice, Complaint, Facts, MinTimes, PassedFailure
-from executive.tree.keys import Child, Declared, Kind, Section
+from executive.tree.inspection import Advice, Facts, MinTimes, NodeFinding, PassedFailure
+from executive.tree.keys import Child, KeyOwner, Kind, Section
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Site:
     emit: Emit = ignore
 
 
-class ControlNode(Declared, Behaviour):
+class ControlNode(KeyOwner, Behaviour):
     """Base of the control nodes.
 
     Attributes:
@@ -53,9 +53,10 @@ class ControlNode(Declared, Behaviour):
         reasons: The reasons of its own failures.
         symbol: Character that stands before its name in drawings.
         shape: Its shape in Graphviz drawings.
-        remedy: Instruction to the author how this node would handle a failure of a node around which it is
-            put; "" if it cannot.
-        elsewhere: Hints for words of other languages that mean this node.
+        remedy: Advice to the mission author how to handle a failure by wrapping the failing node in this
+            node; "" if this node handles none.
+        elsewhere: foreign_keywords: Hints by the keyword that other mission languages use for this node, as
+            `selector` for `fallback`.
         path: Unique path from the root of the tree.
         label: Its label in the mission, or "".
         failure: Cause of the failure while its status is FAILURE; else None.
@@ -116,7 +117,7 @@ class ControlNode(Declared, Behaviour):
     # The checker.
 
     def flow(self, enter: Enter, state: State) -> Flow:
-        """Return how the node may end if it is entered in a state; `enter` runs a child in the same sense."""
+        """Return how the node may end if it is entered in a state; `enter` returns the same for a child."""
         raise NotImplementedError
 
     def min_time(self, times: MinTimes) -> float:
@@ -124,7 +125,7 @@ class ControlNode(Declared, Behaviour):
         del times
         return 0.0
 
-    def check(self, facts: Facts) -> Iterator[Complaint]:
+    def check(self, facts: Facts) -> Iterator[NodeFinding]:
         """Yield mistakes in the mission that only this kind of node knows."""
         del facts
         yield from ()
@@ -257,10 +258,10 @@ class ControlNode(Declared, Behaviour):
         self._emit(NodeEnded(self.path, status.value, reason=reason, message=message, origin=origin))
 
     def _check_constants(self) -> None:
-        """Return if all constants have the declared types and bounds.
+        """Check that all constants have the declared types and bounds.
 
         Raises:
-            InputError: One has not.
+            InputError: A constant has another type or is out of bounds.
         """
         for key in self.keys.values():
             value = getattr(self, key.attribute)

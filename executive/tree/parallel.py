@@ -8,25 +8,27 @@ from typing import Literal
 from py_trees.common import Status
 
 from executive.tree.failure import Failure
-from executive.tree.flow import Enter, Flow, Raise, State, grips_at_end, joined, together
+from executive.tree.flow import Enter, Flow, PossibleFailure, State, combine_branches, grips_at_end, joined
 from executive.tree.inspection import MinTimes, PassedFailure
 from executive.tree.keys import Children, key
 from executive.tree.node import ControlNode
 
 MAX_BRANCHES = 200
-"""Largest number of branches: every two of them are compared."""
+"""Largest number of branches; limits the time of the checker, which compares every pair of branches."""
 
 
 class Parallel(ControlNode):
-    """All at the same time. Running ones may finish before it fails.
+    """Run all children at the same time.
+
+    If too many fail, the running children may finish before the node fails.
 
     Every running child is ticked once per tick, in order; a child that ended is not run again. The node
     decides after all of them were ticked:
 
     * Enough have succeeded: success, even if others failed in the same tick; the running ones are halted.
     * Too many have failed: the others may finish first, or are halted at once with `halt`. The node fails
-      with the first failure, in the same tick with that of the first child. So an arm that a sibling moves is
-      not stopped on its way.
+      with the first failure; of failures in the same tick, with that of the child listed first.
+      Without `halt`, a motion of the arm by another child is thus completed.
 
     With `wait_for: lead` the node ends as its first child does, in the same tick, and halts the others.
     """
@@ -75,7 +77,7 @@ class Parallel(ControlNode):
         return self._tick()
 
     def _follow_lead(self) -> Status:
-        """Tick the lead, and unless it ended the running others."""
+        """Tick the lead; unless it ended, tick the other running children too."""
         lead, *others = self._running
         status = self.run_child(lead)
         if status is not Status.RUNNING:
@@ -127,37 +129,41 @@ class Parallel(ControlNode):
         flows = [enter(branch, state) for branch in self.do]
         taken = [grips_at_end(flow, state, halts=True) for flow in flows]
         halted = joined(flow.halted for flow in flows)
-        halted = halted and halted.gripping(together(state.grips, taken))
-        failures: dict[Raise, State] = {}
+        halted = halted and halted.with_tools(combine_branches(state.tools, taken))
+        failures: dict[PossibleFailure, State] = {}
         if self._has_lead:
             others = taken[1:]
             for failure, after in flows[0].failures.items():
-                failures[failure] = after.gripping(together(state.grips, [after.grips, *others]))
+                failures[failure] = after.with_tools(combine_branches(state.tools, [after.tools, *others]))
             end = flows[0].success
-            return Flow(end and end.gripping(together(state.grips, [end.grips, *others])), failures, halted)
+            return Flow(
+                end and end.with_tools(combine_branches(state.tools, [end.tools, *others])), failures, halted
+            )
         needed = self._needed
         ends = [grips_at_end(flow, state, self.halt or needed < len(flows)) for flow in flows]
         if sum(bool(flow.failures) for flow in flows) > len(flows) - needed:
             for index, flow in enumerate(flows):
                 others = [*ends[:index], *ends[index + 1 :]]
                 for failure, after in flow.failures.items():
-                    failures[failure] = after.gripping(together(state.grips, [after.grips, *others]))
+                    failures[failure] = after.with_tools(
+                        combine_branches(state.tools, [after.tools, *others])
+                    )
         return Flow(self._success(flows, state), failures, halted)
 
     def _success(self, flows: Sequence[Flow], state: State) -> State | None:
-        """Return the facts once enough branches have succeeded; None if so many cannot."""
+        """Return the state once enough branches have succeeded; None if too few can succeed."""
         succeeding = [flow.success for flow in flows if flow.success is not None]
         success = joined(succeeding)
         if success is None or len(succeeding) < self._needed:
             return None
         if self._needed < len(flows):
             ends = [grips_at_end(flow, state, halts=True) for flow in flows]
-            return success.gripping(together(state.grips, ends))
+            return success.with_tools(combine_branches(state.tools, ends))
         everything = success.writing(name for end in succeeding for name in end.written or ())
-        return everything.gripping(together(state.grips, [end.grips for end in succeeding]))
+        return everything.with_tools(combine_branches(state.tools, [end.tools for end in succeeding]))
 
     def min_time(self, times: MinTimes) -> float:
-        """Return the time of the lead, or of the slowest child of as many as must succeed."""
+        """Return the time of the lead, or the n-th shortest time of a child if n children must succeed."""
         return times(self.do[0]) if self._has_lead else sorted(map(times, self.do))[self._needed - 1]
 
     @property
@@ -177,6 +183,6 @@ class Parallel(ControlNode):
         count = len(self.do)
         needs = {"all": f"all {count}", "any": f"one of its {count}"}
         needed = needs.get(str(self.wait_for), f"{self.wait_for} of its {count}")
-        # The failure that it passes on may be among those that it reported while the others went on.
+        # The failure passed on may have been reported already, when the other branches went on.
         others = [reason for reason in failure.handled if reason != failure.reason]
         return f"needs {needed} branches" + (f"; also failed: {', '.join(others)}" if others else "")

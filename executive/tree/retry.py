@@ -10,8 +10,8 @@ from py_trees.common import Status
 from executive.cell.protocols import Steps
 from executive.skill import Seconds
 from executive.tree.failure import Failure
-from executive.tree.flow import Enter, Flow, Raise, State, joined, loop
-from executive.tree.inspection import Advice, Complaint, Facts, MinTimes, PassedFailure, listed
+from executive.tree.flow import Enter, Flow, PossibleFailure, State, joined, loop
+from executive.tree.inspection import Advice, Facts, MinTimes, NodeFinding, PassedFailure, listed
 from executive.tree.keys import Child, Reasons, Section, key
 from executive.tree.loop import Loop
 
@@ -37,7 +37,7 @@ class Backoff(Section):
 
 
 class Retry(Loop):
-    """Again after a failure.
+    """Run a node again after a failure.
 
     Failures that are not `on` the list, and the last one, are passed on. Every further attempt is preceded by
     the wait `backoff` on the run's clock and then by `recover`; if `recover` fails, the retry fails with the
@@ -68,7 +68,7 @@ class Retry(Loop):
         self._pending: Failure | None = None
 
     def step(self) -> Status:
-        """Tick the current child; begin the next attempt in the same tick if time passed."""
+        """Tick the current child; begin the next attempt in the same tick if the round took time."""
         while True:
             if self._pending is None:
                 status = self.run_round(self.do)
@@ -111,13 +111,13 @@ class Retry(Loop):
         recovery: list[Flow] = []
         waiting: State | None = None
 
-        def is_retried(failure: Raise) -> bool:
+        def is_retried(failure: PossibleFailure) -> bool:
             return not self.on or failure.may_match(self.on)
 
         def again(body: Flow) -> State | None:
             nonlocal waiting
             recovery.clear()
-            retried = (after.dealt_with(one) for one, after in body.failures.items() if is_retried(one))
+            retried = (after.after_handling(one) for one, after in body.failures.items() if is_retried(one))
             waiting = joined(retried) if self.attempts != 1 else None
             if waiting is None or self.recover is None:
                 return waiting
@@ -137,17 +137,17 @@ class Retry(Loop):
         """Return the time of one attempt."""
         return times(self.do)
 
-    def check(self, facts: Facts) -> Iterator[Complaint]:
+    def check(self, facts: Facts) -> Iterator[NodeFinding]:
         """Find attempts that change nothing, and a single attempt."""
         skills = facts.skills()
         if not self.backoff and skills and not any(one is None or one.senses or one.moves for one in skills):
             message = "this retry changes nothing between its attempts: nothing in it looks, moves or waits"
             hint = "Put a look or a motion into do or recover, or wait with backoff."
-            yield Complaint("", "unchanging-retry", message, hint, is_warning=True)
+            yield NodeFinding("", "unchanging-retry", message, hint, is_warning=True)
         # A param may be 1 in one run and 3 in the next.
         if self.attempts == 1 and facts.is_literal("attempts"):
             message = "a retry with 1 attempt never tries again"
-            yield Complaint("attempts", "unchanging-retry", message, is_warning=True)
+            yield NodeFinding("attempts", "unchanging-retry", message, is_warning=True)
 
     def explain_unreachable(self, child: Child) -> str:
         """Return the reason why the recovery never runs."""
@@ -173,8 +173,8 @@ class Retry(Loop):
         return f"all {self.attempts} attempts failed: {_counted(handled)}"
 
     def attempt(self, failure: PassedFailure) -> tuple[int, int]:
-        """Return the number of the attempt that failed, and of allowed attempts."""
-        # Every failure but the last one was handled, and so was that of a recovery.
+        """Return the number of the failed attempt and the number of allowed attempts."""
+        # `handled` counts every failed attempt but the last one, and also a failed recovery.
         return sum(failure.handled.values()) + (-1 if self._gave_up(failure) else 1), self.attempts
 
     def advise(self, failure: PassedFailure) -> Iterator[Advice]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from executive.tree.flow import Enter, Flow, Raise, State, joined
+from executive.tree.flow import Enter, Flow, PossibleFailure, State, joined
 from executive.tree.inspection import MinTimes
 from executive.tree.keys import Child, Children, key
 from executive.tree.node import ControlNode
@@ -36,7 +36,7 @@ class Sequence(ControlNode):
 
     def flow(self, enter: Enter, state: State) -> Flow:
         """Enter each child in the state after the one before it."""
-        failures: dict[Raise, State] = {}
+        failures: dict[PossibleFailure, State] = {}
         halted = None
         here: State | None = state
         for child in self.do:

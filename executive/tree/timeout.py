@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from py_trees.common import Status
 
 from executive.skill import Seconds
-from executive.tree.flow import Enter, Flow, Raise, State
-from executive.tree.inspection import Advice, Complaint, Facts, MinTimes, PassedFailure
+from executive.tree.flow import Enter, Flow, PossibleFailure, State
+from executive.tree.inspection import Advice, Facts, MinTimes, NodeFinding, PassedFailure
 from executive.tree.keys import Child, key
 from executive.tree.node import ControlNode
 
@@ -54,14 +54,14 @@ class Timeout(ControlNode):
         body = enter(self.do, state)
         failures = dict(body.failures)
         if body.halted is not None:
-            failures[Raise(self.word, "timeout", self.path)] = body.halted
+            failures[PossibleFailure(self.word, "timeout", self.path)] = body.halted
         return Flow(body.success, failures, body.halted)
 
     def min_time(self, times: MinTimes) -> float:
         """Return the time of the body."""
         return times(self.do)
 
-    def check(self, facts: Facts) -> Iterator[Complaint]:
+    def check(self, facts: Facts) -> Iterator[NodeFinding]:
         """Compare the limit with the least time of the body."""
         shortest = facts.min_time(self.do)
         if self.seconds >= shortest - CLOCK_TOLERANCE:
@@ -72,7 +72,7 @@ class Timeout(ControlNode):
         parts = [(name, time) for name, time in facts.skill_times(self.do) if time > 0]
         hint = f"At the least: {', '.join(f'{name} {time:.2f} s' for name, time in parts)}."
         is_sum = abs(sum(time for _, time in parts) - shortest) <= 1e-9
-        yield Complaint("seconds", "short-timeout", message, hint if is_sum else "")
+        yield NodeFinding("seconds", "short-timeout", message, hint if is_sum else "")
 
     @property
     def first_child(self) -> Child | None:

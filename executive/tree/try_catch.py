@@ -8,8 +8,8 @@ from typing import ClassVar
 from py_trees.common import Status
 
 from executive.tree.failure import Failure, Reason
-from executive.tree.flow import Enter, Flow, Raise, State, joined
-from executive.tree.inspection import Advice, Complaint, Facts, MinTimes, PassedFailure, listed
+from executive.tree.flow import Enter, Flow, PossibleFailure, State, joined
+from executive.tree.inspection import Advice, Facts, MinTimes, NodeFinding, PassedFailure, listed
 from executive.tree.keys import Child, Reasons, Section, key
 from executive.tree.node import ControlNode
 
@@ -92,7 +92,7 @@ class TryCatch(ControlNode):
                 if failure.may_match(catch.on) and not failure.must_match(earlier)
             }
             earlier += catch.on
-            entry = joined(after.dealt_with(failure) for failure, after in caught.items())
+            entry = joined(after.after_handling(failure) for failure, after in caught.items())
             if entry is None:
                 continue
             for failure in caught:
@@ -109,7 +109,7 @@ class TryCatch(ControlNode):
         fastest = min(times(child) for child in (self.do, *(handler.do for handler in self.catch)))
         return fastest + (times(self.finally_) if self.finally_ else 0.0)
 
-    def check(self, facts: Facts) -> Iterator[Complaint]:
+    def check(self, facts: Facts) -> Iterator[NodeFinding]:
         """Find every failure in a handler that earlier ones take already, by this name or another."""
         body = facts.flow(self.do)
         earlier: list[Reason] = []
@@ -118,7 +118,7 @@ class TryCatch(ControlNode):
             if meant and all(failure.must_match(earlier) for failure in meant):
                 taker = next(e for e in earlier if meant[0].must_match([e]))
                 message = f"{reason} is caught already, as {taker} in {facts.place(taker, reason)}"
-                yield Complaint(reason, "unreachable", message, is_warning=True)
+                yield NodeFinding(reason, "unreachable", message, is_warning=True)
             earlier.append(reason)
 
     @property
@@ -152,7 +152,7 @@ class TryCatch(ControlNode):
 def _finish(last: Child, flow: Flow, enter: Enter) -> Flow:
     """Return how a node may end whose last child runs after each of the ends in `flow`."""
     success, halted = None, flow.halted
-    failures: dict[Raise, State] = {}
+    failures: dict[PossibleFailure, State] = {}
     if flow.success is not None:
         end = enter(last, flow.success)
         success, halted = end.success, joined((halted, end.halted))

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from py_trees.common import Status
 
 from executive.tree.flow import Enter, Flow, State, joined, loop
-from executive.tree.inspection import Complaint, Facts, PassedFailure
+from executive.tree.inspection import Facts, NodeFinding, PassedFailure
 from executive.tree.keys import Child, key
 from executive.tree.loop import Loop
 
@@ -65,12 +65,12 @@ class While(Loop):
         halted = joined((condition.halted, entry, *(flow.halted for flow in rounds)))
         return Flow(joined(condition.failures.values()), failures, halted)
 
-    def check(self, facts: Facts) -> Iterator[Complaint]:
+    def check(self, facts: Facts) -> Iterator[NodeFinding]:
         """Find a loop that never ends."""
         condition = facts.flow(self.condition)
         if condition is not None and not condition.failures and not facts.is_halted_by_sibling:
             message = f"this loop never ends: its condition, {facts.name(self.condition)}, cannot fail"
-            yield Complaint("", "endless", message, "Use repeat with times or until.")
+            yield NodeFinding("", "endless", message, "Use repeat with times or until.")
 
     def explain_unreachable(self, child: Child) -> str:
         """Return the cause, the condition."""

@@ -91,7 +91,7 @@ class Choose(Chance):
 
 
 class Take(Chance):
-    """Grip."""
+    """PossibleTool."""
 
     chosen: In[int]
     reasons: ClassVar = ("missed",)
@@ -249,7 +249,7 @@ def hold_against_runs(tree: Tree, seed: int) -> None:
             assert key in ends, f"the checker has not foreseen {key}"
             assert str(failure) in [f"{ending.source}.{ending.reason}" for ending in endings(flow)]
             state = ends[key]
-        assert state.may_be(HOLDING if world.holding else EMPTY), "the checker thinks the tool otherwise"
+        assert state.find_tool(HOLDING if world.holding else EMPTY), "the checker thinks the tool otherwise"
 
 
 def test_a_good_part_of_the_random_trees_can_run() -> None:

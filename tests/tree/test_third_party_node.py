@@ -24,7 +24,7 @@ from collections.abc import Iterator
 from py_trees.common import Status
 
 from executive.skill import Seconds
-from executive.tree.flow import Enter, Flow, State, grips_at_end, joined, together
+from executive.tree.flow import Enter, Flow, State, grips_at_end, joined, combine_branches
 from executive.tree.inspection import MinTimes, PassedFailure
 from executive.tree.keys import Children, key
 from executive.tree.node import ControlNode
@@ -60,11 +60,11 @@ class Race(ControlNode):
     def flow(self, enter: Enter, state: State) -> Flow:
         flows = [enter(child, state) for child in self.do]
         ends = [grips_at_end(flow, state, halts=True) for flow in flows]
-        grips = together(state.grips, ends)
+        tools = combine_branches(state.tools, ends)
         success = joined(flow.success for flow in flows)
         halted = joined(flow.halted for flow in flows)
-        failures = {one: after.gripping(grips) for flow in flows for one, after in flow.failures.items()}
-        return Flow(success and success.gripping(grips), failures, halted and halted.gripping(grips))
+        failures = {one: after.with_tools(tools) for flow in flows for one, after in flow.failures.items()}
+        return Flow(success and success.with_tools(tools), failures, halted and halted.with_tools(tools))
 
     def min_time(self, times: MinTimes) -> float:
         return min(times(child) for child in self.do)

@@ -14,7 +14,7 @@ from executive.campaign.faults.trial import Numbered, empty_trial, try_out
 from executive.campaign.pool import do_all
 from executive.campaign.subject import Subject
 from executive.errors import InputError
-from executive.mission.model.instance import model_of, node_of
+from executive.mission.model.instance import inspection_instance, node_of
 from executive.mission.model.nodes import InnerNode, Node, UseNode
 from executive.mission.source import Mark
 from executive.view.figures.fault import Branch, FaultFigures, Trial
@@ -176,7 +176,7 @@ def branches(tree: Node, trials: Iterable[Trial]) -> tuple[Branch, ...]:
 def _ways(tree: Node) -> Iterator[tuple[Mark, str, Node]]:
     for node in tree.walk():
         if isinstance(node, InnerNode):
-            for what, child in model_of(node).contingencies():
+            for what, child in inspection_instance(node).contingencies():
                 yield node_of(child).mark, what, node_of(child)
 
 

@@ -8,7 +8,7 @@ from typing import cast
 from executive.mission.check.case import Case
 from executive.mission.check.min_times import min_time
 from executive.mission.findings import Finding, error, warning
-from executive.mission.model.instance import count_in, model_of, node_of
+from executive.mission.model.instance import count_in, inspection_instance, node_of
 from executive.mission.model.nodes import InnerNode, Node, Part, Section, SkillNode, parts
 from executive.mission.model.paths import name_of
 from executive.mission.model.typed import WrongType, read_constant
@@ -17,7 +17,7 @@ from executive.mission.words import describe
 from executive.skill import Skill
 from executive.tree.failure import Reason
 from executive.tree.flow import Flow
-from executive.tree.inspection import Complaint
+from executive.tree.inspection import NodeFinding
 from executive.tree.keys import Child, Key, Kind
 
 
@@ -62,18 +62,18 @@ def complaints(case: Case) -> Iterator[Finding]:
     """Find the mistakes that only the class of a control node knows."""
     halted = {node.path for node in _halted(case)}
     for node in case.inner_nodes():
-        for complaint in model_of(node).check(NodeFacts(case, node, node.path in halted)):
+        for complaint in inspection_instance(node).check(NodeFacts(case, node, node.path in halted)):
             yield _finding(node, complaint)
 
 
 def _halted(case: Case) -> Iterator[Node]:
     """Yield every node that is halted when a concurrent one has ended."""
     for node in case.inner_nodes():
-        for child in model_of(node).halted:
+        for child in inspection_instance(node).halted:
             yield from node_of(child).walk()
 
 
-def _finding(node: InnerNode, complaint: Complaint) -> Finding:
+def _finding(node: InnerNode, complaint: NodeFinding) -> Finding:
     mark, note = node.mark, ""
     if isinstance(complaint.at, Match):
         mark = complaint.at.mark

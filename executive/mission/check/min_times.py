@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from executive.cell.protocols import LeastTimes
 from executive.mission.check.case import Case
-from executive.mission.model.instance import is_sound, model_of, node_of
+from executive.mission.model.instance import has_valid_constants, inspection_instance, node_of
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
 from executive.mission.model.typed import WrongType, convert
 from executive.mission.model.wiring import literals
@@ -20,8 +20,8 @@ def min_time(case: Case, node: Node) -> float:
             return _skill(case, node)
         case UseNode(body=Node() as body):
             return min_time(case, body)
-        case InnerNode() if is_sound(node):
-            return model_of(node).min_time(lambda child: min_time(case, node_of(child)))
+        case InnerNode() if has_valid_constants(node):
+            return inspection_instance(node).min_time(lambda child: min_time(case, node_of(child)))
     return 0.0
 
 
@@ -38,9 +38,9 @@ def _skill(case: Case, node: SkillNode) -> float:
             # Another check says so.
             return 0.0
     entry = case.flow.entry.get(node.path)
-    grips = entry.grips if entry else None
+    tools = entry.tools if entry else None
     carries = skill.tool_state[0] is HOLDING
-    from_elsewhere = carries and (grips is None or any(grip.moved for grip in grips))
+    from_elsewhere = carries and (tools is None or any(grip.moved for grip in tools))
     # How long a carry takes is known from where objects lie, not from wherever the arm went with its load.
     return skill.shortest(_FromAnywhere(case.least) if from_elsewhere else case.least, given)
 

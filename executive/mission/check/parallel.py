@@ -7,7 +7,7 @@ from itertools import combinations, permutations
 
 from executive.mission.check.case import Case
 from executive.mission.findings import Finding, error
-from executive.mission.model.instance import model_of, node_of
+from executive.mission.model.instance import inspection_instance, node_of
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
 from executive.mission.model.paths import word_of
 from executive.mission.model.wiring import references, variables
@@ -72,7 +72,7 @@ def racing_reads(case: Case) -> Iterator[Finding]:
 def _concurrent(case: Case) -> Iterator[list[Node]]:
     """Yield the children of each node that run at the same time."""
     for node in case.inner_nodes():
-        if branches := model_of(node).concurrent:
+        if branches := inspection_instance(node).concurrent:
             yield [node_of(branch) for branch in branches]
 
 
@@ -80,7 +80,7 @@ def _first(node: Node) -> Node:
     """Return the node with which another begins in its first tick."""
     if isinstance(node, UseNode):
         return _first(node.body) if node.body else node
-    first = model_of(node).first_child if isinstance(node, InnerNode) else None
+    first = inspection_instance(node).first_child if isinstance(node, InnerNode) else None
     return _first(node_of(first)) if first else node
 
 

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from executive.mission.check.case import Case
 from executive.mission.findings import Finding, error, warning
 from executive.mission.flow.analysis import Analysis
-from executive.mission.model.instance import model_of, node_of
+from executive.mission.model.instance import inspection_instance, node_of
 from executive.mission.model.nodes import InnerNode, Node, SkillNode
 from executive.mission.model.paths import name_of
 from executive.mission.source import Mark
 from executive.skill import EMPTY, HOLDING
-from executive.tree.flow import Grip
+from executive.tree.flow import PossibleTool
 from executive.tree.node import ControlNode
 
 
@@ -22,7 +22,7 @@ def unreachable(case: Case) -> Iterator[Finding]:
 
 
 def _unreachable(node: Node, flow: Analysis) -> Iterator[Finding]:
-    model = model_of(node) if isinstance(node, InnerNode) else None
+    model = inspection_instance(node) if isinstance(node, InnerNode) else None
     for child in node.children:
         if child.path in flow.entry:
             yield from _unreachable(child, flow)
@@ -48,11 +48,11 @@ def tool_states(case: Case) -> Iterator[Finding]:
         before, door = case.skills[node.skill].tool_state[0], case.doors.get(path)
         mark = door.mark if door else node.mark
         who = f'{node.skill} in the subtree "{door.name}"' if door else node.skill
-        if before is EMPTY and (grip := entry.may_be(HOLDING)):
+        if before is EMPTY and (grip := entry.find_tool(HOLDING)):
             message = f"{who} needs an empty tool, but something may still be held here"
             hint = f"{_since(flow, grip, mark)} Put it down on every way from there to here."
             yield error(mark, "tool-state", message, hint)
-        if before is HOLDING and (grip := entry.may_be(EMPTY)):
+        if before is HOLDING and (grip := entry.find_tool(EMPTY)):
             message = f"{who} needs something in the tool, but it may be empty here"
             yield error(mark, "tool-state", message, _since(flow, grip, mark))
 
@@ -60,12 +60,12 @@ def tool_states(case: Case) -> Iterator[Finding]:
 def held_at_the_end(case: Case) -> Iterator[Finding]:
     """Find out whether the mission may succeed with something in the tool."""
     flow = case.flow
-    if flow.result.success and (grip := flow.result.success.may_be(HOLDING)):
+    if flow.result.success and (grip := flow.result.success.find_tool(HOLDING)):
         message = "the mission may end well with something still in the tool"
         yield warning(case.tree.mark, "tool-state", message, _since(flow, grip, case.tree.mark))
 
 
-def _since(flow: Analysis, grip: Grip, mark: Mark) -> str:
+def _since(flow: Analysis, grip: PossibleTool, mark: Mark) -> str:
     """Return since when the tool may be so, and which failure led on from there."""
     node = flow.nodes.get(grip.since)
     after = f", when {grip.after} is dealt with" if grip.after else ""

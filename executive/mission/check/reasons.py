@@ -11,7 +11,7 @@ from executive.mission.model import grammar
 from executive.mission.model.nodes import InnerNode, Node, Section, SkillNode, nodes_of, parts
 from executive.mission.model.values import Match
 from executive.mission.source import Mark
-from executive.tree.flow import ANYTHING, Raise
+from executive.tree.flow import UNKNOWN_NAME, PossibleFailure
 from executive.tree.keys import Key, Kind
 
 
@@ -103,7 +103,7 @@ def _unknown(case: Case, flow: Analysis, match: Match, body: Node) -> Finding | 
     """Return a finding where what a name means has no such reason, wherever it stands."""
     skill = case.skills.get(match.source)
     reasons = skill.reasons if skill else _reasons(flow, body).get(match.source)
-    if reasons is None or match.reason in reasons or ANYTHING in reasons:
+    if reasons is None or match.reason in reasons or UNKNOWN_NAME in reasons:
         return None
     hint = alternatives(match.reason, reasons, f"{match.source} may fail with")
     return error(match.mark, "unknown-reason", f'{match.source} never fails with "{match.reason}"', hint)
@@ -124,7 +124,7 @@ def _reasons(flow: Analysis, body: Node) -> dict[str, list[str]]:
     return {source: list(dict.fromkeys(found)) for source, found in reasons.items()}
 
 
-def _meant(flow: Analysis, match: Match, coming: list[Raise]) -> list[Node]:
+def _meant(flow: Analysis, match: Match, coming: list[PossibleFailure]) -> list[Node]:
     """Return the nodes that a name means; a label means whatever fails under it, and so one thing."""
     if any(match.source in failure.labels for failure in coming):
         return []

@@ -9,21 +9,21 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from executive.mission.findings import suggest
-from executive.mission.model.instance import model_of, node_of
+from executive.mission.model.instance import inspection_instance, node_of
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
 from executive.mission.model.wiring import wires
 from executive.skill import Direction, Skill
 from executive.tree.flow import (
-    ANYTHING,
-    BEGINNING,
+    INITIAL_STATE,
     UNKNOWN,
+    UNKNOWN_NAME,
     Flow,
-    Raise,
+    PossibleFailure,
     State,
     joined,
-    left_after,
-    left_after_failure,
     required,
+    tools_after_failure,
+    tools_after_success,
 )
 from executive.tree.keys import Child
 from executive.tree.node import ControlNode
@@ -55,7 +55,7 @@ class Analysis:
         self._skills = skills
         self._known: dict[tuple[str, State], Flow] = {}
         self._models: dict[str, ControlNode] = {}
-        self.result = self._run(tree, BEGINNING)
+        self.result = self._run(tree, INITIAL_STATE)
 
     def skill(self, name: str) -> type[Skill] | None:
         """Return the skill of this name, or the one that was probably meant."""
@@ -74,7 +74,7 @@ class Analysis:
         match node:
             case InnerNode():
                 if node.path not in self._models:
-                    self._models[node.path] = model_of(node)
+                    self._models[node.path] = inspection_instance(node)
                 return self._models[node.path].flow(self._enter, state)
             case SkillNode():
                 return self._skill(node, state)
@@ -83,7 +83,7 @@ class Analysis:
         for part in node.children:
             # The states around the parts of an unknown node are not those that the author meant.
             self._run(part, UNKNOWN)
-        return Flow(UNKNOWN, {Raise(ANYTHING, ANYTHING, node.path): UNKNOWN}, UNKNOWN)
+        return Flow(UNKNOWN, {PossibleFailure(UNKNOWN_NAME, UNKNOWN_NAME, node.path): UNKNOWN}, UNKNOWN)
 
     def _enter(self, child: Child, state: State) -> Flow:
         return self._run(node_of(child), state)
@@ -91,17 +91,17 @@ class Analysis:
     def _skill(self, node: SkillNode, state: State) -> Flow:
         skill = self.skill(node.skill)
         if skill is None:
-            return Flow(UNKNOWN, {Raise(node.skill, ANYTHING, node.path): UNKNOWN}, UNKNOWN)
+            return Flow(UNKNOWN, {PossibleFailure(node.skill, UNKNOWN_NAME, node.path): UNKNOWN}, UNKNOWN)
         before, after = skill.tool_state
-        state = state.gripping(required(state.grips, before, node.path))
+        state = state.with_tools(required(state.tools, before, node.path))
         outputs = [wire.variable for wire in wires(node, skill, Direction.OUT)]
         end = state.moved() if skill.moves else state
-        success = end.writing(outputs).gripping(left_after(end.grips, after, node.path))
+        success = end.writing(outputs).with_tools(tools_after_success(end.tools, after, node.path))
 
         def left(by: str) -> State:
-            return end.gripping(left_after_failure(end.grips, skill.tool_left.get(by), node.path))
+            return end.with_tools(tools_after_failure(end.tools, skill.tool_left.get(by), node.path))
 
-        failures = {Raise(node.skill, reason, node.path): left(reason) for reason in skill.reasons}
+        failures = {PossibleFailure(node.skill, reason, node.path): left(reason) for reason in skill.reasons}
         return Flow(success, failures, left(HALT))
 
     def _use(self, node: UseNode, body: Node, state: State) -> Flow:

@@ -44,7 +44,7 @@ def node_of(child: Child) -> Node:
     return child.node
 
 
-def model_of(node: InnerNode) -> ControlNode:
+def inspection_instance(node: InnerNode) -> ControlNode:
     """Return an instance that never runs: it answers questions about its node. Its children are `StandIn`s.
 
     A wrong constant, about which another check complains, is replaced by a default or by a large number.
@@ -58,7 +58,7 @@ def instance(node: InnerNode, site: Site, build: Build) -> ControlNode:
     return node.kind(site, **_values(node, build))
 
 
-def is_sound(node: InnerNode) -> bool:
+def has_valid_constants(node: InnerNode) -> bool:
     """Return True if all constants of a node have values that fit."""
     for key in node.kind.keys.values():
         part = node.values.get(key.name)

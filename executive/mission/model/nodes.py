@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 from executive.mission.model.values import Match, Named, Setting, Value
 from executive.mission.source import Mark
-from executive.tree.keys import Declared, Key
+from executive.tree.keys import Key, KeyOwner
 from executive.tree.node import ControlNode
 
 
@@ -78,7 +78,7 @@ class Section:
         kind: Class that declares the keys.
     """
 
-    kind: type[Declared]
+    kind: type[KeyOwner]
     mark: Mark
     values: Mapping[str, Part]
 

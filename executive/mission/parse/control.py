@@ -57,7 +57,7 @@ def read_control(parser: NodeParser, head: Head, kind: type[ControlNode]) -> mod
         if (value := head.node.get(name)) is not None:
             fields = Fields(head.word, head.mark, head.node, head.node.keys, parser.findings)
             reader.read(fields, key, value, value.mark, values)
-    if reader.is_sound and kind.one_of and not any(_is_given(head, name) for name in kind.one_of):
+    if reader.has_valid_constants and kind.one_of and not any(_is_given(head, name) for name in kind.one_of):
         where = " beside it" if set(kind.one_of) <= set(beside) else ""
         listed = " or ".join(f'"{name}"' for name in kind.one_of)
         parser.refuse(head.mark, "missing-key", f"{head.word} needs {listed}{where}")
@@ -79,12 +79,12 @@ class _Reader:
     """Reads the keys of one control node.
 
     Attributes:
-        is_sound: False if the value of the node is no mapping where it must be one.
+        has_valid_constants: False if the value of the node is no mapping where it must be one.
     """
 
     def __init__(self, parser: NodeParser) -> None:
         self.parser = parser
-        self.is_sound = True
+        self.has_valid_constants = True
 
     def read_inner(
         self, owner: str, mark: Mark, value: yaml.Node, kind: type[ControlNode] | type[DeclaredSection]
@@ -99,7 +99,7 @@ class _Reader:
             self.read(fields, bare, value, mark, values)
             return values
         fields = Fields(owner, mark, value, inner, self.parser.findings)
-        self.is_sound = self.is_sound and fields.sound
+        self.has_valid_constants = self.has_valid_constants and fields.sound
         for name, key in inner.items():
             found = fields.required(name) if key.is_required else fields.get(name)
             if found is not None:

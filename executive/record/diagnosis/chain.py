@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from executive.mission.model.instance import model_of, node_of
+from executive.mission.model.instance import inspection_instance, node_of
 from executive.mission.model.nodes import InnerNode, Node, UseNode
 from executive.mission.model.paths import name_of
 from executive.record.timeline.activation import Activation
@@ -69,7 +69,7 @@ def chain(tree: Node, timeline: Timeline, origin: str, failure: str) -> tuple[Li
         node = passed[index]
         below = passed[index + 1] if index + 1 < len(passed) else None
         subtree = next((one.name for one in reversed(passed[:index]) if isinstance(one, UseNode)), "")
-        model = model_of(node) if isinstance(node, InnerNode) else None
+        model = inspection_instance(node) if isinstance(node, InnerNode) else None
         named = frozenset(Reason(name, reason) for name in names)
         links.append(Link(node, subtree, model, _passed(timeline, node, model, below, named)))
         names |= {node.label} if node.label else set()

@@ -85,7 +85,8 @@ class ItemsTimeline:
     Attributes:
         by_name: Events of each item by name, in the order of their first looks.
         look: The last look, or None.
-        classes: Classes that were seen; each class keeps its place.
+        classes: Classes that were detected, in the order of the looks that detected them first (a dict as
+            an ordered set).
     """
 
     by_name: dict[str, ItemTimeline] = field(default_factory=dict)

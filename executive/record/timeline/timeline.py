@@ -38,7 +38,7 @@ class Timeline:
         nodes: Last activation of each node, by path.
         counts: Number of ended activations of each node by status, by path.
         last_end: The activation that ended last, or None.
-        halted: Paths of the skills that were halted since a node started or ended otherwise.
+        halted: Paths of the skills that were halted since a node last started, succeeded or failed.
         activations: All activations in the order of their starts.
         items: Events of the items.
         targets: Last selection of each item, by name.
@@ -145,7 +145,7 @@ class Timeline:
     def _start(self, event: events.NodeStarted) -> None:
         interrupted = self.nodes.get(event.node)
         if interrupted is not None and interrupted.status == "RUNNING":
-            # A resumed run starts the nodes again that were running.
+            # A resumed run restarts the nodes that were running.
             self._close(interrupted, "INVALID")
         self._root = self._root or event.node
         self._count += 1
@@ -189,7 +189,7 @@ class Timeline:
 
     def _add_reading(self, event: events.InputRead) -> None:
         self._readings.pop(event.name, None)
-        # A sentence cannot contain poses, images and lists.
+        # The sentences of the diagnosis can quote these types, but no poses, images and lists.
         if isinstance(event.value, (bool, int, float, str)):
             reading = Reading(event.name, event.value, event.raised, self.tick, self.clock)
             self._readings[event.name] = reading
