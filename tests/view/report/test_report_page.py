@@ -32,6 +32,9 @@ def change(file: Path, change: Any) -> None:
 
 def nasty(value: Any) -> Any:
     """Return a value with something nasty behind every text that a mission or a skill may choose."""
+    if isinstance(value, dict) and value.get("kind") == "InputRead":
+        # A journal with other names or values of inputs is refused.
+        return value
     if isinstance(value, dict):
         return {key: each if key in WORDS else nasty(each) for key, each in value.items()}
     if isinstance(value, list):
