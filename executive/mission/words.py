@@ -68,7 +68,7 @@ def violation(problem: Mapping[str, Any]) -> str:
     return f"is not allowed here: {problem['msg'][:1].lower()}{problem['msg'][1:]}"
 
 
-def _meant(kind: str, given: Any) -> str:
+def _meant(kind: str, given: object) -> str:
     """Return what was probably meant, in brackets, or ""."""
     if kind == "bool_type" and isinstance(given, str) and given.lower() in _TRUTHS:
         return f" (write {_TRUTHS[given.lower()]})"

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 
-class Blackboard(Mapping[str, Any]):
+class Blackboard(Mapping[str, object]):
     """The variables of one run by name; skills read them when they start and write them when they succeed.
 
     One store per run, never one per process: many missions may run side by side. Subtrees share it;
@@ -14,9 +13,9 @@ class Blackboard(Mapping[str, Any]):
     """
 
     def __init__(self) -> None:
-        self._values: dict[str, Any] = {}
+        self._values: dict[str, object] = {}
 
-    def __getitem__(self, name: str) -> Any:
+    def __getitem__(self, name: str) -> object:
         return self._values[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -25,7 +24,7 @@ class Blackboard(Mapping[str, Any]):
     def __len__(self) -> int:
         return len(self._values)
 
-    def write(self, values: Mapping[str, Any]) -> None:
+    def write(self, values: Mapping[str, object]) -> None:
         """Set all these variables at once."""
         self._values.update(values)
 

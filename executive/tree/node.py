@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -71,7 +71,7 @@ class ControlNode(KeyOwner, Behaviour):
     elsewhere: ClassVar[Mapping[str, str]] = {}
     subtrees: tuple[str, ...] = ()
 
-    def __init__(self, site: Site, **values: Any) -> None:
+    def __init__(self, site: Site, **values: object) -> None:
         super().__init__(site.label or self.word)
         self.path, self.label = site.path, site.label
         self.clock, self.blackboard = site.clock, site.blackboard

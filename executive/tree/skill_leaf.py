@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -31,7 +30,7 @@ class Wiring:
         outputs: Variable written by each output.
     """
 
-    constants: Mapping[str, Any] = field(default_factory=dict)
+    constants: Mapping[str, object] = field(default_factory=dict)
     inputs: Mapping[str, str] = field(default_factory=dict)
     outputs: Mapping[str, str] = field(default_factory=dict)
 
@@ -127,7 +126,7 @@ class SkillLeaf(Behaviour):
         self._run = SkillRun(self.skill_type(**self.wiring.constants, **inputs), self._cell)
         return self._run
 
-    def _read(self) -> dict[str, Any]:
+    def _read(self) -> dict[str, object]:
         inputs = {}
         for port, variable in self.wiring.inputs.items():
             if variable in self._blackboard:
@@ -139,14 +138,14 @@ class SkillLeaf(Behaviour):
                 )
         return inputs
 
-    def _item_of(self, values: Mapping[str, Any]) -> str:
+    def _item_of(self, values: Mapping[str, object]) -> str:
         """Return the item that these port values are about, or ""."""
         for value in values.values():
             if isinstance(value, Target):
                 return value.item
-        return next((values[port] for port in self._item_ports if values.get(port)), "")
+        return next((str(values[port]) for port in self._item_ports if values.get(port)), "")
 
-    def _succeed(self, values: Mapping[str, Any]) -> None:
+    def _succeed(self, values: Mapping[str, object]) -> None:
         outputs = {port: values[port] for port in self.wiring.outputs}
         self._blackboard.write({self.wiring.outputs[port]: value for port, value in outputs.items()})
         self._item = self._item_of(outputs) or self._item
@@ -184,5 +183,5 @@ def _bare(wired: Mapping[str, str]) -> dict[str, str]:
     return {port: variable.rpartition(".")[2] for port, variable in wired.items()}
 
 
-def _shown(value: Any) -> str:
+def _shown(value: object) -> str:
     return ", ".join(map(str, value)) if isinstance(value, tuple | list) else str(value)

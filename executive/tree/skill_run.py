@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from executive.errors import Fault
 from executive.skill import Direction, Skill, SkillFailed
@@ -26,7 +26,7 @@ class SkillRun:
     def __init__(self, skill: Skill, cell: Cell) -> None:
         self.skill = skill
         self._cell = cell
-        self._steps: Iterator[Any] | None = None
+        self._steps: Iterator[object] | None = None
 
     def step(self) -> bool:
         """Advance the skill by one step, starting it at the first call; return True once it has succeeded.
@@ -56,7 +56,7 @@ class SkillRun:
             raise Fault(f"it succeeded without setting its output {', '.join(unset)}")
         return True
 
-    def outputs(self) -> dict[str, Any]:
+    def outputs(self) -> dict[str, object]:
         """Return the outputs by name; all are set once the skill has succeeded."""
         return {name: getattr(self.skill, name) for name in self._output_names}
 

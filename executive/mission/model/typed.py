@@ -44,7 +44,7 @@ def is_plain(declared: Any) -> bool:
     return False
 
 
-def input_fault(value: Any, port: Port) -> str:
+def input_fault(value: object, port: Port) -> str:
     """Return what is wrong with a value in a mission file for an input, to follow its name, or ""."""
     if value is None and fits(type(None), port.type):
         return ""
@@ -58,7 +58,7 @@ def input_fault(value: Any, port: Port) -> str:
     return ""
 
 
-def convert(value: Any, declared: Any) -> Any:
+def convert(value: object, declared: Any) -> Any:
     """Return a plain value as the declared type: lists become tuples, whole numbers floats.
 
     Raises:
@@ -69,7 +69,7 @@ def convert(value: Any, declared: Any) -> Any:
     return _read(_adapter(declared), value)
 
 
-def read_constant(key: Key, value: Any, most: int | None = None) -> Any:
+def read_constant(key: Key, value: object, most: int | None = None) -> Any:
     """Return a plain value as a constant of a control node; `most` is the largest allowed number, or None.
 
     Raises:
@@ -78,7 +78,7 @@ def read_constant(key: Key, value: Any, most: int | None = None) -> Any:
     return _read(key.adapter(most), value)
 
 
-def _read(adapter: TypeAdapter[Any], value: Any) -> Any:
+def _read(adapter: TypeAdapter[Any], value: object) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         raise WrongType(f"must be a finite number, not {value}")
     try:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from typing import Any
 
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.model.values import Literal, Match, Reference, Setting, Value
@@ -168,7 +167,7 @@ def _misplaced_dollars(node: Node) -> Iterator[Finding]:
             yield error(scalar.mark, "bad-reference", message, hint)
 
 
-def _unescaped(value: Any) -> Any:
+def _unescaped(value: object) -> object:
     """Return a plain value with every `$$` in its texts as `$`."""
     if isinstance(value, str):
         return value.replace("$$", "$")
