@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping as Mapped
 from dataclasses import replace
+from typing import Any
 
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.model import grammar
@@ -17,13 +18,7 @@ from executive.mission.source import Mark
 from executive.mission.text.yaml_text import Mapping, Node, plain
 from executive.mission.words import describe
 
-TYPES: Mapped[str, object] = {
-    "text": str,
-    "integer": int,
-    "number": float,
-    "boolean": bool,
-    "list": list[object],
-}
+TYPES: Mapped[str, Any] = {"text": str, "integer": int, "number": float, "boolean": bool, "list": list[Any]}
 """The types a param may have, by the word for them."""
 
 
@@ -90,7 +85,7 @@ def _impossible(param: Param) -> str:
     return ""
 
 
-def _any_value(param: Param) -> object:
+def _any_value(param: Param) -> Any:
     """Return a value that a param could have, so that one that is missing is told once, not at every use."""
     if param.choices:
         return param.choices[0]
@@ -108,7 +103,7 @@ def _declared_type(fields: Fields, findings: list[Finding]) -> str:
     return ""
 
 
-def _type_of(value: object) -> str:
+def _type_of(value: Any) -> str:
     kinds = {word: getattr(kind, "__origin__", kind) for word, kind in TYPES.items()}
     return next((word for word, kind in kinds.items() if type(value) is kind), "")
 
@@ -150,7 +145,7 @@ def _checked(name: str, param: Param, value: Literal, findings: list[Finding]) -
     return replace(param, value=replace(value, value=fitting))
 
 
-def _out_of_bounds(param: Param, value: object) -> str:
+def _out_of_bounds(param: Param, value: Any) -> str:
     if isinstance(value, int | float):
         if param.minimum is not None and value < param.minimum:
             return f"must be at least {param.minimum:g}"
