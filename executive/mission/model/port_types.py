@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import types
 from collections.abc import Sequence
-from typing import NoReturn, Union, get_args, get_origin
+from typing import Any, NoReturn, Union, get_args, get_origin
 
 _WORDS = {
     str: "a text",
@@ -15,9 +15,9 @@ _WORDS = {
 }
 
 
-def fits(given: object, wanted: object) -> bool:
+def fits(given: Any, wanted: Any) -> bool:
     """Tell whether every value of the type `given` is one of the type `wanted`."""
-    if given is object or wanted is object or given == wanted or given is NoReturn:
+    if given is Any or wanted is Any or given == wanted or given is NoReturn:
         return True
     if _is_union(given):
         return all(fits(part, wanted) for part in get_args(given))
@@ -31,32 +31,32 @@ def fits(given: object, wanted: object) -> bool:
     return all(fits(one, other) for one, other in inner if ... not in (one, other))
 
 
-def element_of(listed: object) -> object:
+def element_of(listed: Any) -> Any:
     """Return the type of the elements of a list type, or None where it is no list."""
-    if listed is object:
-        return object
+    if listed is Any:
+        return Any
     if not issubclass(_class_of(listed), Sequence) or _class_of(listed) is str:
         return None
     arguments = [argument for argument in get_args(listed) if argument is not ...]
-    return Union[tuple(arguments)] if arguments else object  # noqa: UP007 - made of as many as there are
+    return Union[tuple(arguments)] if arguments else Any  # noqa: UP007 - made of as many as there are
 
 
-def called(declared: object) -> str:
+def called(declared: Any) -> str:
     """Return what values of a type are called in a sentence."""
     if declared in _WORDS:
         return _WORDS[declared]
     if _is_union(declared):
         return " or ".join(called(part) for part in get_args(declared))
     element = element_of(declared)
-    if element is not None and declared is not object:
-        return "a list" if element is object else f"a list of {called(element).removeprefix('a ')}"
+    if element is not None and declared is not Any:
+        return "a list" if element is Any else f"a list of {called(element).removeprefix('a ')}"
     return getattr(declared, "__name__", str(declared))
 
 
-def _is_union(declared: object) -> bool:
+def _is_union(declared: Any) -> bool:
     return get_origin(declared) in (Union, types.UnionType)
 
 
-def _class_of(declared: object) -> type:
+def _class_of(declared: Any) -> type:
     origin = get_origin(declared) or declared
     return origin if isinstance(origin, type) else object
