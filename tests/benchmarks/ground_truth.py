@@ -183,7 +183,7 @@ class AuditedCell(SimCell):
         body = self._tool.held_body
         if body is None:
             return
-        for record in self._ledger.records:
+        for record in self.accounts.records:
             if record.state is State.HELD:
                 self._carried[body] = record.item
 
@@ -195,21 +195,21 @@ class AuditedCell(SimCell):
     def _find(self, body: int) -> FoundObject:
         """Return the true end of a body."""
         places = [self._initial[body], *self._world.stood.get(body, ())]
-        gate = self._config.ledger.gate
+        gate = self.config.ledger.gate
         counts = audit(
-            self._world, {body: places}, self._ledger.records, self._bins, self._routes, gate,
+            self._world, {body: places}, self.accounts.records, self.cell.bins, self.routes, gate,
             held=self._tool.held_body, fallen=self._tool.fallen,
         )  # fmt: skip
         seen_there = tuple(
             record.item
-            for record in self._ledger.records
-            if any(float(np.linalg.norm(record.first[:2] - place[:2])) <= gate for place in places)
+            for record in self.accounts.records
+            if any(float(np.linalg.norm(record.first_position[:2] - place[:2])) <= gate for place in places)
         )
         carried = self._carried.get(body)
         inside = ""
         if body in self._world.bodies:
             position = self._world.object_pose(body).position
-            bins = self._bins.items()
+            bins = self.cell.bins.items()
             inside = next((name for name, bin in bins if bin.contains(position, BIN_THICKNESS)), "")
         return FoundObject(
             label=self._labels[body],
