@@ -151,7 +151,7 @@ def _resume(name: str, options: RunOptions, runs: Path, record: RecordOptions) -
 
     path = find_run(name, runs)
     result = resume_run(path, discover(), options, record)
-    return result, start_of(read_journal(path / "journal.jsonl"), path, "run the mission anew")
+    return result, start_of(read_journal(path / "journal.jsonl"), path, "run the mission again")
 
 
 @contextlib.contextmanager

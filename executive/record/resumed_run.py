@@ -67,7 +67,7 @@ def resume_run(
     recorder = Recorder(directory, frames=record.frames, again=True)
     try:
         events = read_journal(directory.journal)
-        log, start = InputLog.of(events), start_of(events, path, "run the mission anew")
+        log, start = InputLog.of(events), start_of(events, path, "run the mission again")
         has_ended, seed = _has_ended(directory, events), start.seed
         loaded = recorded_mission(path, start, skills)
         # Without the step of a halt or of a bug in a skill: a corrected skill may continue there.
@@ -76,7 +76,7 @@ def resume_run(
         if not replay.same:
             raise InputError(
                 f'the run in "{path}" cannot be taken up again: {replay.difference}. The executive or a '
-                "skill has been changed since; go back to what it was run with, or run the mission anew"
+                "skill has been changed since; go back to what it was run with, or run the mission again"
             )
         options = replace(options, seed=seed, requests=start.requests, scene=directory.scene)
         run = assemble_resumed(
@@ -109,7 +109,7 @@ def _has_ended(directory: RunDirectory, events: Sequence[TimedEvent]) -> bool:
     if ending.status == "INCOMPLETE" and ending.holds:
         raise InputError(
             f'the run in "{directory.path}" ended with {ending.holds} in the tool and cannot be '
-            "resumed; take it out and run the mission anew"
+            "resumed; take it out and run the mission again"
         )
     if ending.status in ENDED and read_result(directory, events) is not None:
         raise InputError(

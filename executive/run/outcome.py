@@ -13,7 +13,7 @@ from executive.tree.failure import Failure
 
 @dataclass(frozen=True)
 class Ending:
-    """How the tick loop ended; see `RunEnded`.
+    """End of the tick loop; see `RunEnded`.
 
     Attributes:
         traceback: Traceback of the exception that caused a fault, or "".

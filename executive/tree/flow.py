@@ -129,7 +129,7 @@ class PossibleFailure:
 
 @dataclass(frozen=True)
 class Flow:
-    """How a node may end when it is entered in a certain state.
+    """Possible ends of a node that is entered in a certain state.
 
     Attributes:
         success: State after its success; None if it cannot succeed.
@@ -180,7 +180,7 @@ def joined(states: Iterable[State | None]) -> State | None:
 
 
 def required(tools: PossibleTools, before: ToolState, path: str) -> PossibleTools:
-    """Return what the tool may be once a skill has what it needs: one mistake is told once."""
+    """Return what the tool may be once a skill has what it needs: one mistake is reported once."""
     if before is ANY or tools is None:
         return tools
     return frozenset(grip for grip in tools if grip.tool is before) or frozenset({PossibleTool(before, path)})

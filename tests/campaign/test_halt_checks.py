@@ -35,7 +35,7 @@ def test_an_arm_that_moves_is_told(fake: FakeCell) -> None:
 
 
 @pytest.mark.parametrize(
-    ("told", "problems"),
+    ("statuses", "problems"),
     [
         ([("a", "RUNNING"), ("b", "RUNNING"), ("b", "SUCCESS"), ("b", "RUNNING"), ("b", "INVALID"),
           ("a", "INVALID")], []),
@@ -46,9 +46,9 @@ def test_an_arm_that_moves_is_told(fake: FakeCell) -> None:
     ],
 )  # fmt: skip
 def test_every_node_of_a_journal_begins_once_and_ends(
-    told: list[tuple[str, str]], problems: list[str]
+    statuses: list[tuple[str, str]], problems: list[str]
 ) -> None:
-    assert list(check_journal(journal_of(*told), HALTED)) == problems
+    assert list(check_journal(journal_of(*statuses), HALTED)) == problems
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_a_journal_that_ends_otherwise_than_the_run_is_told() -> None:
 
 
 @pytest.mark.parametrize(
-    ("holding", "told", "problem"),
+    ("holding", "statuses", "problem"),
     [
         (True, "cube_1", []),
         (False, "", []),
@@ -75,9 +75,9 @@ def test_a_journal_that_ends_otherwise_than_the_run_is_told() -> None:
         (False, "cube_1", ['the tool holds nothing, and the run says "cube_1"']),
     ],
 )
-def test_what_the_tool_holds_must_be_told_by_name(holding: bool, told: str, problem: list[str]) -> None:
+def test_what_the_tool_holds_must_be_told_by_name(holding: bool, statuses: str, problem: list[str]) -> None:
     workcell: Any = SimpleNamespace(
         cell=SimpleNamespace(tool=SimpleNamespace(holding=holding)),
         accounts=SimpleNamespace(summaries=lambda: [item_changed("cube_1")]),
     )
-    assert list(check_tool(replace(HALTED, holds=told), workcell)) == problem
+    assert list(check_tool(replace(HALTED, holds=statuses), workcell)) == problem

@@ -102,7 +102,7 @@ def test_an_undeclared_reason_is_told_at_the_line_of_its_skill() -> None:
     ("at_rest", "arm", "first"),
     [
         (lambda: True, "at rest", "mend what is broken"),
-        (lambda: False, "it was told to brake and is not at rest",
+        (lambda: False, "it was commanded to brake and is not at rest",
          "keep away from the arm until you have seen it stand still: it"),
         (lambda: 1 / 0, "it does not say whether it is at rest (ZeroDivisionError: division by zero)",
          "keep away from the arm"),

@@ -227,7 +227,7 @@ def test_there_must_be_something_to_take_up(missions: Path, tmp_path: Path) -> N
     with pytest.raises(InputError, match=r"came to its end: SUCCESS; there is nothing to take up again"):
         resumed(path)
     (path / "journal.jsonl").write_text("")
-    with pytest.raises(InputError, match=r"had not begun when it was cut off; run the mission anew"):
+    with pytest.raises(InputError, match=r"had not begun when it was cut off; run the mission again"):
         resumed(path)
     with pytest.raises(InputError, match=r'"nowhere" is no run directory, .* the last ones there: 20'):
         find_run("nowhere", tmp_path)

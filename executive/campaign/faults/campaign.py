@@ -141,13 +141,13 @@ class Campaign:
     def _tried(self, wanted: Sequence[Numbers], before: int) -> tuple[list[Trial], bool]:
         """Return the trials, and whether all were done; `before` is how many there are already."""
 
-        def told(done: int, all: int) -> None:
+        def progress(done: int, all: int) -> None:
             if self._progress is not None:
                 self._progress(before + done, before + all)
 
         work = partial(try_out, self.subject, self.rehearsal)
         jobs = [self.these(numbers) for numbers in wanted]
-        trials = do_all(jobs, work, _broken, workers=self._workers, progress=told, halting=self._halting)
+        trials = do_all(jobs, work, _broken, workers=self._workers, progress=progress, halting=self._halting)
         done = [trial for trial in trials if trial is not None and not trial.cut]
         return done, len(done) == len(wanted)
 

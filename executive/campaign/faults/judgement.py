@@ -84,13 +84,13 @@ def check_books(
     then is lost to the robot, wherever it lies, and so is what fell where no look shows it. Of the `taken`
     objects some may have been taken where nobody had to look any more.
     """
-    told = f"the ledger says {counts_text(items)}"
+    ledger_text = f"the ledger says {counts_text(items)}"
     if not is_balanced(items):
-        yield f"the ledger does not balance: {told}"
+        yield f"the ledger does not balance: {ledger_text}"
     if audit is None:
         return
     if audit["wrong_bin"]:
-        yield f"{audit['wrong_bin']} misplaced; {told}; the audit {counts_text(audit)}"
+        yield f"{audit['wrong_bin']} misplaced; {ledger_text}; the audit {counts_text(audit)}"
     unnoticed = min(max(audit["elsewhere"] - items["lost"], 0), taken)
     left = audit["left"] + unnoticed
     still = items["rejected"] + items["skipped"]
@@ -105,7 +105,7 @@ def check_books(
             for inside in range(hidden.inside + 1)
         )
     if not agrees:
-        yield f"{told}; the audit {counts_text(audit)}"
+        yield f"{ledger_text}; the audit {counts_text(audit)}"
 
 
 def check_success(

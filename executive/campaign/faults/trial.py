@@ -32,7 +32,7 @@ from executive.view.figures.fault import Trial
 from executive.view.report.page import leave_report
 
 Numbered = Mapping[int, Fault]
-"""Faults by their numbers in the list, in the order in which they are told."""
+"""Faults by their numbers in the list, in the order of their description."""
 
 
 def try_out(subject: Subject, rehearsal: Rehearsal, faults: Numbered) -> Trial:
@@ -62,8 +62,8 @@ def record(subject: Subject, rehearsal: Rehearsal, faults: Numbered, runs: Path)
 def empty_trial(faults: Numbered) -> Trial:
     """Return the trial of a run of which nothing is known yet."""
     last = list(faults.values())[-1]
-    told = tuple(map(str, faults.values()))
-    return Trial(tuple(faults), told, last.name, last.place, last.what, last.when)
+    descriptions = tuple(map(str, faults.values()))
+    return Trial(tuple(faults), descriptions, last.name, last.place, last.what, last.when)
 
 
 class _Trying:

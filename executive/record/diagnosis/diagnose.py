@@ -144,7 +144,7 @@ def _picture(case: Case, run: Path) -> str:
 
 def _state_of_arm(is_at_rest: Callable[[], bool]) -> str:
     try:
-        return "at rest" if is_at_rest() else "it was told to brake and is not at rest"
+        return "at rest" if is_at_rest() else "it was commanded to brake and is not at rest"
     except Exception as error:
         # The arm may be broken.
         return f"it does not say whether it is at rest ({type(error).__name__}: {error})"

@@ -12,7 +12,7 @@ def conformance_lines(verdicts: Sequence[Verdict]) -> Iterator[str]:
     """Yield a line per check: how it went, of which skill, and what is wrong first."""
     for verdict in verdicts:
         line = f"{verdict.status:7}  {verdict.skill}.{verdict.check}"
-        # Why it could not be run is told once, by the check that nothing else can do without.
+        # The reason why the skill could not be run is stated once.
         if verdict.status == "failed":
             more = len(verdict.problems) - 1
             line += f": {verdict.problems[0]}" + (f" (and {more} more)" if more else "")
@@ -23,5 +23,7 @@ def conformance_total(verdicts: Sequence[Verdict]) -> str:
     """Return how many checks went how."""
     counts = Counter(verdict.status for verdict in verdicts)
     skills = len({verdict.skill for verdict in verdicts})
-    told = ", ".join(f"{counts[status]} {status}" for status in ("ok", "failed", "not run") if counts[status])
-    return f"{len(verdicts)} checks of {skills} skill{'s' if skills != 1 else ''}: {told}"
+    counted = ", ".join(
+        f"{counts[status]} {status}" for status in ("ok", "failed", "not run") if counts[status]
+    )
+    return f"{len(verdicts)} checks of {skills} skill{'s' if skills != 1 else ''}: {counted}"

@@ -18,7 +18,7 @@ class Trial:
 
     Attributes:
         numbers: Of the faults that happened in it, those first that the last one needs to happen at all.
-        told: The faults in words.
+        descriptions: The faults in words.
         name: Skill of the node the last fault is about, or what else it is about.
         place: File and line of that node, or "".
         what: The reason it is to fail with, or what happens.
@@ -40,7 +40,7 @@ class Trial:
     """
 
     numbers: tuple[int, ...]
-    told: tuple[str, ...]
+    descriptions: tuple[str, ...]
     name: str
     place: str
     what: str
@@ -62,12 +62,12 @@ class Trial:
 
     @property
     def label(self) -> str:
-        """What `--fault` repeats it with: `12`, or `3+12`."""
+        """Value of `--fault` that repeats the trial: `12`, or `3+12`."""
         return "+".join(map(str, self.numbers))
 
     @property
     def verdict(self) -> str:
-        """How it ended in a word or two; `-` where there was no occasion."""
+        """Status and reason; `-` if the fault found no occasion."""
         if self.problems:
             return "!!"
         if not self.happened:
@@ -154,10 +154,10 @@ def as_plain(figures: FaultFigures) -> dict[str, Any]:
 def trial_as_plain(trial: Trial) -> dict[str, Any]:
     """Return one run as plain values."""
     plain = asdict(trial)
-    for name in ("numbers", "name", "cut", "entered", "robot_time"):
+    for name in ("numbers", "descriptions", "name", "cut", "entered", "robot_time"):
         del plain[name]
     more = {"fault": trial.label, "verdict": trial.verdict, "robot_time_s": trial.robot_time}
-    return {**plain, **more, "told": list(trial.told), "problems": list(trial.problems)}
+    return {**plain, **more, "told": list(trial.descriptions), "problems": list(trial.problems)}
 
 
 def fault_text(figures: FaultFigures) -> str:
@@ -254,9 +254,9 @@ def _remarks(trials: Sequence[Trial]) -> Iterator[str]:
 
 
 def _trial(trial: Trial) -> Iterator[str]:
-    yield f"fault {trial.label}: {'; and '.join(trial.told)}"
+    yield f"fault {trial.label}: {'; and '.join(trial.descriptions)}"
     if not trial.happened:
-        yield "  one of them found no occasion" if len(trial.told) > 1 else "  it found no occasion"
+        yield "  one of them found no occasion" if len(trial.descriptions) > 1 else "  it found no occasion"
     ended = " ".join(filter(None, (trial.status, trial.reason)))
     where = f" at {trial.node}" if trial.node else ""
     yield f"  {ended}{where}{f': {trial.message}' if trial.message else ''}"

@@ -54,7 +54,7 @@ class Lane:
 def draw_lanes(timeline: Timeline, nodes: Sequence[OutlineNode]) -> str:
     """Return the activations of a run as an SVG document, up to its last event.
 
-    The words of a bar are shown while the pointer rests on it. Activations that cannot be told apart in a
+    The words of a bar are shown while the pointer rests on it. Activations that cannot be distinguished in a
     lane are one bar, in the colour of the worst of them, so the size of the document has a bound however long
     the run was.
     """

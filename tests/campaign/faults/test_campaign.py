@@ -87,13 +87,13 @@ def test_every_way_on_is_entered_the_one_behind_another_fault_with_it(figures: F
     ]  # fmt: skip
     assert figures.unentered == ()
     behind = next(trial for trial in figures.trials if trial.name == "RejectTarget")
-    assert (len(behind.numbers), behind.told[0].rpartition("/")[2]) == (
+    assert (len(behind.numbers), behind.descriptions[0].rpartition("/")[2]) == (
         2, "Grasp missed, first: nothing seals",
     )  # fmt: skip
 
 
 def test_a_way_that_no_run_took_is_told_with_its_place(figures: FaultFigures, small: Subject) -> None:
-    without = [trial for trial in figures.trials if "Grasp missed" not in " ".join(trial.told)]
+    without = [trial for trial in figures.trials if "Grasp missed" not in " ".join(trial.descriptions)]
     without = [trial for trial in without if not trial.what.startswith("no seal")]
     assert [branch.what for branch in branches(small.loaded.tree, without) if not branch.entered] == [
         "catch on Grasp.missed"

@@ -26,14 +26,14 @@ PLACES = {"cube": (0.6, -0.15), "sphere": (0.65, 0.1), "duck": (0.45, 0.2)}
 
 
 def cell_with(*what: Effect, start: float = 0.0, end: float = 100.0) -> FaultyCell:
-    """Return a cell with faults with three objects, the duck nearest to the tool; `told` is what it tells."""
+    """Return a cell with faults with three objects, the duck nearest to the tool; `events` are its events."""
     fake = FakeCell()
     for label, place in PLACES.items():
         fake.world.put(label, *place)
-    told: list[Event] = []
+    events: list[Event] = []
     script = [between(start, end, effect) for effect in what]
-    cell = FaultyCell(fake, script, told.append)
-    cell.told, cell.fake = told, fake  # type: ignore[attr-defined]
+    cell = FaultyCell(fake, script, events.append)
+    cell.events, cell.fake = events, fake  # type: ignore[attr-defined]
     return cell
 
 
@@ -166,13 +166,13 @@ def test_it_happens_so_far_on_the_way(name: str, share: float) -> None:
     hold(cell)
     start = cell.cell.arm.tool_pose.position
     whole = follow(cell)
-    while not cell.told:
+    while not cell.events:
         cell.advance()
     gone = float(np.linalg.norm(cell.cell.arm.tool_pose.position - start))
     assert gone / whole == pytest.approx(share, abs=0.03)
-    if cell.told[0].name == "seal_breaks":
+    if cell.events[0].name == "seal_breaks":
         assert not cell.fake.tool.holding and not cell.cell.arm.at_rest
-        assert cell.told[0].object == "cube" and cell.told[0].position[2] > 0.1, "it hung in the air"
+        assert cell.events[0].object == "cube" and cell.events[0].position[2] > 0.1, "it hung in the air"
         assert cell.fake.world.objects[0].position[2] == pytest.approx(0.025)
     else:
         assert cell.fake.tool.holding and cell.cell.arm.at_rest
@@ -182,10 +182,10 @@ def test_it_happens_so_far_on_the_way(name: str, share: float) -> None:
 def test_a_seal_breaks_at_once_only_where_something_is_held() -> None:
     cell: Any = cell_with(effects.seal_breaks(None))
     cell.advance()
-    assert cell.told == []
+    assert cell.events == []
     hold(cell)
     cell.advance()
-    assert (cell.fake.tool.holding, len(cell.told)) == (False, 1)
+    assert (cell.fake.tool.holding, len(cell.events)) == (False, 1)
     hold(cell)
     cell.advance()
     assert cell.fake.tool.holding, "it happens once"
@@ -207,11 +207,11 @@ def test_a_seal_breaks_over_a_wrong_bin() -> None:
 def test_a_tool_that_sticks_lets_go_when_it_is_opened_once_more() -> None:
     cell: Any = cell_with(effects.tool_sticks(), end=0.1)
     cell.cell.tool.open()
-    assert cell.told == []
+    assert cell.events == []
     hold(cell)
     cell.cell.tool.open()
     wait(cell, 0.1)
-    assert cell.fake.tool.holding and [one.object for one in cell.told] == ["cube"]
+    assert cell.fake.tool.holding and [one.object for one in cell.events] == ["cube"]
     cell.cell.tool.open()
     assert not cell.fake.tool.holding
 
@@ -224,7 +224,7 @@ def test_nothing_seals_or_one_object_does_not(effect: Effect, sealed: bool) -> N
     cell: Any = cell_with(effect)
     cell.fake.arm._tool.position[:] = [*PLACES["cube"], 0.05]
     cell.cell.tool.close()
-    assert (cell.fake.tool.holding, bool(cell.told)) == (sealed, not sealed)
+    assert (cell.fake.tool.holding, bool(cell.events)) == (sealed, not sealed)
 
 
 @pytest.mark.parametrize(("is_blocked", "error"), [(False, Unreachable), (True, Blocked)])
@@ -244,7 +244,7 @@ def test_nothing_that_the_arm_hides_is_believed_and_it_is_told_once_a_control_st
     cell: Any = cell_with(effects.workspace_hidden())
     assert run_skill(Detect, cell).reason == "hidden"
     assert not cell.cell.camera.sees_table() and not cell.cell.camera.capture().visible.any()
-    assert [one.name for one in cell.told] == ["workspace_hidden"]
+    assert [one.name for one in cell.events] == ["workspace_hidden"]
     assert run_skill(Detect, cell, inputs={"hidden": "pass"}).outputs["detections"].found == ()
 
 
@@ -259,7 +259,7 @@ def test_an_object_is_meant_by_its_number_or_by_where_it_is(which: Any, gone: st
     cell: Any = cell_with(effects.object_removed(which))
     cell.advance()
     assert labels(cell) == [label for label in PLACES if label != gone]
-    assert [one.object for one in cell.told] == [gone] * bool(gone)
+    assert [one.object for one in cell.events] == [gone] * bool(gone)
 
 
 def test_the_nearest_is_none_that_lies_in_a_bin_or_hangs_at_the_tool() -> None:
@@ -341,4 +341,4 @@ def test_an_object_is_bumped_aside_to_the_first_free_place(
         cell.fake.world.put("cube", *neighbour)
     cell.advance()
     assert cell.fake.world.objects[0].position[:2] == pytest.approx(place)
-    assert bool(cell.told) is (place != PLACES["cube"])
+    assert bool(cell.events) is (place != PLACES["cube"])

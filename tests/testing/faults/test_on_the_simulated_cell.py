@@ -57,11 +57,11 @@ def holding(cell: SimCell) -> bool:
 @pytest.mark.slow
 def test_when_a_seal_breaks_in_mid_carry_the_object_falls_and_is_picked_up_again(watched: Watched) -> None:
     result = watched.run(during("*/Transit", effects.seal_breaks(), nth=3), places)
-    (told,) = result.faults()
+    (fault,) = result.faults()
     hung = watched.seen["FaultInjected"]
     fallen = watched.seen["SelectTarget.unseen"]
     assert isinstance(hung, dict) and isinstance(fallen, dict)
-    (body,) = (body for body, place in hung.items() if np.allclose(place, told.position, atol=1e-3))
+    (body,) = (body for body, place in hung.items() if np.allclose(place, fault.position, atol=1e-3))
     assert hung[body][2] > 0.1
     assert fallen[body][2] < 0.05
     assert (result.status, result.reasons("*/Transit")) == ("SUCCESS", ["dropped"])
@@ -83,10 +83,10 @@ def test_what_is_taken_out_of_the_tool_is_parted_from_it_first(watched: Watched)
 @pytest.mark.slow
 def test_what_is_moved_is_found_where_it_is_now(watched: Watched) -> None:
     result = watched.run(during("*/Approach", effects.object_moved((0.0, 0.06)), nth=2), places)
-    (told,) = result.faults()
+    (fault,) = result.faults()
     before, felt = watched.seen["FaultInjected"], watched.seen["no_contact"]
     assert isinstance(before, dict) and isinstance(felt, dict)
-    (body,) = (body for body, place in before.items() if np.allclose(place, told.position, atol=1e-3))
+    (body,) = (body for body, place in before.items() if np.allclose(place, fault.position, atol=1e-3))
     assert np.allclose(felt[body][:2] - before[body][:2], [0.0, 0.06], atol=0.005)
     assert (result.status, result.items["lost"], result.agrees) == ("SUCCESS", 0, True)
 
@@ -99,8 +99,8 @@ def test_an_arm_that_runs_into_something_brakes(watched: Watched) -> None:
     failed = next(one for one in result.events if getattr(one.event, "reason", "") == "blocked")
     assert isinstance(failed.event, NodeEnded)
     assert failed.event.message == "the arm ran into a hand"
-    told = next(one for one in result.events if isinstance(one.event, FaultInjected))
-    assert 10 < failed.tick - told.tick < 120, "it brakes along its path"
+    fault = next(one for one in result.events if isinstance(one.event, FaultInjected))
+    assert 10 < failed.tick - fault.tick < 120, "it brakes along its path"
     assert (result.status, result.items["rejected"], result.agrees) == ("SUCCESS", 0, True)
 
 

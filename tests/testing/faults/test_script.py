@@ -66,8 +66,8 @@ def test_after_a_time_it_lasts_until_the_end() -> None:
     result = sorted_with(after(3.0, effects.seal_fails()))
     assert result.status == "INCOMPLETE"
     closed = [one.clock for one in result.events if one.event == ToolCommanded("close")]
-    told = [one.clock for one in result.events if isinstance(one.event, FaultInjected)]
-    assert told == [clock for clock in closed if clock >= 3.0]
+    fault = [one.clock for one in result.events if isinstance(one.event, FaultInjected)]
+    assert fault == [clock for clock in closed if clock >= 3.0]
     assert result.items["rejected"] == result.audit["left"] > 0  # type: ignore[index]
 
 
@@ -112,9 +112,9 @@ def test_a_script_is_a_value_that_can_be_sent_to_another_process_and_used_again(
 
 def test_what_happens_to_a_node_is_told_with_node_item_and_object() -> None:
     result = sorted_with(during("*/Transit", effects.seal_breaks(), nth=1), between(500.0, 600.0, SLIPS))
-    (told,) = result.faults()
-    assert (told.name, told.node.rpartition("/")[2]) == ("seal_breaks", "Transit")
-    assert told.item.startswith(f"{told.object}-") and len(told.position) == 3
+    (fault,) = result.faults()
+    assert (fault.name, fault.node.rpartition("/")[2]) == ("seal_breaks", "Transit")
+    assert fault.item.startswith(f"{fault.object}-") and len(fault.position) == 3
 
 
 def test_a_mission_waits_for_a_detector_and_a_test_for_a_mission_for_so_long_only() -> None:

@@ -19,7 +19,7 @@ STUCK = replace(
 NOWHERE = replace(MISSED, numbers=(1, 5), name="Wait", place="sort.yaml:9", what="raises", happened=False)
 WRONG = replace(
     STUCK, numbers=(6,), problems=("the arm is not at rest",), remark="it says Release.stuck",
-    name="object", place="", what="taken", when="late", told=("object taken, late: from 8.00 s on",),
+    name="object", place="", what="taken", when="late", descriptions=("object taken, late: from 8.00 s on",),
 )  # fmt: skip
 BRANCHES = (
     Branch("sort.yaml:12", "catch on Grasp.missed", ("tree/try/catch/1",), 2),
