@@ -20,7 +20,9 @@ CLOCK_TOLERANCE = 1e-5
 """Largest difference between the clock of an event and its control step [s]."""
 
 KINDS: Mapping[str, type[Event]] = {
-    kind.__name__: kind for kind in Event.__subclasses__() if kind.is_recorded
+    kind.__name__: kind
+    for kind in sorted(Event.__subclasses__(), key=lambda kind: kind.__name__)
+    if kind.is_recorded
 }
 """Recorded kinds of events by name."""
 

@@ -226,7 +226,7 @@ def test_a_new_run_needs_a_new_journal_and_one_that_goes_on_an_old_one(path):
         (b"[" * 100_000, "recursion limit exceeded"),
         (
             b'{"kind": "status", "tick": 1, "clock": 0.1}',
-            "\"kind\" is 'status'; allowed are RunStarted, NodeS",
+            "\"kind\" is 'status'; allowed are BranchChosen, Fau",
         ),
         (
             b'{"kind": "RunHalted", "tick": 1, "clock": 0.1}',

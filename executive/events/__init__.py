@@ -1,0 +1,47 @@
+"""Events of a run: one frozen dataclass per kind of event.
+
+The parts of a run emit events; observers (journal, trace, pictures, views) receive each event with its time.
+A journal holds one JSON object per event; its keys are the fields of these classes.
+"""
+
+from executive.events.cell import FaultInjected, InputRead, MotionPlanned, ToolCommanded
+from executive.events.event import Emit, Event, Observer, TimedEvent, ignore
+from executive.events.ledger import DetectedObject, FrameSearched, ItemChanged, TargetSelected
+from executive.events.run import (
+    JOURNAL_FORMAT,
+    FaultRaised,
+    OperatorAsked,
+    RequestGiven,
+    RunEnded,
+    RunHalted,
+    RunResumed,
+    RunStarted,
+)
+from executive.events.tree import BranchChosen, NodeEnded, NodeStarted
+
+__all__ = [
+    "JOURNAL_FORMAT",
+    "BranchChosen",
+    "DetectedObject",
+    "Emit",
+    "Event",
+    "FaultInjected",
+    "FaultRaised",
+    "FrameSearched",
+    "InputRead",
+    "ItemChanged",
+    "MotionPlanned",
+    "NodeEnded",
+    "NodeStarted",
+    "Observer",
+    "OperatorAsked",
+    "RequestGiven",
+    "RunEnded",
+    "RunHalted",
+    "RunResumed",
+    "RunStarted",
+    "TargetSelected",
+    "TimedEvent",
+    "ToolCommanded",
+    "ignore",
+]

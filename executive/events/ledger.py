@@ -1,0 +1,97 @@
+"""Events of the ledger: looks, items and targets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from pydantic import ConfigDict
+
+from executive.events.event import Event
+
+
+@dataclass(frozen=True)
+class DetectedObject:
+    """A localized detection in a frame.
+
+    Attributes:
+        label: Class.
+        confidence: Confidence of the detector, 0 to 1.
+        box: Left, top, right and bottom side [pixel].
+        position: Position in the world `(3,)` [m].
+        contradiction: Evidence against the class besides the detector's score, or "".
+    """
+
+    label: str
+    confidence: float
+    box: Sequence[float]
+    position: Sequence[float]
+    contradiction: str
+
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(strict=True, extra="forbid")
+
+
+@dataclass(frozen=True)
+class FrameSearched(Event):
+    """A detector searched a frame, and the ledger received its detections.
+
+    Attributes:
+        frame: Number of the frame.
+        camera: Name of the camera.
+        detector: Name of the detector.
+        view: Searched part of the frame: `table` or `full`.
+        found: Confident detections.
+        unsure: Detections of low confidence.
+        unknown: Labels that the cell file does not declare, one for each detection.
+    """
+
+    frame: int
+    camera: str
+    detector: str
+    view: str
+    found: Sequence[DetectedObject]
+    unsure: Sequence[DetectedObject]
+    unknown: Sequence[str]
+
+
+@dataclass(frozen=True)
+class ItemChanged(Event):
+    """The ledger changed an item.
+
+    Attributes:
+        item: Name of the item.
+        label: Its class.
+        state: `seen`, `held`, `dropped`, `placed`, `rejected`, `skipped`, `lost` or `phantom`.
+        position: Its position `(3,)` [m].
+        looks: Number of looks that showed the item.
+        attempts: Number of failed attempts to pick it.
+        bin: Bin in which it was placed, or "".
+        why: Reason of the state, or "".
+    """
+
+    item: str
+    label: str
+    state: str
+    position: Sequence[float]
+    looks: int
+    attempts: int
+    bin: str
+    why: str
+
+
+@dataclass(frozen=True)
+class TargetSelected(Event):
+    """A skill selected the next target.
+
+    Attributes:
+        item: Name of the item.
+        label: Its class.
+        frame: Number of the frame that showed it last.
+        bin: Bin to which it goes.
+    """
+
+    item: str
+    label: str
+    frame: int
+    bin: str

@@ -1,0 +1,71 @@
+"""Events of the nodes of the tree."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, TypeAlias
+
+from pydantic import Field, JsonValue
+
+from executive.events.event import Event
+
+NodeStatus: TypeAlias = Annotated[str, Field(pattern="^(SUCCESS|FAILURE|INVALID)$")]
+
+
+@dataclass(frozen=True)
+class NodeStarted(Event):
+    """A node of the tree was started.
+
+    Attributes:
+        node: Path of the node.
+        skill: Name of the skill; "" for a control node.
+        item: Item that the skill works on, or "".
+    """
+
+    node: str
+    skill: str = ""
+    item: str = ""
+
+
+@dataclass(frozen=True)
+class NodeEnded(Event):
+    """A node of the tree ended.
+
+    Attributes:
+        node: Path of the node.
+        status: Final status; INVALID if the node was halted or raised a fault.
+        skill: Name of the skill; "" for a control node.
+        item: Item that the skill worked on, or "".
+        reason: Reason of the failure: `missed` for a skill, `Grasp.missed` for a control node; "fault" for a
+            fault of a skill; "" otherwise.
+        message: Message of the failure or fault, or "".
+        origin: Path of the node in which the failure of a control node began, or "".
+        outputs: Values of the outputs of a skill that succeeded; None for any other end.
+    """
+
+    node: str
+    status: NodeStatus
+    skill: str = ""
+    item: str = ""
+    reason: str = ""
+    message: str = ""
+    origin: str = ""
+    outputs: Mapping[str, JsonValue] | None = None
+
+
+@dataclass(frozen=True)
+class BranchChosen(Event):
+    """A control node decided what to run next.
+
+    Attributes:
+        node: Path of the control node.
+        choice: The decision in words.
+        reason: Failure that caused the decision, for instance `Grasp.missed`, or "".
+        message: Message of this failure, or "".
+    """
+
+    node: str
+    choice: str
+    reason: str = ""
+    message: str = ""
