@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,11 +10,11 @@ import numpy as np
 
 from executive.cell.config import LedgerConfig
 from executive.cell.detection import Detections, Observation
-from executive.cell.objects import Item
 from executive.ledger.association import associate, find_duplicate, find_moved, may_show
 from executive.ledger.belief import ITEM_AREA_SHARE, Belief, viewpoint_of
 from executive.ledger.coverage import Coverage
 from executive.ledger.item import LYING, REASON_NOT_FOUND, REASON_UNCERTAIN, Record, State
+from executive.ledger.records import Records
 from executive.ledger.staleness import Staleness
 
 EXPECTED_OBJECTS = 3.0
@@ -28,16 +27,14 @@ class Update:
 
     Attributes:
         config: Limits of the cell file.
-        records: All items by name; the update adds new ones.
-        names: Number of names given so far, by class.
+        records: All items; the update adds new ones.
         coverage: Searched areas; the update adds the area of the look.
         staleness: Changes of the table.
         look: The look.
     """
 
     config: LedgerConfig
-    records: dict[Item, Record]
-    names: Counter[str]
+    records: Records
     coverage: Coverage
     staleness: Staleness
     look: Detections
@@ -49,7 +46,7 @@ class Update:
         """
         epoch = self.look.frame.epoch
         current = [one for one in observations if self.staleness.is_unchanged(one.position, epoch)]
-        known = [record for record in self.records.values() if record.state in LYING]
+        known = [record for record in self.records if record.state in LYING]
         seen = self._update_seen(known, [one for one in current if one.confident])
         uncertain = self._update_uncertain(seen, [one for one in current if not one.confident])
         unseen = [record for record in known if record not in (*seen, *uncertain)]
@@ -96,7 +93,7 @@ class Update:
                 continue
             near = [
                 record
-                for record in self.records.values()
+                for record in self.records
                 if record.state in LYING
                 and record.belief.miss_probability > self.config.overlooked
                 and may_show(one, record, self.config.gate)
@@ -134,13 +131,13 @@ class Update:
         """Replace new items in `seen` that are moved items; return the new ones that were known before."""
         duplicates = []
         for index, new in enumerate(seen):
-            old = find_moved(new, self.records.values(), self.staleness, self.config)
+            old = find_moved(new, self.records, self.staleness, self.config)
             if old is None:
                 continue
             old.merge(new)
             seen[index] = old
             if new.first_stamp == new.stamp:
-                del self.records[new.item]
+                self.records.remove(new)
             else:
                 new.set_state(State.PHANTOM, f"it is {old.item}")
                 duplicates.append(new)
@@ -150,7 +147,7 @@ class Update:
         """Make the less certain one of two items at one position a phantom, and return the phantoms."""
         duplicates = []
         for record in seen:
-            if other := find_duplicate(record, self.records.values(), self.config.gate):
+            if other := find_duplicate(record, self.records, self.config.gate):
                 less, more = sorted((record, other), key=self._rank)
                 less.set_state(State.PHANTOM, f"it is {more.item}")
                 duplicates.append(less)
@@ -161,14 +158,9 @@ class Update:
 
     def _add(self, one: Observation, odds: float) -> Record:
         """Add a new item with the prior odds that it exists."""
-        label, frame = one.detection.label, self.look.frame
-        self.names[label] += 1
-        record = Record(
-            f"{label}-{self.names[label]}", Belief(label, math.log(odds)), one.position, frame.epoch,
-            frame.stamp, self.coverage.find_miss_probability(one.position) <= self.config.overlooked,
-        )  # fmt: skip
-        self.records[record.item] = record
-        return record
+        belief, frame = Belief(one.detection.label, math.log(odds)), self.look.frame
+        has_appeared = self.coverage.find_miss_probability(one.position) <= self.config.overlooked
+        return self.records.add(belief, one.position, frame.epoch, frame.stamp, has_appeared)
 
     def _find_prior_odds(self, one: Observation) -> float:
         """Return the number of overlooked objects expected at the position of an observation."""

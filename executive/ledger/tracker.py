@@ -23,14 +23,14 @@ from executive.ledger.accounts import (
     find_lost_elsewhere,
     forget_rejected,
 )  # fmt: skip
-from executive.ledger.belief import LOG_ODDS_OF_PROOF, Belief
-from executive.ledger.bin_contents import BinContents
 from executive.ledger.bins import Bins, find_believed_bin
 from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage
 from executive.ledger.item import LYING, Record, State
 from executive.ledger.look import Update
 from executive.ledger.look_event import describe_look
+from executive.ledger.records import Records
+from executive.ledger.recovery import Recovery
 from executive.ledger.staleness import Staleness
 
 
@@ -63,13 +63,12 @@ class Tracker:
         distinct_by_touch: Collection[str] = (),
     ) -> None:
         self._config, self._routes, self._emit = config, routes, emit
+        self._records = Records(emit)
         self._certainty = Certainty(config, distinct_by_touch)
         self._bins = Bins(config, bins, routes)
         self._coverage, self._staleness = Coverage(table), Staleness()
-        self._records: dict[Item, Record] = {}
-        self._names: Counter[str] = Counter()
-        self._bin_contents: BinContents | None = None
-        """Contents of the bins since `lose_track`, until `record_bin_contents`."""
+        self._recovery: Recovery | None = None
+        """Search for untracked items since `lose_track`, until `record_bin_contents`."""
         self._frame = 0
         self.unknown: Counter[str] = Counter()
         self.doubts: list[str] = []
@@ -77,7 +76,7 @@ class Tracker:
     @property
     def records(self) -> Sequence[Record]:
         """All items, in the order of the first detection."""
-        return list(self._records.values())
+        return list(self._records)
 
     @property
     def epoch(self) -> int:
@@ -142,12 +141,12 @@ class Tracker:
 
     def is_open(self, item: Item) -> bool:
         """Return True if an item is still to be sorted."""
-        record = self._find(item)
+        record = self._records.find(item)
         return record.state in (State.SEEN, State.DROPPED) and not record.why
 
     def is_sure(self, item: Item) -> bool:
         """Return True if the existence, class and position of an item are certain enough."""
-        return self._certainty.is_sure(self._find(item))
+        return self._certainty.is_sure(self._records.find(item))
 
     def is_table_empty(self, label: str | None = None) -> bool:
         """Return True if no object with a route is left on the visible table."""
@@ -161,11 +160,11 @@ class Tracker:
 
     def get_label(self, item: Item) -> str:
         """Return the most probable class of an item."""
-        return self._find(item).label
+        return self._records.find(item).label
 
     def count_attempts(self, item: Item) -> int:
         """Return the number of failed attempts to pick an item."""
-        return self._find(item).attempts
+        return self._records.find(item).attempts
 
     def count_in(self, bin: str) -> int:
         """Return the number of objects in a bin."""
@@ -177,7 +176,7 @@ class Tracker:
         An item that was touched at the height of its class before may have fallen over since: then no height
         contradicts its class.
         """
-        record = self._find(item)
+        record = self._records.find(item)
         record.belief.is_proved, record.had_contact, record.empty_probes = True, True, 0
         if not contradiction:
             record.touched_label, record.low_touches = record.label, 0
@@ -186,17 +185,17 @@ class Tracker:
                 return True
             record.contradiction = contradiction
             self._invalidate(record.position, self._config.neighbourhood)
-            self._emit(record.summary)
+            self._records.report(record)
             return False
         return True
 
     def record_miss(self, item: Item, *, found_table: bool = False) -> None:
         """Record a failed attempt to pick an item; all positions are in doubt now."""
-        record = self._find(item)
+        record = self._records.find(item)
         record.attempts += 1
         record.empty_probes += found_table
         self.invalidate_positions()
-        self._emit(record.summary)
+        self._records.report(record)
 
     def record_grasp(self, item: Item) -> None:
         """Record that the tool holds an item; its neighbours may have been moved.
@@ -209,16 +208,16 @@ class Tracker:
                 f"the tool cannot hold {item}: it holds {other}; the skill that released {other} must call "
                 "record_placement, record_drop or record_put_down of the ledger"
             )
-        record = self._find(item)
-        self._change(record, State.HELD)
+        record = self._records.find(item)
+        self._records.change(record, State.HELD)
         record.belief.is_proved = True
         self._invalidate(record.position, self._config.neighbourhood)
 
     def record_drop(self, item: Item, landing: Array | None = None) -> None:
         """Record that the tool lost an item on the way; all positions are in doubt now."""
-        record = self._find(item)
+        record = self._records.find(item)
         record.is_untracked = False
-        self._change(record, State.DROPPED)
+        self._records.change(record, State.DROPPED)
         self._bins.predict(record, landing)
         record.attempts += 1
         record.epoch = self.epoch
@@ -226,18 +225,17 @@ class Tracker:
 
     def record_placement(self, item: Item, bin: str) -> None:
         """Record that an item was released in a bin."""
-        record = self._find(item)
+        record = self._records.find(item)
         if record.state is State.HELD:
             record.why = ""
-        record.bin = bin
-        self._change(record, State.PLACED)
+        self._records.place(record, bin)
 
     def record_put_down(self, item: Item, position: Array) -> None:
         """Record that an item was put back on the table at `position` `(3,)` [m]; a look must confirm it."""
-        record = self._find(item)
+        record = self._records.find(item)
         record.locate(position, self._config.gate, is_settled=False)
         record.epoch = self.epoch
-        self._change(record, State.REJECTED if record.why else State.SEEN)
+        self._records.change(record, State.REJECTED if record.why else State.SEEN)
         self.invalidate_positions()
 
     def reject(self, item: Item, why: str) -> None:
@@ -245,9 +243,7 @@ class Tracker:
 
         A held item stays HELD until it is released; looks continue to search for a dropped item.
         """
-        record = self._find(item)
-        record.why = f"{why}: {record.contradiction}" if record.contradiction else why
-        self._change(record, record.state if record.state in (State.HELD, State.DROPPED) else State.REJECTED)
+        self._records.reject(self._records.find(item), why)
 
     def invalidate_positions(self) -> None:
         """Record that any object on the table may have been moved."""
@@ -255,11 +251,12 @@ class Tracker:
 
     def lose_track(self) -> None:
         """Record that the tool may have moved any item that is not in a bin."""
-        self._bin_contents = BinContents(self._bins)
-        self._search_everywhere([one for one in self.records if one.state in (State.HELD, State.DROPPED)])
+        self._recovery = Recovery(self._records, self._bins)
+        held_or_dropped = (State.HELD, State.DROPPED)
+        self._search_everywhere([one for one in self.records if one.state in held_or_dropped])
 
     def mark_unseen_as_dropped(self) -> None:
-        """Search every item that no look has shown since `lose_track`, on the table and in the bins."""
+        """Have looks search for every item that none has shown since `lose_track`."""
         self._search_everywhere(
             [
                 record
@@ -271,17 +268,10 @@ class Tracker:
         )
 
     def record_bin_contents(self) -> None:
-        """Place an item for each object that most full looks since `lose_track` have shown in a bin."""
-        contents, self._bin_contents = self._bin_contents, None
-        assert contents is not None, "bins are counted after `lose_track`"
-        for label, bin in contents.find_surplus(self.records):
-            searched = (one for one in self.records if one.state is State.DROPPED and one.is_untracked)
-            record = next((one for one in searched if one.label == label), None) or self._add_in(bin, label)
-            if bin in self._routes.get(label, ()):
-                record.why = "found there when the run was resumed"
-                self.record_placement(record.item, bin)
-            else:
-                self.reject(record.item, f"found in {bin} when the run was resumed")
+        """Record an item for each object that the full looks since `lose_track` have shown in a bin."""
+        recovery, self._recovery = self._recovery, None
+        assert recovery is not None, "the contents of bins are recorded after `lose_track`"
+        recovery.record_bin_contents(self.epoch)
 
     def close(self, *, completed: bool) -> None:
         """Decide the final state of each item; `completed` is True if the tree succeeded."""
@@ -296,14 +286,14 @@ class Tracker:
                 record.bin, final = bin, (State.PLACED, "it fell there")
             if final is not None:
                 record.why = final[1]
-                self._change(record, final[0])
+                self._records.change(record, final[0])
         for record in find_lost_elsewhere(self.records, dropped):
-            self._emit(record.summary)
+            self._records.report(record)
 
     def reopen(self) -> None:
         """Forget the items that were left on the table; the next look adds those that still lie there."""
         for record in forget_rejected(self.records):
-            self._emit(record.summary)
+            self._records.report(record)
 
     def balance(self) -> dict[str, int]:
         """Return the counts `seen, placed, rejected, skipped, lost, phantom`."""
@@ -317,43 +307,20 @@ class Tracker:
         """Associate, update, reject; an object in a bin is no target, but it may be a dropped item."""
         bias = detections.error_rates.bias
         in_bins = {one: self._bins.find_bin(one, bias, self.records) for one in observations}
-        update = Update(self._config, self._records, self._names, self._coverage, self._staleness, detections)
+        update = Update(self._config, self._records, self._coverage, self._staleness, detections)
         for record in update.apply([one for one, bin in in_bins.items() if bin is None]):
             self._certainty.reject_if_uncertain(record, is_settled=self._staleness.is_settled(record))
-            self._emit(record.summary)
-        if detections.view == "full" and self._bin_contents is not None:
-            self._bin_contents.add(detections, in_bins)
+            self._records.report(record)
+        if detections.view == "full" and self._recovery is not None:
+            self._recovery.add(detections, in_bins)
         elif detections.view == "full":
             for record in self._bins.find_dropped(detections, in_bins, self.records):
-                self._emit(record.summary)
+                self._records.report(record)
 
     def _search_everywhere(self, records: Collection[Record]) -> None:
-        """Search items of unknown place on the table and in the bins; all positions are in doubt now."""
-        for record in records:
-            record.epoch, record.is_untracked = self.epoch, True
-            record.bin_log_odds.clear()
-            self._change(record, State.DROPPED)
+        assert self._recovery is not None, "items are searched everywhere after `lose_track`"
+        self._recovery.search(records, self.epoch)
         self.invalidate_positions()
-
-    def _add_in(self, bin: str, label: str) -> Record:
-        """Add an item that was first seen in a bin; its first position is the middle of the bin."""
-        self._names[label] += 1
-        belief = Belief(label, LOG_ODDS_OF_PROOF, is_proved=True)
-        place = self._bins.bins[bin].position
-        record = Record(f"{label}-{self._names[label]}", belief, place, self.epoch, 0.0, True)
-        self._records[record.item] = record
-        return record
-
-    def _find(self, item: Item) -> Record:
-        try:
-            return self._records[item]
-        except KeyError:
-            known = ", ".join(self._records) or "none"
-            raise Fault(f'the ledger knows no item "{item}"; it knows: {known}') from None
-
-    def _change(self, record: Record, state: State) -> None:
-        record.state = state
-        self._emit(record.summary)
 
     def _invalidate(self, centre: Array, radius: float) -> None:
         self._staleness.record_change(centre, radius)
