@@ -66,7 +66,7 @@ def cell_kind(name: str) -> CellKind:
 
 
 @dataclass(frozen=True)
-class Entry:
+class PluginEntry:
     """A class that some package offers under a name.
 
     Attributes:
@@ -96,7 +96,7 @@ class Entry:
             ) from error
 
 
-def registered(group: str, kind: str) -> dict[str, Entry]:
+def registered(group: str, kind: str) -> dict[str, PluginEntry]:
     """Return what is registered in a group by name, in the order of the names; nothing is loaded.
 
     The project one works in (`project_here`) need not be installed: its folder is the last
@@ -107,7 +107,7 @@ def registered(group: str, kind: str) -> dict[str, Entry]:
         InputError: Two packages register one name, or the project's pyproject.toml is wrong.
     """
     project = project_here()
-    found: dict[str, Entry] = {}
+    found: dict[str, PluginEntry] = {}
     entries = (*_installed(group, kind, project), *_own(group, kind, project))
     for entry in sorted(entries, key=lambda entry: (entry.name, entry.value)):
         if entry.name in found and found[entry.name].value != entry.value:
@@ -119,15 +119,15 @@ def registered(group: str, kind: str) -> dict[str, Entry]:
     return found
 
 
-def _installed(group: str, kind: str, project: Project | None) -> Iterator[Entry]:
+def _installed(group: str, kind: str, project: Project | None) -> Iterator[PluginEntry]:
     """Yield what installed packages register, the project itself left out."""
     for point in entry_points(group=group):
         package = point.dist.name if point.dist else point.module.partition(".")[0]
         if project is None or _normal(package) != _normal(project.name):
-            yield Entry(point.name, point.value, kind, f"uninstall the package {package}")
+            yield PluginEntry(point.name, point.value, kind, f"uninstall the package {package}")
 
 
-def _own(group: str, kind: str, project: Project | None) -> Iterator[Entry]:
+def _own(group: str, kind: str, project: Project | None) -> Iterator[PluginEntry]:
     """Yield what the project registers; its modules can be imported afterwards."""
     if project is None or not (entries := project.registers(group)):
         return
@@ -136,7 +136,7 @@ def _own(group: str, kind: str, project: Project | None) -> Iterator[Entry]:
         # At the end: nothing in the folder can stand in for what is installed.
         sys.path.append(folder)
     for name, value in entries.items():
-        yield Entry(name, value, kind, f"take it out of {project.file}")
+        yield PluginEntry(name, value, kind, f"take it out of {project.file}")
 
 
 def _normal(package: str) -> str:

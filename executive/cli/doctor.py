@@ -37,7 +37,7 @@ SERVER_TIMEOUT = 3.0
 """Time after which a server counts as out of reach [s]."""
 
 
-class Finding(NamedTuple):
+class Diagnosed(NamedTuple):
     """Result of one check.
 
     Attributes:
@@ -74,19 +74,19 @@ def command(ctx: click.Context, as_json: bool) -> None:
     ctx.exit(int(problems > 0))
 
 
-def examine() -> Iterator[Finding]:
+def examine() -> Iterator[Diagnosed]:
     """Run every check and yield its findings, even if a package that a check needs is missing."""
     for check in (check_system, check_packages, check_plugins, check_renderer, check_roboflow):
         subject = check.__name__.removeprefix("check_")
         try:
             yield from check()
         except InputError as error:
-            yield Finding("problem", subject, str(error))
+            yield Diagnosed("problem", subject, str(error))
         except ImportError as error:
-            yield Finding("problem", subject, f"cannot be checked: {error}", "run `uv sync`")
+            yield Diagnosed("problem", subject, f"cannot be checked: {error}", "run `uv sync`")
 
 
-def check_system(version: tuple[int, ...] = sys.version_info[:3]) -> Iterator[Finding]:
+def check_system(version: tuple[int, ...] = sys.version_info[:3]) -> Iterator[Diagnosed]:
     """Yield the version of Python, and the screen on which --gui opens a window."""
     python = f"{'.'.join(map(str, version))} on {platform.system()} {platform.machine()}"
     is_supported = MIN_PYTHON <= version[:2] <= MAX_PYTHON
@@ -98,7 +98,7 @@ def check_system(version: tuple[int, ...] = sys.version_info[:3]) -> Iterator[Fi
     yield _choose(bool(name), "display", shown, "note", "DISPLAY is not set", fix)
 
 
-def check_packages() -> Iterator[Finding]:
+def check_packages() -> Iterator[Diagnosed]:
     """Yield findings on required packages, packages that provide `cv2`, extras, and the video encoder."""
     from importlib.metadata import packages_distributions
 
@@ -107,10 +107,10 @@ def check_packages() -> Iterator[Finding]:
     names = required()
     missing = [name for name in (ITSELF, *names) if not installed(name)]
     for name in missing:
-        yield Finding("problem", "packages", f"{name} is missing", "run `uv sync`")
+        yield Diagnosed("problem", "packages", f"{name} is missing", "run `uv sync`")
     if not missing:
         message = f"{ITSELF} {installed(ITSELF)} and its {len(names)} required packages"
-        yield Finding("ok", "packages", message)
+        yield Diagnosed("ok", "packages", message)
     if packages := sorted(set(packages_distributions().get("cv2", ()))):
         opencv = ", ".join(f"{name} {installed(name)}" for name in packages)
         fix = "run `uv sync --reinstall`, which removes all but opencv-python-headless"
@@ -126,10 +126,10 @@ def check_packages() -> Iterator[Finding]:
         fix = f"to {purpose}, run `uv sync --extra {extra}`"
         yield _choose(not missing, extra, versions, "note", f"not installed: {', '.join(missing)}", fix)
     if version := installed("av"):
-        yield Finding("ok", "film", f"av {version} encodes videos; the program ffmpeg is not needed")
+        yield Diagnosed("ok", "film", f"av {version} encodes videos; the program ffmpeg is not needed")
 
 
-def check_plugins() -> Iterator[Finding]:
+def check_plugins() -> Iterator[Diagnosed]:
     """Load every installed skill, kind of cell and kind of detector, and yield their numbers."""
     from executive.perception.detectors import registry
     from executive.plugins import CELL_KINDS, discover, project_here, registered
@@ -139,10 +139,10 @@ def check_plugins() -> Iterator[Finding]:
     for entry in (*kinds.values(), *detectors.values()):
         entry.load()
     message = f"{len(skills)} skills, {len(kinds)} kinds of cells, {len(detectors)} kinds of detectors"
-    yield Finding("ok", "plugins", f"{message}; those of {project.file} included" if project else message)
+    yield Diagnosed("ok", "plugins", f"{message}; those of {project.file} included" if project else message)
 
 
-def check_renderer() -> Iterator[Finding]:
+def check_renderer() -> Iterator[Diagnosed]:
     """Yield the time TinyRenderer needs for a frame, and whether PyBullet's EGL plugin draws."""
     time, problem = measure_frame_time("tiny")
     drawn = f"TinyRenderer, on the CPU: {time:.0f} ms for 640x480 of the overhead cell"
@@ -151,10 +151,10 @@ def check_renderer() -> Iterator[Finding]:
     _, problem = measure_frame_time("egl")
     state = f"draws nothing: {problem}" if problem else "can be loaded and draws"
     status = "note" if problem else "ok"
-    yield Finding(status, "egl", f"PyBullet's EGL plugin {state}; no cell needs it")
+    yield Diagnosed(status, "egl", f"PyBullet's EGL plugin {state}; no cell needs it")
 
 
-def check_roboflow() -> Iterator[Finding]:
+def check_roboflow() -> Iterator[Diagnosed]:
     """Yield whether there is a key, without showing it, and whether Roboflow's own server answers."""
     from executive.perception.detectors.roboflow.key import VARIABLE, ApiKey
     from executive.perception.detectors.roboflow.options import HOSTED
@@ -166,8 +166,8 @@ def check_roboflow() -> Iterator[Finding]:
     yield _choose(is_reachable(HOSTED), "roboflow", f"{HOSTED} answers", "note", message, fix)
 
 
-def _choose(is_ok: bool, subject: str, good: str, status: str, bad: str, fix: str) -> Finding:
-    return Finding("ok", subject, good) if is_ok else Finding(status, subject, bad, fix)
+def _choose(is_ok: bool, subject: str, good: str, status: str, bad: str, fix: str) -> Diagnosed:
+    return Diagnosed("ok", subject, good) if is_ok else Diagnosed(status, subject, bad, fix)
 
 
 def measure_frame_time(renderer: str) -> tuple[float, str]:

@@ -41,12 +41,12 @@ def command(
         from executive.record.run_directory import RunDirectory
         from executive.view.film.film import HOLD, film
         from executive.view.film.formats import file_for, format_of
-        from executive.view.film.source import Source
+        from executive.view.film.source import FilmSource
 
         directory = RunDirectory(find_run(run, runs))
         format = format_of(output, gif)
         file = output or directory.path / f"film{format.suffix}"
-        source = Source(directory)
+        source = FilmSource(directory)
         speed = speed or format.speed
         with file_for(file, force=force) as part:
             if not quiet:

@@ -13,7 +13,7 @@ from executive.motion.arm_model import Configuration, Kinematics
 from executive.motion.cartesian_line import CHAIN_LENGTH, CartesianLine
 from executive.motion.limits import JointLimits, min_time
 from executive.motion.postures import find_postures, solve_vertical_line
-from executive.motion.state import State
+from executive.motion.state import JointState
 
 MIN_JOINT_DIFFERENCE = 0.2
 """Minimum difference of a joint between two candidates [rad]."""
@@ -31,7 +31,7 @@ class Candidate:
     """
 
     estimate: float
-    entry: State
+    entry: JointState
     arrival: CartesianLine | None
     configuration: Configuration | None
 
@@ -42,7 +42,7 @@ class Candidate:
 
 
 def find_candidates(
-    kinematics: Kinematics, limits: JointLimits, start: State, goal: Goal, length: float
+    kinematics: Kinematics, limits: JointLimits, start: JointState, goal: Goal, length: float
 ) -> Iterator[Candidate]:
     """Yield candidates for motions to a goal, the last `length` [m] straight, each unlike those before it.
 
@@ -58,7 +58,7 @@ def find_candidates(
             continue
         taken.append(low)
         configuration = postures.configurations[number]
-        arrival, entry = None, State.rest(low)
+        arrival, entry = None, JointState.rest(low)
         if length > 0:
             chain = solve_vertical_line(kinematics, low, length, CHAIN_LENGTH, configuration)[::-1]
             arrival = CartesianLine(chain, length, limits, goal.speed, enters=True)

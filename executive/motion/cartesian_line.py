@@ -20,7 +20,7 @@ from scipy.interpolate import CubicSpline
 
 from executive.geometry import Array
 from executive.motion.limits import JointLimits
-from executive.motion.state import State
+from executive.motion.state import JointState
 
 CHAIN_LENGTH = 4
 """Places along a line that inverse kinematics is asked for."""
@@ -73,18 +73,18 @@ class CartesianLine:
         Ruckig(1).calculate(inputs, self._profile)
         self.duration: float = self._profile.duration
 
-    def at(self, s: float) -> State:
+    def at(self, s: float) -> JointState:
         """Return the state at time `s`, 0 to `duration` [s]."""
         (place,), (speed,), (change,) = self._profile.at_time(s)
         first, second = (derivative(place) for derivative in self._derivatives)
-        return State(self._spline(place), first * speed, first * change + second * speed**2)
+        return JointState(self._spline(place), first * speed, first * change + second * speed**2)
 
-    def over(self, times: Array) -> State:
+    def over(self, times: Array) -> JointState:
         """Return the states at `times` `(N,)` [s], each array of shape `(N, n)`."""
         place, speed, change = np.array([self._profile.at_time(s) for s in times.tolist()])[:, :, 0].T
         first, second = (derivative(place) for derivative in self._derivatives)
         bent = second * speed[:, None] ** 2
-        return State(self._spline(place), first * speed[:, None], first * change[:, None] + bent)
+        return JointState(self._spline(place), first * speed[:, None], first * change[:, None] + bent)
 
     def _bounds(self, limits: JointLimits, speed: float, length: float) -> tuple[float, float, float]:
         """Return the tool's largest speed [m/s], acceleration [m/s²] and jerk [m/s³]."""

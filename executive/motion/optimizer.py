@@ -19,13 +19,13 @@ from executive.motion.clearance_model import ClearanceModel, Discs
 from executive.motion.limits import JointLimits
 from executive.motion.payload import PayloadLimit
 from executive.motion.point_to_point import Connector, NoProfile, PointToPoint
-from executive.motion.state import State
+from executive.motion.state import JointState
 from executive.motion.transcription import (
     SAMPLES_PER_STEP,
     STEP_COUNT,
     VIOLATION_COST,
-    Course,
     Demand,
+    JointCourse,
     Transcription,
 )
 
@@ -53,8 +53,8 @@ class Problem:
         payload: Acceleration limit due to the load, or None.
     """
 
-    start: State
-    end: State
+    start: JointState
+    end: JointState
     connector: Connector
     kinematics: Kinematics
     clearance: ClearanceModel
@@ -124,7 +124,7 @@ class Optimizer:
             self._trust *= TRUST_DECAY
             self._look(course)
 
-    def _look(self, course: Course) -> None:
+    def _look(self, course: JointCourse) -> None:
         """Take `course` as the last one, and as the best one if it is."""
         self._last, self._slack = course, self._problem.slack(course.qs)
         lacks = [-float(self._slack.min())]
@@ -155,7 +155,7 @@ class Optimizer:
         return tuple(self._problem.connector.connect(a, b, least) for a, b in pairwise(states))
 
 
-def _limit_velocity(state: State, limits: JointLimits) -> State:
+def _limit_velocity(state: JointState, limits: JointLimits) -> JointState:
     """Return the nearest state that can be entered and left without exceeding a velocity limit.
 
     Whoever has an acceleration gains `a² / 2 j` before it is gone.

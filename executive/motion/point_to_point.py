@@ -15,7 +15,7 @@ from ruckig import Trajectory as Profile
 from executive.errors import Fault
 from executive.geometry import Array
 from executive.motion.limits import JointLimits
-from executive.motion.state import State
+from executive.motion.state import JointState
 
 _ROUNDING = 1e-9  # share of a limit
 
@@ -31,14 +31,14 @@ class PointToPoint:
         self._profile = profile
         self.duration: float = profile.duration
 
-    def at(self, s: float) -> State:
+    def at(self, s: float) -> JointState:
         """Return the state at time `s`, 0 to `duration` [s]."""
-        return State(*map(np.array, self._profile.at_time(s)))
+        return JointState(*map(np.array, self._profile.at_time(s)))
 
-    def over(self, times: Array) -> State:
+    def over(self, times: Array) -> JointState:
         """Return the states at `times` `(N,)` [s], each array of shape `(N, n)`."""
         states = np.array([self._profile.at_time(s) for s in times.tolist()])
-        return State(states[:, 0], states[:, 1], states[:, 2])
+        return JointState(states[:, 0], states[:, 1], states[:, 2])
 
 
 class Connector:
@@ -52,7 +52,7 @@ class Connector:
         self._input.max_acceleration = limits.acceleration.tolist()
         self._input.max_jerk = limits.jerk.tolist()
 
-    def connect(self, start: State, end: State, least: float | None = None) -> PointToPoint:
+    def connect(self, start: JointState, end: JointState, least: float | None = None) -> PointToPoint:
         """Return the fastest motion from `start` to `end` that takes `least` [s] or longer.
 
         Positions are not limited: ruckig does not look at that.
@@ -101,5 +101,5 @@ def _fastest(profile: Profile) -> Array:
     return np.array(fastest)
 
 
-def _text(start: State, end: State, why: object) -> str:
+def _text(start: JointState, end: JointState, why: object) -> str:
     return f"ruckig finds no profile from {start.q.round(4)} to {end.q.round(4)} rad: {why}"

@@ -23,7 +23,7 @@ from executive.motion.optimizer import Optimizer, Problem
 from executive.motion.payload import PayloadLimit
 from executive.motion.point_to_point import Connector, NoProfile
 from executive.motion.postures import find_vertical_line, solve_vertical_line
-from executive.motion.state import Piece, State
+from executive.motion.state import JointState, Piece
 from executive.motion.trajectory import Trajectory, sample_pieces
 from executive.motion.transcription import SAMPLE_SHARES
 
@@ -73,9 +73,11 @@ class Search:
         tips, axes = map(np.concatenate, zip(kinematics.tips(start[None]), self._arrival(), strict=True))
         self._clearance = ClearanceModel(config, task.around, tips[:, :2])
         self._clearance.relax(tips, axes, self._discs)
-        self._rises: dict[tuple[float, bool], tuple[list[Piece], State]] = {}
+        self._rises: dict[tuple[float, bool], tuple[list[Piece], JointState]] = {}
         self._departure = self._depart(start, float(tips[0, 2]))
-        self._start = self._departure.at(self._departure.duration) if self._departure else State.rest(start)
+        self._start = (
+            self._departure.at(self._departure.duration) if self._departure else JointState.rest(start)
+        )
 
     def candidates(self) -> Iterator[Trajectory]:
         """Yield motions, best first: direct ones and detours, then such as stop at every corner."""
@@ -103,7 +105,7 @@ class Search:
 
     def _list_ends(self) -> Iterator[Candidate]:
         if not isinstance(self._end, Goal):
-            yield Candidate(0.0, State.rest(self._end), None, None)
+            yield Candidate(0.0, JointState.rest(self._end), None, None)
             return
         length = self._end.guarded or self._straight
         yield from find_candidates(self._kinematics, self._limits, self._start, self._end, length)
@@ -190,11 +192,11 @@ class Search:
                 self._kinematics, candidate.entry.q, high - z, CHAIN_LENGTH, candidate.configuration
             )
             line = CartesianLine(chain[::-1], high - z, self._limits)
-            return [*up, connect(here, State.rest(chain[-1])), line]
+            return [*up, connect(here, JointState.rest(chain[-1])), line]
         above = self._above((x, y, high), candidate.configuration, candidate.entry.q)
         return [*up, connect(here, above), connect(above, candidate.entry)]
 
-    def _rise(self, high: float, straight: bool) -> tuple[list[Piece], State]:
+    def _rise(self, high: float, straight: bool) -> tuple[list[Piece], JointState]:
         """Return the way up from the start, and the state of rest in which it ends."""
         q, ((x, y, z), upright) = self._start.q, self._tip(self._start.q)
         if not upright or z >= high:
@@ -202,7 +204,7 @@ class Search:
         if straight and self._departure is None:
             chain = find_vertical_line(self._kinematics, q, high - z, CHAIN_LENGTH)
             if chain is not None:
-                return [CartesianLine(chain, high - z, self._limits)], State.rest(chain[-1])
+                return [CartesianLine(chain, high - z, self._limits)], JointState.rest(chain[-1])
         above = self._above((x, y, high), self._kinematics.configuration(q), q)
         return [self._connector.connect(self._start, above)], above
 
@@ -210,11 +212,13 @@ class Search:
         tips, axes = self._kinematics.tips(q[None])
         return tips[0], bool(-axes[0, 2] > MIN_COSINE_DOWN)
 
-    def _above(self, place: tuple[float, float, float], configuration: Configuration, near: Array) -> State:
+    def _above(
+        self, place: tuple[float, float, float], configuration: Configuration, near: Array
+    ) -> JointState:
         """Return the state of rest at a place, with the last joint as at `near` `(n,)` [rad]."""
         q = self._kinematics.solve(tool_down(place), configuration)
         q[-1] = near[-1]
-        return State.rest(q)
+        return JointState.rest(q)
 
     def _depart(self, start: Array, height: float) -> CartesianLine | None:
         """Return the straight way up with which a motion begins, or None.

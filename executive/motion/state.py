@@ -9,7 +9,7 @@ import numpy as np
 from executive.geometry import Array
 
 
-class State(NamedTuple):
+class JointState(NamedTuple):
     """Position [rad], velocity [rad/s] and acceleration [rad/s²] of the joints, each `(n,)`."""
 
     q: Array
@@ -17,9 +17,9 @@ class State(NamedTuple):
     qdd: Array
 
     @staticmethod
-    def rest(q: Array) -> State:
+    def rest(q: Array) -> JointState:
         """Return the state of standing still at `q` `(n,)` [rad]."""
-        return State(q, np.zeros(len(q)), np.zeros(len(q)))
+        return JointState(q, np.zeros(len(q)), np.zeros(len(q)))
 
 
 class Piece(Protocol):
@@ -29,8 +29,8 @@ class Piece(Protocol):
     def duration(self) -> float:
         """Time it takes [s]."""
 
-    def at(self, s: float) -> State:
+    def at(self, s: float) -> JointState:
         """Return the state at time `s`, 0 to `duration` [s]."""
 
-    def over(self, times: Array) -> State:
+    def over(self, times: Array) -> JointState:
         """Return the states at `times` `(N,)` [s], each array of shape `(N, n)`."""

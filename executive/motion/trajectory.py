@@ -16,7 +16,7 @@ from executive.errors import Fault, Unreachable
 from executive.geometry import Array
 from executive.motion.limits import JointLimits
 from executive.motion.point_to_point import NoProfile
-from executive.motion.state import Piece, State
+from executive.motion.state import JointState, Piece
 
 _ROUNDING = 1e-6
 """Difference of joint states that is rounding [rad, rad/s, rad/s²]."""
@@ -47,13 +47,13 @@ class Trajectory:
         for number, (before, after) in enumerate(pairwise(pieces), start=1):
             _require_same(before.at(before.duration), after.at(0.0), f"pieces {number} and {number + 1}")
         for state, where in ((self._first, "begins"), (self._last, "ends")):
-            _require_same(state, State.rest(state.q), f"rest and how a trajectory {where}")
+            _require_same(state, JointState.rest(state.q), f"rest and how a trajectory {where}")
 
     def slowed(self, rate: float) -> Trajectory:
         """Return the same motion on the same path at `rate` times its speed, 0 to 1."""
         return Trajectory([_Slowed(piece, rate) for piece in self._pieces], self.guarded / rate)
 
-    def at(self, s: float) -> State:
+    def at(self, s: float) -> JointState:
         """Return position, velocity and acceleration of the joints at path time `s` [s].
 
         Before the start and after the end it rests.
@@ -61,20 +61,20 @@ class Trajectory:
         if not math.isfinite(s):  # ruckig would end the process
             raise Fault(f"a trajectory was asked for the time {s}; its times are 0 to {self.duration:.3f} s")
         if s <= 0 or s >= self.duration:
-            return State.rest((self.start if s <= 0 else self.end).copy())
+            return JointState.rest((self.start if s <= 0 else self.end).copy())
         number = min(bisect_right(self._ends, s), len(self._pieces) - 1)
         before = self._ends[number - 1] if number else 0.0
         return self._pieces[number].at(s - before)
 
     @cached_property
-    def samples(self) -> State:
+    def samples(self) -> JointState:
         """Its states every 1/240 s, the last one included: each array of shape `(N, n)`."""
         states = sample_pieces(
             self._pieces, np.asarray(np.arange(0.0, self.duration, STEP), dtype=np.float64)
         )
-        return State(*(np.concatenate([a, b[None]]) for a, b in zip(states, self._last, strict=True)))
+        return JointState(*(np.concatenate([a, b[None]]) for a, b in zip(states, self._last, strict=True)))
 
-    def check(self, limits: JointLimits) -> State:
+    def check(self, limits: JointLimits) -> JointState:
         """Make sure that every joint keeps its limits on the way, and return the states it was seen in.
 
         Raises:
@@ -93,7 +93,7 @@ class Trajectory:
         return states
 
 
-def find_peaks(states: State, limits: JointLimits) -> Array:
+def find_peaks(states: JointState, limits: JointLimits) -> Array:
     """Return each joint's largest velocity, acceleration and jerk over its limit `(3, n)`.
 
     The states are a motion's samples, every `STEP`. The last one is not a whole step after the one before,
@@ -115,14 +115,14 @@ class _Slowed:
     def duration(self) -> float:
         return self.piece.duration / self.rate
 
-    def at(self, s: float) -> State:
+    def at(self, s: float) -> JointState:
         return self._slower(self.piece.at(s * self.rate))
 
-    def over(self, times: Array) -> State:
+    def over(self, times: Array) -> JointState:
         return self._slower(self.piece.over(times * self.rate))
 
-    def _slower(self, state: State) -> State:
-        return State(state.q, self.rate * state.qd, self.rate**2 * state.qdd)
+    def _slower(self, state: JointState) -> JointState:
+        return JointState(state.q, self.rate * state.qd, self.rate**2 * state.qdd)
 
 
 def thin_out(qs: Array, spacing: float) -> Array:
@@ -134,21 +134,21 @@ def thin_out(qs: Array, spacing: float) -> Array:
     return qs[[*kept, len(qs) - 1]]
 
 
-def sample_pieces(pieces: Sequence[Piece], times: Array) -> State:
+def sample_pieces(pieces: Sequence[Piece], times: Array) -> JointState:
     """Return the states that `pieces`, one after the other, pass at rising `times` `(N,)` [s]."""
     count = len(pieces[0].at(0.0).q)
-    parts, before = [State(*np.empty((3, 0, count)))], 0.0
+    parts, before = [JointState(*np.empty((3, 0, count)))], 0.0
     for number, piece in enumerate(pieces, start=1):
         end = before + piece.duration if number < len(pieces) else np.inf
         here = times[(before <= times) & (times < end)]
         if len(here):
             parts.append(piece.over(np.asarray(here - before)))
         before = end
-    return State(*map(np.concatenate, zip(*parts, strict=True)))
+    return JointState(*map(np.concatenate, zip(*parts, strict=True)))
 
 
-def _require_same(one: State, other: State, what: str) -> None:
-    for name, a, b in zip(State._fields, one, other, strict=True):
+def _require_same(one: JointState, other: JointState, what: str) -> None:
+    for name, a, b in zip(JointState._fields, one, other, strict=True):
         apart = float(np.max(np.abs(a - b)))
         if apart > _ROUNDING:
             raise Fault(f"{what} do not fit together: their {name} differ by {apart:.2g}")

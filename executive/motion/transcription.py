@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from executive.geometry import Array
 from executive.motion.limits import JointLimits
-from executive.motion.state import State
+from executive.motion.state import JointState
 
 STEP_COUNT = 8
 """Steps of time of a motion."""
@@ -48,7 +48,7 @@ _UNBOUNDED = 1e30
 _SOLVED, _EQUALITY = 1, 5  # what daqp calls them
 
 
-class Course(NamedTuple):
+class JointCourse(NamedTuple):
     """A motion in steps.
 
     Attributes:
@@ -94,7 +94,7 @@ class Transcription:
         limits: What the joints may do.
     """
 
-    def __init__(self, start: State, end: State, limits: JointLimits) -> None:
+    def __init__(self, start: JointState, end: JointState, limits: JointLimits) -> None:
         self._start, self._end = start, end
         self._grid = _grid(limits.joint_count)
         self._inner = limits.joint_count * (STEP_COUNT - 1)
@@ -119,7 +119,7 @@ class Transcription:
         self._reach[0, len(still) : -len(grid.jerks)] = np.repeat(velocity, halves)
         self._reach[2, -len(grid.jerks) :] = np.repeat(jerk, STEP_COUNT)
 
-    def states(self, course: Course) -> list[State]:
+    def states(self, course: JointCourse) -> list[JointState]:
         """Return the states at every half step, the start and the end among them."""
         h, grid, start = course.step, self._grid, self._start
         y = course.accelerations * h**2
@@ -128,9 +128,9 @@ class Transcription:
         qdd = np.empty((2 * STEP_COUNT - 1, len(y)))
         qdd[::2], qdd[1::2] = middle.T / h**2, course.accelerations[:, 1:-1].T
         inner = slice(SAMPLES_PER_STEP // 2 - 1, None, SAMPLES_PER_STEP // 2)
-        return [start, *map(State, course.qs[inner], qd, qdd), self._end]
+        return [start, *map(JointState, course.qs[inner], qd, qdd), self._end]
 
-    def fit(self, step: float, first: Array) -> Course | None:
+    def fit(self, step: float, first: Array) -> JointCourse | None:
         """Return the course with steps of `step` [s] that is nearest to positions `(M, n)` [rad], or None."""
         program = self._program(step)
         inner = self._grid.place[:, 1:-1]
@@ -143,7 +143,7 @@ class Transcription:
         program.low[self._inner] = program.high[self._inner] = 1.0
         return self._course(step, program)
 
-    def shorten(self, last: Course, demands: Sequence[Demand], trust: float) -> Course | None:
+    def shorten(self, last: JointCourse, demands: Sequence[Demand], trust: float) -> JointCourse | None:
         """Return the shortest course near the last one that meets demands, or None where there is none.
 
         `trust` is the share of the limits by which its accelerations differ from the last one's at most.
@@ -203,7 +203,7 @@ class Transcription:
 
     def _course(
         self, step: float, program: _Program, clear: Array | None = None, most: Array | None = None
-    ) -> Course | None:
+    ) -> JointCourse | None:
         """Return the solution of a program, with rows `clear` that are at most `most` added, or None."""
         answer = program.solve(clear, most)
         if answer is None:
@@ -212,7 +212,7 @@ class Transcription:
         inner = (answer * program.scale)[: self._inner].reshape(-1, STEP_COUNT - 1)
         y = np.column_stack([self._start.qdd * h**2, inner, self._end.qdd * h**2])
         qs = self._start.q + np.outer(self._grid.times, self._start.qd * h) + self._grid.place @ y.T
-        return Course(h, y / h**2, qs)
+        return JointCourse(h, y / h**2, qs)
 
 
 class _Program(NamedTuple):

@@ -52,7 +52,7 @@ SHRINK, THINNING = 4, 4
 """Factors by which the image is reduced, and the samples are thinned, for the search grid."""
 
 
-class Samples(NamedTuple):
+class EdgeSamples(NamedTuple):
     """Samples of the outlines as a camera sees them.
 
     Attributes:
@@ -81,7 +81,7 @@ class Fit(NamedTuple):
 
     offset: Array
     covariance: Array
-    samples: Samples
+    samples: EdgeSamples
     support: float
 
 
@@ -143,7 +143,7 @@ class OutlineFitter:
             if fit is not None:
                 yield fit
 
-    def _samples(self, offset: Array) -> Samples:
+    def _samples(self, offset: Array) -> EdgeSamples:
         """Return the samples of the outlines that a camera at an offset `(6,)` has in view."""
         rotation = np.asarray(cv2.Rodrigues(offset[:3])[0], dtype=float)
         X_WC, visible = self._frame.X_WC @ Pose(rotation, offset[3:]), self._frame.visible
@@ -155,9 +155,9 @@ class OutlineFitter:
         shown = ((pixels >= BORDER) & (pixels < size - BORDER)).all(axis=1)
         columns, rows = pixels.clip(0, size - 1).astype(int).T
         shown &= visible[rows, columns]
-        return Samples(points[shown], in_camera[shown], pixels[shown], normals[shown], bins[shown])
+        return EdgeSamples(points[shown], in_camera[shown], pixels[shown], normals[shown], bins[shown])
 
-    def _edges(self, samples: Samples, max_distance: int) -> tuple[Array, NDArray[np.bool_]]:
+    def _edges(self, samples: EdgeSamples, max_distance: int) -> tuple[Array, NDArray[np.bool_]]:
         """Return the distance `(N,)` [pixel] of the strongest edge on each normal, and whether it exists."""
         n = samples.normals[:, None, None]
         across = np.arange(-max_distance - 1.5, max_distance + 2)[:, None, None]
@@ -218,7 +218,7 @@ def _perpendicular(directions: Array) -> Array:
     return np.asarray(turned / np.maximum(np.linalg.norm(turned, axis=-1, keepdims=True), 1e-9))
 
 
-def _is_enough(samples: Samples) -> bool:
+def _is_enough(samples: EdgeSamples) -> bool:
     """Return True if there are enough samples and their normals span both directions of the image."""
     count = len(samples.points)
     if count < MIN_SAMPLES:
@@ -226,7 +226,7 @@ def _is_enough(samples: Samples) -> bool:
     return bool(np.linalg.eigvalsh(samples.normals.T @ samples.normals / count)[0] >= MIN_NORMAL_EIGENVALUE)
 
 
-def _jacobian(samples: Samples, matrix: Array) -> Array:
+def _jacobian(samples: EdgeSamples, matrix: Array) -> Array:
     """Return the Jacobian `(N, 6)` [pixel/rad, pixel/m] of positions along normals w.r.t. the offset."""
     x, y, z = samples.in_camera.T
     u, v = (samples.normals * matrix.diagonal()[:2]).T

@@ -12,7 +12,7 @@ from executive.cell.detection import Detection
 from executive.cell.frame import Frame, FrameTaken
 from executive.events import DetectedObject, FrameSearched, NodeEnded, TargetSelected, TimedEvent
 from executive.record.pictures.drawer import Drawer
-from executive.record.pictures.scene import Scene
+from executive.record.pictures.scene import PictureScene
 from executive.record.timeline.activation import skill_name
 from executive.record.timeline.timeline import Timeline
 
@@ -107,12 +107,12 @@ class Frames:
         look: tuple[Frame, FrameSearched],
         choice: TargetSelected | None,
         failure: NodeEnded | None,
-    ) -> Scene:
+    ) -> PictureScene:
         frame, searched = look
         timeline = self._timeline
         item = choice.item if choice else ""
         known = timeline.items.by_name.get(item)
-        return Scene(
+        return PictureScene(
             image=frame.image,
             visible=frame.visible,
             seen=[_detection(one) for one in searched.found],

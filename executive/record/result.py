@@ -16,7 +16,7 @@ from executive.events import RunResumed, TimedEvent
 from executive.record.diagnosis.diagnosis import Diagnosis
 from executive.record.journal import ending_of
 from executive.record.run_directory import RunDirectory
-from executive.record.timeline.timeline import Planning, Timeline
+from executive.record.timeline.timeline import PlanningTotals, Timeline
 from executive.record.whole_file import write_whole
 
 QUIT = "quit"
@@ -103,7 +103,7 @@ class Result:
     doubts: Sequence[str] = ()
     empty: bool = False
     audit: Audit | None = None
-    planning: Planning = field(default_factory=Planning)
+    planning: PlanningTotals = field(default_factory=PlanningTotals)
     requests: Sequence[str] = ()
     ticks: int = 0
     robot_time_s: float = 0.0

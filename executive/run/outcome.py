@@ -12,7 +12,7 @@ from executive.tree.failure import Failure
 
 
 @dataclass(frozen=True)
-class Ending:
+class LoopEnd:
     """End of the tick loop; see `RunEnded`.
 
     Attributes:
@@ -26,15 +26,15 @@ class Ending:
     traceback: str = ""
 
 
-HALTED = Ending("HALTED", "halted", "halted by the user")
+HALTED = LoopEnd("HALTED", "halted", "halted by the user")
 """Somebody wanted the run to end."""
 
 
-def end_of_tree(failure: Failure | None) -> Ending:
+def end_of_tree(failure: Failure | None) -> LoopEnd:
     """Return the end of a run whose tree ended with a failure or None; its items are not judged yet."""
     if failure is None:
-        return Ending("SUCCESS")
-    return Ending("FAILURE", str(failure), failure.message, failure.path)
+        return LoopEnd("SUCCESS")
+    return LoopEnd("FAILURE", str(failure), failure.message, failure.path)
 
 
 def problems_of(do: Callable[[], None]) -> list[str]:
@@ -46,18 +46,18 @@ def problems_of(do: Callable[[], None]) -> list[str]:
     return []
 
 
-def judge_items(accounts: Accounts) -> Ending:
+def judge_items(accounts: Accounts) -> LoopEnd:
     """Return the end of a run whose tree succeeded: its items decide whether it is a success."""
     items = accounts.summaries()
     lost = [item.item for item in items if item.state == "lost"]
     if lost:
         message = f"{len(lost)} object(s) were lost and not found again: {', '.join(lost)}"
-        return Ending("FAILURE", "lost", message)
+        return LoopEnd("FAILURE", "lost", message)
     rejected = [f"{item.item} ({item.why})" for item in items if item.state == "rejected"]
     if rejected:
         message = f"{len(rejected)} object(s) were not sorted: {', '.join(rejected)}"
-        return Ending("INCOMPLETE", "rejected", message)
-    return Ending("SUCCESS")
+        return LoopEnd("INCOMPLETE", "rejected", message)
+    return LoopEnd("SUCCESS")
 
 
 def close_books(accounts: Accounts, *, completed: bool) -> None:

@@ -16,7 +16,7 @@ from executive.events import FaultRaised, Observer, RunEnded, RunHalted, RunStar
 from executive.mission.build import TreeNode
 from executive.run.outcome import (
     HALTED,
-    Ending,
+    LoopEnd,
     close_books,
     end_of_tree,
     judge_items,
@@ -126,10 +126,10 @@ class Run:
         if problems and ending.status == "FAULT":
             ending = replace(ending, message="; ".join([ending.message, *problems]))
         elif problems:
-            ending = Ending("FAULT", "fault", "; ".join(problems))
+            ending = LoopEnd("FAULT", "fault", "; ".join(problems))
         return self._outcome(ending)
 
-    def _tick_to_end(self) -> Ending:
+    def _tick_to_end(self) -> LoopEnd:
         """Tick the tree once in every control step until it ends, or until the run is stopped."""
         context, control, ticked = self._context, self.control, False
         try:
@@ -157,10 +157,10 @@ class Run:
         except Exception as error:
             message = str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"
             node = error.node if isinstance(error, Fault) else ""
-            ending = Ending("FAULT", "fault", message, node, traceback.format_exc())
+            ending = LoopEnd("FAULT", "fault", message, node, traceback.format_exc())
         broken = problems_of(lambda: context.emit(RunHalted(ticked)))
         if broken and ending.status != "FAULT":
-            ending = Ending("FAULT", "fault", broken[0])
+            ending = LoopEnd("FAULT", "fault", broken[0])
         return ending
 
     def _ask_tool(self) -> None:
@@ -174,7 +174,7 @@ class Run:
         ledger = self._context.cell.ledger
         self._is_empty = ledger.is_table_empty() and not ledger.unknown
 
-    def _outcome(self, ending: Ending) -> RunEnded:
+    def _outcome(self, ending: LoopEnd) -> RunEnded:
         if ending.status == "SUCCESS":
             ending = judge_items(self.workcell.accounts)
         end = (self._is_empty, self._held_item, self.tick, round(self.now, 6))

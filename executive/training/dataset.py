@@ -27,7 +27,7 @@ QUALITY = 95
 
 
 @dataclass(frozen=True)
-class Entry:
+class DatasetEntry:
     """What is known of one image of a dataset.
 
     Attributes:
@@ -65,7 +65,9 @@ def save_image(path: Path, image: NDArray[np.uint8]) -> None:
         raise InputError(f"the image {path} could not be written; is the disk full or the folder read-only?")
 
 
-def write_annotations(root: Path, layout: str, entries: Sequence[Entry], classes: Sequence[str]) -> None:
+def write_annotations(
+    root: Path, layout: str, entries: Sequence[DatasetEntry], classes: Sequence[str]
+) -> None:
     """Write the annotations of a whole dataset, the classes numbered from 0 in the order given.
 
     Beside them each split gets `ignored.json` (boxes by file, for measurements that must neither
@@ -92,7 +94,7 @@ def write_annotations(root: Path, layout: str, entries: Sequence[Entry], classes
         (root / "data.yaml").write_text(yaml.safe_dump(data, sort_keys=False))
 
 
-def _coco(entries: Sequence[Entry], classes: Sequence[str]) -> dict[str, Any]:
+def _coco(entries: Sequence[DatasetEntry], classes: Sequence[str]) -> dict[str, Any]:
     images: list[dict[str, Any]] = []
     annotations: list[dict[str, Any]] = []
     for number, entry in enumerate(entries):
@@ -120,7 +122,7 @@ def _coco(entries: Sequence[Entry], classes: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def _write_yolo(folder: Path, entries: Sequence[Entry], classes: Sequence[str]) -> None:
+def _write_yolo(folder: Path, entries: Sequence[DatasetEntry], classes: Sequence[str]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for entry in entries:
         width, height = entry.size

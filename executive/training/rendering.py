@@ -20,7 +20,7 @@ from executive.cells.sim.scenes import IMAGE_SIZE, Sample, SceneRenderer
 from executive.errors import InputError
 from executive.geometry import Array
 from executive.processes import Workers
-from executive.training.dataset import Entry, image_path, save_image, write_annotations
+from executive.training.dataset import DatasetEntry, image_path, save_image, write_annotations
 from executive.training.labelled_image import LabelledImage
 
 T = TypeVar("T")
@@ -131,7 +131,7 @@ def _draw(
 
 def _render_block(
     cells: Sequence[CellConfig], out: Path, layout: str, seed: int, first_valid: int, numbers: range
-) -> dict[int, Entry]:
+) -> dict[int, DatasetEntry]:
     """Render and save the images of these numbers; runs in a process of its own."""
     entries = {}
     for number, camera, sample in _draw(cells, seed, numbers):
@@ -152,7 +152,7 @@ def _take_frames(
     }
 
 
-def _entry(sample: Sample, split: str, file: str, camera: str) -> Entry:
+def _entry(sample: Sample, split: str, file: str, camera: str) -> DatasetEntry:
     """Return the dataset entry of a sample, with the truth for measuring localizers."""
     rounded = {
         "matrix": sample.matrix.tolist(),
@@ -162,7 +162,7 @@ def _entry(sample: Sample, split: str, file: str, camera: str) -> Entry:
     }
     boxes, ignored = _boxes(sample.boxes), _boxes(sample.ignored)
     truth = {**_truth(sample, camera, sample.part), **rounded}
-    return Entry(split, file, (IMAGE_SIZE, IMAGE_SIZE), sample.labels, boxes, ignored, truth)
+    return DatasetEntry(split, file, (IMAGE_SIZE, IMAGE_SIZE), sample.labels, boxes, ignored, truth)
 
 
 def as_labelled_frame(sample: Sample, camera: str, file: str) -> LabelledImage:

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from py_trees.common import Status
 
-from executive.tree.flow import Enter, Flow, PossibleFailure, State, joined
+from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure, joined
 from executive.tree.inspection import MinTimes, PassedFailure
 from executive.tree.keys import Child, Children, key
 from executive.tree.node import ControlNode
@@ -42,11 +42,11 @@ class Fallback(ControlNode):
                 return self.fail(failure)
             self.choose(f"choice {self._next + 1} of {len(self.do)}", failure)
 
-    def flow(self, enter: Enter, state: State) -> Flow:
+    def flow(self, enter: Enter, state: FlowState) -> Flow:
         """Enter each child in the states after the failures of the one before it."""
         success = halted = None
-        failures: Mapping[PossibleFailure, State] = {}
-        here: State | None = state
+        failures: Mapping[PossibleFailure, FlowState] = {}
+        here: FlowState | None = state
         for choice in self.do:
             if here is None:
                 break

@@ -37,7 +37,7 @@ PossibleTools = frozenset[PossibleTool] | None
 
 
 @dataclass(frozen=True)
-class State:
+class FlowState:
     """Facts that hold on every execution path to a point in the tree.
 
     Attributes:
@@ -48,7 +48,7 @@ class State:
     written: frozenset[str] | None
     tools: PossibleTools
 
-    def join(self, other: State) -> State:
+    def join(self, other: FlowState) -> FlowState:
         """Return the facts that hold after either of two states."""
         if self == other:
             return self
@@ -56,26 +56,28 @@ class State:
         if self.written is not None and other.written is not None:
             written = self.written & other.written
         known = self.tools is not None and other.tools is not None
-        return State(written, (self.tools or frozenset()) | (other.tools or frozenset()) if known else None)
+        return FlowState(
+            written, (self.tools or frozenset()) | (other.tools or frozenset()) if known else None
+        )
 
-    def writing(self, names: Iterable[str]) -> State:
+    def writing(self, names: Iterable[str]) -> FlowState:
         """Return the state once these variables are written."""
         return self if self.written is None else replace(self, written=self.written.union(names))
 
-    def without_variable(self, name: str) -> State:
+    def without_variable(self, name: str) -> FlowState:
         """Return the state once a variable is gone."""
         return self if self.written is None else replace(self, written=self.written - {name})
 
-    def with_tools(self, tools: PossibleTools) -> State:
+    def with_tools(self, tools: PossibleTools) -> FlowState:
         """Return the state with the tool as given."""
         return replace(self, tools=tools)
 
-    def after_handling(self, failure: PossibleFailure) -> State:
+    def after_handling(self, failure: PossibleFailure) -> FlowState:
         """Return the state after a control node handled the failure that led to it."""
         tools = [replace(grip, after=str(failure)) for grip in self.tools or ()]
         return self if self.tools is None else self.with_tools(frozenset(tools))
 
-    def moved(self) -> State:
+    def moved(self) -> FlowState:
         """Return the state once the arm has been moved."""
         moved = [replace(grip, moved=True) for grip in self.tools or ()]
         return self if self.tools is None else self.with_tools(frozenset(moved))
@@ -86,10 +88,10 @@ class State:
         return min(found, key=lambda grip: (grip.since, grip.after)) if found else None
 
 
-INITIAL_STATE = State(frozenset(), frozenset({PossibleTool(ToolState.EMPTY)}))
+INITIAL_STATE = FlowState(frozenset(), frozenset({PossibleTool(ToolState.EMPTY)}))
 """A run begins without variables and with an empty tool."""
 
-UNKNOWN = State(None, None)
+UNKNOWN = FlowState(None, None)
 """State after a part of the tree whose effects are unknown."""
 
 
@@ -137,28 +139,28 @@ class Flow:
         halted: State after it was halted; None if it always ends in its first tick.
     """
 
-    success: State | None
-    failures: Mapping[PossibleFailure, State]
-    halted: State | None
+    success: FlowState | None
+    failures: Mapping[PossibleFailure, FlowState]
+    halted: FlowState | None
 
     def labelled(self, label: str) -> Flow:
         """Return the flow of the same node under a label."""
         if not label:
             return self
-        failures: dict[PossibleFailure, State] = {}
+        failures: dict[PossibleFailure, FlowState] = {}
         for failure, state in self.failures.items():
             named = replace(failure, labels=failure.labels | {label})
             failures[named] = state.join(failures.get(named, state))
         return replace(self, failures=failures)
 
 
-Enter: TypeAlias = Callable[[Child, State], Flow]
+Enter: TypeAlias = Callable[[Child, FlowState], Flow]
 """Function that returns how a child may end if it is entered in a state."""
 
 
 def loop(
-    enter: Enter, child: Child, state: State, again: Callable[[Flow], State | None]
-) -> tuple[Flow, State]:
+    enter: Enter, child: Child, state: FlowState, again: Callable[[Flow], FlowState | None]
+) -> tuple[Flow, FlowState]:
     """Return how a repeatedly entered child may end, and the state that holds at every entry.
 
     `again` returns the state of the next entry, given how the child may end; None if there is no next entry.
@@ -173,10 +175,10 @@ def loop(
         entry = widened
 
 
-def joined(states: Iterable[State | None]) -> State | None:
+def joined(states: Iterable[FlowState | None]) -> FlowState | None:
     """Return what is true where all these ways meet; None stands for a way that nobody comes."""
     reached = [state for state in states if state is not None]
-    return reduce(State.join, reached) if reached else None
+    return reduce(FlowState.join, reached) if reached else None
 
 
 def required(tools: PossibleTools, before: ToolState, path: str) -> PossibleTools:
@@ -202,7 +204,7 @@ def tools_after_failure(tools: PossibleTools, left: ToolState | None, path: str)
     return frozenset({PossibleTool(left, path)})
 
 
-def grips_at_end(flow: Flow, state: State, halts: bool) -> PossibleTools:
+def grips_at_end(flow: Flow, state: FlowState, halts: bool) -> PossibleTools:
     """Return what the tool may be once a branch of a parallel is over, halted or not."""
     ends = joined((flow.success, *flow.failures.values(), *((flow.halted, state) if halts else ())))
     return state.tools if ends is None else ends.tools

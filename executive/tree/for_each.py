@@ -8,7 +8,7 @@ from py_trees.common import Status
 
 from executive.cell.objects import Target
 from executive.errors import Fault
-from executive.tree.flow import Enter, Flow, State, joined, loop
+from executive.tree.flow import Enter, Flow, FlowState, joined, loop
 from executive.tree.inspection import MinTimes, PassedFailure
 from executive.tree.keys import Child, Elements, Variable, key
 from executive.tree.loop import Loop
@@ -91,7 +91,7 @@ class ForEach(Loop):
             )
         return tuple(value)
 
-    def flow(self, enter: Enter, state: State) -> Flow:
+    def flow(self, enter: Enter, state: FlowState) -> Flow:
         """Enter the body with the variable written, as often as there are new states."""
         if self.in_ == ():
             return Flow(state, {}, None)

@@ -34,7 +34,7 @@ class NodeFinding:
     is_warning: bool = False
 
 
-class Facts(Protocol):
+class NodeFacts(Protocol):
     """The checker's knowledge of a node in a mission."""
 
     @property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from executive.tree.flow import Enter, Flow, PossibleFailure, State, joined
+from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure, joined
 from executive.tree.keys import Child, key
 from executive.tree.node import ControlNode
 
@@ -25,7 +25,7 @@ class Invert(ControlNode):
             return self.fail_for("inverted", f"{self.do.name} succeeded")
         return Status.SUCCESS if status is Status.FAILURE else status
 
-    def flow(self, enter: Enter, state: State) -> Flow:
+    def flow(self, enter: Enter, state: FlowState) -> Flow:
         """Exchange the ends of the body."""
         body = enter(self.do, state)
         inverted = PossibleFailure(self.word, "inverted", self.path)

@@ -84,9 +84,9 @@ class Key:
         return self.default is ...
 
     @property
-    def section(self) -> type[Section]:
+    def section(self) -> type[KeySection]:
         """The class of the section or sections under the key."""
-        declared: type[Section] = self.type
+        declared: type[KeySection] = self.type
         return declared
 
     def adapter(self, most: int | None = None) -> TypeAdapter[Any]:
@@ -156,7 +156,7 @@ class KeyOwner:
             raise TypeError(f"{type(self).__name__} has no key {', '.join(left)}")
 
 
-class Section(KeyOwner):
+class KeySection(KeyOwner):
     """Mapping below a key of a control node: a subclass declares its keys."""
 
     def __init__(self, **values: object) -> None:
@@ -171,9 +171,9 @@ def _complete(declared: Key, attribute: str, hint: Any) -> Key:
     listed = get_args(base)[0] if get_origin(base) is tuple else None
     simple = {Child: Kind.NODE, Children: Kind.NODES, Reasons: Kind.REASONS, Variable: Kind.VARIABLE}
     kind = Kind.ELEMENTS if base == Elements else simple.get(base, Kind.CONSTANT)
-    if isinstance(base, type) and issubclass(base, Section):
+    if isinstance(base, type) and issubclass(base, KeySection):
         kind = Kind.SECTION
-    elif isinstance(listed, type) and issubclass(listed, Section):
+    elif isinstance(listed, type) and issubclass(listed, KeySection):
         kind, base = Kind.SECTIONS, listed
     return replace(declared, name=attribute.rstrip("_"), attribute=attribute, kind=kind, type=base)
 

@@ -20,10 +20,10 @@ from executive.errors import Fault, InputError
 from executive.events import BranchChosen, Emit, NodeEnded, NodeStarted, ignore
 from executive.tree.blackboard import Blackboard
 from executive.tree.failure import Failure
-from executive.tree.flow import Enter, Flow, State
+from executive.tree.flow import Enter, Flow, FlowState
 from executive.tree.halting import halt
-from executive.tree.inspection import Advice, Facts, MinTimes, NodeFinding, PassedFailure
-from executive.tree.keys import Child, KeyOwner, Kind, Section
+from executive.tree.inspection import Advice, MinTimes, NodeFacts, NodeFinding, PassedFailure
+from executive.tree.keys import Child, KeyOwner, KeySection, Kind
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class ControlNode(KeyOwner, Behaviour):
 
     # The checker.
 
-    def flow(self, enter: Enter, state: State) -> Flow:
+    def flow(self, enter: Enter, state: FlowState) -> Flow:
         """Return how the node may end if it is entered in a state; `enter` returns the same for a child."""
         raise NotImplementedError
 
@@ -125,7 +125,7 @@ class ControlNode(KeyOwner, Behaviour):
         del times
         return 0.0
 
-    def check(self, facts: Facts) -> Iterator[NodeFinding]:
+    def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
         """Yield mistakes in the mission that only this kind of node knows."""
         del facts
         yield from ()
@@ -278,7 +278,7 @@ class ControlNode(KeyOwner, Behaviour):
 
 def _nodes(value: object) -> list[Child]:
     """Return the nodes in the value of a key."""
-    if isinstance(value, Section):
+    if isinstance(value, KeySection):
         return [node for key in value.keys.values() for node in _nodes(getattr(value, key.attribute))]
     if isinstance(value, tuple):
         return [node for item in value for node in _nodes(item)]

@@ -8,7 +8,15 @@ from typing import Literal
 from py_trees.common import Status
 
 from executive.tree.failure import Failure
-from executive.tree.flow import Enter, Flow, PossibleFailure, State, combine_branches, grips_at_end, joined
+from executive.tree.flow import (
+    Enter,
+    Flow,
+    FlowState,
+    PossibleFailure,
+    combine_branches,
+    grips_at_end,
+    joined,
+)
 from executive.tree.inspection import MinTimes, PassedFailure
 from executive.tree.keys import Children, key
 from executive.tree.node import ControlNode
@@ -124,13 +132,13 @@ class Parallel(ControlNode):
         for failure in failures:
             self.choose(choice, failure)
 
-    def flow(self, enter: Enter, state: State) -> Flow:
+    def flow(self, enter: Enter, state: FlowState) -> Flow:
         """Enter all children in the same state and join their ends."""
         flows = [enter(branch, state) for branch in self.do]
         taken = [grips_at_end(flow, state, halts=True) for flow in flows]
         halted = joined(flow.halted for flow in flows)
         halted = halted and halted.with_tools(combine_branches(state.tools, taken))
-        failures: dict[PossibleFailure, State] = {}
+        failures: dict[PossibleFailure, FlowState] = {}
         if self._has_lead:
             others = taken[1:]
             for failure, after in flows[0].failures.items():
@@ -150,7 +158,7 @@ class Parallel(ControlNode):
                     )
         return Flow(self._success(flows, state), failures, halted)
 
-    def _success(self, flows: Sequence[Flow], state: State) -> State | None:
+    def _success(self, flows: Sequence[Flow], state: FlowState) -> FlowState | None:
         """Return the state once enough branches have succeeded; None if too few can succeed."""
         succeeding = [flow.success for flow in flows if flow.success is not None]
         success = joined(succeeding)

@@ -9,7 +9,7 @@ from typing import TypeAlias, cast
 
 from executive.cell.protocols import Clock
 from executive.errors import InputError
-from executive.plugins import Entry, registered
+from executive.plugins import PluginEntry, registered
 from executive.tree.blackboard import Blackboard
 from executive.tree.node import ControlNode, Site
 
@@ -30,7 +30,7 @@ def control_nodes() -> ControlNodes:
 
 
 @cache
-def _load(entries: tuple[Entry, ...]) -> ControlNodes:
+def _load(entries: tuple[PluginEntry, ...]) -> ControlNodes:
     nodes = {entry.name: entry.load() for entry in entries}
     for entry in entries:
         if problem := _find_problem(entry.name, nodes[entry.name]):

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from py_trees.common import Status
 
-from executive.tree.flow import Enter, Flow, State, joined, loop
+from executive.tree.flow import Enter, Flow, FlowState, joined, loop
 from executive.tree.inspection import MinTimes, PassedFailure, listed
 from executive.tree.keys import Child, Reasons, key
 from executive.tree.loop import Loop
@@ -56,7 +56,7 @@ class Repeat(Loop):
                 return Status.RUNNING
         return Status.SUCCESS
 
-    def flow(self, enter: Enter, state: State) -> Flow:
+    def flow(self, enter: Enter, state: FlowState) -> Flow:
         """Enter the body again in the state after its success."""
         if self.times == 0:
             return Flow(state, {}, None)

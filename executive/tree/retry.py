@@ -10,13 +10,13 @@ from py_trees.common import Status
 from executive.cell.protocols import Steps
 from executive.skill import Seconds
 from executive.tree.failure import Failure
-from executive.tree.flow import Enter, Flow, PossibleFailure, State, joined, loop
-from executive.tree.inspection import Advice, Facts, MinTimes, NodeFinding, PassedFailure, listed
-from executive.tree.keys import Child, Reasons, Section, key
+from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure, joined, loop
+from executive.tree.inspection import Advice, MinTimes, NodeFacts, NodeFinding, PassedFailure, listed
+from executive.tree.keys import Child, KeySection, Reasons, key
 from executive.tree.loop import Loop
 
 
-class Backoff(Section):
+class Backoff(KeySection):
     """Waits that grow from one failure to the next."""
 
     first: Seconds = key(gt=0, bare=True, doc="Wait before the second attempt [s].")
@@ -106,15 +106,15 @@ class Retry(Loop):
             return self.fail(pending)
         return status
 
-    def flow(self, enter: Enter, state: State) -> Flow:
+    def flow(self, enter: Enter, state: FlowState) -> Flow:
         """Enter recovery and body in turn until no new state occurs."""
         recovery: list[Flow] = []
-        waiting: State | None = None
+        waiting: FlowState | None = None
 
         def is_retried(failure: PossibleFailure) -> bool:
             return not self.on or failure.may_match(self.on)
 
-        def again(body: Flow) -> State | None:
+        def again(body: Flow) -> FlowState | None:
             nonlocal waiting
             recovery.clear()
             retried = (after.after_handling(one) for one, after in body.failures.items() if is_retried(one))
@@ -137,7 +137,7 @@ class Retry(Loop):
         """Return the time of one attempt."""
         return times(self.do)
 
-    def check(self, facts: Facts) -> Iterator[NodeFinding]:
+    def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
         """Find attempts that change nothing, and a single attempt."""
         skills = facts.skills()
         if not self.backoff and skills and not any(one is None or one.senses or one.moves for one in skills):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from executive.tree.flow import Enter, Flow, PossibleFailure, State, joined
+from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure, joined
 from executive.tree.inspection import MinTimes
 from executive.tree.keys import Child, Children, key
 from executive.tree.node import ControlNode
@@ -34,11 +34,11 @@ class Sequence(ControlNode):
             self._next += 1
         return Status.SUCCESS
 
-    def flow(self, enter: Enter, state: State) -> Flow:
+    def flow(self, enter: Enter, state: FlowState) -> Flow:
         """Enter each child in the state after the one before it."""
-        failures: dict[PossibleFailure, State] = {}
+        failures: dict[PossibleFailure, FlowState] = {}
         halted = None
-        here: State | None = state
+        here: FlowState | None = state
         for child in self.do:
             if here is None:
                 break

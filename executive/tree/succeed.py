@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from executive.tree.flow import Enter, Flow, State, joined
+from executive.tree.flow import Enter, Flow, FlowState, joined
 from executive.tree.keys import Child, key
 from executive.tree.node import ControlNode
 
@@ -26,7 +26,7 @@ class Succeed(ControlNode):
             self.choose("succeed none the less", self.failure_of(self.do))
         return Status.RUNNING if status is Status.RUNNING else Status.SUCCESS
 
-    def flow(self, enter: Enter, state: State) -> Flow:
+    def flow(self, enter: Enter, state: FlowState) -> Flow:
         """Join all ends of the body."""
         if self.do is None:
             return Flow(state, {}, None)

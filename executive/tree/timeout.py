@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from py_trees.common import Status
 
 from executive.skill import Seconds
-from executive.tree.flow import Enter, Flow, PossibleFailure, State
-from executive.tree.inspection import Advice, Facts, MinTimes, NodeFinding, PassedFailure
+from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure
+from executive.tree.inspection import Advice, MinTimes, NodeFacts, NodeFinding, PassedFailure
 from executive.tree.keys import Child, key
 from executive.tree.node import ControlNode
 
@@ -49,7 +49,7 @@ class Timeout(ControlNode):
             return self.fail_for("timeout", f"not done after {self.seconds:g} s")
         return status
 
-    def flow(self, enter: Enter, state: State) -> Flow:
+    def flow(self, enter: Enter, state: FlowState) -> Flow:
         """Add the timeout to the ends of a body that waits."""
         body = enter(self.do, state)
         failures = dict(body.failures)
@@ -61,7 +61,7 @@ class Timeout(ControlNode):
         """Return the time of the body."""
         return times(self.do)
 
-    def check(self, facts: Facts) -> Iterator[NodeFinding]:
+    def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
         """Compare the limit with the least time of the body."""
         shortest = facts.min_time(self.do)
         if self.seconds >= shortest - CLOCK_TOLERANCE:

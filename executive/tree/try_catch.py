@@ -8,13 +8,13 @@ from typing import ClassVar
 from py_trees.common import Status
 
 from executive.tree.failure import Failure, Reason
-from executive.tree.flow import Enter, Flow, PossibleFailure, State, joined
-from executive.tree.inspection import Advice, Facts, MinTimes, NodeFinding, PassedFailure, listed
-from executive.tree.keys import Child, Reasons, Section, key
+from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure, joined
+from executive.tree.inspection import Advice, MinTimes, NodeFacts, NodeFinding, PassedFailure, listed
+from executive.tree.keys import Child, KeySection, Reasons, key
 from executive.tree.node import ControlNode
 
 
-class Catch(Section):
+class Catch(KeySection):
     """A handler of failures."""
 
     on: Reasons = key(doc="The failures this is for.")
@@ -79,7 +79,7 @@ class TryCatch(ControlNode):
     def _handler(self, failure: Failure) -> Child | None:
         return next((handler.do for handler in self.catch if failure.matches(handler.on)), None)
 
-    def flow(self, enter: Enter, state: State) -> Flow:
+    def flow(self, enter: Enter, state: FlowState) -> Flow:
         """Enter each handler in the states after its failures, and `finally` in all states at the end."""
         body = enter(self.do, state)
         success, halted = body.success, body.halted
@@ -109,7 +109,7 @@ class TryCatch(ControlNode):
         fastest = min(times(child) for child in (self.do, *(handler.do for handler in self.catch)))
         return fastest + (times(self.finally_) if self.finally_ else 0.0)
 
-    def check(self, facts: Facts) -> Iterator[NodeFinding]:
+    def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
         """Find every failure in a handler that earlier ones take already, by this name or another."""
         body = facts.flow(self.do)
         earlier: list[Reason] = []
@@ -152,7 +152,7 @@ class TryCatch(ControlNode):
 def _finish(last: Child, flow: Flow, enter: Enter) -> Flow:
     """Return how a node may end whose last child runs after each of the ends in `flow`."""
     success, halted = None, flow.halted
-    failures: dict[PossibleFailure, State] = {}
+    failures: dict[PossibleFailure, FlowState] = {}
     if flow.success is not None:
         end = enter(last, flow.success)
         success, halted = end.success, joined((halted, end.halted))

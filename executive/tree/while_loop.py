@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from py_trees.common import Status
 
-from executive.tree.flow import Enter, Flow, State, joined, loop
-from executive.tree.inspection import Facts, NodeFinding, PassedFailure
+from executive.tree.flow import Enter, Flow, FlowState, joined, loop
+from executive.tree.inspection import NodeFacts, NodeFinding, PassedFailure
 from executive.tree.keys import Child, key
 from executive.tree.loop import Loop
 
@@ -49,11 +49,11 @@ class While(Loop):
                 if not self.next_round():
                     return Status.RUNNING
 
-    def flow(self, enter: Enter, state: State) -> Flow:
+    def flow(self, enter: Enter, state: FlowState) -> Flow:
         """Enter condition and body in turn until no new state occurs."""
         rounds: list[Flow] = []
 
-        def again(condition: Flow) -> State | None:
+        def again(condition: Flow) -> FlowState | None:
             rounds.clear()
             if condition.success is None:
                 return None
@@ -65,7 +65,7 @@ class While(Loop):
         halted = joined((condition.halted, entry, *(flow.halted for flow in rounds)))
         return Flow(joined(condition.failures.values()), failures, halted)
 
-    def check(self, facts: Facts) -> Iterator[NodeFinding]:
+    def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
         """Find a loop that never ends."""
         condition = facts.flow(self.condition)
         if condition is not None and not condition.failures and not facts.is_halted_by_sibling:

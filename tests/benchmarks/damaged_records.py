@@ -34,7 +34,7 @@ from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
 from executive.view.film.film import film
 from executive.view.film.formats import format_of
-from executive.view.film.source import Source
+from executive.view.film.source import FilmSource
 from executive.view.report.page import write_report
 from tests.benchmarks.damage import BLOCK, copy_run, damage_run
 from tests.benchmarks.forks import ForkRunner
@@ -203,7 +203,7 @@ def _film_first_picture(path: Path) -> None:
     shots.BLOCK = 1
 
     film(
-        Source(RunDirectory(path)),
+        FilmSource(RunDirectory(path)),
         path / "film.mp4",
         format_of(None, False),
         speed=1.0,

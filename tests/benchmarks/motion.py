@@ -24,7 +24,7 @@ from executive.errors import Blocked, InputError, Unreachable
 from executive.geometry import Array
 from executive.motion.braking import brake
 from executive.motion.planner import Planner
-from executive.motion.state import State
+from executive.motion.state import JointState
 from executive.motion.trajectory import Trajectory, find_peaks
 from tests.benchmarks import motion_baselines as baselines
 from tests.benchmarks.motion_execution import execute_pairs
@@ -76,7 +76,7 @@ class _MethodComparison:
         self._add("ours", duration, [motion.samples for motion in motions])
         self._compare(start, scene)
 
-    def _add(self, method: str, duration: float, states: Sequence[State]) -> None:
+    def _add(self, method: str, duration: float, states: Sequence[JointState]) -> None:
         """Add the time [s] and the states of a pair."""
         shares = [find_peaks(one, self._planner.limits).max(axis=1) for one in states]
         self._durations[method].append(duration)

@@ -22,11 +22,11 @@ from executive.motion.arm_model import Kinematics
 from executive.motion.limits import JointLimits, min_time
 from executive.motion.point_to_point import Connector
 from executive.motion.postures import find_postures, find_vertical_line
-from executive.motion.state import State
+from executive.motion.state import JointState
 from executive.motion.trajectory import Trajectory
 from tests.motion.joint_states import reach
 
-PairMotion = tuple[float, list[State]]
+PairMotion = tuple[float, list[JointState]]
 """Total duration of the two motions of a pair [s], and the joint states of each motion every 1/240 s."""
 
 
@@ -66,14 +66,16 @@ def find_waypoints(
     )
 
 
-def plan_with_stops(waypoints: Array, limits: JointLimits) -> tuple[float, State]:
+def plan_with_stops(waypoints: Array, limits: JointLimits) -> tuple[float, JointState]:
     """Return the time [s] and the states of the motion that rests at every waypoint (ruckig)."""
     connector = Connector(limits)
-    motion = Trajectory([connector.connect(State.rest(a), State.rest(b)) for a, b in pairwise(waypoints)])
+    motion = Trajectory(
+        [connector.connect(JointState.rest(a), JointState.rest(b)) for a, b in pairwise(waypoints)]
+    )
     return motion.duration, motion.samples
 
 
-def plan_with_toppra(waypoints: Array, limits: JointLimits) -> tuple[float, State]:
+def plan_with_toppra(waypoints: Array, limits: JointLimits) -> tuple[float, JointState]:
     """Return the least time [s] along a spline through waypoints, and the states.
 
     The natural cubic spline is parametrized by chord length in joint space; of the usual parametrizations, it
@@ -91,7 +93,7 @@ def plan_with_toppra(waypoints: Array, limits: JointLimits) -> tuple[float, Stat
     ]
     motion: Any = TOPPRA(bounds, path, solver_wrapper="seidel").compute_trajectory(0, 0)
     times = np.append(np.arange(0.0, motion.duration, STEP), motion.duration)
-    return float(motion.duration), State(motion(times), motion(times, 1), motion(times, 2))
+    return float(motion.duration), JointState(motion(times), motion(times, 1), motion(times, 2))
 
 
 def find_lower_bound(

@@ -25,7 +25,7 @@ from executive.events import TimedEvent
 from executive.motion.braking import brake
 from executive.motion.limits import JointLimits
 from executive.motion.point_to_point import Connector
-from executive.motion.state import State
+from executive.motion.state import JointState
 from executive.motion.trajectory import Trajectory
 from executive.record.result import Audit, ItemCounts, Result
 from tests.benchmarks import damaged_records, halts, journal, kills, report, soak, suction_map, tick
@@ -124,7 +124,7 @@ class TestHalts:
         assert worst["rest_s"] > 0.1 and worst["jerk_ratio"] > 0.5 and worst["deviation_rad"] > 0.0
 
     def test_braking_is_measured(self, limits: JointLimits) -> None:
-        path = Trajectory([Connector(limits).connect(State.rest(START), State.rest(START + 0.8))])
+        path = Trajectory([Connector(limits).connect(JointState.rest(START), JointState.rest(START + 0.8))])
         stopped = 40
         times = [step * STEP for step in range(stopped + 1)]
         times += brake(path, times[-1], limits, STEP).tolist()

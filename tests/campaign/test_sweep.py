@@ -14,15 +14,15 @@ import pytest
 from executive.campaign.sweep import Job, run_job, spread, summarize, sweep, wilson
 from executive.errors import InputError
 from executive.record.result import Audit, ItemCounts, Result
-from executive.record.timeline.timeline import Planning
+from executive.record.timeline.timeline import PlanningTotals
 
 
 def result(seed: int, status: str = "SUCCESS", right: int = 4, left: int = 0, **more) -> Result:
     fields = {
         "mission": "sort", "status": status, "reason": "" if status == "SUCCESS" else "Grasp.missed",
         "message": "", "node": "", "items": ItemCounts(seen=right + left, placed=right, rejected=left),
-        "audit": Audit(right=right, left=left), "planning": Planning(10, 8, 0.1), "robot_time_s": 30.0 + seed,
-        "wall_time_s": 6.0, "run": f"runs/{seed}",
+        "audit": Audit(right=right, left=left), "planning": PlanningTotals(10, 8, 0.1),
+        "robot_time_s": 30.0 + seed, "wall_time_s": 6.0, "run": f"runs/{seed}",
     }  # fmt: skip
     return Result(seed=seed, **fields | more)
 
@@ -50,7 +50,7 @@ def test_every_seed_is_run_once_in_another_process():
     assert results[0].unknown == {"a": "1"}
     assert (results[2].status, results[2].message) == ("FAULT", "ValueError: seed three")
     assert (results[3].status, results[3].message) == ("FAULT", "there is no place for seed four")
-    assert results[2].planning == Planning()
+    assert results[2].planning == PlanningTotals()
     assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 

@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 
 from executive.cli.main import main
 from executive.cli.progress import bar
-from executive.training.dataset import Entry, image_path, save_image, write_annotations
+from executive.training.dataset import DatasetEntry, image_path, save_image, write_annotations
 
 FAKE = ("--set", "cell.kind=fake")
 
@@ -70,7 +70,7 @@ def at_terminal(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
 def grey(tmp_path: Path) -> Path:
     """A data set of two images with nothing on them."""
     root = tmp_path / "grey"
-    entries = [Entry("test", f"{name}.jpg", (160, 120), (), ()) for name in "ab"]
+    entries = [DatasetEntry("test", f"{name}.jpg", (160, 120), (), ()) for name in "ab"]
     for entry in entries:
         save_image(image_path(root, "coco", "test", entry.file), np.full((120, 160, 3), 128, np.uint8))
     write_annotations(root, "coco", entries, ("cube", "sphere", "duck"))

@@ -21,12 +21,12 @@ from executive.errors import Fault, InputError
 from executive.mission.findings import Finding, MissionError
 from executive.mission.flow.endings import Ending
 from executive.record.result import Audit, ItemCounts, Result
-from executive.record.timeline.timeline import Planning
+from executive.record.timeline.timeline import PlanningTotals
 from executive.run.assembly import RunOptions
 
 RESULT = Result(
     mission="sort", status="SUCCESS", reason="", message="", node="", seed=7,
-    items=ItemCounts(seen=1, placed=1), audit=Audit(right=1), planning=Planning(3, 2, 0.05),
+    items=ItemCounts(seen=1, placed=1), audit=Audit(right=1), planning=PlanningTotals(3, 2, 0.05),
     robot_time_s=30.0, wall_time_s=6.0, trace="0123456789abcdef", run="runs/x",
 )  # fmt: skip
 

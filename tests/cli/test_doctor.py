@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner
 
 from executive.cli import doctor
-from executive.cli.doctor import Finding
+from executive.cli.doctor import Diagnosed
 from executive.cli.main import main
 from executive.errors import InputError
 from executive.run import versions
@@ -197,8 +197,8 @@ def test_any_answer_in_time_shows_that_a_server_is_there(monkeypatch):
         assert not doctor.is_reachable(f"http://127.0.0.1:{nobody.getsockname()[1]}", 10.0)
 
 
-NOTE = Finding("note", "display", "is not set", "run without")
-PROBLEM = Finding("problem", "packages", "av is missing", "run `uv sync`")
+NOTE = Diagnosed("note", "display", "is not set", "run without")
+PROBLEM = Diagnosed("problem", "packages", "av is missing", "run `uv sync`")
 
 
 @pytest.mark.parametrize(
@@ -206,7 +206,7 @@ PROBLEM = Finding("problem", "packages", "av is missing", "run `uv sync`")
     [([], 0, "no problems"), ([PROBLEM], 1, "1 problem"), ([PROBLEM] * 2, 1, "2 problems")],
 )
 def test_marks_and_subjects_are_aligned_and_problems_counted(monkeypatch, findings, code, total):
-    monkeypatch.setattr(doctor, "examine", lambda: [Finding("ok", "python", "3.11"), NOTE, *findings])
+    monkeypatch.setattr(doctor, "examine", lambda: [Diagnosed("ok", "python", "3.11"), NOTE, *findings])
     result = CliRunner().invoke(main, ["doctor"])
     width = 8 if findings else 7
     assert result.stdout.splitlines() == [

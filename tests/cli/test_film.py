@@ -30,7 +30,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         return 30
 
     monkeypatch.setattr(
-        "executive.view.film.source.Source",
+        "executive.view.film.source.FilmSource",
         lambda directory: SimpleNamespace(directory=directory, events=[SimpleNamespace(clock=4.0)]),
     )
     monkeypatch.setattr("executive.view.film.film.film", film)

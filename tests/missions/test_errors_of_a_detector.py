@@ -11,7 +11,7 @@ import pytest
 from executive.cells.fake.cell import FakeCell
 from executive.cells.fake.noisy_detector import NoisyDetector
 from executive.mission.load import LoadedMission, load_mission
-from executive.perception.detectors.setting import Setting
+from executive.perception.detectors.setting import DetectorSetting
 from executive.plugins import cell_kind, discover
 from executive.record.result import agrees
 from executive.run.assembly import RunOptions, assemble
@@ -36,7 +36,9 @@ class Spoilt(FakeCell):
         super().__init__(config, seed=seed, **given)
         name, other = config.detectors
         camera = next(iter(config.cameras.values()))
-        setting = Setting(name, camera, self.cell.clock, Path(), seed, lambda _: self.detectors[other])
+        setting = DetectorSetting(
+            name, camera, self.cell.clock, Path(), seed, lambda _: self.detectors[other]
+        )
         spoilt: Any = NoisyDetector.from_config(config.detectors[name], setting)
         self.detectors[name] = spoilt
 

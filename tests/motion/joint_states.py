@@ -11,7 +11,7 @@ from executive.geometry import Array
 from executive.motion.arm_model import Kinematics
 from executive.motion.limits import JointLimits, JointRange
 from executive.motion.postures import find_postures
-from executive.motion.state import Piece, State
+from executive.motion.state import JointState, Piece
 
 POSITION_LIMIT = np.radians([170, 120, 170, 120, 170, 120, 175])
 """Of an iiwa 14 [rad]."""
@@ -36,20 +36,20 @@ positions = shares.map(lambda share: share * LIMITS.position.upper)
 
 
 @st.composite
-def states(draw: st.DrawFn) -> State:
+def states(draw: st.DrawFn) -> JointState:
     """States that can be entered and left inside the limits, most of them moving."""
     qdd = 0.9 * draw(shares) * LIMITS.acceleration
     most = LIMITS.velocity - qdd**2 / (2 * LIMITS.jerk)
-    return State(draw(positions), 0.99 * draw(shares) * most, qdd)
+    return JointState(draw(positions), 0.99 * draw(shares) * most, qdd)
 
 
-def passed(motion: Piece, spacing: float = SOONER) -> State:
+def passed(motion: Piece, spacing: float = SOONER) -> JointState:
     """The states of a motion every `spacing` [s], the last one included, each array of shape `(N, 7)`."""
     times = [*np.arange(0.0, motion.duration, spacing), motion.duration]
-    return State(*map(np.array, zip(*(motion.at(float(s)) for s in times), strict=True)))
+    return JointState(*map(np.array, zip(*(motion.at(float(s)) for s in times), strict=True)))
 
 
-def peaks(states: State, limits: JointLimits, spacing: float = SOONER) -> tuple[float, float, float]:
+def peaks(states: JointState, limits: JointLimits, spacing: float = SOONER) -> tuple[float, float, float]:
     """The largest velocity, acceleration and jerk of any joint, as shares of its limits."""
     jerk = np.diff(states.qdd, axis=0) / spacing
     pairs = (states.qd, limits.velocity), (states.qdd, limits.acceleration), (jerk, limits.jerk)
@@ -57,7 +57,7 @@ def peaks(states: State, limits: JointLimits, spacing: float = SOONER) -> tuple[
     return v, a, j
 
 
-def tool_velocities(kinematics: Kinematics, states: State) -> Array:
+def tool_velocities(kinematics: Kinematics, states: JointState) -> Array:
     """The tool centre point's velocities `(N, 3)` [m/s] in states, each array of shape `(N, 7)`."""
     h = 1e-6
     ahead, behind = (kinematics.tips(states.q + step * states.qd)[0] for step in (h, -h))

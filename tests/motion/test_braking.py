@@ -9,7 +9,7 @@ from joint_states import positions
 from executive.cell.arm import Goal
 from executive.geometry import Array
 from executive.motion.braking import brake
-from executive.motion.state import State
+from executive.motion.state import JointState
 from executive.motion.trajectory import Trajectory
 
 STEP = 1 / 240
@@ -39,7 +39,7 @@ def test_a_halt_at_any_tick_is_short_and_inside_the_stop_limits(
     connector, limits, start, end, power: float, share: float
 ) -> None:
     end = start + (end - start) * 10**power
-    trajectory = Trajectory([connector.connect(State.rest(start), State.rest(end))])
+    trajectory = Trajectory([connector.connect(JointState.rest(start), JointState.rest(end))])
     assert_short_and_inside(trajectory, STEP * int(share * trajectory.duration / STEP), limits)
 
 

@@ -14,7 +14,7 @@ from executive.motion.clearance_model import ClearanceModel, discs_below_flange
 from executive.motion.optimizer import Optimizer, Problem
 from executive.motion.payload import PayloadLimit
 from executive.motion.point_to_point import NoProfile
-from executive.motion.state import State
+from executive.motion.state import JointState
 from executive.motion.trajectory import Trajectory, sample_pieces
 from executive.motion.transcription import SAMPLE_SHARES
 
@@ -31,8 +31,8 @@ def over_the_post(config, kinematics, connector):
     def given(load: Load | None = None) -> tuple[Problem, list]:
         branch, _ = kinematics.configuration(np.radians(config.arm.poses_deg["home"]))
 
-        def state(x: float, y: float, z: float) -> State:
-            return State.rest(kinematics.solve(tool_down((x, y, z)), (branch, 0.0)))
+        def state(x: float, y: float, z: float) -> JointState:
+            return JointState.rest(kinematics.solve(tool_down((x, y, z)), (branch, 0.0)))
 
         corners = [state(*LEFT), state(*LEFT[:2], HIGH), state(*RIGHT[:2], HIGH), state(*RIGHT)]
         clearance = ClearanceModel(config, (POST,), np.array([LEFT[:2], RIGHT[:2]]))

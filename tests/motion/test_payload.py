@@ -10,7 +10,7 @@ import pytest
 from executive.cell.objects import Load, ObjectClass
 from executive.geometry import GRAVITY
 from executive.motion.payload import DISTANCE_PER_ACCELERATION, POSITION_STRIDE, SAFETY_FACTOR, PayloadLimit
-from executive.motion.state import State
+from executive.motion.state import JointState
 from executive.motion.trajectory import Trajectory
 from executive.motion.transcription import SAMPLE_SHARES, SAMPLES_PER_STEP, STEP_COUNT
 
@@ -27,7 +27,7 @@ class Sway:
     def __init__(self, q, angle: float) -> None:
         self._q, self._angle = q, angle
 
-    def at(self, s: float) -> State:
+    def at(self, s: float) -> JointState:
         """A quintic from rest to rest."""
         turn = np.eye(7)[0] * self._angle
         place, speed, change = (
@@ -35,11 +35,11 @@ class Sway:
             30 * s**2 * (1 - s) ** 2,
             60 * s * (1 - s) * (1 - 2 * s),
         )
-        return State(self._q + turn * place, turn * speed, turn * change)
+        return JointState(self._q + turn * place, turn * speed, turn * change)
 
-    def over(self, times) -> State:
+    def over(self, times) -> JointState:
         """The states at many times."""
-        return State(*map(np.array, zip(*map(self.at, times), strict=True)))
+        return JointState(*map(np.array, zip(*map(self.at, times), strict=True)))
 
 
 @pytest.fixture
@@ -79,7 +79,7 @@ def test_flown_at_the_root_of_the_share_a_motion_is_just_affordable(sway, kinema
 
 
 def test_a_motion_too_short_to_pull_at_anything_is_affordable(kinematics, connector, home) -> None:
-    still = Trajectory([connector.connect(State.rest(home), State.rest(home))])
+    still = Trajectory([connector.connect(JointState.rest(home), JointState.rest(home))])
     assert PayloadLimit(Load(KIND, 0.5), kinematics).share(still) == 1.0
 
 

@@ -10,15 +10,15 @@ from joint_states import LIMITS, passed, peaks, states
 
 from executive.errors import Fault
 from executive.motion.point_to_point import Connector, NoProfile
-from executive.motion.state import State
+from executive.motion.state import JointState
 
 CONNECTOR = Connector(LIMITS)
-STILL = State.rest(np.zeros(7))
+STILL = JointState.rest(np.zeros(7))
 
 
 @given(states(), states())
 @settings(max_examples=60)
-def test_it_joins_two_states_inside_the_limits(start: State, end: State) -> None:
+def test_it_joins_two_states_inside_the_limits(start: JointState, end: JointState) -> None:
     motion = CONNECTOR.connect(start, end)
     for state, wanted in ((motion.at(0.0), start), (motion.at(motion.duration), end)):
         for one, other in zip(state, wanted, strict=True):
@@ -31,7 +31,7 @@ def test_it_joins_two_states_inside_the_limits(start: State, end: State) -> None
 
 @given(states(), states(), st.floats(0, 8))
 @settings(max_examples=30)
-def test_it_takes_as_long_as_it_is_told_to(start: State, end: State, least: float) -> None:
+def test_it_takes_as_long_as_it_is_told_to(start: JointState, end: JointState, least: float) -> None:
     fastest = CONNECTOR.connect(start, end).duration
     slower = CONNECTOR.connect(start, end, least).duration
     # Some durations in between cannot be: a moving joint may have to turn back first.
@@ -40,16 +40,17 @@ def test_it_takes_as_long_as_it_is_told_to(start: State, end: State, least: floa
 
 
 @pytest.mark.parametrize(
-    ("end", "least"), [(STILL._replace(qd=1.01 * LIMITS.velocity), None), (State.rest(np.full(7, 0.3)), 1e5)]
+    ("end", "least"),
+    [(STILL._replace(qd=1.01 * LIMITS.velocity), None), (JointState.rest(np.full(7, 0.3)), 1e5)],
 )
-def test_a_state_too_fast_and_a_motion_too_slow_have_no_profile(end: State, least: float | None) -> None:
+def test_a_state_too_fast_and_a_motion_too_slow_have_no_profile(end: JointState, least: float | None) -> None:
     with pytest.raises(NoProfile, match=r"ruckig finds no profile from \[0\. .*\] to \[0\.[ 3].*\] rad: "):
         CONNECTOR.connect(STILL, end, least)
 
 
 def test_a_profile_that_is_too_fast_between_its_phases_counts_for_none() -> None:
     """Ruckig's own would be too fast by 0.6 % where the acceleration changes sign."""
-    ends = [State.rest(np.zeros(7)) for _ in range(2)]
+    ends = [JointState.rest(np.zeros(7)) for _ in range(2)]
     moving = (0.0, -1.67968043, -3.33422395), (-0.27431039, -1.24049521, 8.54397608)
     for state, third in zip(ends, moving, strict=True):
         for values, value in zip(state, third, strict=True):
@@ -60,7 +61,7 @@ def test_a_profile_that_is_too_fast_between_its_phases_counts_for_none() -> None
 
 
 @pytest.mark.parametrize("values", [np.full(7, math.nan), np.array([math.inf, *[0.0] * 6]), np.zeros(6)])
-@pytest.mark.parametrize("field", State._fields)
+@pytest.mark.parametrize("field", JointState._fields)
 @pytest.mark.parametrize("side", [0, 1])
 def test_what_would_crash_ruckig_never_reaches_it(monkeypatch, side: int, field: str, values) -> None:
     connector = Connector(LIMITS)

@@ -14,17 +14,17 @@ from executive.cell.clock import STEP
 from executive.cells.sim.rebuild import join_samples
 from executive.errors import Fault, Unreachable
 from executive.motion.point_to_point import Connector, NoProfile
-from executive.motion.state import State
+from executive.motion.state import JointState
 from executive.motion.trajectory import Trajectory, find_peaks, thin_out
 
 CONNECTOR = Connector(LIMITS)
 A, B, C = np.radians([[0, 20, 0, -90, 0, 70, 0], [40, 40, 20, -60, 10, 60, 90], [40, 45, 20, -60, 0, 60, 90]])
-MOVING = State((A + B) / 2, (B - A) / 3, np.full(7, 0.2))
+MOVING = JointState((A + B) / 2, (B - A) / 3, np.full(7, 0.2))
 
 
-def by_way_of(*passing: State) -> Trajectory:
+def by_way_of(*passing: JointState) -> Trajectory:
     """A motion from A to B, in pieces that meet in the given states."""
-    ends = [State.rest(A), *passing, State.rest(B)]
+    ends = [JointState.rest(A), *passing, JointState.rest(B)]
     return Trajectory([CONNECTOR.connect(one, other) for one, other in pairwise(ends)])
 
 
@@ -32,18 +32,18 @@ def by_way_of(*passing: State) -> Trajectory:
     ("field", "off"), [("q", "their q differ by 0.01"), ("qd", "qd differ"), ("qdd", "qdd differ")]
 )
 def test_pieces_that_do_not_meet_are_a_fault(field: str, off: str) -> None:
-    first = CONNECTOR.connect(State.rest(A), MOVING)
+    first = CONNECTOR.connect(JointState.rest(A), MOVING)
     wrong = MOVING._replace(**{field: getattr(MOVING, field) + 0.01})
-    second = CONNECTOR.connect(wrong, State.rest(B))
+    second = CONNECTOR.connect(wrong, JointState.rest(B))
     with pytest.raises(Fault, match=f"pieces 1 and 2 do not fit together: .*{off}"):
         Trajectory([first, second])
 
 
 def test_a_motion_that_does_not_begin_or_end_at_rest_is_a_fault() -> None:
     with pytest.raises(Fault, match="rest and how a trajectory begins do not fit together: their qd"):
-        Trajectory([CONNECTOR.connect(MOVING, State.rest(B))])
+        Trajectory([CONNECTOR.connect(MOVING, JointState.rest(B))])
     with pytest.raises(Fault, match="rest and how a trajectory ends do not fit together: their qd"):
-        Trajectory([CONNECTOR.connect(State.rest(A), MOVING)])
+        Trajectory([CONNECTOR.connect(JointState.rest(A), MOVING)])
 
 
 @pytest.mark.parametrize("s", [math.nan, math.inf, -math.inf])
@@ -54,7 +54,7 @@ def test_a_time_that_would_crash_ruckig_is_a_fault(s: float) -> None:
 
 @given(states(), st.floats(0.2, 1.0))
 @settings(max_examples=20)
-def test_slowed_it_takes_the_same_path_in_more_time(between: State, rate: float) -> None:
+def test_slowed_it_takes_the_same_path_in_more_time(between: JointState, rate: float) -> None:
     """The chain rule: velocities are multiplied by the rate, accelerations by its square."""
     trajectory = by_way_of(between)
     slow = trajectory.slowed(rate)
@@ -78,7 +78,7 @@ def test_slowed_it_takes_the_same_path_in_more_time(between: State, rate: float)
 
 
 def test_a_motion_to_where_the_arm_is_takes_no_time() -> None:
-    trajectory = Trajectory([CONNECTOR.connect(State.rest(A), State.rest(A))])
+    trajectory = Trajectory([CONNECTOR.connect(JointState.rest(A), JointState.rest(A))])
     assert trajectory.duration == 0
     assert np.array_equal(join_samples(trajectory.samples, 0.0).at(1.0).q, A)
     assert np.array_equal(trajectory.at(0.5).q, A)
@@ -89,11 +89,11 @@ def test_a_motion_to_where_the_arm_is_takes_no_time() -> None:
 @settings(max_examples=30)
 def test_leaving_a_joints_range_between_two_states_inside_it_is_seen(joint: int, share: float) -> None:
     """Where a joint turns back, ruckig's own extremes are too small."""
-    edge = State.rest(np.zeros(7))
+    edge = JointState.rest(np.zeros(7))
     edge.q[joint] = -LIMITS.position.upper[joint] + 0.01
-    leaving = State.rest(edge.q.copy())
+    leaving = JointState.rest(edge.q.copy())
     leaving.qd[joint] = share * LIMITS.velocity[joint]
-    back = CONNECTOR.connect(leaving, State.rest(np.zeros(7)))
+    back = CONNECTOR.connect(leaving, JointState.rest(np.zeros(7)))
     trajectory = Trajectory([CONNECTOR.connect(edge, leaving), back])
     limit = round(np.degrees(LIMITS.position.upper[joint]))
     with pytest.raises(Unreachable, match=rf"take joint {joint + 1} to -\d+\.\d°; its limit is ±{limit}°"):
@@ -114,7 +114,7 @@ def test_a_motion_outside_a_limit_cannot_be_flown_and_the_text_names_the_joint(l
 @given(positions, st.floats(0.01, 0.2))
 @settings(max_examples=30)
 def test_a_thinned_path_has_no_gaps_and_no_more_points_than_it_needs(end, spacing: float) -> None:
-    qs = Trajectory([CONNECTOR.connect(State.rest(A), State.rest(end))]).samples.q
+    qs = Trajectory([CONNECTOR.connect(JointState.rest(A), JointState.rest(end))]).samples.q
     kept = thin_out(qs, spacing)
     step = np.max(np.abs(np.diff(qs, axis=0)), initial=0.0)
     assert np.array_equal(kept[[0, -1]], qs[[0, -1]])

@@ -8,8 +8,8 @@ from joint_states import LIMITS, positions, shares
 
 from executive.geometry import Array
 from executive.motion.point_to_point import Connector
-from executive.motion.state import State
-from executive.motion.transcription import SAMPLES_PER_STEP, STEP_COUNT, Course, Demand, Transcription
+from executive.motion.state import JointState
+from executive.motion.transcription import SAMPLES_PER_STEP, STEP_COUNT, Demand, JointCourse, Transcription
 
 CONNECTOR = Connector(LIMITS)
 PLACES = np.arange(1, STEP_COUNT * SAMPLES_PER_STEP) / (STEP_COUNT * SAMPLES_PER_STEP)
@@ -27,7 +27,7 @@ NOTHING = [clear_of(np.zeros(0, dtype=np.intp), 0.0, np.zeros(7))]
 
 
 @st.composite
-def moves(draw: st.DrawFn, passing: float = 0.0) -> tuple[State, State]:
+def moves(draw: st.DrawFn, passing: float = 0.0) -> tuple[JointState, JointState]:
     """Start and end of moves that take half a second to a second and a half.
 
     `passing`: share of the limits of velocity and acceleration that they have at most.
@@ -37,19 +37,19 @@ def moves(draw: st.DrawFn, passing: float = 0.0) -> tuple[State, State]:
     joint = np.argmax(np.abs(change))
     change[joint] = np.copysign(max(0.3, abs(change[joint])), change[joint])
     ends = [
-        State(q, passing * draw(shares) * LIMITS.velocity, passing * draw(shares) * LIMITS.acceleration)
+        JointState(q, passing * draw(shares) * LIMITS.velocity, passing * draw(shares) * LIMITS.acceleration)
         for q in (near, near + change)
     ]
     return ends[0], ends[1]
 
 
-def direct(start: State, end: State) -> tuple[float, Array]:
+def direct(start: JointState, end: JointState) -> tuple[float, Array]:
     """How long the fastest motion takes, and its positions at the places looked at."""
     motion = CONNECTOR.connect(start, end)
     return motion.duration, motion.over(PLACES * motion.duration).q
 
 
-def fitted(start: State, end: State, slower: float = 1.6) -> tuple[Transcription, Course]:
+def fitted(start: JointState, end: JointState, slower: float = 1.6) -> tuple[Transcription, JointCourse]:
     """A course that takes so much longer than the fastest motion."""
     program = Transcription(start, end, LIMITS)
     duration, first = direct(start, end)
@@ -58,7 +58,7 @@ def fitted(start: State, end: State, slower: float = 1.6) -> tuple[Transcription
     return program, course
 
 
-def shortened(program: Transcription, course: Course, times: int = 12) -> Course:
+def shortened(program: Transcription, course: JointCourse, times: int = 12) -> JointCourse:
     """What remains of a course after so many steps with nothing in the way."""
     for _ in range(times):
         found = program.shorten(course, NOTHING, WIDE)
@@ -67,18 +67,18 @@ def shortened(program: Transcription, course: Course, times: int = 12) -> Course
     return course
 
 
-def flown(start: State, course: Course, fine: int = FINE) -> State:
+def flown(start: JointState, course: JointCourse, fine: int = FINE) -> JointState:
     """States on a course, by adding up its accelerations, each array of shape `(N, 7)`."""
     dt = course.step / fine
     q, qd, states = start.q, start.qd, []
     for before, after in zip(course.accelerations.T, course.accelerations.T[1:], strict=False):
         for k in range(fine):
             one, other = (before + (after - before) * share for share in (k / fine, (k + 1) / fine))
-            states.append(State(q, qd, one))
+            states.append(JointState(q, qd, one))
             q = q + qd * dt + dt**2 * (2 * one + other) / 6
             qd = qd + dt * (one + other) / 2
-    states.append(State(q, qd, course.accelerations[:, -1]))
-    return State(*map(np.array, zip(*states, strict=True)))
+    states.append(JointState(q, qd, course.accelerations[:, -1]))
+    return JointState(*map(np.array, zip(*states, strict=True)))
 
 
 @given(moves() | moves(passing=0.15))

@@ -12,7 +12,7 @@ from executive.cell.detection import Detection
 from executive.errors import InputError
 from executive.perception.detectors.embedded import LABELS, MODEL, EmbeddedDetector
 from executive.perception.detectors.rfdetr import RfdetrDetector
-from executive.perception.detectors.setting import Setting
+from executive.perception.detectors.setting import DetectorSetting
 
 ONNX = str(MODEL)
 
@@ -41,7 +41,7 @@ def frame_with_spot(left, top):
 
 def setting(base=None):
     camera = SimpleNamespace(table_view=(192, 100, 448, 356))
-    return Setting("eye", camera, SimpleNamespace(now=0.0), base, seed=0, other=None)
+    return DetectorSetting("eye", camera, SimpleNamespace(now=0.0), base, seed=0, other=None)
 
 
 def found_by(detector, frame, view):

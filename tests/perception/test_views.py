@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from executive.cell.detection import Detection
 from executive.errors import InputError
 from executive.perception.detectors.views import (
-    Finding,
+    ViewDetection,
     merge_findings,
     parts_of,
     remove_duplicates,
@@ -22,7 +22,7 @@ SIZE = (640, 480)
 
 
 def found(box, confidence=0.9, part=(0, 0, 256, 256), label="cube"):
-    return Finding(Detection(label, confidence, box), part)
+    return ViewDetection(Detection(label, confidence, box), part)
 
 
 def test_the_table_view_is_the_square_of_the_cell_file_and_a_smaller_frame_is_one_tile():

@@ -27,7 +27,7 @@ from executive.events import (
 )
 from executive.record.journal import Journal, read_journal
 from executive.record.timeline.activation import by_node, count_ends, last_failure, skill_name
-from executive.record.timeline.timeline import Planning, Timeline
+from executive.record.timeline.timeline import PlanningTotals, Timeline
 
 
 def folded(*events: Event, history: bool = True) -> Timeline:
@@ -207,7 +207,7 @@ def test_motions_targets_questions_and_injected_faults_are_kept() -> None:
         run_started(), MotionPlanned(False, 0.05, 1.0), MotionPlanned(True, 0.02, 1.0), selected,
         OperatorAsked(["cube"]), RequestGiven(None), FaultInjected("object removed", "", "", "", []),
     )  # fmt: skip
-    assert timeline.planning == Planning(2, 1, 0.07)
+    assert timeline.planning == PlanningTotals(2, 1, 0.07)
     assert (timeline.targets, timeline.selections) == ({"cube-1": selected}, [(3.0, "cube-1")])
     assert (timeline.question, timeline.requests) == (None, [None])
     assert timeline.faults == [(6.0, "object removed")]

@@ -9,15 +9,15 @@ import pytest
 import yaml
 
 from executive.errors import InputError
-from executive.training.dataset import Entry, image_path, save_image, write_annotations
+from executive.training.dataset import DatasetEntry, image_path, save_image, write_annotations
 from executive.training.samples import Samples
 
 CLASSES = ("cube", "duck")
 BOXES = ((10.0, 20.0, 30.0, 60.0), (50.5, 10.25, 60.0, 20.0))
 IGNORED = ((100.0, 10.0, 120.0, 30.0),)
 ENTRIES = [
-    Entry("valid", "a.jpg", (128, 64), ("duck", "cube"), BOXES, IGNORED, {"camera": "overhead"}),
-    Entry("train", "b.jpg", (128, 64), (), ()),
+    DatasetEntry("valid", "a.jpg", (128, 64), ("duck", "cube"), BOXES, IGNORED, {"camera": "overhead"}),
+    DatasetEntry("train", "b.jpg", (128, 64), (), ()),
 ]
 
 

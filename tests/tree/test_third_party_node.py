@@ -24,7 +24,7 @@ from collections.abc import Iterator
 from py_trees.common import Status
 
 from executive.skill import Seconds
-from executive.tree.flow import Enter, Flow, State, grips_at_end, joined, combine_branches
+from executive.tree.flow import Enter, Flow, FlowState, grips_at_end, joined, combine_branches
 from executive.tree.inspection import MinTimes, PassedFailure
 from executive.tree.keys import Children, key
 from executive.tree.node import ControlNode
@@ -57,7 +57,7 @@ class Race(ControlNode):
                     return self.fail(self.failure_of(child))
         return Status.RUNNING
 
-    def flow(self, enter: Enter, state: State) -> Flow:
+    def flow(self, enter: Enter, state: FlowState) -> Flow:
         flows = [enter(child, state) for child in self.do]
         ends = [grips_at_end(flow, state, halts=True) for flow in flows]
         tools = combine_branches(state.tools, ends)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
-from executive.campaign.faults.fault import Fault
+from executive.campaign.faults.fault import PlannedFault
 from executive.campaign.faults.listing import list_faults
 from executive.campaign.faults.rehearsal import rehearse
 from executive.campaign.faults.trial import Numbered, empty_trial, try_out
@@ -55,10 +55,10 @@ class Campaign:
     ) -> None:
         self.subject = subject
         self.rehearsal = rehearse(subject)
-        self.faults: Sequence[Fault] = list_faults(subject, self.rehearsal)
+        self.faults: Sequence[PlannedFault] = list_faults(subject, self.rehearsal)
         self._workers, self._progress, self._halting = workers, progress, halting
 
-    def fault(self, number: int) -> Fault:
+    def fault(self, number: int) -> PlannedFault:
         """Return the fault with a number.
 
         Raises:
@@ -103,7 +103,7 @@ class Campaign:
         trials, complete = self._tried(list(drawn), 0)
         return self._figures(trials, complete, pairs=True)
 
-    def these(self, numbers: Numbers) -> dict[int, Fault]:
+    def these(self, numbers: Numbers) -> dict[int, PlannedFault]:
         """Return the faults with these numbers."""
         return {number: self.fault(number) for number in numbers}
 

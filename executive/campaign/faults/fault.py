@@ -42,7 +42,7 @@ class SkillFault:
 
 
 @dataclass(frozen=True)
-class Fault:
+class PlannedFault:
     """A fault that is injected into a run; a value that can be sent to another process.
 
     Attributes:

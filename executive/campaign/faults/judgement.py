@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.campaign.faults.fault import Fault, InjectedError
+from executive.campaign.faults.fault import InjectedError, PlannedFault
 from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.frame import Frame, FrameTaken
 from executive.events import FaultInjected, FrameSearched, ItemChanged, RunEnded, TimedEvent
@@ -34,7 +34,7 @@ NOTHING_HIDDEN = Hidden(0, 0)
 
 
 def check_end(
-    outcome: RunEnded, faults: Sequence[Fault], endings: Sequence[Ending], raised: bool
+    outcome: RunEnded, faults: Sequence[PlannedFault], endings: Sequence[Ending], raised: bool
 ) -> Iterator[str]:
     """Yield how the run ended as it must not; `raised` tells whether a bug that was put in came up."""
     if outcome.status == "FAULT":
@@ -136,7 +136,7 @@ def count_of(events: Sequence[TimedEvent], what: str) -> int:
     return sum(isinstance(one.event, FaultInjected) and one.event.name == what for one in events)
 
 
-def remark(outcome: RunEnded, faults: Sequence[Fault]) -> str:
+def remark(outcome: RunEnded, faults: Sequence[PlannedFault]) -> str:
     """Return a sentence if the run failed for another reason than those that were brought about, or ""."""
     if outcome.status != "FAILURE" or outcome.reason == "lost":
         return ""

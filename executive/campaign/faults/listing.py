@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from executive.campaign.faults.fault import Fault, SkillFault, When
+from executive.campaign.faults.fault import PlannedFault, SkillFault, When
 from executive.campaign.faults.rehearsal import Rehearsal
 from executive.campaign.subject import Subject
 from executive.cell.config import TableConfig
@@ -71,7 +71,7 @@ def causes(table: TableConfig) -> Mapping[str, Cause]:
     }
 
 
-def list_faults(subject: Subject, rehearsal: Rehearsal) -> tuple[Fault, ...]:
+def list_faults(subject: Subject, rehearsal: Rehearsal) -> tuple[PlannedFault, ...]:
     """Return every single fault of a mission; the number of a fault is its place, from 1.
 
     In the order of the tree, each reason of each node and the errors of its code; then faults of detectors,
@@ -101,7 +101,7 @@ class _Listing:
         self._causes = causes(self._table)
         self.nodes = skill_nodes(subject)
 
-    def failures(self, node: nodes.SkillNode) -> Iterator[Fault]:
+    def failures(self, node: nodes.SkillNode) -> Iterator[PlannedFault]:
         """Yield for every reason of a node a fault of the cell, if one exists, and a failure of the skill."""
         skill = self._skills[node.skill]
         count = len(self._rehearsal.activations.get(node.path, ()))
@@ -120,7 +120,7 @@ class _Listing:
                     failure = replace(failure, instead_of=-1)
                 yield failure
 
-    def errors(self, node: nodes.SkillNode) -> Iterator[Fault]:
+    def errors(self, node: nodes.SkillNode) -> Iterator[PlannedFault]:
         """Yield errors that the code of a skill raises: at its start, later, and when it is halted."""
         ticks = self._rehearsal.activations.get(node.path, ())
         start, longest = max(enumerate(ticks, 1), key=lambda one: one[1], default=(1, 0))
@@ -135,7 +135,7 @@ class _Listing:
             means = f"its code raises when it is halted {half} ticks on"
             yield self._fault(node, "halted", "middle", means=means, skill_faults=(halted,))
 
-    def detector(self) -> Iterator[Fault]:
+    def detector(self) -> Iterator[PlannedFault]:
         """Yield detectors that are slow, hang, are unsure or dead, from the start and from half-way on."""
         starts: tuple[tuple[When, float], ...] = (("first", 0.0), ("middle", self._rehearsal.robot_time / 2))
         dead, unsure = effects.detector_dead(), effects.detector_unsure()
@@ -150,7 +150,7 @@ class _Listing:
                 leads_to = "unsure" if what.startswith("unsure") else "unavailable"
                 yield replace(_other("detector", what, when, cell_fault), leads_to=leads_to)
 
-    def objects(self) -> Iterator[Fault]:
+    def objects(self) -> Iterator[PlannedFault]:
         """Yield objects taken away and bumped aside, on the table and while the arm approaches them."""
         x, y = self._table.x, self._table.y
         for when, share in QUARTERS:
@@ -168,7 +168,7 @@ class _Listing:
                     cell_fault = during(node.path, effect, nth=nth)
                     yield self._fault(node, what, when, means=f"at {share:g}", cell_faults=(cell_fault,))
 
-    def tool(self) -> Iterator[Fault]:
+    def tool(self) -> Iterator[PlannedFault]:
         """Yield seals that break during a carry, and seals that fail."""
         for node in self.nodes:
             skill = self._skills[node.skill]
@@ -187,9 +187,11 @@ class _Listing:
             refuses = after(0.0, effects.object_refuses(number))
             yield _other("tool", f"no seal on object {number}", "lasting", refuses)
 
-    def _fault(self, node: nodes.SkillNode, what: str, when: When, **more: object) -> Fault:
+    def _fault(self, node: nodes.SkillNode, what: str, when: When, **more: object) -> PlannedFault:
         place = f"{node.mark.source.path}:{node.mark.line}"
-        fault = Fault(node.path, node.label or node.skill, place, what, when, "", behind=not self._runs(node))
+        fault = PlannedFault(
+            node.path, node.label or node.skill, place, what, when, "", behind=not self._runs(node)
+        )
         return replace(fault, **more)  # type: ignore[arg-type]
 
     def _runs(self, node: nodes.SkillNode) -> bool:
@@ -201,9 +203,9 @@ def skill_nodes(subject: Subject) -> list[nodes.SkillNode]:
     return [node for node in subject.loaded.tree.walk() if isinstance(node, nodes.SkillNode)]
 
 
-def _other(about: str, what: str, when: When, cell_fault: ScheduledFault) -> Fault:
+def _other(about: str, what: str, when: When, cell_fault: ScheduledFault) -> PlannedFault:
     start = getattr(cell_fault.when, "start", 0.0)
-    return Fault(about, about, "", what, when, f"from {start:.2f} s on", cell_faults=(cell_fault,))
+    return PlannedFault(about, about, "", what, when, f"from {start:.2f} s on", cell_faults=(cell_fault,))
 
 
 def _goes_to_target(skill: type[Skill]) -> bool:

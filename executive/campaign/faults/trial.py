@@ -12,8 +12,8 @@ from typing import Any
 from executive.campaign.faults import judgement
 from executive.campaign.faults.fault import (
     INJECTED_FAILURE,
-    Fault,
     InjectedError,
+    PlannedFault,
     broken_skills,
 )
 from executive.campaign.faults.listing import skill_nodes
@@ -31,7 +31,7 @@ from executive.testing.faults import FaultyCell, with_faults
 from executive.view.figures.fault import Trial
 from executive.view.report.page import leave_report
 
-Numbered = Mapping[int, Fault]
+Numbered = Mapping[int, PlannedFault]
 """Faults by their numbers in the list, in the order of their description."""
 
 
@@ -151,14 +151,14 @@ class _Trying:
         assert isinstance(workcell, FaultyCell)
         return judgement.out_of_sight(workcell.hand.things, workcell.cell.bins.values(), self._events)
 
-    def _happened(self, fault: Fault) -> bool:
+    def _happened(self, fault: PlannedFault) -> bool:
         """Return True if a fault was injected."""
         names = {cell_fault.what.name for cell_fault in fault.cell_faults}
         if any(isinstance(one.event, FaultInjected) and one.event.name in names for one in self._events):
             return True
         return bool(fault.skill_faults) and self._raised(fault)
 
-    def _raised(self, fault: Fault) -> bool:
+    def _raised(self, fault: PlannedFault) -> bool:
         """Return True if the node of a fault ended as the fault wants it; True for a fault without a node."""
         ends = [one.event for one in self._events if isinstance(one.event, NodeEnded)]
         mine = [end for end in ends if end.node == fault.about]

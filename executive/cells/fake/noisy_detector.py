@@ -14,7 +14,7 @@ from executive.cell.frame import Frame
 from executive.cell.protocols import Detector
 from executive.perception.detectors.options import OptionFaults, find_wrong_options, read_options
 from executive.perception.detectors.requests import ChangedRequest
-from executive.perception.detectors.setting import Setting
+from executive.perception.detectors.setting import DetectorSetting
 
 MAX_CONFUSED_CONFIDENCE = 0.75
 """Highest confidence of a detection that is given a wrong class."""
@@ -45,14 +45,14 @@ class NoisyDetector:
 
     is_fake = True
 
-    def __init__(self, config: DetectorConfig, options: NoisyOptions, setting: Setting) -> None:
+    def __init__(self, config: DetectorConfig, options: NoisyOptions, setting: DetectorSetting) -> None:
         self._config = config
         self._options = options
         self._setting = setting
         self._other: Detector = setting.other(options.of)
 
     @classmethod
-    def from_config(cls, config: DetectorConfig, setting: Setting) -> NoisyDetector:
+    def from_config(cls, config: DetectorConfig, setting: DetectorSetting) -> NoisyDetector:
         """Return the detector that a cell file describes.
 
         Raises:

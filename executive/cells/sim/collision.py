@@ -25,7 +25,7 @@ ROUNDING_ERROR = 1e-5
 PARKING_POSITION = (0.0, 0.0, 50.0)
 
 
-class Approach(NamedTuple):
+class ClosestApproach(NamedTuple):
     """A part of the robot near a body of the cell."""
 
     part: str
@@ -76,16 +76,16 @@ class PathClearance:
                     raise Blocked(self._text(near))
             spared = {pair: near for pair, near in spared.items() if pair in nearest}
 
-    def _nearest(self, q: Array, carrying: Load | None) -> dict[tuple[str, str], Approach]:
+    def _nearest(self, q: Array, carrying: Load | None) -> dict[tuple[str, str], ClosestApproach]:
         """Return the nearest place of every pair that is nearer than the margin at `q`."""
-        found: dict[tuple[str, str], Approach] = {}
+        found: dict[tuple[str, str], ClosestApproach] = {}
         for near in self._near(q, carrying):
             pair = near.part, near.body
             if pair not in found or near.distance - near.allowed < found[pair].distance - found[pair].allowed:
                 found[pair] = near
         return found
 
-    def too_near(self, q: Array) -> Approach | None:
+    def too_near(self, q: Array) -> ClosestApproach | None:
         """Return what an empty arm at `q` `(n,)` [rad] brings nearest, if nearer than the margin, or None."""
         nearest = min(self._near(q, None), key=lambda near: near.distance, default=None)
         return nearest if nearest and nearest.distance < nearest.allowed - ROUNDING_ERROR else None
@@ -94,14 +94,14 @@ class PathClearance:
         """Give the planning world back."""
         self.world.close()
 
-    def _text(self, near: Approach) -> str:
+    def _text(self, near: ClosestApproach) -> str:
         x, y, z = self.world.tool_pose().position
         return (
             f"the motion would bring {near}, with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m; "
             f"{self._margin:.3f} m must stay free"
         )
 
-    def _near(self, q: Array, carrying: Load | None) -> Iterator[Approach]:
+    def _near(self, q: Array, carrying: Load | None) -> Iterator[ClosestApproach]:
         """Yield what is nearer than its margin at `q`."""
         client, arm = self.world.client, self.world.arm
         near = client.getClosestPoints  # looked up once: that costs as much as asking
@@ -111,14 +111,18 @@ class PathClearance:
             for body in parts:
                 for point in near(arm, body, self._margin):
                     if point[3] >= self.world.robot.first_moving_link:
-                        yield Approach(self.world.part_of(point[3]), name, point[8], self._margin)
+                        yield ClosestApproach(self.world.part_of(point[3]), name, point[8], self._margin)
         for one, other in self.world.robot.self_pairs:
             for point in near(arm, arm, self._margin, linkIndexA=one, linkIndexB=other):
-                yield Approach(self.world.part_of(one), self.world.part_of(other), point[8], self._margin)
+                yield ClosestApproach(
+                    self.world.part_of(one), self.world.part_of(other), point[8], self._margin
+                )
         if carrying is not None:
             yield from self._near_held(carrying.kind, bodies)
 
-    def _near_held(self, carrying: ObjectClass, bodies: Mapping[str, tuple[int, ...]]) -> Iterator[Approach]:
+    def _near_held(
+        self, carrying: ObjectClass, bodies: Mapping[str, tuple[int, ...]]
+    ) -> Iterator[ClosestApproach]:
         held, near = self._body(carrying), self.world.client.getClosestPoints
         X_WH = self.world.tool_pose() @ Pose.of([0, 0, carrying.height / 2])
         self.world.client.resetBasePositionAndOrientation(held, X_WH.position, X_WH.quaternion)
@@ -128,10 +132,10 @@ class PathClearance:
                 for point in near(held, body, self._margin):
                     floor = self._floor(name) + BIN_THICKNESS
                     touchable = point[6][2] <= floor + 0.001 and name not in self._around
-                    yield Approach(part, name, point[8], 0.0 if touchable else self._margin)
+                    yield ClosestApproach(part, name, point[8], 0.0 if touchable else self._margin)
         for point in near(held, self.world.arm, self._margin):
             if self.world.robot.first_moving_link <= point[4] < self.world.robot.wrist_link:
-                yield Approach(part, self.world.part_of(point[4]), point[8], self._margin)
+                yield ClosestApproach(part, self.world.part_of(point[4]), point[8], self._margin)
         self.world.client.resetBasePositionAndOrientation(held, PARKING_POSITION, [0, 0, 0, 1])
 
     @contextmanager

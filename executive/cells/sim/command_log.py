@@ -17,7 +17,7 @@ import numpy as np
 from executive.cells.log_file import LogFile
 from executive.errors import Fault, InputError, explained
 from executive.geometry import Array
-from executive.motion.state import State
+from executive.motion.state import JointState
 from executive.motion.trajectory import Trajectory
 
 VERSION = 2
@@ -168,7 +168,7 @@ def _content(path: Path) -> bytes:
         return path.read_bytes()
 
 
-def states_of(command: Command) -> State:
+def states_of(command: Command) -> JointState:
     """Return the states of a motion that begins, each array of shape `(N, n)`."""
     assert command.states is not None
-    return State(*np.hsplit(command.states, 3))
+    return JointState(*np.hsplit(command.states, 3))

@@ -16,7 +16,7 @@ from executive.cells.sim.command_log import Command, states_of
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
-from executive.motion.state import State
+from executive.motion.state import JointState
 from executive.motion.trajectory import Trajectory
 
 
@@ -115,18 +115,18 @@ class SampledPiece:
         duration: Time it takes [s].
     """
 
-    def __init__(self, states: State, duration: float) -> None:
+    def __init__(self, states: JointState, duration: float) -> None:
         self.duration = duration
         self._times = np.append(np.arange(0.0, duration, STEP), duration)
         self._states = states
 
-    def at(self, s: float) -> State:
+    def at(self, s: float) -> JointState:
         """Return the state at time `s` [s]."""
-        return State(*(curve(s) for curve in self._curves))
+        return JointState(*(curve(s) for curve in self._curves))
 
-    def over(self, times: Array) -> State:
+    def over(self, times: Array) -> JointState:
         """Return the states at `times` `(N,)` [s]."""
-        return State(*(curve(times) for curve in self._curves))
+        return JointState(*(curve(times) for curve in self._curves))
 
     @cached_property
     def _curves(self) -> tuple[BPoly, BPoly, BPoly]:
@@ -137,6 +137,6 @@ class SampledPiece:
         return q, q.derivative(), q.derivative(2)
 
 
-def join_samples(states: State, duration: float, guarded: float = math.inf) -> Trajectory:
+def join_samples(states: JointState, duration: float, guarded: float = math.inf) -> Trajectory:
     """Return the motion that `Trajectory.samples` gave these states of."""
     return Trajectory([SampledPiece(states, duration)], guarded)

@@ -90,7 +90,7 @@ class Sample:
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class SceneView:
     """A part of a camera's image, free of noise.
 
     Attributes:
@@ -173,7 +173,7 @@ class SceneRenderer:
         with _removing(world, bodies):
             world.table_top.paint(colour, texture)
             shot = render(world, matrix, X_WC, part, light)
-        view = View(shot.image, shot.bodies, part, matrix, X_WC, noise)
+        view = SceneView(shot.image, shot.bodies, part, matrix, X_WC, noise)
         sample = self._label(view, bodies, items)
         return None if sample is None else replace(sample, image=_resized(add_noise(shot.image, noise, rng)))
 
@@ -197,7 +197,7 @@ class SceneRenderer:
         left, top, right, bottom = part = camera.table_view
         clean, seen = shot.image[top:bottom, left:right], shot.bodies[top:bottom, left:right]
         # By the declared noise: more noise in a scene does not excuse a detector from finding an object.
-        view = View(clean, seen, part, self._matrix, X_WC, self._declared.noise)
+        view = SceneView(clean, seen, part, self._matrix, X_WC, self._declared.noise)
         sample = self._label(view, bodies, items)
         if sample is None:
             return None
@@ -206,7 +206,7 @@ class SceneRenderer:
         image = _resized(frame[top:bottom, left:right])
         return replace(sample, image=image, frame=frame, depth=depth, second=second)
 
-    def _label(self, view: View, bodies: Sequence[int], items: Sequence[SceneObject]) -> Sample | None:
+    def _label(self, view: SceneView, bodies: Sequence[int], items: Sequence[SceneObject]) -> Sample | None:
         """Label a render, or return None if too many objects are half hidden."""
         labelled: list[tuple[str, list[float], float, Array, Array]] = []
         ignored, half_hidden = [], 0

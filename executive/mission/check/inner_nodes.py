@@ -9,7 +9,7 @@ from executive.mission.check.case import Case
 from executive.mission.check.min_times import min_time
 from executive.mission.findings import Finding, error, warning
 from executive.mission.model.instance import count_in, inspection_instance, node_of
-from executive.mission.model.nodes import InnerNode, Node, Part, Section, SkillNode, parts
+from executive.mission.model.nodes import InnerNode, Node, Part, SectionNode, SkillNode, parts
 from executive.mission.model.paths import name_of
 from executive.mission.model.typed import WrongType, read_constant
 from executive.mission.model.values import Literal, Match, Reference
@@ -27,13 +27,13 @@ def constants(case: Case) -> Iterator[Finding]:
         yield from _constants(case, node, node.kind.word)
 
 
-def _constants(case: Case, owner: InnerNode | Section, name: str) -> Iterator[Finding]:
+def _constants(case: Case, owner: InnerNode | SectionNode, name: str) -> Iterator[Finding]:
     for key, value in parts(owner):
-        if isinstance(value, Section):
+        if isinstance(value, SectionNode):
             yield from _constants(case, value, key.name)
         elif isinstance(value, tuple):
             for item in value:
-                if isinstance(item, Section):
+                if isinstance(item, SectionNode):
                     yield from _constants(case, item, key.name)
         elif key.kind is Kind.CONSTANT:
             yield from _constant(case, f"{name}.{key.name}", key, value, count_in(owner, key))
@@ -62,7 +62,7 @@ def complaints(case: Case) -> Iterator[Finding]:
     """Find the mistakes that only the class of a control node knows."""
     halted = {node.path for node in _halted(case)}
     for node in case.inner_nodes():
-        for complaint in inspection_instance(node).check(NodeFacts(case, node, node.path in halted)):
+        for complaint in inspection_instance(node).check(CaseFacts(case, node, node.path in halted)):
             yield _finding(node, complaint)
 
 
@@ -83,7 +83,7 @@ def _finding(node: InnerNode, complaint: NodeFinding) -> Finding:
     return report(mark, complaint.code, complaint.message + note, complaint.hint)
 
 
-class NodeFacts:
+class CaseFacts:
     """Knowledge of the checker about a control node; implements `Facts`."""
 
     def __init__(self, case: Case, node: InnerNode, is_halted_by_sibling: bool) -> None:

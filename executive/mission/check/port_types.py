@@ -69,7 +69,7 @@ def port_types(case: Case) -> Iterator[Finding]:
 
 
 @dataclass(frozen=True)
-class Loop:
+class ElementType:
     """A control node that writes the elements of a list to a variable.
 
     Attributes:
@@ -120,11 +120,11 @@ class Loop:
             yield Writer(self.word, self.mark, element, source.refers)
 
 
-def _loops(node: Node) -> Iterator[Loop]:
+def _loops(node: Node) -> Iterator[ElementType]:
     for key, variable in variables(node):
         source = node.values.get(key.element_of) if isinstance(node, InnerNode) else None
         if isinstance(source, Literal | Reference):
-            yield Loop(word_of(node), node.mark, variable.name, key.element_of, source)
+            yield ElementType(word_of(node), node.mark, variable.name, key.element_of, source)
 
 
 def _misfits(case: Case, wire: Wire, writer: Writer) -> Iterator[Finding]:

@@ -8,7 +8,7 @@ from executive.mission.check.case import Case
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.flow.analysis import Analysis
 from executive.mission.model import grammar
-from executive.mission.model.nodes import InnerNode, Node, Section, SkillNode, nodes_of, parts
+from executive.mission.model.nodes import InnerNode, Node, SectionNode, SkillNode, nodes_of, parts
 from executive.mission.model.values import Match
 from executive.mission.source import Mark
 from executive.tree.flow import UNKNOWN_NAME, PossibleFailure
@@ -71,13 +71,13 @@ def _expectations(node: Node) -> Iterator[tuple[Match, str, Node]]:
             yield match, node.kind.word, body
 
 
-def _matches(owner: InnerNode | Section) -> Iterator[tuple[Key, Match]]:
+def _matches(owner: InnerNode | SectionNode) -> Iterator[tuple[Key, Match]]:
     """Yield the names of failures in the keys of a node and of its sections."""
     for key, value in parts(owner):
         for item in value if isinstance(value, tuple) else (value,):
             if isinstance(item, Match):
                 yield key, item
-            elif isinstance(item, Section):
+            elif isinstance(item, SectionNode):
                 yield from _matches(item)
 
 

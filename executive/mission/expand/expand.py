@@ -13,7 +13,7 @@ from typing import Any
 
 from executive.mission.findings import Finding, alternatives, error, suggest, warning
 from executive.mission.model.mission import Mission, Subtree
-from executive.mission.model.nodes import Node, Section, SkillNode, UnknownNode, UseNode
+from executive.mission.model.nodes import Node, SectionNode, SkillNode, UnknownNode, UseNode
 from executive.mission.model.paths import word_of
 from executive.mission.model.values import Named, Reference, Setting, Value
 from executive.mission.model.wiring import variables, written_below
@@ -256,6 +256,6 @@ def _with_parts(part: Any, change: Callable[[Any], Any]) -> Any:
         return tuple([change(item) for item in part])
     if isinstance(part, dict):
         return {key: change(item) for key, item in part.items()}
-    if isinstance(part, Node | Setting | Section):
+    if isinstance(part, Node | Setting | SectionNode):
         return replace(part, **{field.name: change(getattr(part, field.name)) for field in fields(part)})
     return part

@@ -1,6 +1,6 @@
 """Abstract execution of the tree over every way it can go, for the checks to ask about.
 
-Every node is entered with the facts that hold on all ways to it (`State`) and returns its ends (`Flow`).
+Every node is entered with the facts that hold on all ways to it (`FlowState`) and returns its ends (`Flow`).
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from executive.tree.flow import (
     UNKNOWN,
     UNKNOWN_NAME,
     Flow,
+    FlowState,
     PossibleFailure,
-    State,
     joined,
     required,
     tools_after_failure,
@@ -49,11 +49,11 @@ class Analysis:
 
     def __init__(self, tree: Node, skills: Mapping[str, type[Skill]]) -> None:
         self.nodes = {node.path: node for node in tree.walk()}
-        self.entry: dict[str, State] = {}
+        self.entry: dict[str, FlowState] = {}
         self.flows: dict[str, Flow] = {}
-        self.bodies: dict[str, State | None] = {}
+        self.bodies: dict[str, FlowState | None] = {}
         self._skills = skills
-        self._known: dict[tuple[str, State], Flow] = {}
+        self._known: dict[tuple[str, FlowState], Flow] = {}
         self._models: dict[str, ControlNode] = {}
         self.result = self._run(tree, INITIAL_STATE)
 
@@ -62,7 +62,7 @@ class Analysis:
         meant = name if name in self._skills else suggest(name, self._skills)
         return self._skills[meant] if meant else None
 
-    def _run(self, node: Node, state: State) -> Flow:
+    def _run(self, node: Node, state: FlowState) -> Flow:
         self.entry[node.path] = state.join(self.entry.get(node.path, state))
         key = node.path, state
         if key not in self._known:
@@ -70,7 +70,7 @@ class Analysis:
             self._known[key] = self.flows[node.path] = flow
         return self._known[key]
 
-    def _flow(self, node: Node, state: State) -> Flow:
+    def _flow(self, node: Node, state: FlowState) -> Flow:
         match node:
             case InnerNode():
                 if node.path not in self._models:
@@ -85,10 +85,10 @@ class Analysis:
             self._run(part, UNKNOWN)
         return Flow(UNKNOWN, {PossibleFailure(UNKNOWN_NAME, UNKNOWN_NAME, node.path): UNKNOWN}, UNKNOWN)
 
-    def _enter(self, child: Child, state: State) -> Flow:
+    def _enter(self, child: Child, state: FlowState) -> Flow:
         return self._run(node_of(child), state)
 
-    def _skill(self, node: SkillNode, state: State) -> Flow:
+    def _skill(self, node: SkillNode, state: FlowState) -> Flow:
         skill = self.skill(node.skill)
         if skill is None:
             return Flow(UNKNOWN, {PossibleFailure(node.skill, UNKNOWN_NAME, node.path): UNKNOWN}, UNKNOWN)
@@ -98,13 +98,13 @@ class Analysis:
         end = state.moved() if skill.moves else state
         success = end.writing(outputs).with_tools(tools_after_success(end.tools, after, node.path))
 
-        def left(by: str) -> State:
+        def left(by: str) -> FlowState:
             return end.with_tools(tools_after_failure(end.tools, skill.tool_left.get(by), node.path))
 
         failures = {PossibleFailure(node.skill, reason, node.path): left(reason) for reason in skill.reasons}
         return Flow(success, failures, left(HALT))
 
-    def _use(self, node: UseNode, body: Node, state: State) -> Flow:
+    def _use(self, node: UseNode, body: Node, state: FlowState) -> Flow:
         flow = self._run(body, state)
         # One use may be entered in several states: in a finally, in a loop.
         self.bodies[node.path] = joined((self.bodies.get(node.path), flow.success))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Key:
+class GrammarKey:
     """A key of a mapping.
 
     Attributes:
@@ -28,7 +28,7 @@ class Key:
 LABEL = "[a-z_][a-z0-9_]*"
 """How labels are written."""
 
-AS = Key("label", "A name of its own, for `on`, `until` and `catch`.")
+AS = GrammarKey("label", "A name of its own, for `on`, `until` and `catch`.")
 """The key `as` beside the word of any node."""
 
 SEQUENCE = "sequence"
@@ -37,9 +37,9 @@ SEQUENCE = "sequence"
 USE = "use"
 """Word before the name of a subtree."""
 
-USE_PARTNERS: Mapping[str, Key] = {
-    "with": Key("values", "Values of the subtree's arguments."),
-    "returns": Key("variables", "Other names for the variables it returns: `its: $mine`."),
+USE_PARTNERS: Mapping[str, GrammarKey] = {
+    "with": GrammarKey("values", "Values of the subtree's arguments."),
+    "returns": GrammarKey("variables", "Other names for the variables it returns: `its: $mine`."),
 }
 """Keys that stand beside `use`."""
 
@@ -51,39 +51,39 @@ ELSEWHERE: Mapping[str, str] = {
 }
 """Hints for words that are no nodes; control nodes have further ones."""
 
-MISSION: Mapping[str, Key] = {
-    "mission": Key("word", "Its name.", required=True),
-    "description": Key("text", "What it does, one sentence."),
-    "cell": Key("text", "The cell file, below this file's folder, or a shipped one.", required=True),
-    "library": Key("paths", "Files with subtrees, below this file's folder, or shipped ones."),
-    "params": Key("params", "Constants, written `$name`; `--set name=value` gives another value."),
-    "routes": Key("routes", "For every class the bin it goes to, or a list of bins."),
-    "tree": Key("node", "What is done.", required=True),
-    "trees": Key("trees", "Subtrees by name."),
+MISSION: Mapping[str, GrammarKey] = {
+    "mission": GrammarKey("word", "Its name.", required=True),
+    "description": GrammarKey("text", "What it does, one sentence."),
+    "cell": GrammarKey("text", "The cell file, below this file's folder, or a shipped one.", required=True),
+    "library": GrammarKey("paths", "Files with subtrees, below this file's folder, or shipped ones."),
+    "params": GrammarKey("params", "Constants, written `$name`; `--set name=value` gives another value."),
+    "routes": GrammarKey("routes", "For every class the bin it goes to, or a list of bins."),
+    "tree": GrammarKey("node", "What is done.", required=True),
+    "trees": GrammarKey("trees", "Subtrees by name."),
 }
 """The keys of a mission file."""
 
-LIBRARY: Mapping[str, Key] = {
-    "library": Key("word", "Its name.", required=True),
-    "description": Key("text", "What is in it, one sentence."),
-    "trees": Key("trees", "Subtrees by name.", required=True),
+LIBRARY: Mapping[str, GrammarKey] = {
+    "library": GrammarKey("word", "Its name.", required=True),
+    "description": GrammarKey("text", "What is in it, one sentence."),
+    "trees": GrammarKey("trees", "Subtrees by name.", required=True),
 }
 """The keys of a library file."""
 
-SUBTREE: Mapping[str, Key] = {
-    "doc": Key("text", "What it does, one sentence."),
-    "args": Key("args", "Its arguments: a list of names, or names with defaults."),
-    "returns": Key("words", "The variables it writes for others; with it, all others are its own."),
-    "do": Key("node", "What is done.", required=True),
+SUBTREE: Mapping[str, GrammarKey] = {
+    "doc": GrammarKey("text", "What it does, one sentence."),
+    "args": GrammarKey("args", "Its arguments: a list of names, or names with defaults."),
+    "returns": GrammarKey("words", "The variables it writes for others; with it, all others are its own."),
+    "do": GrammarKey("node", "What is done.", required=True),
 }
 """The keys of a subtree."""
 
-PARAM: Mapping[str, Key] = {
-    "default": Key("value", "Its value unless `--set` gives another; without it, it must be given."),
-    "type": Key("word", "text, integer, number, boolean or list; without it, that of the default."),
-    "min": Key("number", "Smallest value."),
-    "max": Key("number", "Largest value."),
-    "choices": Key("list", "The values it may have."),
-    "doc": Key("text", "What it means, one sentence."),
+PARAM: Mapping[str, GrammarKey] = {
+    "default": GrammarKey("value", "Its value unless `--set` gives another; without it, it must be given."),
+    "type": GrammarKey("word", "text, integer, number, boolean or list; without it, that of the default."),
+    "min": GrammarKey("number", "Smallest value."),
+    "max": GrammarKey("number", "Largest value."),
+    "choices": GrammarKey("list", "The values it may have."),
+    "doc": GrammarKey("text", "What it means, one sentence."),
 }
 """The keys of a param that is declared by a mapping."""

@@ -11,7 +11,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.cell.protocols import Clock
-from executive.mission.model.nodes import InnerNode, Node, Part, Section, nodes_of
+from executive.mission.model.nodes import InnerNode, Node, Part, SectionNode, nodes_of
 from executive.mission.model.typed import WrongType, read_constant
 from executive.mission.model.values import Literal, Match, Named
 from executive.tree.blackboard import Blackboard
@@ -73,21 +73,21 @@ def has_valid_constants(node: InnerNode) -> bool:
     return True
 
 
-def count_in(owner: InnerNode | Section, key: Key) -> int | None:
+def count_in(owner: InnerNode | SectionNode, key: Key) -> int | None:
     """Return the largest allowed number of a constant, if it counts nodes under another key."""
     return len(nodes_of(owner.values[key.max_of])) if key.max_of in owner.values else None
 
 
-def _values(owner: InnerNode | Section, build: Build) -> Mapping[str, object]:
+def _values(owner: InnerNode | SectionNode, build: Build) -> Mapping[str, object]:
     keys = (key for key in owner.kind.keys.values() if key.is_required or key.name in owner.values)
     return {key.attribute: _value(owner, key, owner.values.get(key.name), build) for key in keys}
 
 
-def _value(owner: InnerNode | Section, key: Key, part: Part | None, build: Build) -> object:
+def _value(owner: InnerNode | SectionNode, key: Key, part: Part | None, build: Build) -> object:
     """Return the value of an attribute."""
     if isinstance(part, Node):
         return build(part)
-    if isinstance(part, Section):
+    if isinstance(part, SectionNode):
         return part.kind(**_values(part, build))
     if isinstance(part, tuple):
         return tuple(item if isinstance(item, Match) else _value(owner, key, item, build) for item in part)

@@ -48,7 +48,7 @@ class Library:
 
 
 @dataclass(frozen=True)
-class Param:
+class MissionParam:
     """A constant of the mission.
 
     Attributes:
@@ -95,7 +95,7 @@ class Mission:
     description: str
     cell: Named
     libraries: tuple[Named, ...] = ()
-    params: Mapping[str, Param] = field(default_factory=dict)
+    params: Mapping[str, MissionParam] = field(default_factory=dict)
     routes: tuple[Route, ...] = ()
     tree: Node | None = None
     trees: Mapping[str, Subtree] = field(default_factory=dict)

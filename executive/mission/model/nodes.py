@@ -71,7 +71,7 @@ class UnknownNode(Node):
 
 
 @dataclass(frozen=True)
-class Section:
+class SectionNode:
     """A mapping below a key of a control node: the values of its keys.
 
     Attributes:
@@ -126,11 +126,11 @@ class UseNode(Node):
         return () if self.body is None else (self.body,)
 
 
-Part: TypeAlias = "Value | Named | Node | Section | tuple[Node | Match | Section, ...]"
+Part: TypeAlias = "Value | Named | Node | SectionNode | tuple[Node | Match | SectionNode, ...]"
 """Value of a key of a control node."""
 
 
-def parts(of: InnerNode | Section) -> Iterator[tuple[Key, Part]]:
+def parts(of: InnerNode | SectionNode) -> Iterator[tuple[Key, Part]]:
     """Yield the keys that are given, in the order of their declaration, with their values."""
     for name, key in of.kind.keys.items():
         if name in of.values:
@@ -139,7 +139,7 @@ def parts(of: InnerNode | Section) -> Iterator[tuple[Key, Part]]:
 
 def nodes_of(part: Part) -> list[Node]:
     """Return the nodes in the value of a key."""
-    if isinstance(part, Section):
+    if isinstance(part, SectionNode):
         return [node for _, value in parts(part) for node in nodes_of(value)]
     if isinstance(part, tuple):
         return [node for item in part if not isinstance(item, Match) for node in nodes_of(item)]

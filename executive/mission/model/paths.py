@@ -13,7 +13,7 @@ from executive.mission.model.nodes import (
     InnerNode,
     Node,
     Part,
-    Section,
+    SectionNode,
     SkillNode,
     UnknownNode,
     UseNode,
@@ -62,7 +62,7 @@ def _placed(node: Node, parent: str, slot: str, name: str | None = None) -> Node
     return replace(node, path=path)
 
 
-def _parts(owner: InnerNode | Section, path: str, prefix: str = "") -> dict[str, Part]:
+def _parts(owner: InnerNode | SectionNode, path: str, prefix: str = "") -> dict[str, Part]:
     """Return the values of an owner with their paths; `prefix` is the slot of a section in its node."""
     placed: dict[str, Part] = {}
     for key, value in parts(owner):
@@ -70,14 +70,14 @@ def _parts(owner: InnerNode | Section, path: str, prefix: str = "") -> dict[str,
         name = prefix if prefix and key.name == "do" else _join(prefix, key.name)
         if isinstance(value, Node):
             value = _placed(value, path, name if key.is_in_path or _is_list(value) else "")
-        elif isinstance(value, Section):
+        elif isinstance(value, SectionNode):
             value = replace(value, values=_parts(value, path, name))
         elif isinstance(value, tuple) and key.kind is Kind.NODES:
             value = _listed(tuple(item for item in value if isinstance(item, Node)), path)
         elif isinstance(value, tuple):
             value = tuple(
                 replace(item, values=_parts(item, path, f"{name}/{index}"))
-                if isinstance(item, Section)
+                if isinstance(item, SectionNode)
                 else item
                 for index, item in enumerate(value, 1)
             )

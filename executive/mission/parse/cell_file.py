@@ -71,7 +71,7 @@ def read_cell(path: Path, overrides: Mapped[str, str]) -> CellFile:
         InputError: There is no such file.
     """
     source = read_source(path)
-    parts = _Parts()
+    parts = _CellParts()
     root = parts.tree(path, source, ())
     if root is None:
         return CellFile(None, source, None, tuple(parts.findings))
@@ -91,7 +91,7 @@ def read_cell(path: Path, overrides: Mapped[str, str]) -> CellFile:
     return CellFile(found, source, root, (*file.findings, *later))
 
 
-class _Parts:
+class _CellParts:
     """The files that a cell is put together from, gathered while they are read.
 
     Attributes:

@@ -14,7 +14,7 @@ from executive.mission.source import Mark
 from executive.mission.text import yaml_text as yaml
 from executive.mission.words import describe
 from executive.tree.keys import Key, Kind
-from executive.tree.keys import Section as DeclaredSection
+from executive.tree.keys import KeySection as DeclaredSection
 from executive.tree.node import ControlNode
 
 if TYPE_CHECKING:
@@ -92,7 +92,9 @@ class _Reader:
         """Return the values of the keys under the word of a node or section."""
         values: dict[str, Part] = {}
         bare, inner = bare_key(kind), inner_keys(kind)
-        is_short = isinstance(value, yaml.Sequence) if bare and bare.kind is Kind.NODES else bare is not None
+        is_short = (
+            isinstance(value, yaml.YamlSequence) if bare and bare.kind is Kind.NODES else bare is not None
+        )
         if bare is not None and (not inner or (is_short and not isinstance(value, yaml.Mapping))):
             root = yaml.Mapping(mark, (yaml.Entry(yaml.Scalar(mark, owner, bare.name), value),))
             fields = Fields(owner, mark, root, [bare.name], self.parser.findings)
@@ -152,24 +154,24 @@ class _Reader:
         bare = variable.name.removeprefix("$")
         return Named(bare, variable.mark) if NAME.fullmatch(bare) else None
 
-    def _section(self, key: Key, value: yaml.Node, mark: Mark) -> model.Section | None:
+    def _section(self, key: Key, value: yaml.Node, mark: Mark) -> model.SectionNode | None:
         values = self.read_inner(key.name, mark, value, key.section)
         required = (one for one in key.section.keys.values() if one.is_required and one.kind is Kind.CONSTANT)
         return (
             None
             if any(one.name not in values for one in required)
-            else model.Section(key.section, mark, values)
+            else model.SectionNode(key.section, mark, values)
         )
 
-    def _sections(self, key: Key, value: yaml.Node) -> Iterable[model.Section]:
+    def _sections(self, key: Key, value: yaml.Node) -> Iterable[model.SectionNode]:
         """Yield the sections of a list, or the only one."""
         needed = " and ".join(f'"{name}"' for name in key.section.keys)
-        if not isinstance(value, yaml.Sequence | yaml.Mapping):
+        if not isinstance(value, yaml.YamlSequence | yaml.Mapping):
             message = f"{key.name} takes {needed}, or a list of them, not {describe(yaml.plain(value))}"
             self.parser.refuse(value.mark, "wrong-type", message)
             return
-        if isinstance(value, yaml.Sequence) and not value.items:
+        if isinstance(value, yaml.YamlSequence) and not value.items:
             self.parser.refuse(value.mark, "empty-list", f"{key.name} needs at least one {needed}")
-        for item in value.items if isinstance(value, yaml.Sequence) else (value,):
+        for item in value.items if isinstance(value, yaml.YamlSequence) else (value,):
             if (section := self._section(key, item, item.mark)) is not None:
                 yield section

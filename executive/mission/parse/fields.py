@@ -9,7 +9,7 @@ from dataclasses import replace
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.model.values import Literal, Match, Reference, Setting, Value
 from executive.mission.source import Mark
-from executive.mission.text.yaml_text import Mapping, Node, Scalar, Sequence, plain, scalars
+from executive.mission.text.yaml_text import Mapping, Node, Scalar, YamlSequence, plain, scalars
 from executive.mission.words import describe
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -87,7 +87,7 @@ class Fields:
         if node is None:
             return ()
         found = []
-        if isinstance(node, Sequence) and not node.items:
+        if isinstance(node, YamlSequence) and not node.items:
             hint = f'For every failure leave out "{key}".'
             self._refuse(node.mark, "empty-list", f"{self.owner}.{key} names no failure", hint)
         for item in self.items(key):
@@ -103,7 +103,7 @@ class Fields:
     def items(self, key: str) -> tuple[Node, ...]:
         """Return the items of the list under `key`; a single value counts as a list of one."""
         node = self.get(key)
-        if isinstance(node, Sequence):
+        if isinstance(node, YamlSequence):
             return node.items
         return () if node is None else (node,)
 
@@ -154,7 +154,7 @@ def value_of(node: Node, findings: list[Finding]) -> Value | None:
 
 def literal_of(node: Node) -> Literal:
     """Return a node as a value that knows where it and its elements stand."""
-    elements = tuple(item.mark for item in node.items) if isinstance(node, Sequence) else ()
+    elements = tuple(item.mark for item in node.items) if isinstance(node, YamlSequence) else ()
     return Literal(plain(node), node.mark, elements=elements)
 
 

@@ -15,7 +15,7 @@ from executive.mission.parse.fields import NAME, Fields, value_of
 from executive.mission.parse.nodes import NodeParser, Skills
 from executive.mission.parse.params import parse_params
 from executive.mission.source import Mark
-from executive.mission.text.yaml_text import Mapping, Node, Scalar, Sequence, plain
+from executive.mission.text.yaml_text import Mapping, Node, Scalar, YamlSequence, plain
 from executive.mission.words import describe
 from executive.tree.registry import ControlNodes
 
@@ -67,7 +67,7 @@ def _routes(fields: Fields) -> tuple[Route, ...]:
     routes: list[Route] = []
 
     def read(label: str, mark: Mark, node: Node) -> None:
-        items = node.items if isinstance(node, Sequence) else (node,)
+        items = node.items if isinstance(node, YamlSequence) else (node,)
         if not items:
             fields.findings.append(error(node.mark, "empty-list", "a route needs at least one bin"))
         bins = _names(items, "a route names a bin or a list of bins", fields.findings)
@@ -134,7 +134,7 @@ def _subtree(name: str, mark: Mark, node: Mapping, parser: NodeParser, library: 
         required = isinstance(value, Scalar) and value.value is None
         args[argument] = Argument(where, None if required else value_of(value, parser.findings))
 
-    if isinstance(fields.get("args"), Sequence):
+    if isinstance(fields.get("args"), YamlSequence):
         for item in fields.items("args"):
             if isinstance(item, Scalar):
                 read(item.text, item.mark, Scalar(item.mark, None, ""))

@@ -12,7 +12,7 @@ from executive.mission.model import nodes as model
 from executive.mission.parse.control import Head, bare_key, inner_keys, read_control, unread
 from executive.mission.parse.fields import settings_of
 from executive.mission.source import Mark
-from executive.mission.text.yaml_text import Entry, Mapping, Node, Scalar, Sequence, plain
+from executive.mission.text.yaml_text import Entry, Mapping, Node, Scalar, YamlSequence, plain
 from executive.mission.words import describe
 from executive.skill import Skill
 from executive.tree.registry import ControlNodes
@@ -42,7 +42,7 @@ class NodeParser:
             if node is not None:
                 self.refuse(mark, "missing-node", "a node is missing here")
             return unread(mark)
-        if isinstance(node, Sequence):
+        if isinstance(node, YamlSequence):
             return self._list(node)
         if isinstance(node, Scalar):
             return self._word(node)
@@ -50,7 +50,7 @@ class NodeParser:
 
     def nodes(self, node: Node, owner: str) -> tuple[model.Node, ...]:
         """Return the nodes of a list."""
-        if not isinstance(node, Sequence):
+        if not isinstance(node, YamlSequence):
             self.refuse(
                 node.mark, "wrong-type", f"{owner} takes a list of nodes, not {describe(plain(node))}"
             )
@@ -63,7 +63,7 @@ class NodeParser:
         """Record an error."""
         self.findings.append(error(mark, code, message, hint))
 
-    def _list(self, node: Sequence) -> model.Node:
+    def _list(self, node: YamlSequence) -> model.Node:
         steps = self.nodes(node, "a list of steps")
         kind = self._control[grammar.SEQUENCE]
         return (

@@ -9,7 +9,7 @@ from typing import Any
 
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.model import grammar
-from executive.mission.model.mission import Param
+from executive.mission.model.mission import MissionParam
 from executive.mission.model.typed import WrongType, convert
 from executive.mission.model.values import Literal
 from executive.mission.parse.fields import NAME, Fields, literal_of
@@ -22,9 +22,9 @@ TYPES: Mapped[str, Any] = {"text": str, "integer": int, "number": float, "boolea
 """The types a param may have, by the word for them."""
 
 
-def parse_params(fields: Fields, overrides: Mapped[str, str]) -> dict[str, Param]:
+def parse_params(fields: Fields, overrides: Mapped[str, str]) -> dict[str, MissionParam]:
     """Return the params of a mission file, with the values given beside the file put in."""
-    params: dict[str, Param] = {}
+    params: dict[str, MissionParam] = {}
 
     def read(name: str, mark: Mark, node: Node) -> None:
         if not NAME.fullmatch(name):
@@ -45,15 +45,15 @@ def parse_params(fields: Fields, overrides: Mapped[str, str]) -> dict[str, Param
     return params
 
 
-def _param(name: str, mark: Mark, node: Node, given: bool, findings: list[Finding]) -> Param:
+def _param(name: str, mark: Mark, node: Node, given: bool, findings: list[Finding]) -> MissionParam:
     """Return a param as it is declared: by its default alone, or by a mapping."""
     if not isinstance(node, Mapping):
-        return Param(mark, literal_of(node), _type_of(plain(node)))
+        return MissionParam(mark, literal_of(node), _type_of(plain(node)))
     fields = Fields(f'the param "{name}"', mark, node, grammar.PARAM, findings)
     default = fields.get("default")
     kind = _declared_type(fields, findings) or _type_of(None if default is None else plain(default))
     choices = fields.get("choices")
-    param = Param(
+    param = MissionParam(
         mark,
         Literal(None, mark) if default is None else literal_of(default),
         kind,
@@ -76,7 +76,7 @@ def _param(name: str, mark: Mark, node: Node, given: bool, findings: list[Findin
     return fallback
 
 
-def _impossible(param: Param) -> str:
+def _impossible(param: MissionParam) -> str:
     """Return why no value fits the declaration, or ""."""
     if param.choices == ():
         return "no choices"
@@ -85,7 +85,7 @@ def _impossible(param: Param) -> str:
     return ""
 
 
-def _any_value(param: Param) -> Any:
+def _any_value(param: MissionParam) -> Any:
     """Return a value that a param could have, so that one that is missing is told once, not at every use."""
     if param.choices:
         return param.choices[0]
@@ -121,7 +121,7 @@ def _bound(fields: Fields, key: str, findings: list[Finding]) -> float | None:
     return None
 
 
-def _given(name: str, text: str, param: Param, findings: list[Finding]) -> Param:
+def _given(name: str, text: str, param: MissionParam, findings: list[Finding]) -> MissionParam:
     """Return the param with the value given beside the file, which must fit as the default does."""
     node, wrong = override_node(name, text, as_text=param.type == "text")
     findings += wrong
@@ -130,7 +130,7 @@ def _given(name: str, text: str, param: Param, findings: list[Finding]) -> Param
     return _checked(name, param, literal_of(node), findings) or param
 
 
-def _checked(name: str, param: Param, value: Literal, findings: list[Finding]) -> Param | None:
+def _checked(name: str, param: MissionParam, value: Literal, findings: list[Finding]) -> MissionParam | None:
     """Return the param with a value of its type and within its bounds, or None with a finding."""
     fitting = value.value
     if param.type:
@@ -145,7 +145,7 @@ def _checked(name: str, param: Param, value: Literal, findings: list[Finding]) -
     return replace(param, value=replace(value, value=fitting))
 
 
-def _out_of_bounds(param: Param, value: Any) -> str:
+def _out_of_bounds(param: MissionParam, value: Any) -> str:
     if isinstance(value, int | float):
         if param.minimum is not None and value < param.minimum:
             return f"must be at least {param.minimum:g}"

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.source import Mark
-from executive.mission.text.yaml_text import Mapping, Node, Scalar, Sequence, plain, scalars
+from executive.mission.text.yaml_text import Mapping, Node, Scalar, YamlSequence, plain, scalars
 from executive.mission.words import violation
 
 M = TypeVar("M", bound=BaseModel)
@@ -58,7 +58,7 @@ def mark_of(root: Node, path: KeyPath, of_key: bool = False) -> Mark:
         if isinstance(node, Mapping) and (entry := node.entry(str(step))):
             node = entry.value
             mark = node.mark if isinstance(node, Scalar) and not of_key else entry.key.mark
-        elif isinstance(node, Sequence) and isinstance(step, int) and step < len(node.items):
+        elif isinstance(node, YamlSequence) and isinstance(step, int) and step < len(node.items):
             node = node.items[step]
             mark = node.mark
         else:

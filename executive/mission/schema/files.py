@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 from executive.mission.model import grammar
-from executive.mission.model.grammar import Key
+from executive.mission.model.grammar import GrammarKey
 from executive.mission.parse.control import bare_key, inner_keys
 from executive.mission.parse.fields import NAME
 from executive.mission.parse.params import TYPES
@@ -22,8 +22,7 @@ from executive.mission.schema.types import (
     words,
 )
 from executive.skill import Skill
-from executive.tree.keys import Key as DeclaredKey
-from executive.tree.keys import Kind
+from executive.tree.keys import Key, Kind
 from executive.tree.node import ControlNode
 from executive.tree.registry import ControlNodes
 
@@ -45,7 +44,7 @@ def library_schema(skills: Skills, control: ControlNodes) -> Json:
     return _file("A library", grammar.LIBRARY, skills, control)
 
 
-def _file(title: str, keys: Mapping[str, Key], skills: Skills, control: ControlNodes) -> Json:
+def _file(title: str, keys: Mapping[str, GrammarKey], skills: Skills, control: ControlNodes) -> Json:
     forms = {word: _form(kind) for word, kind in control.items()}
     forms[grammar.USE] = {"title": grammar.USE, "description": "A subtree by its name.", **_KINDS["word"]}
     return {
@@ -127,7 +126,7 @@ def _sentence(kind: type[ControlNode]) -> str:
     return (inspect.getdoc(kind) or "").partition("\n")[0]
 
 
-def _object(keys: Mapping[str, DeclaredKey]) -> Json:
+def _object(keys: Mapping[str, Key]) -> Json:
     return {
         "type": "object",
         "properties": {name: _key(key) for name, key in keys.items()},
@@ -136,11 +135,11 @@ def _object(keys: Mapping[str, DeclaredKey]) -> Json:
     }
 
 
-def _key(key: DeclaredKey) -> Json:
+def _key(key: Key) -> Json:
     return {"description": key.doc, **_value_of(key)}
 
 
-def _value_of(key: DeclaredKey) -> Json:
+def _value_of(key: Key) -> Json:
     """Return the schema of the value of a key of a control node."""
     match key.kind:
         case Kind.NODE:
@@ -187,7 +186,7 @@ def _param() -> Json:
     return {**declared, "type": ["object", "array", "string", "number", "boolean", "null"]}
 
 
-def _mapping(keys: Mapping[str, Key]) -> Json:
+def _mapping(keys: Mapping[str, GrammarKey]) -> Json:
     return {
         "type": "object",
         "properties": _properties(keys),
@@ -196,7 +195,7 @@ def _mapping(keys: Mapping[str, Key]) -> Json:
     }
 
 
-def _properties(keys: Mapping[str, Key]) -> Json:
+def _properties(keys: Mapping[str, GrammarKey]) -> Json:
     return {name: {"description": key.doc, **_KINDS[key.kind]} for name, key in keys.items()}
 
 

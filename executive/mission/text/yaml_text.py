@@ -43,7 +43,7 @@ class Scalar:
 
 
 @dataclass(frozen=True)
-class Sequence:
+class YamlSequence:
     """A list."""
 
     mark: Mark
@@ -80,14 +80,14 @@ class Mapping:
         return tuple(entry.key.text for entry in self.entries)
 
 
-Node = Scalar | Sequence | Mapping
+Node = Scalar | YamlSequence | Mapping
 
 
 def plain(node: Node) -> Any:
     """Return the node as plain Python values."""
     if isinstance(node, Scalar):
         return node.value
-    if isinstance(node, Sequence):
+    if isinstance(node, YamlSequence):
         return [plain(item) for item in node.items]
     return {entry.key.text: plain(entry.value) for entry in node.entries}
 
@@ -97,7 +97,7 @@ def scalars(node: Node) -> Iterator[Scalar]:
     if isinstance(node, Scalar):
         yield node
         return
-    for part in node.items if isinstance(node, Sequence) else (entry.value for entry in node.entries):
+    for part in node.items if isinstance(node, YamlSequence) else (entry.value for entry in node.entries):
         yield from scalars(part)
 
 
@@ -184,7 +184,7 @@ class _Composer:
             items = []
             while not isinstance(item := next(self._events), yaml.SequenceEndEvent):
                 items.append(self._node(item, depth + 1))
-            return Sequence(self._mark(event, 1), tuple(items))
+            return YamlSequence(self._mark(event, 1), tuple(items))
         return self._mapping(event, depth)
 
     def _scalar(self, event: Any) -> Scalar:
@@ -231,7 +231,7 @@ class _Composer:
 def _height(node: Node) -> int:
     if isinstance(node, Scalar):
         return 0
-    inner = node.items if isinstance(node, Sequence) else [entry.value for entry in node.entries]
+    inner = node.items if isinstance(node, YamlSequence) else [entry.value for entry in node.entries]
     return 1 + max(map(_height, inner), default=0)
 
 

@@ -9,7 +9,7 @@ from executive.cell.config import DetectorConfig, Section
 from executive.perception.detectors.onnx_model import OnnxModel, read_labels
 from executive.perception.detectors.options import OptionFaults, find_wrong_options, read_options
 from executive.perception.detectors.rfdetr import RfdetrDetector
-from executive.perception.detectors.setting import Setting
+from executive.perception.detectors.setting import DetectorSetting
 
 WEIGHTS = Path(__file__).parent.parent / "weights"
 MODEL = WEIGHTS / "embedded.onnx"
@@ -20,7 +20,7 @@ class EmbeddedDetector(RfdetrDetector):
     """Finds cubes, spheres and ducks with the shipped weights; see `weights/embedded.card.md`."""
 
     @classmethod
-    def from_config(cls, config: DetectorConfig, setting: Setting) -> EmbeddedDetector:
+    def from_config(cls, config: DetectorConfig, setting: DetectorSetting) -> EmbeddedDetector:
         """Return the detector; its weights are the project's own.
 
         Raises:

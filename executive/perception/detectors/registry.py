@@ -9,15 +9,15 @@ from executive.cell.config import CameraConfig, DetectorConfig
 from executive.cell.protocols import Clock
 from executive.cell.workcell import KeyPath
 from executive.errors import InputError
-from executive.perception.detectors.setting import ClosableDetector, Setting
-from executive.plugins import Entry, registered
+from executive.perception.detectors.setting import ClosableDetector, DetectorSetting
+from executive.plugins import PluginEntry, registered
 
 GROUP = "executive.detectors"
 RATES = frozenset({"misses", "confused", "invented", "jitter"})
 """Keys of the error rates that only a fake detector states."""
 
 
-def installed() -> dict[str, Entry]:
+def installed() -> dict[str, PluginEntry]:
     """Return the kinds of detectors by name."""
     return registered(GROUP, "kind of detector")
 
@@ -52,7 +52,7 @@ def build_detectors(
         if kind not in kinds:
             raise InputError(_not_installed(name, kind, kinds))
         under_way.append(name)
-        setting = Setting(name, camera, clock, base, seed, build)
+        setting = DetectorSetting(name, camera, clock, base, seed, build)
         built[name] = kinds[kind].load().from_config(configs[name], setting)
         under_way.remove(name)
         return built[name]
@@ -99,7 +99,7 @@ def known_labels(configs: Mapping[str, DetectorConfig], base: Path) -> dict[str,
     return {name: find(configs[name], base) if find else None for name, find in labels.items()}
 
 
-def _not_installed(name: str, kind: str, kinds: Mapping[str, Entry]) -> str:
+def _not_installed(name: str, kind: str, kinds: Mapping[str, PluginEntry]) -> str:
     return (
         f'detector "{name}" is of kind "{kind}", which is not installed; '
         f"installed: {', '.join(sorted(kinds)) or 'none'}"

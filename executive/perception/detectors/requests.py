@@ -16,7 +16,7 @@ from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
 from executive.cell.protocols import Clock, Request
 from executive.errors import DeadlinePassed, Unavailable
-from executive.perception.detectors.setting import Setting
+from executive.perception.detectors.setting import DetectorSetting
 from executive.perception.detectors.views import Part, parts_of
 
 MAX_BLOCKING_TIME = 0.05
@@ -120,7 +120,7 @@ class ThreadedDetector:
         deadline: Time after which a passed deadline shows on the run's clock [s].
     """
 
-    def __init__(self, config: DetectorConfig, setting: Setting, deadline: float = -math.inf) -> None:
+    def __init__(self, config: DetectorConfig, setting: DetectorSetting, deadline: float = -math.inf) -> None:
         self._config, self._setting, self._deadline = config, setting, deadline
         self._thread = ThreadPoolExecutor(1, f"detector-{setting.name}")
 

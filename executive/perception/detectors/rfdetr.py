@@ -22,7 +22,7 @@ from executive.perception.detectors.options import (
     read_options,
 )
 from executive.perception.detectors.requests import ThreadedDetector
-from executive.perception.detectors.setting import Setting
+from executive.perception.detectors.setting import DetectorSetting
 from executive.perception.detectors.views import Part, search_parts
 
 
@@ -61,7 +61,7 @@ class RfdetrDetector(ThreadedDetector):
         self,
         model: OnnxModel,
         config: DetectorConfig,
-        setting: Setting,
+        setting: DetectorSetting,
         class_map: Mapping[str, str] | None = None,
     ) -> None:
         super().__init__(config, setting)
@@ -69,7 +69,7 @@ class RfdetrDetector(ThreadedDetector):
         self._class_map = dict(class_map or {})
 
     @classmethod
-    def from_config(cls, config: DetectorConfig, setting: Setting) -> RfdetrDetector:
+    def from_config(cls, config: DetectorConfig, setting: DetectorSetting) -> RfdetrDetector:
         """Return the detector that a cell file describes.
 
         Raises:

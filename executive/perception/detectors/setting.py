@@ -19,7 +19,7 @@ class ClosableDetector(Detector, Protocol):
 
 
 @dataclass(frozen=True)
-class Setting:
+class DetectorSetting:
     """What a detector is built into.
 
     Attributes:

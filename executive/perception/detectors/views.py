@@ -27,7 +27,7 @@ MIN_SAME_IOU, MIN_CONTAINED_SHARE = 0.5, 0.7
 
 
 @dataclass(frozen=True)
-class Finding:
+class ViewDetection:
     """A detection and the part of the frame it was found in.
 
     Attributes:
@@ -82,11 +82,11 @@ def search_parts(
             x0, y0, x1, y1 = found.box
             box = left + x0, top + y0, left + x1, top + y1
             label = class_map.get(found.label, found.label)
-            findings.append(Finding(replace(found, label=label, box=box), part))
+            findings.append(ViewDetection(replace(found, label=label, box=box), part))
     return merge_findings(findings, (image.shape[1], image.shape[0]))
 
 
-def merge_findings(findings: Sequence[Finding], size: tuple[int, int]) -> list[Detection]:
+def merge_findings(findings: Sequence[ViewDetection], size: tuple[int, int]) -> list[Detection]:
     """Return every object once, most confident first.
 
     Where parts overlap, the box that is whole in its part wins over one that the part's border cuts off,
@@ -128,7 +128,7 @@ def _is_same_object(boxes: Sequence[Box]) -> NDArray[np.bool_]:
     return np.asarray((box_iou_batch(corners, corners) > MIN_SAME_IOU) | contained)
 
 
-def _is_cut(finding: Finding, size: tuple[int, int]) -> bool:
+def _is_cut(finding: ViewDetection, size: tuple[int, int]) -> bool:
     """Tell whether a box reaches a border of its part beyond which the frame goes on."""
     left, top, right, bottom = finding.detection.box
     part = finding.part

@@ -8,7 +8,7 @@ from executive.errors import Unavailable
 from executive.mission.model.instance import node_of
 from executive.mission.model.nodes import InnerNode
 from executive.mission.model.values import Literal
-from executive.record.diagnosis.case import Case
+from executive.record.diagnosis.case import FailedRun
 from executive.record.diagnosis.chain import Link
 from executive.record.timeline.activation import Reading
 from executive.record.timeline.items import ItemTimeline
@@ -21,7 +21,7 @@ REMEDIES: Mapping[str, str] = {
 """Advice by the reason of a failure after which no mission can go on: every further look would mislead it."""
 
 
-def advice(case: Case, arm: str, reads: Sequence[Reading]) -> Iterator[str]:
+def advice(case: FailedRun, arm: str, reads: Sequence[Reading]) -> Iterator[str]:
     """Yield advice for a person, the most pressing first.
 
     Args:
@@ -62,7 +62,7 @@ def _whereabouts(item: ItemTimeline) -> str:
     return "around ({:.2f}, {:.2f}) m".format(*item.now.position)
 
 
-def _ways_on(case: Case) -> Iterator[str]:
+def _ways_on(case: FailedRun) -> Iterator[str]:
     """Yield what the mission would have to say for this failure not to end it."""
     if not case.links:
         return
@@ -85,7 +85,7 @@ def _advice_of(link: Link) -> Iterator[Advice]:
         yield from link.model.advise(link.failure)
 
 
-def _located(case: Case, link: Link, advice: Advice) -> str:
+def _located(case: FailedRun, link: Link, advice: Advice) -> str:
     """Return an advice with the place to change: the command line if the value is a param, else the file."""
     at = node_of(advice.child) if advice.child else link.node
     value = link.node.values.get(advice.key) if isinstance(link.node, InnerNode) else None

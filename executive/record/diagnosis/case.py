@@ -18,7 +18,7 @@ MOST = 5
 """Largest number of items that a sentence names."""
 
 
-class Case:
+class FailedRun:
     """A run that did not succeed, in the terms of its mission.
 
     Args:
@@ -65,7 +65,7 @@ class Case:
         return node.mark.place(self.loaded.tree.mark.source)
 
 
-def verdict(case: Case) -> str:
+def verdict(case: FailedRun) -> str:
     """Return the cause of the end of a run in one sentence: skill, item, number of attempts and message."""
     end = case.end
     running = " and ".join(map(case.named, case.running))
@@ -86,7 +86,7 @@ def verdict(case: Case) -> str:
     return f"{case.links[-1].name}{_tried(case)}: {end.message}{during}"
 
 
-def _tried(case: Case) -> str:
+def _tried(case: FailedRun) -> str:
     """Return the attempt that failed, as counted by the innermost node that counts; "" for the first."""
     attempts = next((link.attempt for link in reversed(case.links) if link.attempt), None)
     if attempts is None:

@@ -12,7 +12,7 @@ from executive.events import RunEnded
 from executive.mission.model.nodes import Node, SkillNode
 from executive.mission.model.paths import name_of
 from executive.record.diagnosis.advice import advice
-from executive.record.diagnosis.case import Case, verdict
+from executive.record.diagnosis.case import FailedRun, verdict
 from executive.record.diagnosis.diagnosis import DecidingNode, Diagnosis, ItemFailure, LostItem, PassedNode
 from executive.record.frames import picture_of
 from executive.record.result import ENDED
@@ -57,7 +57,7 @@ def diagnose(
     """
     if end.status in ("SUCCESS", "INCOMPLETE"):
         return None
-    case = Case(loaded, timeline, end)
+    case = FailedRun(loaded, timeline, end)
     arm = _state_of_arm(is_at_rest) if end.status == "FAULT" else "at rest"
     reads = list(_deciding_reads(case, skills))
     journal = RunDirectory(run).journal
@@ -92,7 +92,7 @@ def diagnose(
     )
 
 
-def _deciding_reads(case: Case, skills: Mapping[str, type[Skill]]) -> Iterator[Reading]:
+def _deciding_reads(case: FailedRun, skills: Mapping[str, type[Skill]]) -> Iterator[Reading]:
     """Yield the exceptions of the cell for the deciding skill, else its deciding inputs, the latest first."""
     node, ran = case.node, case.decided
     if ran is None or not isinstance(node, SkillNode):
@@ -103,7 +103,7 @@ def _deciding_reads(case: Case, skills: Mapping[str, type[Skill]]) -> Iterator[R
     yield from reversed(refused or read)
 
 
-def _deciding_node(case: Case) -> DecidingNode | None:
+def _deciding_node(case: FailedRun) -> DecidingNode | None:
     node = case.node
     if node is None:
         return None
@@ -115,7 +115,7 @@ def _place(node: Node) -> str:
     return f"{node.mark.source.path}:{node.mark.line}"
 
 
-def _last_look(case: Case) -> Sighting | Look | None:
+def _last_look(case: FailedRun) -> Sighting | Look | None:
     item = case.timeline.items.by_name.get(case.item)
     if item is None or item.sighting is None:
         return case.timeline.items.look
@@ -129,7 +129,7 @@ def _lost_item(name: str, item: ItemTimeline) -> LostItem:
     return LostItem(name, item.sighting, item.unseen, item.held, item.dropped, failed)
 
 
-def _picture(case: Case, run: Path) -> str:
+def _picture(case: FailedRun, run: Path) -> str:
     """Return the picture of the failure, else of the last decision about the item."""
     reason = case.end.reason.rpartition(".")[2] if case.end.status == "FAILURE" else ""
     item = case.timeline.items.by_name.get(case.item)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.record.pictures.palette import RIM, class_colour
-from executive.record.pictures.scene import Scene
+from executive.record.pictures.scene import PictureScene
 
 THIN, THICK, RIM_WIDTH = 2, 3, 1
 """Lines of a box, of the chosen one, and of the rim on both sides of that [pixel]."""
@@ -17,7 +17,7 @@ TEXT_SCALE, PADDING = 0.36, 2
 """Size of labels in OpenCV's unit, and the free space around their text [pixel]."""
 
 
-def draw_boxes(image: NDArray[np.uint8], scene: Scene, scale: float) -> NDArray[np.uint8]:
+def draw_boxes(image: NDArray[np.uint8], scene: PictureScene, scale: float) -> NDArray[np.uint8]:
     """Return the image, `scale` times as large as the scene's, with every box on it, the chosen one last."""
     import supervision as sv
 
@@ -37,7 +37,7 @@ def draw_boxes(image: NDArray[np.uint8], scene: Scene, scale: float) -> NDArray[
     ).annotate(image, every, captions(scene))
 
 
-def captions(scene: Scene) -> list[str]:
+def captions(scene: PictureScene) -> list[str]:
     """Return the text of each box: the item or class that it is taken for, and the detector's confidence."""
     return [
         f"{scene.item if number == scene.chosen and scene.item else seen.label} {seen.confidence:.2f}"

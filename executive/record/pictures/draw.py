@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from executive.cell.frame import Box
 from executive.record.pictures.boxes import draw_boxes
 from executive.record.pictures.palette import GROUND, bgr, class_colour
-from executive.record.pictures.scene import Scene
+from executive.record.pictures.scene import PictureScene
 from executive.record.pictures.strip import HEIGHT, draw_strip
 
 WIDTH = 640
@@ -21,7 +21,7 @@ SURROUNDINGS = 2.0
 """Side of what the close-up shows, in sides of the chosen box."""
 
 
-def draw(scene: Scene) -> NDArray[np.uint8]:
+def draw(scene: PictureScene) -> NDArray[np.uint8]:
     """Return the picture of a scene, `(rows, WIDTH, 3)` RGB; the scene's own image is left alone."""
     import cv2
 

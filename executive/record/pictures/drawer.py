@@ -8,7 +8,7 @@ from pathlib import Path
 
 from executive.errors import ExecutiveError, explained
 from executive.record.pictures.draw import draw
-from executive.record.pictures.scene import Scene
+from executive.record.pictures.scene import PictureScene
 from executive.record.whole_file import replacing
 
 MAX_WAITING = 64
@@ -31,7 +31,7 @@ class Drawer:
         self.problem = ""
         """Reason for which pictures are missing, or "" if none is."""
 
-    def draw(self, name: str, scene: Scene) -> bool:
+    def draw(self, name: str, scene: PictureScene) -> bool:
         """Have `scene` drawn to the file `name` of the folder; False if too many wait already."""
         if sum(not picture.done() for picture in self._pictures) >= MAX_WAITING:
             return False
@@ -45,7 +45,7 @@ class Drawer:
             self.problem = f"{len(unfinished)} pictures were not drawn within {CLOSE_TIMEOUT:.0f} s"
         self._thread.shutdown(wait=False, cancel_futures=True)
 
-    def _save(self, path: Path, scene: Scene) -> None:
+    def _save(self, path: Path, scene: PictureScene) -> None:
         """Save a picture; keep the first error only, because a traceback would keep its scene."""
         try:
             save(path, scene)
@@ -53,7 +53,7 @@ class Drawer:
             self.problem = self.problem or f"not every picture was drawn: {error}"
 
 
-def save(path: Path, scene: Scene) -> None:
+def save(path: Path, scene: PictureScene) -> None:
     """Draw `scene` and write the file; its ending says the format.
 
     Raises:

@@ -12,7 +12,7 @@ from executive.cell.detection import Detection
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class PictureScene:
     """Camera image with its detections and the state of a run, at one moment.
 
     Attributes:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.record.pictures.palette import FAINT, GROUND, INK, WARNING, bgr
-from executive.record.pictures.scene import Scene
+from executive.record.pictures.scene import PictureScene
 
 HEIGHT = 116
 """Height of the strip [pixel]."""
@@ -43,7 +43,7 @@ class StripText:
     fates: tuple[tuple[str, tuple[str, ...]], ...]
 
 
-def strip_text(scene: Scene) -> StripText:
+def strip_text(scene: PictureScene) -> StripText:
     """Return what the strip of a scene says."""
     choice = f"{scene.item} to {scene.bin}" if scene.bin else scene.item
     title = ": ".join(filter(None, (scene.failure, scene.item))) if scene.failure else choice
@@ -59,7 +59,7 @@ def strip_text(scene: Scene) -> StripText:
     return StripText(title, lines, tuple(filter(None, notes)), fates)
 
 
-def draw_strip(scene: Scene, width: int, left: int = 0) -> NDArray[np.uint8]:
+def draw_strip(scene: PictureScene, width: int, left: int = 0) -> NDArray[np.uint8]:
     """Return the strip of a scene, `(HEIGHT, width, 3)` BGR, its first `left` columns free."""
     strip = np.full((HEIGHT, width, 3), bgr(GROUND), np.uint8)
     said = strip_text(scene)

@@ -12,7 +12,7 @@ from executive.record.timeline.items import ItemsTimeline
 
 
 @dataclass
-class Planning:
+class PlanningTotals:
     """Planned motions, including those planned again and those for which the planner found no solution.
 
     Attributes:
@@ -63,7 +63,7 @@ class Timeline:
     items: ItemsTimeline = field(default_factory=ItemsTimeline)
     targets: dict[str, events.TargetSelected] = field(default_factory=dict)
     selections: list[tuple[float, str]] = field(default_factory=list)
-    planning: Planning = field(default_factory=Planning)
+    planning: PlanningTotals = field(default_factory=PlanningTotals)
     question: events.OperatorAsked | None = None
     requests: list[str | None] = field(default_factory=list)
     faults: list[tuple[float, str]] = field(default_factory=list)

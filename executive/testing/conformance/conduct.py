@@ -9,7 +9,7 @@ from typing import Any, Union, get_args, get_origin
 from executive.mission.model.port_types import called, element_of
 from executive.skill import ANY, EMPTY, HOLDING, ToolState
 from executive.testing.conformance.declarations import HALT
-from executive.testing.conformance.rehearsal import MAX_TIME, Rehearsal, is_same
+from executive.testing.conformance.rehearsal import MAX_TIME, SkillRehearsal, is_same
 from executive.testing.conformance.situations import NotArranged
 from executive.testing.conformance.skill_runs import GotStuck, SkillRuns
 
@@ -150,7 +150,7 @@ def ticks_are_quick(runs: SkillRuns) -> Iterator[str]:
             )
 
 
-def _difference(one: Rehearsal, other: Rehearsal) -> str:
+def _difference(one: SkillRehearsal, other: SkillRehearsal) -> str:
     """Return how two runs differ, or ""."""
     for first, second in zip(one.calls, other.calls, strict=False):
         if (first.tick, first.name) != (second.tick, second.name):
@@ -165,21 +165,21 @@ def _difference(one: Rehearsal, other: Rehearsal) -> str:
 
 
 def _first_wrong(
-    rehearsals: Iterable[Rehearsal], is_wrong: Callable[[Rehearsal], bool]
-) -> Iterable[Rehearsal]:
+    rehearsals: Iterable[SkillRehearsal], is_wrong: Callable[[SkillRehearsal], bool]
+) -> Iterable[SkillRehearsal]:
     """Return the first run of each situation that is wrong: one halt is as good as the next."""
-    found: dict[str, Rehearsal] = {}
+    found: dict[str, SkillRehearsal] = {}
     for rehearsal in filter(is_wrong, rehearsals):
         found.setdefault(rehearsal.where, rehearsal)
     return found.values()
 
 
-def _leaves_arm_moving(rehearsal: Rehearsal) -> bool:
+def _leaves_arm_moving(rehearsal: SkillRehearsal) -> bool:
     has_ended = rehearsal.status in ("SUCCESS", "FAILURE", "HALTED")
     return has_ended and rehearsal.has_moved and not rehearsal.at_rest
 
 
-def _tool_fault(runs: SkillRuns, rehearsal: Rehearsal) -> str:
+def _tool_fault(runs: SkillRuns, rehearsal: SkillRehearsal) -> str:
     """Return what is wrong with the tool at the end of a run, or ""."""
     if rehearsal.status not in ("SUCCESS", "FAILURE", "HALTED"):
         return ""
@@ -199,7 +199,7 @@ def _tool_fault(runs: SkillRuns, rehearsal: Rehearsal) -> str:
     return ""
 
 
-def _wanted_tool(runs: SkillRuns, rehearsal: Rehearsal) -> tuple[ToolState, str]:
+def _wanted_tool(runs: SkillRuns, rehearsal: SkillRehearsal) -> tuple[ToolState, str]:
     """Return what the tool must hold at the end of a run, and why."""
     before = HOLDING if rehearsal.held else EMPTY
     if rehearsal.status == "SUCCESS":

@@ -51,7 +51,7 @@ class Call:
     arguments: tuple[Any, ...]
 
 
-class Rehearsal:
+class SkillRehearsal:
     """One run of a skill, driven as the tree would.
 
     Args:

@@ -9,7 +9,7 @@ import numpy as np
 
 from executive.skill import Skill
 from executive.testing.conformance.faults import NamedFault, faults_of
-from executive.testing.conformance.rehearsal import Rehearsal
+from executive.testing.conformance.rehearsal import SkillRehearsal
 from executive.testing.conformance.situations import Arrange, NotTried, Situation, situations
 
 MAX_HALTS = 40
@@ -39,12 +39,12 @@ class SkillRuns:
         return list(situations(self.skill, self._arrange))
 
     @cached_property
-    def repeated_runs(self) -> list[tuple[Situation, Rehearsal, Rehearsal]]:
+    def repeated_runs(self) -> list[tuple[Situation, SkillRehearsal, SkillRehearsal]]:
         """Two runs to the end in every situation, without a fault."""
         return [(situation, self._run(situation), self._run(situation)) for situation in self.situations]
 
     @cached_property
-    def complete_runs(self) -> list[Rehearsal]:
+    def complete_runs(self) -> list[SkillRehearsal]:
         """Runs to the end: in every situation one without a fault, and one under each fault."""
         plain = [first for _, first, _ in self.repeated_runs]
         return plain + [
@@ -56,7 +56,7 @@ class SkillRuns:
         ]
 
     @cached_property
-    def halted_runs(self) -> list[Rehearsal]:
+    def halted_runs(self) -> list[SkillRehearsal]:
         """Halted runs: in every situation one for each tick that `_halt_ticks` returns."""
         return [
             self._run(situation, halt_at=tick)
@@ -67,7 +67,7 @@ class SkillRuns:
 
     def _run(
         self, situation: Situation, fault: NamedFault | None = None, halt_at: int | None = None
-    ) -> Rehearsal:
+    ) -> SkillRehearsal:
         """Run the skill once.
 
         Raises:
@@ -75,7 +75,7 @@ class SkillRuns:
         """
         if self._stuck:
             raise GotStuck(self._stuck)
-        rehearsal = Rehearsal(self.skill, situation, self._arrange, fault, halt_at)
+        rehearsal = SkillRehearsal(self.skill, situation, self._arrange, fault, halt_at)
         if rehearsal.status == "STUCK":
             halted = ", halted there," if rehearsal.ticks == halt_at else ""
             self._stuck = (
@@ -90,7 +90,7 @@ class SkillRuns:
         return rehearsal
 
 
-def _halt_ticks(rehearsal: Rehearsal) -> list[int]:
+def _halt_ticks(rehearsal: SkillRehearsal) -> list[int]:
     """Return the ticks at which to halt a run: evenly spaced ones, and those of calls and after calls."""
     evenly_spaced = np.linspace(1, rehearsal.ticks, min(rehearsal.ticks, MAX_HALTS), dtype=int).tolist()
     call_ticks = sorted({call.tick + offset for call in rehearsal.calls for offset in (0, 1)})

@@ -11,7 +11,7 @@ from executive.cell.plain import rounded
 from executive.errors import InputError
 from executive.events import FaultInjected
 from executive.testing.faults.hand import Thing
-from executive.testing.faults.scene import Scene
+from executive.testing.faults.scene import FaultScene
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Occasion:
     """
 
     effect: Effect
-    scene: Scene
+    scene: FaultScene
     node: str = ""
     item: str = ""
     until: float = math.inf

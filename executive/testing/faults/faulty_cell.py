@@ -16,7 +16,7 @@ from executive.errors import Fault, InputError
 from executive.events import Emit, NodeEnded, NodeStarted, TimedEvent, ignore
 from executive.testing.faults.effect import Effect, Occasion
 from executive.testing.faults.hand import Hand, hand_of
-from executive.testing.faults.scene import Scene
+from executive.testing.faults.scene import FaultScene
 from executive.testing.faults.script import DuringNode, DuringTime, ScheduledFault
 
 TIME_TOLERANCE = 1e-9
@@ -54,7 +54,7 @@ class FaultyCell(CellWrapper):
         longest: float = math.inf,
     ) -> None:
         super().__init__(inner)
-        self._scene = Scene(inner, hand, emit)
+        self._scene = FaultScene(inner, hand, emit)
         self._longest = longest
         self._by_node = [(one.what, one.when) for one in faults if isinstance(one.when, DuringNode)]
         self._to_come = [(one.what, one.when) for one in faults if isinstance(one.when, DuringTime)]

@@ -10,7 +10,7 @@ import numpy as np
 from executive.errors import InputError
 from executive.testing.faults.effect import Effect, Occasion, checked_share
 from executive.testing.faults.hand import Thing
-from executive.testing.faults.scene import Scene, Which
+from executive.testing.faults.scene import FaultScene, Which
 
 BUMP_DISTANCE = 0.06
 """Distance by which an object is bumped aside [m]."""
@@ -107,7 +107,7 @@ def _bump(now: Occasion, which: Which, share: float, x: Range, y: Range) -> bool
     return by is not None and _move(now, which, share, by)
 
 
-def _find_free_place(scene: Scene, thing: Thing, x: Range, y: Range) -> tuple[float, float] | None:
+def _find_free_place(scene: FaultScene, thing: Thing, x: Range, y: Range) -> tuple[float, float] | None:
     """Return the displacement of an object to a free place beside it [m], or None."""
     radius = scene.cell.classes[thing.label].radius
     others = [

@@ -26,7 +26,7 @@ The object of the node is the one that the ledger takes for its item; without an
 """
 
 
-class Scene:
+class FaultScene:
     """A cell and its world, as they are now.
 
     Args:

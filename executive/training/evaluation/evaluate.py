@@ -19,7 +19,7 @@ from executive.errors import Unavailable
 from executive.perception.envelope.frame_statistics import FrameRange, FrameStatistics, measure_frame
 from executive.training.evaluation.asking import CellDetector
 from executive.training.evaluation.figures import Evaluation, Spread
-from executive.training.evaluation.matching import Match, is_ignored, match
+from executive.training.evaluation.matching import BoxMatch, is_ignored, match
 from executive.training.evaluation.misses import WorstMisses
 from executive.training.evaluation.tally import RepeatedErrors, Tally
 from executive.training.labelled_image import LabelledImage
@@ -101,7 +101,7 @@ def evaluate(
     )
 
 
-def _match(answer: Answer, sample: LabelledImage, min_confidence: float) -> list[Match]:
+def _match(answer: Answer, sample: LabelledImage, min_confidence: float) -> list[BoxMatch]:
     """Return the matches of the detections that count."""
     found = [one for one in answer.found if one.confidence >= min_confidence]
     return match([one for one in found if not is_ignored(one, sample)], sample)

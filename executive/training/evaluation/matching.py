@@ -20,7 +20,7 @@ MIN_OVERLAP = 0.5
 
 
 @dataclass(frozen=True)
-class Match:
+class BoxMatch:
     """Object that a detection shows.
 
     Attributes:
@@ -42,7 +42,7 @@ class Match:
         return np.array(self.detection.centre) - [(left + right) / 2, (top + bottom) / 2]
 
 
-def match(found: Sequence[Detection], sample: LabelledImage) -> list[Match]:
+def match(found: Sequence[Detection], sample: LabelledImage) -> list[BoxMatch]:
     """Return the object of each detection, the most confident detection first.
 
     Greedy: each detection takes the object of its own class that it overlaps most, if none has taken it; the
@@ -62,11 +62,11 @@ def match(found: Sequence[Detection], sample: LabelledImage) -> list[Match]:
     for rank, one in enumerate(ranked):
         number = taken.get(rank)
         is_right = number is not None and sample.labels[number] == one.label
-        matches.append(Match(one, number, is_right, one.box if number is None else sample.boxes[number]))
+        matches.append(BoxMatch(one, number, is_right, one.box if number is None else sample.boxes[number]))
     return matches
 
 
-def is_covered(number: int, matches: Sequence[Match], sample: LabelledImage) -> bool:
+def is_covered(number: int, matches: Sequence[BoxMatch], sample: LabelledImage) -> bool:
     """Return True if a detection of another object overlaps an object: it is looked at again afterwards."""
     others = [one.detection.box for one in matches if one.number not in (None, number)]
     return bool(overlap([sample.boxes[number]], others).max(initial=0.0) >= MIN_COVERING_OVERLAP)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from executive.cell.detection import Detection
 from executive.cell.frame import Box
-from executive.training.evaluation.matching import Match
+from executive.training.evaluation.matching import BoxMatch
 from executive.training.labelled_image import LabelledImage
 
 COLUMNS = 6
@@ -70,14 +70,14 @@ class WorstMisses:
         self._count = count
         self.kept: list[Miss] = []
 
-    def add(self, matches: Sequence[Match], sample: LabelledImage) -> None:
+    def add(self, matches: Sequence[BoxMatch], sample: LabelledImage) -> None:
         """Look for mistakes in the answer to one image."""
         self.kept += misses(matches, sample)
         self.kept.sort(key=lambda miss: -miss.severity)
         del self.kept[self._count :]
 
 
-def misses(matches: Sequence[Match], sample: LabelledImage) -> Iterator[Miss]:
+def misses(matches: Sequence[BoxMatch], sample: LabelledImage) -> Iterator[Miss]:
     """Yield the mistakes in the answer to one image, and every right detection with the offset of its box."""
     found = tuple(one.detection for one in matches)
     taken = {one.number for one in matches}

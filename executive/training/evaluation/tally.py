@@ -16,7 +16,7 @@ from executive.geometry import Array
 from executive.perception.camera_model import intersect_plane
 from executive.training.evaluation.error_rates import CountedRate, MeasuredErrorRates
 from executive.training.evaluation.figures import NOTHING, ClassFigures
-from executive.training.evaluation.matching import MIN_OVERLAP, Match, is_covered, overlap
+from executive.training.evaluation.matching import MIN_OVERLAP, BoxMatch, is_covered, overlap
 from executive.training.labelled_image import LabelledImage
 
 
@@ -43,7 +43,7 @@ class Tally:
         self.confusion: Counter[tuple[str, str]] = Counter()
         self.centre, self.position, self.localized = list[float](), list[float](), list[float]()
 
-    def add(self, matches: Sequence[Match], sample: LabelledImage, frame: Frame) -> None:
+    def add(self, matches: Sequence[BoxMatch], sample: LabelledImage, frame: Frame) -> None:
         """Count the answer to one image, with the detections that count."""
         self._looks += 1
         counts = self.by_count[len(sample.labels)]
@@ -113,7 +113,7 @@ class Tally:
     def _right(self) -> int:
         return sum(count for (true, found), count in self.confusion.items() if true == found)
 
-    def _measure(self, one: Match, number: int, sample: LabelledImage, frame: Frame) -> None:
+    def _measure(self, one: BoxMatch, number: int, sample: LabelledImage, frame: Frame) -> None:
         """Measure the distance of a right detection from the object `number`."""
         self.centre.append(float(np.hypot(*one.offset)))
         if sample.is_in_full_view(number):
@@ -153,7 +153,7 @@ class RepeatedErrors:
         self._systematic: list[float] = []
 
     def add(
-        self, first: Sequence[Match], second: Sequence[Match], sample: LabelledImage, frame: Frame
+        self, first: Sequence[BoxMatch], second: Sequence[BoxMatch], sample: LabelledImage, frame: Frame
     ) -> None:
         """Count the errors in the answers to two images of one scene, and those that are repeated."""
         before = {one.number: one for one in first if one.number is not None}
@@ -191,7 +191,7 @@ class RepeatedErrors:
         variance = float(np.mean(self._systematic)) if self._systematic else 0.0
         return math.sqrt(max(variance, 0.0))
 
-    def _compare(self, one: Match, other: Match, sample: LabelledImage, frame: Frame) -> None:
+    def _compare(self, one: BoxMatch, other: BoxMatch, sample: LabelledImage, frame: Frame) -> None:
         """Compare the boxes and positions of one object in both looks."""
         assert one.number is not None
         difference = (one.offset - other.offset) * sample.pixel_size

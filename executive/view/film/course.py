@@ -15,7 +15,7 @@ TROUBLE_TIME = 1.6
 """Time for which a failure is shown [s]."""
 
 
-class Course:
+class FilmCourse:
     """Follows the events of a run up to a control step.
 
     Args:

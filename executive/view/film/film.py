@@ -11,10 +11,10 @@ from PIL import Image
 
 from executive.cells.sim.shots import Shoot, count_steps, take_pictures
 from executive.cells.sim.viewpoint import overview
-from executive.view.film.course import Course
+from executive.view.film.course import FilmCourse
 from executive.view.film.formats import Format
 from executive.view.film.page import STAGE, draw_ending, draw_page
-from executive.view.film.source import Source
+from executive.view.film.source import FilmSource
 
 SHOWN = (24, 76, 776, 644)
 """Part of the picture that arm, workspace and bins fill; texts stand around it [pixel]."""
@@ -26,7 +26,7 @@ Progress = Callable[[int, int], None]
 
 
 def film(
-    source: Source, file: Path, format: Format, *, speed: float, workers: int, progress: Progress
+    source: FilmSource, file: Path, format: Format, *, speed: float, workers: int, progress: Progress
 ) -> int:
     """Film a run, and return the number of frames.
 
@@ -58,13 +58,13 @@ def shown_steps(steps: int, each: float) -> list[int]:
 
 
 def _pages(
-    source: Source, steps: Sequence[int], held: int, speed: float, workers: int
+    source: FilmSource, steps: Sequence[int], held: int, speed: float, workers: int
 ) -> Generator[Image.Image, None, None]:
     """Yield the frames of a film: a page for each of these control steps, and the last one for a while."""
     start, directory = source.start, source.directory
     note = f"seed {start.seed} · cell {source.config.cell}" + (f" · {speed:g}x speed" if speed != 1 else "")
     length = steps[-1] * start.step
-    course = Course(source.events, source.nodes, list(directory.frames.glob("*.jpg")))
+    course = FilmCourse(source.events, source.nodes, list(directory.frames.glob("*.jpg")))
     view = overview(source.config, STAGE, SHOWN)
     shoot = Shoot(source.config, start.seed, directory.world, view, directory.scene)
     with closing(take_pictures(shoot, steps, workers)) as pictures:

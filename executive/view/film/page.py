@@ -14,9 +14,9 @@ from executive.events import RunEnded
 from executive.record.pictures.strip import HEIGHT as STRIP
 from executive.record.result import Result
 from executive.view.film import panel
-from executive.view.film.course import Course
+from executive.view.film.course import FilmCourse
 from executive.view.film.ink import BACK, DIM, FAILURE, INK, RULE, RUNNING, SUCCESS, clipped, font, wrapped
-from executive.view.film.source import Source
+from executive.view.film.source import FilmSource
 
 WIDTH, HEIGHT = 1280, 720
 """Size of a frame [pixel]."""
@@ -35,7 +35,12 @@ _COLOURS = {"SUCCESS": SUCCESS, "INCOMPLETE": FAILURE, "FAILURE": FAILURE, "FAUL
 
 
 def draw_page(
-    source: Source, picture: NDArray[np.uint8], course: Course, note: str, length: float, caption: bool = True
+    source: FilmSource,
+    picture: NDArray[np.uint8],
+    course: FilmCourse,
+    note: str,
+    length: float,
+    caption: bool = True,
 ) -> Image.Image:
     """Return the page that shows a run as `course` has it.
 

@@ -10,7 +10,7 @@ from executive.cell.frame import Box
 from executive.events import ItemChanged
 from executive.mission.outline import OutlineNode
 from executive.view.film import ink
-from executive.view.film.course import Course
+from executive.view.film.course import FilmCourse
 from executive.view.film.ink import DIM, FAILURE, FAINT, INK, RULE, RUNNING, STATUS, SUCCESS
 from executive.view.tree.outline import branches, opened
 
@@ -29,7 +29,7 @@ _SETTLED = ("placed", "rejected", "skipped", "lost", "phantom")
 _SWATCH = 9
 
 
-def draw_branch(image: Image.Image, box: Box, nodes: Sequence[OutlineNode], course: Course) -> None:
+def draw_branch(image: Image.Image, box: Box, nodes: Sequence[OutlineNode], course: FilmCourse) -> None:
     """Draw the open nodes of a course and what stands directly below them.
 
     Args:
@@ -59,7 +59,7 @@ def draw_branch(image: Image.Image, box: Box, nodes: Sequence[OutlineNode], cour
         draw.text((x, middle), why, FAILURE if now == "FAILURE" else DIM, ink.font(TYPE), "lm")
 
 
-def fitted(nodes: Sequence[OutlineNode], course: Course, rows: int) -> list[OutlineNode]:
+def fitted(nodes: Sequence[OutlineNode], course: FilmCourse, rows: int) -> list[OutlineNode]:
     """Return the open nodes and what stands directly below them, in at most so many rows.
 
     What is left out first never ran, then what rests; from the end of the tree.

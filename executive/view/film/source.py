@@ -12,7 +12,7 @@ from executive.record.run_directory import RunDirectory
 from executive.replay.input_log import InputLog
 
 
-class Source:
+class FilmSource:
     """Record of a run.
 
     Args:

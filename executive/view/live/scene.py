@@ -19,7 +19,7 @@ CAMERA, LOOK_AT = (1.35, -0.68, 0.95), (0.33, 0.0, 0.2)
 BACKGROUND = (243, 245, 248)
 
 
-class Scene:
+class LiveScene:
     """A viser server that shows shapes.
 
     Args:

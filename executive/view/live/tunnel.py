@@ -13,7 +13,7 @@ from aiohttp import WSMsgType, web
 from executive.cell.visuals import Shape
 
 if TYPE_CHECKING:
-    from executive.view.live.scene import Scene
+    from executive.view.live.scene import LiveScene
 
 POLICY = (
     "default-src 'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' data: blob:; "
@@ -37,7 +37,7 @@ class Tunnel:
         self._path = path
         self._shapes: asyncio.Future[Sequence[Shape]] = asyncio.get_running_loop().create_future()
         self._bodies: Mapping[str, Sequence[float]] = {}
-        self._scene: Scene | None = None
+        self._scene: LiveScene | None = None
         self._building = asyncio.Lock()
 
     def show(self, shapes: Sequence[Shape]) -> None:
@@ -89,10 +89,10 @@ class Tunnel:
         return aiohttp.ClientSession(connector=aiohttp.UnixConnector(path=str(self._path)))
 
 
-def _built(path: Path, shapes: Sequence[Shape]) -> Scene:
-    from executive.view.live.scene import Scene
+def _built(path: Path, shapes: Sequence[Shape]) -> LiveScene:
+    from executive.view.live.scene import LiveScene
 
-    return Scene(path, shapes)
+    return LiveScene(path, shapes)
 
 
 async def _carry(source: Side, target: Side) -> None:

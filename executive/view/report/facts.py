@@ -20,7 +20,7 @@ CUT_OFF = "CUT OFF"
 """Status of a run whose record has no end: it was killed, or goes on."""
 
 
-class Facts:
+class ReportFacts:
     """Facts about a run.
 
     Args:

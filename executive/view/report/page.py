@@ -18,7 +18,7 @@ from executive.record.result import disagreement
 from executive.record.run_directory import RunDirectory, refusing
 from executive.record.timeline.activation import by_node, count_ends, last_failure
 from executive.record.whole_file import write_whole
-from executive.view.report.facts import Facts
+from executive.view.report.facts import ReportFacts
 from executive.view.report.lanes import draw_lanes
 from executive.view.report.shares import LOOK, RETRY, WAITING
 from executive.view.terminal.summary import place_on_table
@@ -52,14 +52,14 @@ def write_report(path: Path) -> Path:
         InputError: The directory lacks journal or tree, or cannot be written to.
     """
     file = RunDirectory(path).report
-    page = report(Facts(path))
+    page = report(ReportFacts(path))
     instead = "copy the run directory to where you may write, and have the report of the copy made"
     with refusing(f'write the report "{file}"', instead):
         write_whole(file, page)
     return file
 
 
-def report(facts: Facts) -> str:
+def report(facts: ReportFacts) -> str:
     """Return the report as HTML. Whatever a mission or a skill says in it is text, and never markup."""
     result, timeline = facts.result, facts.timeline
     story = None if result is None else result.story
@@ -89,19 +89,19 @@ def report(facts: Facts) -> str:
     )
 
 
-def _reason(facts: Facts) -> str:
+def _reason(facts: ReportFacts) -> str:
     """Return the reason of the end, if the status does not say it already."""
     reason = "" if facts.ended is None else facts.ended.reason
     return "" if reason.upper() == facts.status else reason
 
 
-def _verdict(facts: Facts) -> str:
+def _verdict(facts: ReportFacts) -> str:
     """Return the end of the run in one sentence."""
     warning = "" if facts.result is None else disagreement(facts.result)
     return ". ".join(filter(None, (warning, _ending(facts))))
 
 
-def _ending(facts: Facts) -> str:
+def _ending(facts: ReportFacts) -> str:
     result, ended = facts.result, facts.ended
     if ended is None:
         return "The record has no end: the run was killed, or goes on."
@@ -125,7 +125,7 @@ def _colours(activities: Sequence[str]) -> dict[str, str]:
     return {activity: COLOURS.get(activity) or next(free) for activity in activities}
 
 
-def _notes(facts: Facts) -> dict[str, Note]:
+def _notes(facts: ReportFacts) -> dict[str, Note]:
     """Return the note of each node in the picture of the tree."""
     return {
         path: Note(ran[-1].status, tuple(filter(None, (count_ends(ran), last_failure(ran)))))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from events import at, frame_searched, item_changed
 
-from executive.campaign.faults.fault import Fault, SkillFault
+from executive.campaign.faults.fault import PlannedFault, SkillFault
 from executive.campaign.faults.judgement import (
     Hidden,
     check_books,
@@ -24,10 +24,10 @@ from executive.events import FaultInjected, RunEnded
 from executive.mission.flow.endings import Ending
 from executive.testing.faults.hand import Thing
 
-BUG = Fault(
+BUG = PlannedFault(
     "tree/Grasp", "Grasp", "", "raises", "first", "", skill_faults=(SkillFault("tree/Grasp", "raises"),)
 )
-MISS = Fault("tree/Grasp", "Grasp", "", "missed", "first", "", reason=True)
+MISS = PlannedFault("tree/Grasp", "Grasp", "", "missed", "first", "", reason=True)
 ENDINGS = (Ending("Grasp", "missed", "tree/Grasp", "a.yaml", 3),)
 ITEMS = {"seen": 3, "placed": 2, "rejected": 1, "skipped": 0, "lost": 0, "phantom": 0}
 AUDIT = {"right": 2, "wrong_bin": 0, "left": 1, "elsewhere": 0, "unseen": 0}
@@ -44,7 +44,7 @@ def books(*args: Any) -> list[str]:
     return list(check_books(*args))
 
 
-def end(out: RunEnded, fault: Fault, *, raised: bool = False) -> list[str]:
+def end(out: RunEnded, fault: PlannedFault, *, raised: bool = False) -> list[str]:
     return list(check_end(out, [fault], ENDINGS, raised))
 
 
@@ -134,7 +134,7 @@ def test_a_failure_for_another_reason_is_remarked() -> None:
     assert remark(outcome("FAILURE", "lost"), [MISS]) == remark(outcome("SUCCESS"), [MISS]) == ""
     said = remark(outcome("FAILURE", "Transit.dropped"), [MISS])
     assert said == "it says Transit.dropped, and missed was brought about"
-    dead = Fault("detector", "detector", "", "dead for ever", "first", "", leads_to="unavailable")
+    dead = PlannedFault("detector", "detector", "", "dead for ever", "first", "", leads_to="unavailable")
     assert remark(outcome("FAILURE", "Detect.unavailable"), [MISS, dead]) == ""
     assert remark(outcome("FAILURE", "SelectTarget.unseen"), [dead]) == (
         "it says SelectTarget.unseen, and unavailable was brought about"

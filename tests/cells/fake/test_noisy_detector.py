@@ -11,7 +11,7 @@ import pytest
 from executive.cell.config import DetectorConfig
 from executive.cell.detection import Answer, Detection
 from executive.cells.fake.noisy_detector import NoisyDetector
-from executive.perception.detectors.setting import Setting
+from executive.perception.detectors.setting import DetectorSetting
 
 CLASSES = ("cube", "sphere", "duck")
 LOOKS = 1000
@@ -29,7 +29,9 @@ KNOWN = SimpleNamespace(
 def answers(seed=1, view="table", **errors):
     none = {"misses": 1e-9, "confused": 1e-9, "invented": 1e-9, "jitter": 1e-9}
     config = DetectorConfig(kind="noisy", of="known", classes=list(CLASSES), **{**none, **errors})
-    setting = Setting("noisy", SimpleNamespace(table_view=TABLE), None, Path(), seed, lambda name: KNOWN)
+    setting = DetectorSetting(
+        "noisy", SimpleNamespace(table_view=TABLE), None, Path(), seed, lambda name: KNOWN
+    )
     detector = NoisyDetector.from_config(config, setting)
     frames = [SimpleNamespace(id=number, image=np.zeros((480, 640, 3))) for number in range(LOOKS)]
     return [detector.request(frame, view).result() for frame in frames]

@@ -17,7 +17,7 @@ from stub_server import BODIES, MODEL, SPOILT, WORKFLOW, StubServer
 from executive.cell.config import DetectorConfig
 from executive.errors import DeadlinePassed, Unavailable
 from executive.perception.detectors.roboflow.detector import RoboflowDetector
-from executive.perception.detectors.setting import Setting
+from executive.perception.detectors.setting import DetectorSetting
 
 SECRET = "SECRET1234567890"
 DEADLINE = 2.0
@@ -49,7 +49,7 @@ def spot(left=300, top=200, channel=0):
 
 def build(name, **options):
     config = DetectorConfig(kind="roboflow", **{"model_id": MODEL, "deadline": DEADLINE, **options})
-    setting = Setting(name, CAMERA, SimpleNamespace(now=0.0), None, 0, None)
+    setting = DetectorSetting(name, CAMERA, SimpleNamespace(now=0.0), None, 0, None)
     return RoboflowDetector.from_config(config, setting)
 
 

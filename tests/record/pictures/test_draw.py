@@ -11,7 +11,7 @@ from executive.cell.detection import Detection
 from executive.record.pictures.boxes import captions
 from executive.record.pictures.draw import WIDTH, draw
 from executive.record.pictures.palette import GROUND, PALETTE, bgr, class_colour
-from executive.record.pictures.scene import Scene
+from executive.record.pictures.scene import PictureScene
 from executive.record.pictures.strip import HEIGHT
 
 GREY = 150
@@ -20,9 +20,9 @@ DUCK = Detection("duck", 0.7, (300.0, 100.0, 340.0, 140.0))
 CLASSES = ("cube", "duck")
 
 
-def scene(*seen: Detection, height: int = 480, width: int = 640, **more) -> Scene:
+def scene(*seen: Detection, height: int = 480, width: int = 640, **more) -> PictureScene:
     image = np.full((height, width, 3), GREY, np.uint8)
-    return Scene(image, seen=seen, classes=CLASSES, **more)
+    return PictureScene(image, seen=seen, classes=CLASSES, **more)
 
 
 def rgb(colour: str) -> tuple[int, ...]:

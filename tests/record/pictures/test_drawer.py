@@ -10,9 +10,9 @@ import numpy as np
 from executive.cell.detection import Detection
 from executive.record.pictures import drawer as module
 from executive.record.pictures.drawer import MAX_WAITING, Drawer
-from executive.record.pictures.scene import Scene
+from executive.record.pictures.scene import PictureScene
 
-SCENE = Scene(
+SCENE = PictureScene(
     np.full((480, 640, 3), 150, np.uint8),
     seen=[Detection("cube", 0.9, (100, 200, 160, 260))],
     chosen=0,
@@ -21,7 +21,7 @@ SCENE = Scene(
 
 
 def test_a_scene_becomes_a_small_file(tmp_path):
-    noisy = Scene(np.random.default_rng(0).integers(120, 140, (480, 640, 3)).astype(np.uint8))
+    noisy = PictureScene(np.random.default_rng(0).integers(120, 140, (480, 640, 3)).astype(np.uint8))
     drawer = Drawer(tmp_path / "frames")
     assert not (tmp_path / "frames").exists()
     assert drawer.draw("a.jpg", SCENE)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from executive.record.pictures.scene import Scene
+from executive.record.pictures.scene import PictureScene
 from executive.record.pictures.strip import HEIGHT, ROWS, draw_strip, fitted, listed, strip_text, wrapped
 
 IMAGE = np.zeros((48, 64, 3), np.uint8)
@@ -28,7 +28,7 @@ def at_most(count: int):
 )  # fmt: skip
 def test_a_decision_is_told_with_its_bin_and_a_failure_with_its_reason(scene, title, lines):
     fates = {"red_bin": ["cube-1", "cube-2"], "rejected": ["duck-1"]}
-    said = strip_text(Scene(IMAGE, fates=fates, **scene))
+    said = strip_text(PictureScene(IMAGE, fates=fates, **scene))
     assert (said.title, said.lines) == (title, lines)
     assert said.fates == (("red_bin", ("cube-1", "cube-2")), ("rejected", ("duck-1",)))
 
@@ -36,9 +36,9 @@ def test_a_decision_is_told_with_its_bin_and_a_failure_with_its_reason(scene, ti
 def test_the_strip_says_where_and_when():
     hidden = np.zeros((48, 64), bool)
     look = {"camera": "overhead", "detector": "embedded", "age": 0.05}
-    said = strip_text(Scene(IMAGE, hidden, mission="sort", clock=3.4, **look))
+    said = strip_text(PictureScene(IMAGE, hidden, mission="sort", clock=3.4, **look))
     assert said.notes == ("sort   3.40 s   shaded: behind the arm", "overhead by embedded, 0.05 s old")
-    assert strip_text(Scene(IMAGE, ~hidden, camera="wrist")).notes == ("0.00 s", "wrist, 0.00 s old")
+    assert strip_text(PictureScene(IMAGE, ~hidden, camera="wrist")).notes == ("0.00 s", "wrist, 0.00 s old")
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,7 @@ def test_a_text_is_wrapped_between_words_and_cut_where_it_must():
 def test_whatever_is_said_there_is_room_for_it(width):
     many = {f"bin_{number}_with_a_long_name": [f"cube-{number}"] * 40 for number in range(ROWS + 3)}
     long = {"item": "cube-1" * 20, "bin": "red", "message": "word " * 100, "camera": "c" * 90}
-    strip = draw_strip(Scene(IMAGE, fates=many, **long), width)
+    strip = draw_strip(PictureScene(IMAGE, fates=many, **long), width)
     assert strip.shape == (HEIGHT, width, 3)
     edges = (strip[:3], strip[-3:], strip[:, -3:])
     assert all(len(np.unique(edge.reshape(-1, 3), axis=0)) == 1 for edge in edges)  # Nothing is cut off.

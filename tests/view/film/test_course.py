@@ -9,7 +9,7 @@ from events import at, item_changed
 from small_tree import NODES, ended, started
 
 from executive.events import Event, FaultRaised, RunHalted, RunResumed, TargetSelected
-from executive.view.film.course import TROUBLE_TIME, Course
+from executive.view.film.course import TROUBLE_TIME, FilmCourse
 
 EVENTS = [
     started(0, "tree"),
@@ -26,18 +26,20 @@ EVENTS = [
 ]
 
 
-def statuses(course: Course) -> dict[str, str]:
+def statuses(course: FilmCourse) -> dict[str, str]:
     """Return the status of each node that ran in the present round."""
     current = ((node.path, course.timeline.current(node.path)) for node in NODES)
     return {path: last.status for path, last in current if last is not None}
 
 
 @pytest.fixture
-def course() -> Course:
-    return Course(EVENTS, NODES, [Path("frames/000250_cube-1_missed.jpg"), Path("frames/000003_cube-1.jpg")])
+def course() -> FilmCourse:
+    return FilmCourse(
+        EVENTS, NODES, [Path("frames/000250_cube-1_missed.jpg"), Path("frames/000003_cube-1.jpg")]
+    )
 
 
-def test_what_happens_in_a_step_is_seen_in_it_and_not_before(course: Course) -> None:
+def test_what_happens_in_a_step_is_seen_in_it_and_not_before(course: FilmCourse) -> None:
     course.go_to(2, 2 / 240)
     assert (statuses(course), course.doing) == ({"tree": "RUNNING"}, "")
     assert list(course.timeline.items.by_name) == ["cube-1"]
@@ -59,12 +61,12 @@ def test_what_happens_in_a_step_is_seen_in_it_and_not_before(course: Course) -> 
     ids=["a node that begins again knows nothing of the round before", "a failure under a success is folded"],
 )  # fmt: skip
 def test_a_round_is_over_where_its_root_begins_again_or_succeeds(events, opened, known) -> None:
-    course = Course(events, NODES, [])
+    course = FilmCourse(events, NODES, [])
     course.go_to(960, 4.0)
     assert (course.open, statuses(course)) == (opened, known)
 
 
-def test_a_failure_with_an_item_is_told_for_a_while(course: Course) -> None:
+def test_a_failure_with_an_item_is_told_for_a_while(course: FilmCourse) -> None:
     course.go_to(240, 1.0)
     assert course.trouble == "Grasp.missed: no seal"
     course.go_to(300, 1.25)
@@ -74,7 +76,7 @@ def test_a_failure_with_an_item_is_told_for_a_while(course: Course) -> None:
     assert course.trouble == ""
 
 
-def test_of_a_tree_that_ended_what_ended_last_stays_open(course: Course) -> None:
+def test_of_a_tree_that_ended_what_ended_last_stays_open(course: FilmCourse) -> None:
     course.go_to(900, 3.75)
     assert course.doing == "Transit cube-1 to red_bin"
     assert course.open == {"tree", "tree/Transit"}
@@ -91,6 +93,6 @@ def test_of_a_tree_that_ended_what_ended_last_stays_open(course: Course) -> None
     [(FaultRaised("Traceback"), "fault"), (RunHalted(True), "halt"), (RunResumed(0, "", {}), "resumed")],
 )
 def test_what_befalls_a_whole_run_is_told(event: Event, told: str) -> None:
-    course = Course([at(1, event, 0.0)], NODES, [])
+    course = FilmCourse([at(1, event, 0.0)], NODES, [])
     course.go_to(1, 0.0)
     assert course.trouble == told

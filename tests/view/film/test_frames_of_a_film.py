@@ -12,15 +12,15 @@ from PIL import Image, ImageColor
 from small_tree import NODES, ended, node, started
 
 from executive.record.result import ItemCounts, Result
-from executive.view.film.course import Course
+from executive.view.film.course import FilmCourse
 from executive.view.film.film import shown_steps
 from executive.view.film.ink import BACK, FAILURE, FAINT, RUNNING, SUCCESS, clipped, font, put_mark, wrapped
 from executive.view.film.page import draw_ending, draw_page, ending_of
 from executive.view.film.panel import MOST, draw_branch, draw_items, fitted, height, kept
 
 
-def course_of(*entries) -> Course:
-    course = Course(entries, NODES, [])
+def course_of(*entries) -> FilmCourse:
+    course = FilmCourse(entries, NODES, [])
     course.go_to(1000, 0.0)
     return course
 
@@ -132,7 +132,7 @@ def test_steps_are_shown_at_even_times_up_to_the_last(steps, each, shown) -> Non
 def test_a_page_shows_picture_camera_caption_and_how_far_the_run_is(tmp_path) -> None:
     Image.new("RGB", (640, 556), "white").save(tmp_path / "000000_cube-1.jpg")
     entries = [started(0, "tree"), started(1, "tree/Grasp", "cube-1")]
-    course = Course(entries, NODES, [tmp_path / "000000_cube-1.jpg"])
+    course = FilmCourse(entries, NODES, [tmp_path / "000000_cube-1.jpg"])
     course.go_to(240, 1.0)
     source = SimpleNamespace(start=run_started(mission="sort"), items=0, bins={}, nodes=NODES)
     picture = np.full((720, 800, 3), 128, np.uint8)

@@ -18,10 +18,10 @@ from executive.cells.sim.tool import SuctionTool
 from executive.errors import InputError
 from executive.events import NodeEnded, ToolCommanded
 from executive.record.run_directory import RunDirectory
-from executive.view.film.course import Course
+from executive.view.film.course import FilmCourse
 from executive.view.film.film import film
 from executive.view.film.formats import MP4
-from executive.view.film.source import Source
+from executive.view.film.source import FilmSource
 
 pytestmark = pytest.mark.slow
 MP4_HELD = 50
@@ -36,7 +36,7 @@ def copy(filmed_run: RunDirectory, tmp_path: Path) -> RunDirectory:
 
 def test_a_run_becomes_a_film(filmed_run: RunDirectory, tmp_path: Path) -> None:
     told: list[tuple[int, int]] = []
-    source = Source(filmed_run)
+    source = FilmSource(filmed_run)
     frames = film(
         source, tmp_path / "film", MP4, speed=12.0, workers=1, progress=lambda *done: told.append(done)
     )
@@ -56,7 +56,7 @@ def test_a_run_becomes_a_film(filmed_run: RunDirectory, tmp_path: Path) -> None:
 
 
 def test_picture_and_tree_are_in_step(filmed_run: RunDirectory) -> None:
-    source = Source(filmed_run)
+    source = FilmSource(filmed_run)
     events = source.events
     (grasped,) = (
         one.tick for one in events if isinstance(one.event, NodeEnded) and one.event.skill == "Grasp"
@@ -70,7 +70,7 @@ def test_picture_and_tree_are_in_step(filmed_run: RunDirectory) -> None:
         if command.kind == STEP:
             holds.append(tool.holding)
     world.close()
-    course = Course(events, source.nodes, [])
+    course = FilmCourse(events, source.nodes, [])
     course.go_to(grasped, 0.0)
     grasp = course.timeline.nodes["tree/Grasp"]
     assert grasp.status == "SUCCESS"
@@ -82,14 +82,14 @@ def test_picture_and_tree_are_in_step(filmed_run: RunDirectory) -> None:
 
 
 def test_the_source_is_the_record_and_may_be_cut_off(copy: RunDirectory) -> None:
-    source = Source(copy)
+    source = FilmSource(copy)
     assert (source.start.mission, source.start.seed) == ("bring_one", 5)
     assert (source.config.cell, source.nodes[0].path) == ("overhead", "tree")
     assert (source.result.status, source.items) == ("SUCCESS", 6)
     lines = copy.journal.read_text().splitlines(keepends=True)
     copy.journal.write_text("".join(lines[:-1]))
     copy.result.write_text("{")
-    assert Source(copy).result is None
+    assert FilmSource(copy).result is None
 
 
 @pytest.mark.parametrize(
@@ -109,4 +109,4 @@ def test_a_record_that_lacks_a_part_is_refused(copy, file: str, content: str | N
     if content is not None:
         (copy.path / file).write_text(content)
     with pytest.raises(InputError, match=re.escape(sentence)):
-        Source(copy)
+        FilmSource(copy)

@@ -182,7 +182,7 @@ class Built:
 @pytest.mark.parametrize("looked_at", [True, False])
 def test_the_scene_is_built_once_when_somebody_looks_and_there_is_one(monkeypatch, looked_at) -> None:
     monkeypatch.setattr(Built, "made", [])
-    monkeypatch.setattr(scene, "Scene", Built)
+    monkeypatch.setattr(scene, "LiveScene", Built)
 
     async def work() -> None:
         tunnel = Tunnel(Path("socket"))

@@ -19,7 +19,7 @@ from executive.record.journal_format import encode
 from executive.record.recorded_run import RecordOptions
 from executive.record.resumed_run import resume_run
 from executive.run.assembly import RunOptions
-from executive.view.report.facts import CUT_OFF, Facts
+from executive.view.report.facts import CUT_OFF, ReportFacts
 
 
 def append(run: Path, tick: int, event: Event) -> None:
@@ -33,7 +33,7 @@ def without_end(run: Path) -> None:
 
 
 def test_a_run_that_ended_is_told_by_its_result(failed):
-    facts = Facts(failed)
+    facts = ReportFacts(failed)
     assert plain(facts.result) == json.loads((failed / "result.json").read_text())
     assert (facts.status, facts.timeline.clock) == ("FAILURE", facts.result.robot_time_s)
     assert facts.resume == ""
@@ -44,9 +44,9 @@ def test_a_run_that_ended_is_told_by_its_result(failed):
 @pytest.mark.slow
 def test_a_run_that_was_cut_off_and_taken_up_again_is_told_as_one(killed, copy):
     run = copy(killed)
-    assert Facts(run).status == CUT_OFF
+    assert ReportFacts(run).status == CUT_OFF
     resume_run(run, discover(), RunOptions(3, kind=FakeCell), RecordOptions(frames=False))
-    facts = Facts(run)
+    facts = ReportFacts(run)
     assert (facts.status, facts.resume) == ("SUCCESS", "")
     transits = [one for one in facts.timeline.activations if one.node.endswith("/Transit")]
     assert [one.status for one in transits] == ["INVALID", "SUCCESS"]
@@ -57,10 +57,10 @@ def test_a_run_that_was_cut_off_and_taken_up_again_is_told_as_one(killed, copy):
 def test_a_result_from_before_the_run_was_taken_up_again_is_not_its_end(failed, copy):
     run = copy(failed)
     append(run, 312, RunResumed(310, "", {}))
-    facts = Facts(run)
+    facts = ReportFacts(run)
     assert (facts.status, facts.ended, facts.timeline.clock) == (CUT_OFF, None, 1.3)
     append(run, 400, run_ended("HALTED", reason="halted", message="halted by the user", ticks=400))
-    facts = Facts(run)
+    facts = ReportFacts(run)
     assert (facts.status, facts.ended.message) == ("HALTED", "halted by the user")
     assert facts.resume == shlex.join(["executive", "run", "--resume", str(run)])
 
@@ -70,7 +70,7 @@ def test_a_run_whose_end_the_disk_did_not_take_is_told_by_its_result(failed, cop
     without_end(run)
     result = json.loads((run / "result.json").read_text()) | {"status": "FAULT"}
     (run / "result.json").write_text(json.dumps(result))
-    facts = Facts(run)
+    facts = ReportFacts(run)
     assert (facts.status, plain(facts.result)) == ("FAULT", result)
 
 
@@ -78,10 +78,10 @@ def test_a_run_whose_end_the_disk_did_not_take_is_told_by_its_result(failed, cop
 def test_a_result_that_is_none_tells_nothing(failed, copy, content):
     run = copy(failed)
     (run / "result.json").write_bytes(content.encode(errors="surrogatepass"))
-    facts = Facts(run)
+    facts = ReportFacts(run)
     assert (facts.status, facts.ended) == ("FAILURE", facts.timeline.ended)
     without_end(run)
-    assert (Facts(run).status, Facts(run).ended) == (CUT_OFF, None)
+    assert (ReportFacts(run).status, ReportFacts(run).ended) == (CUT_OFF, None)
 
 
 def test_a_shipped_mission_is_repeated_by_its_name_and_with_what_was_asked_for(done, copy):
@@ -91,7 +91,7 @@ def test_a_shipped_mission_is_repeated_by_its_name_and_with_what_was_asked_for(d
     (run / "journal.jsonl").write_text("\n".join([json.dumps(shipped), *others]) + "\n")
     append(run, 420, RequestGiven("apple"))
     append(run, 432, FaultInjected("object removed", "", "", "", []))
-    facts = Facts(run)
+    facts = ReportFacts(run)
     assert facts.repeat == "executive run sort_fruit --seed 3 --request apple"
     assert facts.replay == shlex.join(["executive", "replay", str(run)])
     assert (facts.requests, facts.timeline.faults) == (["apple"], [(1.8, "object removed")])
@@ -101,7 +101,7 @@ def test_a_run_that_had_not_begun_has_nothing_to_report(done, copy):
     run = copy(done)
     (run / "journal.jsonl").write_text("")
     with pytest.raises(InputError) as caught:
-        Facts(run)
+        ReportFacts(run)
     assert str(caught.value) == (
         f'the run in "{run}" had not begun when it was cut off; there is nothing to report'
     )

@@ -12,7 +12,7 @@ import pytest
 from page_reader import SECTIONS, Page
 
 from executive.record.journal import read_journal, start_of
-from executive.view.report.facts import Facts
+from executive.view.report.facts import ReportFacts
 from executive.view.report.page import report, write_report
 
 NASTY = """</style></title><script>alert("x")</script><img src=x onerror='y'> & {{ 7 * 7 }} {% raw %} \x00"""
@@ -21,7 +21,7 @@ WORDS = {"kind", "status", "state", "file", "node", "path", "item", "origin", "p
 
 
 def page(run: Path) -> Page:
-    return Page(report(Facts(run)))
+    return Page(report(ReportFacts(run)))
 
 
 def change(file: Path, change: Any) -> None:
@@ -68,7 +68,7 @@ def test_a_success_has_no_story_and_says_what_is_in_the_bins(done):
 
 
 def test_every_object_is_there_with_its_fate_its_time_its_picture_and_what_went_wrong(failed):
-    found, facts = page(failed), Facts(failed)
+    found, facts = page(failed), ReportFacts(failed)
     told = found.texts["objects"]
     assert all(f"{row.item} rejected" in told for row in facts.objects)
     assert [row.item for row in facts.objects] == ["sphere-1", "sphere-2"]
@@ -87,7 +87,7 @@ def test_the_rows_of_time_sum_up_to_the_time_of_the_run(failed, done, killed, co
     )
     assert "no object" in page(braked).texts["objects"]
     for run in (failed, done, killed, braked):
-        facts = Facts(run)
+        facts = ReportFacts(run)
         rows = re.findall(r"</td><td>([0-9.]+)</td>\s*<td class=\"bar\">", report(facts))
         assert len(rows) == len(facts.shares.rows)
         assert sum(map(float, rows)) == pytest.approx(facts.timeline.clock, abs=0.01 * len(rows))
@@ -151,7 +151,7 @@ def test_whatever_a_mission_says_is_text(failed, copy):
     odd.rename(run / "frames" / "000001_<script>'{{ 7 * 7 }}\".jpg")
     for name in ("journal.jsonl", "tree.json", "result.json"):
         change(run / name, nasty)
-    text = report(Facts(run))
+    text = report(ReportFacts(run))
     found = Page(text)
     assert found.shape == plain.shape
     assert found.raw == plain.raw
@@ -164,7 +164,7 @@ def test_whatever_a_mission_says_is_text(failed, copy):
 
 @pytest.mark.parametrize("name", ["done", "failed", "killed"])
 def test_the_page_needs_nothing_from_outside(name, request):
-    text = report(Facts(request.getfixturevalue(name)))
+    text = report(ReportFacts(request.getfixturevalue(name)))
     found = Page(text)
     tags = {tag for tag, _ in found.elements}
     assert not tags & {"script", "iframe", "object", "embed", "base", "form", "image", "use", "foreignobject"}

@@ -27,7 +27,7 @@ from executive.perception.detectors.roboflow.options import (
     RoboflowOptions,
     find_wrong_roboflow_options,
 )
-from executive.perception.detectors.setting import Setting
+from executive.perception.detectors.setting import DetectorSetting
 from executive.perception.detectors.views import Part, remove_duplicates, search_parts
 
 
@@ -42,7 +42,7 @@ class RoboflowDetector(ThreadedDetector):
     """
 
     def __init__(
-        self, config: DetectorConfig, options: RoboflowOptions, setting: Setting, key: ApiKey
+        self, config: DetectorConfig, options: RoboflowOptions, setting: DetectorSetting, key: ApiKey
     ) -> None:
         super().__init__(config, setting, options.deadline)
         self._options = options
@@ -51,7 +51,7 @@ class RoboflowDetector(ThreadedDetector):
         self._helper = Helper({**server, "confidence": config.floor}, key)
 
     @classmethod
-    def from_config(cls, config: DetectorConfig, setting: Setting) -> RoboflowDetector:
+    def from_config(cls, config: DetectorConfig, setting: DetectorSetting) -> RoboflowDetector:
         """Return the detector that a cell file describes; nobody is asked yet, and no key is needed for it.
 
         Raises:
