@@ -18,7 +18,6 @@ from tempfile import TemporaryDirectory
 import click
 
 from executive.campaign.subject import Subject
-from executive.cells.sim import shots
 from executive.cells.sim.command_log import is_log
 from executive.cli.options import runs_option
 from executive.errors import ExecutiveError, InputError
@@ -198,9 +197,6 @@ def _resume_to_first_tick(subject: Subject, path: Path) -> None:
 def _film_first_picture(path: Path) -> None:
     def stop(done: int, number: int) -> None:
         raise Reached
-
-    # Pictures are taken in blocks.
-    shots.BLOCK = 1
 
     film(
         FilmSource(RunDirectory(path)),

@@ -178,16 +178,15 @@ class TestKills:
 class TestDamagedRecords:
     @pytest.mark.slow
     @pytest.mark.parametrize("simulated", [False, True])
-    def test_a_damaged_record_is_read_replayed_and_resumed_or_refused(
+    def test_a_damaged_record_is_read_replayed_resumed_and_filmed_or_refused(
         self, tmp_path: Path, simulated: bool
     ) -> None:
         subject = load_subject("sort_overhead", {}, oracle=True, seed=7) if simulated else load()
         figures = damaged_records.measure(
-            # A film draws 24 pictures at a time: its first page can take more than the limit of CPU time.
-            subject, tmp_path, reports=12, others=6, films=0, truncations=6, kills=2,
-        )  # fmt: skip
+            subject, tmp_path, reports=12, others=6, films=2 * simulated, truncations=6, kills=2
+        )
         assert figures["problems"] == []
-        assert [row["records"] for row in figures["damaged"]] == [12, 6, 6, 0]
+        assert [row["records"] for row in figures["damaged"]] == [12, 6, 6, 2 * simulated]
         assert [row["agree"] for row in figures["resumed"]] == [6, 2]
         assert list(tmp_path.iterdir()) == []
 

@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import cv2
@@ -29,6 +30,8 @@ MIN_EDGE_CONTRAST = 24
 """Difference of brightness between neighbours from which there is an edge, of 255."""
 PICTURES_PER_BLOCK = 24
 """Pictures that a process takes in one world; each block does again what was done before it."""
+PICTURES_IN_FIRST_BLOCK = 2
+"""Pictures of the first block, so that the first picture comes soon."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +70,8 @@ def take_pictures(shoot: Shoot, steps: Sequence[int], workers: int) -> Generator
         steps: After how many steps, ascending.
         workers: Processes that take them.
     """
-    blocks = [steps[first : first + PICTURES_PER_BLOCK] for first in range(0, len(steps), PICTURES_PER_BLOCK)]
+    bounds = [0, *range(PICTURES_IN_FIRST_BLOCK, len(steps), PICTURES_PER_BLOCK), len(steps)]
+    blocks = [steps[first:end] for first, end in pairwise(bounds)]
     with Workers(workers) as pool:
         under_way: deque[Future[list[Image]]] = deque()
         # No more at a time than keeps everybody busy: pictures that nobody fetches yet fill the memory.
