@@ -245,10 +245,10 @@ def test_the_authors_guide_names_every_control_node_with_its_keys() -> None:
     told = rows("### Control nodes")
     assert {cell.strip("`"): set(in_code(keys)) for cell, (keys, *_) in told.items() if "`" in cell} == {
         **{word: {*inner_keys(kind), *partners(kind)} for word, kind in control_nodes().items()},
-        grammar.USE: set(grammar.USE_PARTNERS),
+        grammar.USE: set(grammar.USE_SIBLINGS),
     }
 
 
 def partners(kind: type[ControlNode]) -> list[str]:
     """Return the keys that stand beside the word of a control node."""
-    return [name for name, key in kind.keys.items() if key.is_partner]
+    return [name for name, key in kind.keys.items() if key.is_sibling]

@@ -1,4 +1,4 @@
-"""The arm as a skill sees it: a goal, and what to heed on the way, become a motion planned and checked."""
+"""Protocol of the arm, and the goals, tasks and motions that it plans and follows."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ class Motion(Protocol):
 
     @property
     def duration(self) -> float:
-        """Time it takes from start to rest [s]."""
+        """Time from the start to the final rest [s]."""
 
 
 @dataclass(frozen=True)
 class Goal:
-    """Where the tool is to come to rest, pointing down.
+    """Pose at which the tool comes to rest, pointing down.
 
     Attributes:
-        position: Of the tool centre point `(x, y, z)` [m].
-        yaw: Rotation about the vertical [rad], or None where it is free.
-        guarded: Length of the last part, straight down and no faster than `speed` [m]; 0 for none.
-        speed: Tool speed of that part [m/s].
+        position: Position of the tool centre point `(x, y, z)` [m].
+        yaw: Rotation about the vertical [rad], or None if any rotation will do.
+        guarded: Length of the guarded last part, straight down [m]; 0 for none.
+        speed: Largest tool speed of the guarded part [m/s].
     """
 
     position: tuple[float, float, float]
@@ -39,12 +39,12 @@ class Goal:
 
 @dataclass(frozen=True)
 class Task:
-    """What a motion has to heed on its way.
+    """Load and obstacles of a motion.
 
     Attributes:
-        load: What the tool holds, or None.
-        around: What stands in the cell beyond what its file says.
-        target: What the tool is to touch on the guarded part, and stays away from before that, or None.
+        load: Object in the tool, or None.
+        around: Obstacles that the cell file does not declare.
+        target: Obstacle that the tool may touch on the guarded part only, or None.
     """
 
     load: Load | None = None
@@ -53,18 +53,18 @@ class Task:
 
 
 class Planning(Protocol):
-    """A motion being planned."""
+    """Planning of a motion, in progress or finished."""
 
     @property
     def ready(self) -> bool:
-        """True from the tick at which it is known, on the run's clock."""
+        """True from the control step in which the planning is finished."""
 
     def result(self) -> Motion:
         """Return the motion.
 
         Raises:
             Unreachable: The goal has no joint solution inside the limits.
-            Blocked: Every way comes too close to something.
+            Blocked: Every path comes too close to an obstacle.
         """
 
 
@@ -85,37 +85,37 @@ class Arm(Protocol):
 
     @property
     def destination(self) -> Array:
-        """Where the tool will be when the running motion is over, or is now `(3,)` [m]."""
+        """Position of the tool at the end of the present motion, or now if there is none `(3,)` [m]."""
 
     @property
     def at_rest(self) -> bool:
-        """True while no motion runs and no braking is under way."""
+        """True while the arm neither follows a motion nor brakes."""
 
     @property
     def met(self) -> str | None:
-        """What the arm ran into in its last motion, which it then broke off, or None."""
+        """Description of the collision that ended the last motion, or None."""
 
     def plan(self, goal: Goal | str, task: Task = Task()) -> Planning:
-        """Begin to plan a motion from where the arm rests to a goal, or to a named pose of the cell file.
+        """Begin to plan a motion from the present rest to a goal, or to a named pose of the cell file.
 
-        What `plan_ahead` was asked before, in the same words and for the same start, is known at once.
+        The planning is finished at once if `plan_ahead` had the same arguments and the same start.
         """
 
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
-        """Plan a motion, from where the running one will end, before anybody asks for it."""
+        """Plan a motion from the end of the present motion, for a later call of `plan`."""
 
     def start(self, motion: Motion) -> None:
-        """Begin to follow `motion`; the arm must be at rest where it starts."""
+        """Begin to follow `motion`; the arm must be at rest at its start."""
 
     def stop(self) -> None:
-        """Brake along the running motion's path; returns at once, also when nothing runs."""
+        """Brake along the path of the present motion, if any; return at once."""
 
 
 def refuse_steps(motion: object) -> None:
-    """Return unless what an arm is to follow are the steps that would plan a motion, none of them made.
+    """Check that a motion is not a generator whose caller forgot `yield from`.
 
     Raises:
-        Fault: They are.
+        Fault: The motion is a generator.
     """
     if isinstance(motion, GeneratorType):
         raise Fault(

@@ -52,7 +52,7 @@ class CellWrapper:
         self.inner.log_to(path)
 
     def advance(self) -> None:
-        """Let one control step pass, with the call after it."""
+        """Let one control step pass, and then call `after`."""
         self.inner.advance()
         self.after()
 

@@ -18,7 +18,7 @@ class Detection:
 
     Attributes:
         label: Class name.
-        confidence: 0 to 1.
+        confidence: Confidence, 0 to 1.
         box: Bounding box of the whole object [pixel] in the frame's image.
         rival: Confidence of the second class for this box, 0 to 1; 0 if unknown.
     """
@@ -39,12 +39,12 @@ class Detection:
 class Answer:
     """Answer of a detector to a frame; it may be empty.
 
-    A detector reports all detections at or above its floor in `found`. The cell divides them before a skill
-    reads the answer (`executive.perception.detectors.screening`).
+    A detector reports all detections at or above its floor in `found`. Before a skill reads the answer, the
+    cell moves some of them to `doubtful` and `unknown` (`executive.perception.detectors.screening`).
 
     Attributes:
         detector: Name of the detector in the cell file.
-        found: Detections that count, most confident first.
+        found: Confident detections of known classes, most confident first.
         error_rates: Error rates of the detector.
         doubtful: Detections below the threshold or less than twice as likely as another class.
         unknown: Detections at or above the threshold with labels that the cell does not know.
@@ -57,7 +57,7 @@ class Answer:
     unknown: tuple[Detection, ...] = ()
 
     def describe_doubt(self, detection: Detection) -> str:
-        """Return a sentence about the best of the doubtful detections and the limit that it misses."""
+        """Return a sentence about the best doubtful detection and the reason of the doubt."""
         threshold = self.error_rates.threshold
         second = f"with another class at {detection.rival:.2f}"
         limit = f"< {threshold:.2f}" if detection.confidence < threshold else second
@@ -102,7 +102,7 @@ class Observation:
         position: Centre of the object `(3,)` [m] in the world.
         std: Standard deviation of the random error of the position along each axis [m].
         confident: False for a low-confidence detection: a doubtful or a contradicted one.
-        contradiction: Evidence against its class as a sentence, "" if there is none.
+        contradiction: Evidence against the detected class as a sentence, or "".
     """
 
     detection: Detection

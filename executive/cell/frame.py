@@ -16,7 +16,7 @@ Box = tuple[float, float, float, float]
 OBJECT_RADIUS = 0.03
 """Typical distance from the centre of an object to its outline [m]."""
 OBJECT_POINTS = OBJECT_RADIUS * np.array([(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)], float)
-"""Points of an object, relative to its centre `(5, 3)` [m], that must all be visible for it to be found."""
+"""Points of an object relative to its centre `(5, 3)` [m]; a detector finds the object if all are visible."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class Frame:
         matrix: Camera matrix `(3, 3)` [pixel].
         X_WC: Camera pose in the world at capture, OpenCV convention (z forward, y down).
         stamp: Capture time on the run's clock [s].
-        visible: `(H, W)` bool, False for pixels in which the arm hides the scene, by its kinematics.
+        visible: `(H, W)` bool, False for pixels in which the arm, by its kinematics, hides the scene.
         epoch: Number of changes of the table at capture (`Ledger.epoch`).
     """
 
@@ -102,7 +102,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class FrameTaken(Event):
-    """The image that the next `FrameSearched` is about; only for observers in this process.
+    """Image of the next `FrameSearched`; only for observers in this process.
 
     Attributes:
         frame: The frame with its image.

@@ -18,11 +18,11 @@ Triple = tuple[float, float, float]
 TOOL_RADIUS = 0.012
 """Radius of the tool's body [m]."""
 NECK_LENGTH = 0.015
-"""Length of the thin part at the tool's end, as wide as the cup [m]."""
+"""Length of the thin part at the end of the tool, which has the radius of the cup [m]."""
 
 
 def as_bin(name: str, config: BinConfig) -> Bin:
-    """Return the bin of a cell file with its drop slots spread evenly over the floor."""
+    """Return a bin of a cell file, with its slots distributed evenly over the floor."""
     position, size = np.array(config.position), np.array(config.size)
     columns, rows = config.slots
     x = position[0] + size[0] * ((np.arange(columns) + 0.5) / columns - 0.5)
@@ -32,25 +32,25 @@ def as_bin(name: str, config: BinConfig) -> Bin:
 
 
 def object_class(label: str, config: ObjectConfig) -> ObjectClass:
-    """Return an object class of a cell file as skills see it, with the default mass."""
+    """Return an object class of a cell file for skills, with the default mass."""
     return ObjectClass(label, config.height, config.radius, config.ring)
 
 
 def travel_height(config: CellConfig) -> float:
-    """Return the tool height [m] at which the highest load clears the highest wall and the highest pile."""
-    tallest = max(kind.height for kind in config.objects.values())
-    wall = max(bin.position[2] + bin.size[2] for bin in config.bins.values())
-    return max(wall, pile_height(config)) + tallest + config.motion.clearance
+    """Return the tool height [m] at which the tallest load clears the highest wall and pile."""
+    max_height = max(kind.height for kind in config.objects.values())
+    wall_top = max(bin.position[2] + bin.size[2] for bin in config.bins.values())
+    return max(wall_top, pile_height(config)) + max_height + config.motion.clearance
 
 
 def pile_height(config: CellConfig) -> float:
-    """Return the greatest height [m] of a pile on the table: the tallest object, doubled if stacked."""
-    tallest = max(kind.height for kind in config.objects.values())
-    return 2 * tallest if config.table.stacked else tallest
+    """Return the largest height of a pile on the table [m]: the tallest object, twice if stacked."""
+    max_height = max(kind.height for kind in config.objects.values())
+    return 2 * max_height if config.table.stacked else max_height
 
 
 def bin_walls(size: tuple[float, float, float]) -> Sequence[tuple[Triple, Triple]]:
-    """Return half the extents of a bin's floor and walls and their middles, above the bin's position [m]."""
+    """Return the half extents of a bin's floor and walls, and their centres relative to the bin [m]."""
     (length, width, height), t = size, BIN_THICKNESS
     across, along = (t / 2, width / 2 + t, height / 2), (length / 2, t / 2, height / 2)
     x, y, z = (length + t) / 2, (width + t) / 2, height / 2
@@ -62,11 +62,11 @@ def bin_walls(size: tuple[float, float, float]) -> Sequence[tuple[Triple, Triple
 def places_out_of_reach(
     config: CellConfig, require: Callable[[Array, float], None]
 ) -> Iterator[tuple[KeyPath, str]]:
-    """Yield a key of the cell file and a sentence for each bin, and the safe place, out of reach.
+    """Yield the key in the cell file and a sentence for each bin or safe place that is out of reach.
 
     Args:
         config: The cell file.
-        require: Raises `Unreachable` for a place `(2,)` on a floor of this height [m].
+        require: Raises `Unreachable` if a place `(2,)` [m] on a floor of a height [m] is out of reach.
     """
     places: list[tuple[KeyPath, str, Array, float]] = [
         (("bins", name, "position"), f'the bin "{name}"', as_bin(name, bin).slots, bin.position[2])
@@ -74,12 +74,12 @@ def places_out_of_reach(
     ]
     safe_place = np.array([config.safe_place[:2]])
     places.append((("safe_place",), "the safe place", safe_place, config.safe_place[2]))
-    for keys, what, slots, floor in places:
+    for keys, name, slots, floor in places:
         try:
             for slot in slots:
                 require(slot, floor)
         except Unreachable as error:
-            yield keys, f"{what} is out of reach: {error}"
+            yield keys, f"{name} is out of reach: {error}"
 
 
 def bins_of(config: CellConfig) -> dict[str, Bin]:
@@ -88,5 +88,5 @@ def bins_of(config: CellConfig) -> dict[str, Bin]:
 
 
 def object_classes(config: CellConfig) -> dict[str, ObjectClass]:
-    """Return the classes of a cell file by label, each of the default mass."""
+    """Return the object classes of a cell file by label, each with the default mass."""
     return {label: object_class(label, kind) for label, kind in config.objects.items()}

@@ -26,11 +26,11 @@ class Ledger(Protocol):
         """Update all items with one search of a frame, and return all targets (`find_targets`).
 
         Objects in bins are no targets. Detections at positions that the robot changed after the capture do
-        not count, and neither does a second search of the same frame.
+        not count. A second search of the same frame does not count either.
 
         Args:
             detections: The frame, the searched area, and the detector's error rates.
-            observations: Its detections, localized.
+            observations: The localized detections.
         """
 
     def find_targets(self) -> Sequence[Target]:
@@ -121,7 +121,7 @@ class Ledger(Protocol):
         """
 
     def record_bin_contents(self) -> None:
-        """Place an item for each object that most full looks since `lose_track` have shown in a bin.
+        """Record an item for each object that most full looks since `lose_track` have shown in a bin.
 
-        Objects that the ledger knows to be in the bin do not count. The items are searched ones or new ones.
+        Objects that the ledger knows to be in the bin do not count. The others become searched or new items.
         """

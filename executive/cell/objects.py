@@ -13,16 +13,16 @@ Item = str
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """An observation bound to an item.
+    """An item on the table as skills see it.
 
     Attributes:
         item: The item.
         label: Class name.
         position: Centre of the object `(3,)` [m] in the world, at half its known height.
         confidence: Confidence of the last detection, 0 to 1.
-        frame: Id of the frame that showed it last.
-        epoch: Number of changes of the table when that frame was taken.
-        stamp: Time at which that frame was taken [s].
+        frame: Id of the last frame that showed the item.
+        epoch: Number of changes of the table at the capture of this frame.
+        stamp: Capture time of this frame [s].
     """
 
     item: Item
@@ -42,8 +42,8 @@ class ObjectClass:
         label: Class name that the detectors use.
         height: Height of the object as it lies on the table [m].
         radius: Radius of the circle around its outline seen from above [m].
-        ring: Distance from its centre at which to touch it [m]; more than 0 for parts with a hole.
-        mass: [kg]
+        ring: Distance of the contact point from the centre [m]; more than 0 for parts with a hole.
+        mass: Mass [kg].
     """
 
     label: str
@@ -58,8 +58,8 @@ class Load:
     """Object in the tool.
 
     Attributes:
-        kind: Its class.
-        bears: Largest force that its seal withstands [N].
+        kind: Class of the object.
+        bears: Largest force that the seal withstands [N].
     """
 
     kind: ObjectClass
@@ -71,10 +71,10 @@ class Obstacle:
     """An upright cylinder on the table that the arm must avoid.
 
     Attributes:
-        x, y: Position of its axis [m].
-        radius: [m]
-        top: Height of its top [m].
-        name: Its name in error messages.
+        x, y: Position of the axis [m].
+        radius: Radius [m].
+        top: Height of the upper end [m].
+        name: Name in error messages.
     """
 
     x: float

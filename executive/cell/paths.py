@@ -1,4 +1,4 @@
-"""Paths that files of the user name: do they stay below a folder?"""
+"""Checks that paths in files of the user stay below a folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Values as records keep them: plain JSON, numbers rounded, images left out."""
+"""Conversion of values to plain JSON for records: numbers are rounded, images left out."""
 
 from __future__ import annotations
 
@@ -16,26 +16,25 @@ from executive.cell.frame import Frame
 from executive.geometry import Pose
 
 DIGITS = 6
-"""Decimal places kept: a micrometre, a microradian, a microsecond."""
+"""Number of decimal places of floats: a micrometre, a microradian, a microsecond."""
 
-LONGEST = 2048
-"""Bits of the largest integer that is kept as a number: Python reads and writes no more than 640 digits
-for certain."""
+MAX_INTEGER_BITS = 2048
+"""Length of the largest integer that stays a number [bit]; Python guarantees to read 640 digits."""
 
 
 def plain(value: Any) -> Any:
-    """Return `value` as JSON can hold it: floats to `DIGITS` places, a frame by its number only.
+    """Return `value` as plain JSON: floats rounded to `DIGITS` places, a frame by its number.
 
-    What JSON does not have (infinities, NaN, integers beyond `LONGEST`) becomes text, and so does the half
-    of a surrogate pair that stands in a file name which is not UTF-8: a record stays readable by any parser.
+    Values that JSON lacks become text: infinities, NaN, integers beyond `MAX_INTEGER_BITS`, and lone
+    surrogates, as in a file name that is not UTF-8. Any parser can read the result.
     """
     return _rule(value.__class__)(value)
 
 
 def plain_or_type(value: Any) -> Any:
-    """Return `value` as JSON can hold it, or the name of its type if it has no plain form.
+    """Return `value` as plain JSON, or the name of its type if it cannot be converted.
 
-    Skills set outputs of any type; a value whose content cannot be read must not end the run.
+    Skills set outputs of any type; an output that cannot be converted must not end the run.
     """
     try:
         return plain(value)
@@ -56,14 +55,14 @@ def _number(value: Any) -> float | str:
     number = float(value)
     if not math.isfinite(number):
         return str(number)
-    # Adding zero turns -0.0 into 0.0, which compare equal but print differently.
+    # The addition of zero turns -0.0 into 0.0; both are equal, but print differently.
     return round(number, DIGITS) + 0.0
 
 
 _RULES: Sequence[tuple[type | tuple[type, ...], Callable[[Any], Any]]] = (
     (Enum, lambda value: plain(value.value)),
     (str, _text),
-    (int, lambda value: value if value.bit_length() <= LONGEST else hex(value)),
+    (int, lambda value: value if value.bit_length() <= MAX_INTEGER_BITS else hex(value)),
     (type(None), lambda value: value),
     ((float, np.floating), _number),
     (np.generic, lambda value: plain(value.item())),
@@ -75,16 +74,16 @@ _RULES: Sequence[tuple[type | tuple[type, ...], Callable[[Any], Any]]] = (
     ((set, frozenset), lambda values: sorted((plain(value) for value in values), key=repr)),
     (PurePath, lambda path: _text(str(path))),
 )
-"""Functions that make values of these types plain; the first that fits counts."""
+"""Types, and functions that make values of these types plain; the first matching type counts."""
 
 
 @functools.cache
 def _rule(kind: type) -> Callable[[Any], Any]:
-    """Return the function for a type; found once per type, for events are recorded within a tick."""
+    """Return the function for a type; cached, because events are recorded within a control step."""
     if rule := next((rule for known, rule in _RULES if issubclass(kind, known)), None):
         return rule
     if dataclasses.is_dataclass(kind):
         names = [field.name for field in dataclasses.fields(kind)]
         return lambda value: {name: plain(getattr(value, name)) for name in names}
-    # A default repr holds a memory address, which would make equal runs look different.
+    # The default `repr` contains a memory address, which differs between equal runs.
     return lambda _: kind.__name__

@@ -1,8 +1,8 @@
-"""The protocols a skill sees: what a work cell offers, whatever it is made of.
+"""Protocols of the parts of a work cell that skills use.
 
-A skill gets one `Cell` and talks to its parts only through these protocols, so it runs unchanged in
-simulation, on the fake cell of the test kit, and on hardware that implements them. Nothing here
-blocks: a skill asks, yields, and looks again at the next tick.
+A skill uses the parts of its `Cell` only through these protocols, so it runs unchanged in simulation, on the
+fake cell of the test kit, and on hardware. No call blocks: a skill sends a request, yields, and reads the
+result in a later control step.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from executive.cell.objects import ObjectClass, Target
 from executive.geometry import Array
 
 Steps = Iterator[None]
-"""What a generator hands the tick loop: one None per control step."""
+"""Generator that yields None once per control step."""
 
 Routes = Mapping[str, tuple[str, ...]]
-"""Class label to the bins it may go to, in the order the mission names them: any of them is right."""
+"""Class label to the bins that are right for it, in the order of the mission."""
 
 
 class Clock(Protocol):
-    """The run's only clock; in simulation it advances by physics steps alone."""
+    """The only clock of the run; in simulation it advances with the physics steps."""
 
     @property
     def now(self) -> float:
@@ -46,56 +46,56 @@ class Tool(Protocol):
 
     @property
     def touching(self) -> bool:
-        """True while the cup's lip is on something."""
+        """True while the lip of the cup touches something."""
 
     @property
     def holding(self) -> bool:
-        """True while the vacuum says that something is sealed to the cup."""
+        """True while the vacuum sensor reports a seal."""
 
     @property
     def bears(self) -> float:
-        """The pull that the seal bears, as the vacuum gauge tells [N]; 0 while nothing is held."""
+        """Largest force that the seal withstands, by the vacuum gauge [N]; 0 without a seal."""
 
     def close(self) -> None:
-        """Switch the vacuum on: what the cup touches now is sealed to it if the seal is good enough."""
+        """Switch the vacuum on, which seals the touched object to the cup if its surface allows."""
 
     def open(self) -> None:
-        """Let go and switch the vacuum off."""
+        """Switch the vacuum off and release the object."""
 
 
 class Camera(Protocol):
-    """A camera that can be asked for a frame at any tick."""
+    """A camera that returns a frame in any control step."""
 
     @property
     def name(self) -> str:
-        """Its name in the cell file."""
+        """Name in the cell file."""
 
     @property
     def scan_poses(self) -> Sequence[str]:
-        """Names of the arm poses from which it sees the table, best first."""
+        """Names of the arm poses from which the camera sees the table, best first."""
 
     def next_pose(self) -> str:
-        """Return the scan pose after the one this returned last, for a look from elsewhere."""
+        """Return the next scan pose in turn, for a look from another viewpoint."""
 
     def area(self, view: str) -> Box:
-        """Return the part of the image [pixel] that `view` (`table` or `full`) means."""
+        """Return the part of the image [pixel] of a `view` (`table` or `full`)."""
 
     def sees_table(self) -> bool:
-        """Tell whether the whole workspace is in view now, the arm not in front of it."""
+        """Return True if the whole workspace is in view now, and the arm does not hide any part of it."""
 
     def capture(self) -> Frame:
-        """Return a fresh frame."""
+        """Return a new frame."""
 
     def displacement(self, frame: Frame) -> str:
-        """Return in words how far a frame shows the camera beside its declared pose; "" if it does not."""
+        """Return the deviation of the camera from its declared pose in words, by a frame; "" if none."""
 
 
 class Request(Protocol):
-    """A detection under way."""
+    """Search of a frame by a detector, in progress or finished."""
 
     @property
     def ready(self) -> bool:
-        """True from the tick at which the answer is due on the run's clock."""
+        """True from the control step in which the answer is due."""
 
     def result(self) -> Answer:
         """Return the answer of the detector.
@@ -107,10 +107,10 @@ class Request(Protocol):
 
 
 class Detector(Protocol):
-    """Finds objects in frames, beside the tick loop."""
+    """Finds objects in frames, in parallel to the tick loop."""
 
     def request(self, frame: Frame, view: str) -> Request:
-        """Start to search `frame`: the `table` part or the `full` image."""
+        """Begin to search a view of a frame: `table` or `full`."""
 
 
 class Localizer(Protocol):
@@ -120,7 +120,7 @@ class Localizer(Protocol):
         """Return the centre of the detected object `(3,)` [m], from the camera pose of the frame.
 
         Raises:
-            NoDepth: The frame has no usable depth where the detection lies.
+            NoDepth: The frame has no usable depth at the detection.
         """
 
     def localize(self, detections: Detections) -> Sequence[Observation]:
@@ -130,41 +130,41 @@ class Localizer(Protocol):
         of its top contradicts its class.
 
         Raises:
-            NoDepth: The frame has no usable depth where a detection lies.
+            NoDepth: The frame has no usable depth at a detection.
         """
 
 
 class Operator(Protocol):
-    """The person (or script) beside the cell."""
+    """The person or script that requests objects."""
 
     def ask(self, choices: Sequence[str]) -> str | None:
-        """Return the next thing asked for, one of `choices`, `rescan`, or None to quit.
+        """Return the next request: one of `choices`, `rescan`, or None to quit.
 
-        The run's clock stands still while the person thinks.
+        The clock of the run stands still until the answer.
 
         Raises:
-            Stopped: The run is to end.
+            Stopped: The run has to halt.
         """
 
 
 class LeastTimes(Protocol):
-    """What things take in a cell at the very least [s]: nothing that succeeds there is done sooner.
+    """Lower bounds of the times of actions in a cell [s].
 
-    Bounds, not estimates: whoever is given less time than this must fail, by whichever way the arm goes.
+    An action with a shorter timeout fails for certain, whatever path the arm takes.
     """
 
     @property
     def descent(self) -> float:
-        """The guarded last part of an approach, down to an object that lies on the table."""
+        """Time of the guarded last part of an approach to an object on the table [s]."""
 
     def carry(self, bin: str | None) -> float:
-        """From where objects lie to above the floor of a bin, at rest at both ends; None: the nearest bin.
+        """Return the time from the workspace to a bin [s], from rest to rest; None: the nearest bin.
 
         0 for a bin that the cell lacks.
         """
 
     def answer(self, detector: str) -> float:
-        """From a frame to the answer of a detector; "": the first one. 0 for one that the cell lacks."""
+        """Return the time from a frame to the answer [s]; "": the first detector; 0 for an unknown one."""
 
 
 @dataclass(frozen=True)
@@ -172,16 +172,16 @@ class Cell:
     """A work cell: everything a skill may use.
 
     Attributes:
-        camera: The camera that watches the table.
-        detectors: By name; the first is the default.
-        bins: By name.
-        classes: What is known of each class of objects, by label.
-        routes: Class label to the names of the bins that are right for it, as the mission says.
-        localizer: How detections become positions in this cell.
-        safe_place: Where something held may be put down `(3,)` [m].
-        descent: Length of an approach's guarded last part above the expected surface [m].
-        descent_speed: Tool speed of that part [m/s].
-        decided: Tells the record which target was chosen and for which bin.
+        camera: The camera that sees the table.
+        detectors: Detectors by name; the first is the default.
+        bins: Bins by name.
+        classes: Known properties of each class of objects, by label.
+        routes: Class label to the names of the bins that are right for it, by the mission.
+        localizer: Finds the positions of detections.
+        safe_place: Place on the table for a put-down `(3,)` [m].
+        descent: Length of the guarded last part of an approach above the expected surface [m].
+        descent_speed: Tool speed of the guarded part [m/s].
+        decided: Records a selected target and its bin.
     """
 
     clock: Clock

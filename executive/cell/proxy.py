@@ -1,7 +1,7 @@
 """Proxy between a skill and its cell: every attribute read and every call goes through one interceptor.
 
-The recorder and the replay use it, the test kit observes through it, and fault scripts change answers
-through it. Proxies can be nested: the cell that `intercept` returns can be intercepted again.
+Recorder, replay, test kit and fault scripts use the proxy to record, replace, observe or change answers.
+Proxies can be nested: the cell that `intercept` returns can be intercepted again.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ Interceptor = Callable[[Access], Any]
 def intercept(cell: Cell, interceptor: Interceptor, roles: Collection[str]) -> Cell:
     """Return a copy of the cell in which each access to the parts in `roles` goes through the interceptor.
 
-    So does each access to the `Planning` and `Request` objects that these parts return.
+    Each access to the `Planning` and `Request` objects that these parts return does so, too.
     """
     parts: dict[str, Any] = {
         role: _Proxy(role, "", getattr(cell, role), interceptor) for role in roles if role != "detector"

@@ -1,6 +1,6 @@
-"""What there is to be seen in a cell, for a person who watches: bodies of simple shape, and where they are.
+"""Shapes and poses of the bodies in a cell, for displays.
 
-Nothing here is for the robot: what it knows of the cell it knows from its cameras.
+Skills never use these true poses; the robot knows objects only from its cameras.
 """
 
 from __future__ import annotations
@@ -17,16 +17,15 @@ Colour = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Shape:
-    """One solid, fixed to a body.
+    """A solid that is fixed to a body.
 
     Attributes:
-        body: Name of the body that it moves with; "" for one that never moves.
+        body: Name of the body; "" for a solid that never moves.
         kind: `box`, `cylinder`, `sphere` or `mesh`.
-        size: Of a box its lengths, of a cylinder its diameter twice and its height along z, of a sphere its
-            diameter three times [m]; of a mesh the scales along its axes.
-        X_BS: Where it is in the body's frame.
-        colour: Its own.
-        file: Of a mesh, in a format that it says by its ending.
+        size: Size along x, y and z [m]; for a mesh, scale factors along x, y and z.
+        X_BS: Pose of the shape in the frame of the body.
+        colour: Colour.
+        file: File of a mesh, whose suffix names the format; "" for other kinds.
     """
 
     body: str
@@ -38,11 +37,11 @@ class Shape:
 
 
 class Visuals(Protocol):
-    """Everything that there is to be seen."""
+    """Everything that displays show of a cell."""
 
     @property
     def shapes(self) -> Sequence[Shape]:
-        """Every solid."""
+        """All solids."""
 
     def poses(self) -> Mapping[str, Pose]:
-        """Return where every body is now, by name; one that was taken away is left out."""
+        """Return the present pose of each body by name; removed bodies are left out."""

@@ -12,7 +12,7 @@ from executive.cell.visuals import Visuals
 from executive.events import Emit, ItemChanged
 
 PLACES = ("right", "wrong_bin", "left", "elsewhere", "fell_in_wrong_bin", "unseen")
-"""Keys of the counts of an audit; the last two count objects that the others count, too."""
+"""Keys of the counts of an audit; the last two count objects that are also among the first four."""
 
 
 class Accounts(Protocol):
@@ -22,7 +22,7 @@ class Accounts(Protocol):
         """Decide the final state of each item; `completed` is True if the tree succeeded."""
 
     def reopen(self) -> None:
-        """Forget the items that were left on the table; the next look enters those that still lie there."""
+        """Forget the items that were left on the table; the next look adds those that still lie there."""
 
     def balance(self) -> dict[str, int]:
         """Return the counts `seen, placed, rejected, skipped, lost, phantom`.
@@ -39,7 +39,7 @@ class Accounts(Protocol):
         """Reasons why error rates of detectors were assumed and not measured."""
 
     def summaries(self) -> Sequence[ItemChanged]:
-        """Return the present state of each item, in the order of first sight."""
+        """Return the present state of each item, in the order of the first detection."""
 
 
 class Workcell(Protocol):
@@ -65,9 +65,9 @@ class Workcell(Protocol):
         """
 
     def log_to(self, path: Path) -> None:
-        """Start a log file from which the simulated world can be rebuilt as it is at any moment.
+        """Start a log file from which the simulated world can be rebuilt at any control step.
 
-        Called before the first control step; a cell of hardware keeps no log.
+        The run calls this before the first control step; a hardware cell keeps no log.
 
         Raises:
             InputError: The file cannot be written.
@@ -109,11 +109,11 @@ class CellOptions:
 
     Attributes:
         operator: The operator beside the cell.
-        base: Folder that paths in the cell file are relative to.
-        gui: Show the world in a window.
+        base: Folder to which paths in the cell file are relative.
+        gui: True to show the simulated world in a window.
         resume: State in which the interrupted run left the cell; None for a new run.
         scene: File that changes the world of a simulated cell, and that only this cell reads; None: the world
-            is as the cell file declares it.
+            is as the cell file declares.
     """
 
     operator: Operator
@@ -128,23 +128,24 @@ KeyPath = tuple[str | int, ...]
 
 
 class CellKind(Protocol):
-    """A class that makes work cells; found by its name in the entry-point group `executive.cells`."""
+    """A class of work cells; its name is an entry point of the group `executive.cells`."""
 
     def __call__(
         self, config: Any, *, seed: int, routes: Routes, emit: Emit, options: CellOptions
     ) -> Workcell:
-        """Return a cell made from a cell file (`executive.cell.config.CellConfig`)."""
+        """Return a cell for a cell file (`executive.cell.config.CellConfig`)."""
 
     def check(self, config: Any, base: Path) -> Iterable[tuple[KeyPath, str]]:
-        """Return findings about a cell file of the right form: the key of each, and a sentence.
+        """Return the mistakes in a cell file of the right form, each as its key and a sentence.
 
-        `base` is the folder that paths in the file are relative to.
+        `base` is the folder to which paths in the file are relative.
         """
 
     def labels(self, config: Any, base: Path) -> Mapping[str, tuple[str, ...] | None]:
-        """Return the classes that each detector of a cell file knows, by the cell's names for them.
+        """Return the classes that each detector of a cell file knows, with the labels of the cell.
 
-        None for a detector whose classes are unknown until it is asked. Never raises: `check` reports errors.
+        None for a detector whose classes are unknown before its first answer. Never raises: `check` reports
+        errors.
         """
 
     def least_times(self, config: Any) -> LeastTimes:

@@ -1,1 +1,1 @@
-"""Kinds of cells: the simulated one, and the fake one for tests."""
+"""Kinds of cells: the simulated cell, and the fake cell for tests."""

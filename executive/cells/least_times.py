@@ -1,4 +1,4 @@
-"""Minimum times that the kinds of cells share."""
+"""Minimum times of the stages of a task that all kinds of cells compute alike."""
 
 from __future__ import annotations
 
@@ -10,33 +10,33 @@ class CellLeastTimes:
 
     Args:
         config: The cell file.
-        feeling_distance: Distance at which the tool already feels a surface [m].
-        surplus: Largest height by which an object may be higher than expected [m].
+        touch_distance: Distance at which the tool detects a surface [m].
+        max_excess_height: Largest excess of the height of an object over the expected height [m].
     """
 
-    def __init__(self, config: CellConfig, feeling_distance: float, surplus: float = 0.0) -> None:
+    def __init__(self, config: CellConfig, touch_distance: float, max_excess_height: float = 0.0) -> None:
         self._config = config
-        self._saved = feeling_distance + surplus
+        self._max_saved_distance = touch_distance + max_excess_height
 
     @property
     def descent(self) -> float:
-        """The guarded last part of an approach, to the highest object where the lowest was expected [s]."""
+        """Minimum time of a guarded descent: it ends on the highest object, the lowest was expected [s]."""
         motion = self._config.motion
-        return max(0.0, motion.descent - self._saved) / motion.descent_speed
+        return max(0.0, motion.descent - self._max_saved_distance) / motion.descent_speed
 
     def carry(self, bin: str | None) -> float:
-        """From the nearest place where objects lie to over a bin, or over the nearest bin [s].
+        """Return the minimum time from the objects to a position over a bin, None for the nearest bin [s].
 
-        0 for a bin that the cell does not have, and if the arm does not reach one of the two.
+        The time is 0 for a bin that the cell does not have or the arm does not reach.
         """
         names = self._config.bins if bin is None else {bin} & set(self._config.bins)
-        return min(map(self._carry, names), default=0.0)
+        return min(map(self._min_carry_time, names), default=0.0)
 
     def answer(self, detector: str) -> float:
-        """From a frame to the answer of a detector; "": the first [s]. 0 for one that the cell lacks."""
+        """Return the latency of a detector, "" for the first one [s]; 0 for one that the cell lacks."""
         detectors = self._config.detectors
         config = detectors.get(detector or next(iter(detectors)))
         return config.latency if config else 0.0
 
-    def _carry(self, bin: str) -> float:
+    def _min_carry_time(self, bin: str) -> float:
         raise NotImplementedError

@@ -1,4 +1,4 @@
-"""File from which the world of an interrupted run can be rebuilt."""
+"""Log file from which the world of an interrupted run can be rebuilt."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from executive.errors import Fault, InputError, explained, reason_of
 
 
 class LogFile:
-    """A file that is written without a buffer: data written before a kill is in the file.
+    """A file that is written without a buffer: a killed process loses no written data.
 
     Args:
-        path: The file.
-        subject: Name of the content, for the text of a fault.
-        length: Length after which an existing file is cut off [byte]; None: nowhere.
+        path: Path of the file.
+        content: Name of the content, for the message of a fault.
+        length: Length to which an existing file is truncated [byte]; None: the file is not truncated.
 
     Raises:
         InputError: The file cannot be opened.
     """
 
-    def __init__(self, path: Path, subject: str, length: int | None = None) -> None:
-        self._path, self._subject = path, subject
+    def __init__(self, path: Path, content: str, length: int | None = None) -> None:
+        self._path, self._content = path, content
         with explained(InputError, f'cannot write "{path}"'):
             self._file: int | None = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
             if length is not None:
@@ -36,8 +36,8 @@ class LogFile:
         """Write all data at a position [byte]; do nothing if the file is closed.
 
         Raises:
-            Fault: The disk does not accept the data. Later data is not written, without another fault, so
-                that the arm can be brought to rest.
+            Fault: The disk does not accept the data. Later writes do nothing and raise no fault, so
+                that the run can still bring the arm to rest.
         """
         try:
             while data and self._file is not None:
@@ -46,12 +46,12 @@ class LogFile:
         except OSError as error:
             self.close()
             raise Fault(
-                f'{self._subject} "{self._path}" cannot be written: {reason_of(error)}; '
-                "the run stops because it could not be taken up again"
+                f'{self._content} "{self._path}" cannot be written: {reason_of(error)}; '
+                "the run stops because it could not be resumed"
             ) from error
 
     def close(self) -> None:
-        """Close the file; more calls do nothing."""
+        """Close the file; do nothing if it is closed."""
         if self._file is not None:
             file, self._file = self._file, None
             os.close(file)

@@ -27,18 +27,18 @@ class CellWithoutHardware:
 
     Args:
         config: The cell file.
-        seed: Not used.
-        routes: Class label to the bins that are right for it.
+        seed: Random seed of the run; not used.
+        routes: Names of the right bins of each class.
         emit: Receives the events of the cell.
         options: Options of the run.
 
     Attributes:
         config: The cell file.
-        routes: Class label to the bins that are right for it.
-        accounts: The ledger.
-        cell: The cell that skills see.
+        routes: Names of the right bins of each class.
+        accounts: The ledger of the run.
+        cell: The cell as skills use it.
         steps: Number of control steps since the run began.
-        last_command: Control step of the last command to arm or tool that the log of the world holds, or 0.
+        last_command: Control step of the last command to arm or tool in the log of the world, or 0.
     """
 
     def __init__(
@@ -74,14 +74,14 @@ class CellWithoutHardware:
         )
 
     def log_to(self, path: Path) -> None:
-        """Keep no log."""
+        """Do nothing: without hardware or physics, there is no world to log."""
 
     def advance(self) -> None:
-        """Let one control step pass."""
+        """Count one control step."""
         self.steps += 1
 
     def visuals(self) -> Visuals | None:
-        """Return None: there is nothing to show."""
+        """Return None: the cell has no shapes to show."""
         return None
 
     def audit(self) -> Mapping[str, int] | None:
@@ -89,4 +89,4 @@ class CellWithoutHardware:
         return None
 
     def close(self) -> None:
-        """Release nothing."""
+        """Do nothing: the cell holds no resources."""

@@ -102,19 +102,19 @@ def check_packages() -> Iterator[Diagnosed]:
     """Yield findings on required packages, packages that provide `cv2`, extras, and the video encoder."""
     from importlib.metadata import packages_distributions
 
-    from executive.run.versions import ITSELF, installed, installer, required
+    from executive.run.versions import DISTRIBUTION, installed, installer, required
 
     names = required()
-    missing = [name for name in (ITSELF, *names) if not installed(name)]
+    missing = [name for name in (DISTRIBUTION, *names) if not installed(name)]
     for name in missing:
         yield Diagnosed("problem", "packages", f"{name} is missing", "run `uv sync`")
     if not missing:
-        message = f"{ITSELF} {installed(ITSELF)} and its {len(names)} required packages"
+        message = f"{DISTRIBUTION} {installed(DISTRIBUTION)} and its {len(names)} required packages"
         yield Diagnosed("ok", "packages", message)
     if packages := sorted(set(packages_distributions().get("cv2", ()))):
         opencv = ", ".join(f"{name} {installed(name)}" for name in packages)
         fix = "run `uv sync --reinstall`, which removes all but opencv-python-headless"
-        if installer(ITSELF) == "pip":
+        if installer(DISTRIBUTION) == "pip":
             fix = f"run `pip uninstall -y {' '.join(packages)}`, then `pip install opencv-python-headless`"
         alone = f"{opencv} is the only package that provides `cv2`"
         message = f"{len(packages)} packages provide `cv2` and overwrite each other ({opencv})"

@@ -1,4 +1,4 @@
-"""How skills use the arm: one user after another, each motion planned, checked and watched."""
+"""Motions of the arm for skills: plan, follow, carry an item, release an item."""
 
 from __future__ import annotations
 
@@ -13,31 +13,33 @@ from executive.manipulation.obstacles import list_obstacles
 from executive.skill import Skill, SkillFailed
 
 MAX_PLANS = 3
-"""Times that a motion is planned when what stands around changes meanwhile."""
+"""Largest number of times that a motion is planned, if the obstacles change during the planning."""
 
 
 def wait_for_rest(arm: Arm) -> Steps:
-    """Yield until the arm is at rest: whoever uses it next waits for the braking of whoever used it last."""
+    """Yield until the arm is at rest; an earlier skill may have left the arm braking."""
     while not arm.at_rest:
         yield
 
 
-def plan(skill: Skill, arm: Arm, ask: Callable[[], tuple[Goal | str, Task]]) -> Generator[None, None, Motion]:
-    """Yield until the arm rests and the motion that `ask` wants is planned, and return it.
+def plan(
+    skill: Skill, arm: Arm, find_goal: Callable[[], tuple[Goal | str, Task]]
+) -> Generator[None, None, Motion]:
+    """Yield until the arm is at rest and a motion is planned, and return the motion.
 
-    What is wanted is asked once more when the plan is there: if a look has shown something new meanwhile, it
-    is planned anew, a few times at most.
+    If `find_goal` returns another goal or task after the planning, because of a new look, the motion is
+    planned again.
 
     Raises:
-        SkillFailed: There is none; the reason is the skill's `unreachable` or `blocked`.
+        SkillFailed: No motion was found; the reason is `unreachable` or `blocked`.
     """
     yield from wait_for_rest(arm)
     for _ in range(MAX_PLANS):
-        goal, task = ask()
+        goal, task = find_goal()
         planning = arm.plan(goal, task)
         while not planning.ready:
             yield
-        if ask() == (goal, task):
+        if find_goal() == (goal, task):
             break
     try:
         return planning.result()
@@ -48,13 +50,13 @@ def plan(skill: Skill, arm: Arm, ask: Callable[[], tuple[Goal | str, Task]]) -> 
 
 
 def follow(skill: Skill, cell: Cell, motion: Motion, until: Callable[[], bool] = lambda: False) -> Steps:
-    """Yield while the arm follows `motion`, until it is at rest again.
+    """Yield while the arm follows `motion`, until the arm is at rest again.
 
-    The arm brakes along its path as soon as `until` holds, when it runs into something, and on any early
-    end of the skill.
+    The arm brakes along its path as soon as `until` returns True, after a collision, and if the skill is
+    halted.
 
     Raises:
-        SkillFailed: It ran into something; the reason is the skill's `blocked`.
+        SkillFailed: The arm collided with something; the reason is `blocked`.
     """
     arm = cell.arm
     arm.start(motion)
@@ -69,62 +71,63 @@ def follow(skill: Skill, cell: Cell, motion: Motion, until: Callable[[], bool] =
         raise skill.failed("blocked", arm.met)
 
 
-def carry(skill: Skill, cell: Cell, item: Item, goal: Goal, whither: str) -> Steps:
-    """Yield until `item` has been carried to `goal`, the tool's sensor watched all the way.
+def carry(skill: Skill, cell: Cell, item: Item, goal: Goal, destination: str) -> Steps:
+    """Yield until `item` has been carried to `goal`; the sensor of the tool is read in every control step.
 
     Args:
-        skill: Who carries.
+        skill: The skill that carries the item.
         cell: The work cell.
-        item: What the tool holds.
-        goal: Where to.
-        whither: The goal in words, for the text of an error.
+        item: Item in the tool.
+        goal: Goal of the motion.
+        destination: Name of the goal in error messages.
 
     Raises:
-        SkillFailed: There is no way, or the arm ran into something, and the tool holds the item still: the
-            reason is the skill's `unreachable` or `blocked`. Or the seal broke, for whatever cause: then the
-            arm is at rest, the tool open, the ledger told, and the reason is the skill's `dropped`.
+        SkillFailed: No motion was found, or the arm collided, and the tool still holds the item: the reason
+            is `unreachable` or `blocked`. Or the seal broke: then the arm is at rest, the tool is open, the
+            ledger has recorded the drop, and the reason is `dropped`.
     """
     try:
         motion = yield from plan(skill, cell.arm, lambda: (goal, task_of_carrying(cell, item)))
         yield from follow(skill, cell, motion, until=lambda: record_drop(cell, item))
     except SkillFailed:
-        # Whatever else went wrong: what the tool no longer holds cannot be put down.
+        # A lost item outranks the other failure: without the item, a put-down is impossible.
         if not record_drop(cell, item):
             raise
     if record_drop(cell, item):
         x, y, z = cell.arm.tool_pose.position
         cell.tool.open()
         raise skill.failed(
-            "dropped", f"the seal on {item} broke on the way to {whither}, near ({x:.2f}, {y:.2f}, {z:.2f}) m"
+            "dropped",
+            f"the seal on {item} broke on the way to {destination}, near ({x:.2f}, {y:.2f}, {z:.2f}) m",
         )
 
 
-def let_go(skill: Skill, cell: Cell, item: Item, wait: float, told: Callable[[], None]) -> Steps:
-    """Switch the vacuum off and yield for `wait` [s]; afterwards the tool's sensor says that it is empty.
+def let_go(skill: Skill, cell: Cell, item: Item, wait: float, record: Callable[[], None]) -> Steps:
+    """Switch the vacuum off and yield for `wait` [s]; afterwards the sensor must report an empty tool.
 
-    The ledger is `told` where the item went as soon as the tool is empty, also when the skill is taken away
-    meanwhile: what has fallen cannot be kept in the books as held.
+    `record` records the new place of the item in the ledger; it is called if the tool is empty, even if the
+    skill is halted during the wait.
 
     Raises:
-        SkillFailed: `item` still hangs on the tool; the reason is the skill's `stuck`.
+        SkillFailed: The item still hangs on the tool; the reason is `stuck`.
     """
     cell.tool.open()
     try:
         yield from cell.clock.sleep(wait)
     finally:
         if not cell.tool.holding:
-            told()
+            record()
     if cell.tool.holding:
         raise skill.failed("stuck", f"{item} hangs on the tool {wait:.2f} s after release")
 
 
 def task_of_moving(cell: Cell) -> Task:
-    """Return the task of going somewhere with whatever the tool holds."""
+    """Return the task of a motion with the present content of the tool."""
     held = cell.ledger.find_held_item()
     return Task(around=list_obstacles(cell)) if held is None else task_of_carrying(cell, held)
 
 
 def task_of_carrying(cell: Cell, item: Item) -> Task:
-    """Return the task of carrying `item`, which the tool holds."""
+    """Return the task of a motion with `item` in the tool."""
     kind = cell.classes[cell.ledger.get_label(item)]
     return Task(Load(kind, cell.tool.bears), list_obstacles(cell, item))

@@ -1,4 +1,4 @@
-"""What stands in the cell beyond what its file says: objects on the table and in the bins."""
+"""Obstacles that the cell file does not declare: objects on the table and in the bins."""
 
 from __future__ import annotations
 
@@ -12,18 +12,13 @@ from executive.cell.protocols import Cell
 from executive.errors import NoDepth
 
 MAX_ROLL_DISTANCE = 0.002
-"""How far an object in a bin may lie from where it was let go [m]."""
+"""Largest distance of an object in a bin from the place of its release [m]."""
 
 
-def list_obstacles(cell: Cell, but: Item | None = None) -> tuple[Obstacle, ...]:
-    """Return what stands in the cell beyond what its file says, the item `but` left out.
-
-    That is what the ledger believes on the table, and what lies in the bins (`count_used_slots`).
-    """
-    return (
-        *(obstacle_of(cell, target) for target in cell.ledger.find_objects_on_table() if target.item != but),
-        *_list_bin_contents(cell, but),
-    )
+def list_obstacles(cell: Cell, excluded: Item | None = None) -> tuple[Obstacle, ...]:
+    """Return the objects on the table and in the bins as obstacles, without the item `excluded`."""
+    targets = [one for one in cell.ledger.find_objects_on_table() if one.item != excluded]
+    return (*(obstacle_of(cell, target) for target in targets), *_list_bin_contents(cell, excluded))
 
 
 def shows_bin_content(cell: Cell, detection: Detection, frame: Frame) -> bool:
@@ -35,18 +30,18 @@ def shows_bin_content(cell: Cell, detection: Detection, frame: Frame) -> bool:
     return any(bin.contains(position, BIN_THICKNESS) for bin in cell.bins.values())
 
 
-def count_used_slots(cell: Cell, bin: str, but: Item | None = None) -> int:
-    """Return how many objects lie in `bin`, the item `but` not counted: the number of its next free slot.
+def count_used_slots(cell: Cell, bin: str, excluded: Item | None = None) -> int:
+    """Return the number of objects in `bin` without the item `excluded`: the index of the next free slot.
 
-    What the tool carries into the bin counts, so that a plan made meanwhile still holds when it was let go.
+    An item that is being carried into the bin counts, so that a plan stays valid after its release.
     """
     held = cell.ledger.find_held_item()
-    coming = held not in (None, but) and cell.bins[bin].contains(cell.arm.destination)
-    return cell.ledger.count_in(bin) + coming
+    is_arriving = held not in (None, excluded) and cell.bins[bin].contains(cell.arm.destination)
+    return cell.ledger.count_in(bin) + is_arriving
 
 
 def obstacle_of(cell: Cell, target: Target) -> Obstacle:
-    """Return what is in the way where a target stands."""
+    """Return a target as an obstacle."""
     x, y, middle = (float(value) for value in target.position)
     kind = cell.classes[target.label]
     return Obstacle(x, y, kind.radius, middle + kind.height / 2, target.item)
@@ -58,21 +53,16 @@ def max_object_height(cell: Cell) -> float:
 
 
 def layer_height(bin: Bin, layer: int, max_object_height: float) -> float:
-    """Return the height on which a layer of objects in a bin lies at most [m]; layer 0 is on the floor."""
+    """Return the largest height of the underside of a layer in a bin [m]; layer 0 lies on the floor."""
     return float(bin.position[2]) + BIN_THICKNESS + layer * max_object_height
 
 
-def _list_bin_contents(cell: Cell, but: Item | None) -> Iterator[Obstacle]:
-    """Yield what stands on the slots of bins that were used, the item `but` left out."""
-    widest, highest = max(kind.radius for kind in cell.classes.values()), max_object_height(cell)
-    for name, box in cell.bins.items():
-        count, slots = count_used_slots(cell, name, but), len(box.slots)
-        for number, (x, y) in enumerate(box.slots[:count]):
-            top = layer_height(box, (count - 1 - number) // slots + 1, highest)
-            yield Obstacle(
-                float(x),
-                float(y),
-                widest + MAX_ROLL_DISTANCE,
-                top,
-                f"what lies in slot {number + 1} of {name}",
-            )
+def _list_bin_contents(cell: Cell, excluded: Item | None) -> Iterator[Obstacle]:
+    """Yield an obstacle for each used slot of a bin, without the item `excluded`."""
+    max_radius, max_height = max(kind.radius for kind in cell.classes.values()), max_object_height(cell)
+    for name, bin in cell.bins.items():
+        count, slots = count_used_slots(cell, name, excluded), len(bin.slots)
+        for number, (x, y) in enumerate(bin.slots[:count]):
+            top = layer_height(bin, (count - 1 - number) // slots + 1, max_height)
+            label = f"what lies in slot {number + 1} of {name}"
+            yield Obstacle(float(x), float(y), max_radius + MAX_ROLL_DISTANCE, top, label)

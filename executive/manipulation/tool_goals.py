@@ -1,4 +1,4 @@
-"""Where the arm goes to: onto an object, into a bin, to a free place on the table."""
+"""Goals of the tool: on an object, over a slot of a bin, over a free place on the table."""
 
 from __future__ import annotations
 
@@ -22,23 +22,22 @@ from executive.manipulation.obstacles import (
 )
 
 DROP_HEIGHT = 0.01
-"""Height of an item's underside above a bin's floor, or the layer of objects there, when it is let go [m].
-
-A mission may say otherwise.
-"""
+"""Default height of an item's underside above the floor of a bin, or the layer of objects there, at its
+release [m]."""
 OVERTRAVEL = 0.015
-"""How far below the expected surface an approach searches for contact, unless the mission sets it [m]."""
+"""Default depth below the expected surface down to which an approach searches for contact [m]."""
 PROBE_CLEARANCE = 0.005
 """Height above the table down to which later attempts search for contact [m]."""
 ATTEMPTS_BEFORE_PROBE = 3
-"""Number of failed attempts after which an approach goes down almost to the table."""
+"""Number of failed attempts after which an approach descends almost to the table."""
 SPIRAL_SPACING = 0.0025
-"""Spacing of the spiral on which further attempts come down, unless a mission says otherwise [m]."""
+"""Default spacing of the spiral of contact points of further attempts [m]."""
 MIN_GAP = 0.02
-"""Room between the outlines of what is put down and what stands beside it [m]."""
+"""Smallest distance between the outlines of an object that is put down and of its neighbours [m]."""
 PLACES_PER_SIDE = 2
-"""How many places on each side of the safe one are considered for putting something down."""
+"""Number of candidate places on each side of the safe place for a put-down."""
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
+"""Angle between two successive points of a Vogel spiral [rad]."""
 
 
 def approach(
@@ -46,15 +45,15 @@ def approach(
 ) -> tuple[Goal, Task]:
     """Return goal and task of an approach to a point below the surface of `target`.
 
-    The last part of the motion is guarded: it stops on contact. Each further attempt comes down a little
-    beside the previous one. From the fourth attempt on, the motion ends almost at the table: if the tool
-    meets nothing, the item is a false detection.
+    The last part of the motion is guarded: the arm stops on contact. Each further attempt is offset from the
+    previous one. From the fourth attempt on, the motion ends almost at the table: without a contact, the item
+    is a false detection.
 
     Args:
         cell: The work cell.
-        target: What to touch.
-        overtravel: How far below the expected surface the first attempts search for contact [m], but not
-            below the target's middle.
+        target: Target to touch.
+        overtravel: Depth below the expected surface down to which the first attempts search for contact [m];
+            limited to half of the height.
         spacing: Spacing of the spiral of further attempts [m].
     """
     goal = goal_on_object(
@@ -82,11 +81,11 @@ def goal_on_object(
     """Return the goal of an approach to an object.
 
     Args:
-        kind: Its class.
-        position: Its centre `(3,)` [m].
-        descent: Length of the guarded part above its surface [m].
-        descent_speed: Tool speed of that part [m/s].
-        attempt: How many have failed before.
+        kind: Class of the object.
+        position: Centre of the object `(3,)` [m].
+        descent: Length of the guarded part above the expected surface [m].
+        descent_speed: Tool speed of the guarded part [m/s].
+        attempt: Number of failed attempts before this one.
         overtravel: See `approach`.
         spacing: See `approach`.
     """
@@ -111,10 +110,10 @@ def lowest_contact(kind: ObjectClass, middle: float, overtravel: float) -> float
 
 
 def nearest_first(cell: Cell, targets: Sequence[Target]) -> list[Target]:
-    """Return the targets that can be picked, in the order of their distance from where the arm will be.
+    """Return the targets that can be picked, in the order of their distance from the arm's destination.
 
-    A target can be picked if its item is open, sure and of a class with a route, and nothing has put its
-    position in doubt.
+    A target can be picked if its item is open and certain, its class has a route, and nothing may have moved
+    the item since its last detection.
     """
     ledger, here = cell.ledger, cell.arm.destination[:2]
     possible = [
@@ -129,7 +128,7 @@ def nearest_first(cell: Cell, targets: Sequence[Target]) -> list[Target]:
 
 
 def goal_in_bin(cell: Cell, bin: str, item: Item, drop: float = DROP_HEIGHT) -> Goal:
-    """Return the goal of a transit: over the next free slot of a bin, `drop` [m] above what is there."""
+    """Return the goal of a transit: `drop` [m] above the next free slot of a bin, or the layer there."""
     height = cell.classes[cell.ledger.get_label(item)].height
     return goal_over_slot(
         cell.bins[bin], count_used_slots(cell, bin, item), height, max_object_height(cell), drop
@@ -143,48 +142,47 @@ def goal_over_slot(
 
     Args:
         bin: The bin.
-        number: Of the slot; from the number of slots on, those of the next layer.
-        height: Of what is carried [m].
+        number: Number of objects in the bin before; with every slot used, the next layer begins.
+        height: Height of the carried object [m].
         max_object_height: Height of the tallest objects that may lie in a layer below [m].
-        drop: Of the underside above that layer, or the floor [m].
+        drop: Height of the underside of the carried object above that layer, or the floor [m].
     """
-    layer, place = divmod(number, len(bin.slots))
-    x, y = (float(value) for value in bin.slots[place])
+    layer, slot = divmod(number, len(bin.slots))
+    x, y = (float(value) for value in bin.slots[slot])
     return Goal((x, y, layer_height(bin, layer, max_object_height) + height + drop))
 
 
 def goal_aside(cell: Cell, kind: ObjectClass, drop: float, item: Item | None = None) -> Goal:
-    """Return the goal of putting an object down: `drop` [m] above the free place nearest the safe one.
+    """Return the goal of a put-down: `drop` [m] above the free place nearest to the safe place.
 
-    A place is free where nothing is believed to stand and no bin is; if none is far and wide, it is the safe
-    place itself.
+    A place is free if neither an obstacle nor a bin is there. If no candidate is free, the goal is the safe
+    place. The obstacles do not include `item`.
     """
-    apart = 2 * kind.radius + MIN_GAP
+    pitch = 2 * kind.radius + MIN_GAP
     x, y, floor = (float(value) for value in cell.safe_place)
-    steps = [step * apart for step in range(-PLACES_PER_SIDE, PLACES_PER_SIDE + 1)]
-    places = [
-        (x + dx, y + dy) for dx, dy in sorted(product(steps, steps), key=lambda step: math.hypot(*step))
-    ]
-    room = kind.radius + MIN_GAP
-    place = next((place for place in places if _is_free(cell, np.array(place), room, item)), (x, y))
+    offsets = [step * pitch for step in range(-PLACES_PER_SIDE, PLACES_PER_SIDE + 1)]
+    nearest = sorted(product(offsets, offsets), key=lambda offset: math.hypot(*offset))
+    places = [(x + dx, y + dy) for dx, dy in nearest]
+    radius = kind.radius + MIN_GAP
+    place = next((place for place in places if _is_free(cell, np.array(place), radius, item)), (x, y))
     return Goal((*place, floor + kind.height + drop))
 
 
-def _is_free(cell: Cell, place: Array, radius: float, but: Item | None) -> bool:
-    """Tell whether nothing else is within `radius` [m] of a place `(2,)` [m] on the table."""
+def _is_free(cell: Cell, place: Array, radius: float, excluded: Item | None) -> bool:
+    """Return True if nothing but `excluded` is within `radius` [m] of a place `(2,)` [m] on the table."""
     if any(bin.contains(place, radius + BIN_THICKNESS) for bin in cell.bins.values()):
         return False
     return all(
         math.dist(place, (obstacle.x, obstacle.y)) > radius + obstacle.radius
-        for obstacle in list_obstacles(cell, but)
+        for obstacle in list_obstacles(cell, excluded)
     )
 
 
 def _attempt_offset(attempt: int, ring: float, spacing: float) -> tuple[float, float]:
-    """Return the sideways step (x, y) [m] of an attempt: a point of the ring, or of Vogel's spiral.
+    """Return the horizontal offset (x, y) [m] of an attempt: a point of the ring, or of a Vogel spiral.
 
-    The turn of a part is not known, and any point of its ring is as good as another. The spiral begins in
-    the middle.
+    The orientation of a part is unknown, and each point of its ring is equally suitable. The spiral begins
+    at the centre.
     """
     angle = attempt * GOLDEN_ANGLE
     distance = ring or spacing * math.sqrt(attempt)

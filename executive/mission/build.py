@@ -11,13 +11,13 @@ from executive.errors import InputError
 from executive.events import Emit
 from executive.mission.load import LoadedMission
 from executive.mission.model.grammar import SEQUENCE
-from executive.mission.model.instance import instance
+from executive.mission.model.instance import make_instance
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
 from executive.mission.model.typed import convert
-from executive.mission.model.wiring import literals, wires
+from executive.mission.model.wiring import find_literals, find_wires
 from executive.skill import Direction, Param, Port, Skill
 from executive.tree.blackboard import Blackboard
-from executive.tree.node import ControlNode, Site
+from executive.tree.node import ControlNode, NodeContext
 from executive.tree.registry import ControlNodes, control_nodes
 from executive.tree.skill_leaf import SkillLeaf, Wiring
 
@@ -42,8 +42,8 @@ def build(
         InputError: A pattern fits no node that runs a skill.
     """
     builder = Builder(skills, cell, blackboard, emit, substitutes or {})
-    root = builder.node(loaded.tree)
-    if unused := [pattern for pattern in builder.substitutes if pattern not in builder.used]:
+    root = builder.build_node(loaded.tree)
+    if unused := [pattern for pattern in builder.substitutes if pattern not in builder.matched_patterns]:
         paths = [node.path for node in root.iterate() if isinstance(node, SkillLeaf)]
         raise InputError(f'no node is called "{unused[0]}"; there are: {", ".join(paths)}')
     return root
@@ -58,36 +58,38 @@ class Builder:
     blackboard: Blackboard
     emit: Emit
     substitutes: Mapping[str, type[Skill]] = field(default_factory=dict)
-    used: list[str] = field(default_factory=list)
-    control: ControlNodes = field(default_factory=control_nodes)
+    matched_patterns: list[str] = field(default_factory=list)
+    node_classes: ControlNodes = field(default_factory=control_nodes)
 
-    def node(self, node: Node) -> TreeNode:
+    def build_node(self, node: Node) -> TreeNode:
         """Return the behaviour for a node."""
-        site = Site(node.path, self.cell.clock, self.blackboard, node.label, self.emit)
+        context = NodeContext(node.path, self.cell.clock, self.blackboard, node.label, self.emit)
         match node:
             case SkillNode():
-                return self._skill(site, node)
+                return self._build_skill_leaf(context, node)
             case InnerNode():
-                return instance(node, site, self.node)
+                return make_instance(node, context, self.build_node)
             case UseNode(body=Node() as written):
-                body = self.node(written)
-                root = self.control[SEQUENCE](site, do=(body,)) if node.label else body
+                body = self.build_node(written)
+                root = self.node_classes[SEQUENCE](context, do=(body,)) if node.label else body
                 root.subtrees = (node.name, *root.subtrees)
                 return root
         raise AssertionError(f"a checked mission has no {type(node).__name__}")
 
-    def _skill(self, site: Site, node: SkillNode) -> TreeNode:
+    def _build_skill_leaf(self, context: NodeContext, node: SkillNode) -> TreeNode:
         skill = self.skills[node.skill]
         declared: dict[str, Param | Port] = {**skill.params, **skill.ports}
         wiring = Wiring(
-            constants={name: convert(value.value, declared[name].type) for name, value in literals(node)},
-            inputs={wire.port.name: wire.variable for wire in wires(node, skill, Direction.IN)},
-            outputs={wire.port.name: wire.variable for wire in wires(node, skill, Direction.OUT)},
+            constants={
+                name: convert(value.value, declared[name].type) for name, value in find_literals(node)
+            },
+            inputs={wire.port.name: wire.variable for wire in find_wires(node, skill, Direction.IN)},
+            outputs={wire.port.name: wire.variable for wire in find_wires(node, skill, Direction.OUT)},
         )
-        runs = self._substitute(node.path) or skill
-        return SkillLeaf(site, node.skill, runs, wiring, self.cell)
+        runs = self._find_substitute(node.path) or skill
+        return SkillLeaf(context, node.skill, runs, wiring, self.cell)
 
-    def _substitute(self, path: str) -> type[Skill] | None:
+    def _find_substitute(self, path: str) -> type[Skill] | None:
         fitting = [pattern for pattern in self.substitutes if fnmatchcase(path, pattern)]
-        self.used.extend(fitting)
+        self.matched_patterns.extend(fitting)
         return self.substitutes[fitting[0]] if fitting else None

@@ -11,9 +11,9 @@ from functools import lru_cache
 from executive.errors import InputError, shorten_quotations
 from executive.mission.source import Mark
 
-_WINDOW = 140
+_MAX_EXCERPT_LENGTH = 140
 """Largest number of characters of a source line that a finding shows."""
-_MOST_LISTED = 24
+_MAX_ALTERNATIVES = 24
 MAX_PRINTED_FINDINGS, MAX_LISTED_FINDINGS = 50, 1000
 """Largest numbers of findings that a message and `--json` list; a message counts the others."""
 _SECRET = re.compile(
@@ -33,7 +33,7 @@ CODES = frozenset({
     "unused-tree", "unwritten", "wrong-length", "wrong-type", "wrong-value", "yaml",
 })  # fmt: skip
 """Every code of a finding."""
-_OF_A_VALUE = frozenset({
+_VALUE_CODES = frozenset({
     "wrong-type", "wrong-value", "out-of-range", "port-type", "unwritten",
     "unknown-bin", "unknown-class", "unknown-detector", "unknown-pose", "unseen-class",
 })  # fmt: skip
@@ -68,12 +68,12 @@ class Finding:
 
     @property
     def shown_excerpt(self) -> str:
-        """The part of the source line around the place, of at most `_WINDOW` characters."""
-        return self.excerpt[self._excerpt_start : self._excerpt_start + _WINDOW]
+        """The part of the source line around the place, of at most `_MAX_EXCERPT_LENGTH` characters."""
+        return self.excerpt[self._excerpt_start : self._excerpt_start + _MAX_EXCERPT_LENGTH]
 
     @property
     def _excerpt_start(self) -> int:
-        return max(0, self.col - _WINDOW // 2) if len(self.excerpt) > _WINDOW else 0
+        return max(0, self.col - _MAX_EXCERPT_LENGTH // 2) if len(self.excerpt) > _MAX_EXCERPT_LENGTH else 0
 
     def __str__(self) -> str:
         place = f"{self.path}:{self.line}:{self.col}" if self.line else self.path
@@ -146,7 +146,7 @@ def in_file_order(findings: Iterable[Finding], first: str) -> tuple[Finding, ...
     """
     unique: dict[tuple[str, int, int, str], Finding] = {}
     for finding in findings:
-        sort = finding.code if finding.code in _OF_A_VALUE else str(finding)
+        sort = finding.code if finding.code in _VALUE_CODES else str(finding)
         unique.setdefault((finding.path, finding.line, finding.col, sort), finding)
     return tuple(sorted(unique.values(), key=lambda f: (f.path != first, f.path, f.line, f.col)))
 
@@ -162,6 +162,6 @@ def alternatives(word: str, known: Iterable[str], lead: str) -> str:
     """Return a hint: the likely meaning of `word`, then `lead` and every known word."""
     known = list(known)
     meant = suggest(word, known)
-    more = f" and {len(known) - _MOST_LISTED} more" if len(known) > _MOST_LISTED else ""
-    listed = f"{lead}: {', '.join(known[:_MOST_LISTED]) or 'none'}{more}."
+    more = f" and {len(known) - _MAX_ALTERNATIVES} more" if len(known) > _MAX_ALTERNATIVES else ""
+    listed = f"{lead}: {', '.join(known[:_MAX_ALTERNATIVES]) or 'none'}{more}."
     return f'Did you mean "{meant}"? {listed}' if meant else listed

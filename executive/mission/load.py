@@ -14,7 +14,7 @@ from executive.mission.check.case import Case
 from executive.mission.check.checks import check
 from executive.mission.expand.expand import expand
 from executive.mission.findings import Finding, MissionError, in_file_order, warning
-from executive.mission.flow.endings import Ending, endings
+from executive.mission.flow.endings import Ending, find_endings
 from executive.mission.model.mission import Mission
 from executive.mission.model.nodes import Node, UnknownNode
 from executive.mission.model.paths import with_paths
@@ -115,7 +115,7 @@ def load_mission(
         )
     return LoadedMission(
         mission, tree, config, files.source.text, file, files.cell_path, files.libraries,
-        endings(case.flow), ordered, dict(overrides or {}),
+        find_endings(case.flow), ordered, dict(overrides or {}),
     )  # fmt: skip
 
 

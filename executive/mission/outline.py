@@ -38,7 +38,7 @@ class OutlineNode:
         name: What it is called, after what it is to its parent: `Grasp`, `recover: look`, `do`.
         depth: How many nodes are above it.
         detail: What the mission says about it, in a few words.
-        kind: `skill`, or the word of a control node.
+        kind: `skill`, or the keyword of a control node.
         symbol, shape: Its symbol and its Graphviz shape in drawings; "" for a skill.
         title: What it is called without regard to its parent: label, skill or word.
         slot: What it is to its parent: `do`, `recover`, `catch 1`; "" in a list.
@@ -106,7 +106,7 @@ def _outline(node: Behaviour, parent: Behaviour | None, depth: int = 0) -> Itera
     title = label or facts.get("skill") or facts["kind"]
     subtrees = tuple(getattr(node, "subtrees", ()))
     slot = _slot(place, parent, node, title, subtrees) if parent else ""
-    when = parent.when(node) if isinstance(parent, ControlNode) else ""
+    when = parent.describe_trigger(node) if isinstance(parent, ControlNode) else ""
     yield OutlineNode(
         path, _name(place), depth, detail, title=title, subtrees=subtrees, slot=slot, when=when, **facts
     )
@@ -121,7 +121,7 @@ def _path(node: Behaviour) -> str:
 def _inner_facts(node: Behaviour) -> dict[str, str]:
     """Return the facts of a control node; a stock py_trees behaviour has the name of its class."""
     if isinstance(node, ControlNode):
-        return {"kind": node.word, "symbol": node.symbol, "shape": node.shape}
+        return {"kind": node.keyword, "symbol": node.symbol, "shape": node.shape}
     return {"kind": type(node).__name__.lower(), "symbol": ControlNode.symbol, "shape": ControlNode.shape}
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from executive.mission.findings import suggest
 
-_WANTED = {
+_TYPE_PHRASES = {
     "string_type": "a text",
     "int_type": "a whole number",
     "int_from_float": "a whole number",
@@ -23,7 +23,7 @@ _WANTED = {
     "dataclass_type": "a mapping",
     "none_required": "left empty",
 }
-_TRUTHS = {"yes": "true", "on": "true", "no": "false", "off": "false"}
+_BOOLEAN_WORDS = {"yes": "true", "on": "true", "no": "false", "off": "false"}
 _WITH_UNIT = re.compile(r"[-+]?[0-9.]+ *[A-Za-z]+")
 _BOUNDS = {
     "greater_than": ("more than", "gt"),
@@ -50,8 +50,8 @@ def violation(problem: Mapping[str, Any]) -> str:
     """Return what one of pydantic's errors says, to follow the name of the value."""
     kind, given = problem["type"], problem["input"]
     context = problem.get("ctx", {})
-    if kind in _WANTED:
-        return f"must be {_WANTED[kind]}, not {describe(given)}{_meant(kind, given)}"
+    if kind in _TYPE_PHRASES:
+        return f"must be {_TYPE_PHRASES[kind]}, not {describe(given)}{_meant(kind, given)}"
     if kind in _BOUNDS:
         words, key = _BOUNDS[kind]
         return f"must be {words} {context[key]:g}, not {describe(given)}"
@@ -70,8 +70,8 @@ def violation(problem: Mapping[str, Any]) -> str:
 
 def _meant(kind: str, given: object) -> str:
     """Return what was probably meant, in brackets, or ""."""
-    if kind == "bool_type" and isinstance(given, str) and given.lower() in _TRUTHS:
-        return f" (write {_TRUTHS[given.lower()]})"
+    if kind == "bool_type" and isinstance(given, str) and given.lower() in _BOOLEAN_WORDS:
+        return f" (write {_BOOLEAN_WORDS[given.lower()]})"
     if kind in ("float_type", "int_type") and isinstance(given, str) and _WITH_UNIT.fullmatch(given):
         return " (write the number without its unit)"
     return ""

@@ -1,1 +1,1 @@
-"""The tick loop, the person beside the cell, and the installed kinds of cells."""
+"""Assembly, tick loop, control and end of a run, and its operator."""

@@ -31,12 +31,12 @@ class RunOptions:
     """Options of a run.
 
     Attributes:
-        seed: Seed of everything random.
-        requests: Answers of the operator; None: ask at the terminal and the control of the run.
+        seed: Seed of all random numbers.
+        requests: Answers of the operator; None: a person answers at the terminal or in a view.
         keyboard: True if a person can type at the terminal.
-        gui: Show the simulated world in a window.
-        realtime: Pace the run by the wall clock.
-        kind: Makes the work cell; None: the installed kind that the cell file names.
+        gui: True to show the simulated world in a window.
+        realtime: True to pace the run by the wall clock.
+        kind: Kind of the work cell; None: the installed kind that the cell file names.
         substitutes: Skills that replace the skills of nodes, by a pattern of the paths of the nodes
             (`*/Grasp`).
         scene: File that changes the world of a simulated cell; None: as the cell file declares it.
@@ -113,8 +113,8 @@ def assemble_resumed(
         InputError: The cell is of a kind that is not installed, or its world cannot be rebuilt.
     """
     parts = _Parts(loaded, skills, options)
-    frames, turns = (log.number_of_answers(f"camera.{name}") for name in ("frame", "next_pose"))
-    inner = parts.build_cell(ResumePoint(world, frames, turns), log.number_of(RequestGiven))
+    frames, pose_changes = (log.number_of_answers(f"camera.{name}") for name in ("frame", "next_pose"))
+    inner = parts.build_cell(ResumePoint(world, frames, pose_changes), log.number_of(RequestGiven))
     last = log.interruption_after(inner.steps, inner.last_command, is_complete=is_complete)
     return parts.build_resumed_run(inner, log, None if has_ended else last)
 
@@ -133,7 +133,7 @@ def assemble_replay(
 
 
 class _Parts:
-    """Parts of a run, which are built one after the other.
+    """Builder of the parts of a run.
 
     Attributes:
         context: Cell and events of the run; it is connected to the cell before the tree is built.
@@ -151,19 +151,19 @@ class _Parts:
         self.context = RunContext(observers)
         self.control = RunControl()
 
-    def build_cell(self, resume: ResumePoint | None = None, served: int = 0) -> Workcell:
+    def build_cell(self, resume: ResumePoint | None = None, served_requests: int = 0) -> Workcell:
         """Return the work cell of the run.
 
         Args:
             resume: State in which an interrupted run left the cell; None for a new run.
-            served: Number of requests that the interrupted run has served.
+            served_requests: Number of requests that the operator of the interrupted run had given.
         """
         loaded, options, emit = self._loaded, self._options, self.context.emit
         operator: Operator
         if options.requests is None:
             operator = TerminalOperator(emit, self.control, keyboard=options.keyboard)
         else:
-            operator = ScriptedOperator(options.requests, tuple(loaded.routes), emit, served)
+            operator = ScriptedOperator(options.requests, tuple(loaded.routes), emit, served_requests)
         cell_options = CellOptions(
             operator, loaded.cell_path.parent, options.gui, resume=resume, scene=options.scene
         )

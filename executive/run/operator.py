@@ -1,4 +1,4 @@
-"""Operators beside the cell: a list of requests, or a person at the terminal."""
+"""Operators: a list of requests, or a person at the terminal."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from executive.events import Emit, OperatorAsked, RequestGiven
 from executive.run.run_control import RunControl
 
 RESCAN = "rescan"
-MAX_WAIT_SLICE = 0.1
-"""Time for which a wait for the keyboard lasts at once, so that a stop is noticed [s]."""
+KEYBOARD_POLL_PERIOD = 0.1
+"""Time between two checks whether the run has to halt, while the operator is asked [s]."""
 
 
 class ScriptedOperator:
-    """Gives the answers of a list, then quits; every answer is emitted as an event.
+    """Operator that gives the requests of a list, then quits; each request is emitted as an event.
 
     Args:
         requests: The list.
         choices: Classes that can be requested.
         emit: Takes the events.
-        served: Number of requests of the list that an interrupted run has already served.
+        served: Number of requests of the list that were given before an interruption of the run.
 
     Raises:
         InputError: A request names none of the `choices`.
@@ -44,11 +44,11 @@ class ScriptedOperator:
 
 
 class TerminalOperator:
-    """Asks at the terminal; the run's clock stands still meanwhile, and Ctrl-C works.
+    """Operator at the terminal; the clock of the run stands still during a question, and Ctrl-C works.
 
     Args:
         emit: Takes the events.
-        control: Tells whether the run has to halt, and gives answers from elsewhere, for instance a browser.
+        control: Control of the run, which also gives answers from other sources, such as a browser.
         keyboard: True if a person can type at the terminal; otherwise only `control` gives answers.
     """
 
@@ -56,12 +56,12 @@ class TerminalOperator:
         self._emit, self._control, self._keyboard = emit, control, keyboard
 
     def ask(self, choices: Sequence[str]) -> str | None:
-        """Return the class typed, `rescan`, or None for `q` or the end of the input.
+        """Return the typed class, `rescan`, or None for `q` or the end of the input.
 
         Raises:
             Stopped: The run has to halt.
         """
-        # An answer without a question, such as a second click, must not pick anything.
+        # An answer from before the question, such as a second click, must have no effect.
         while self._control.take_request() is not None:
             pass
         self._emit(OperatorAsked(list(choices)))
@@ -83,8 +83,8 @@ class TerminalOperator:
                 sys.stderr.write("\n" if self._keyboard else "")
                 return word or "?"
             if not self._keyboard:
-                time.sleep(MAX_WAIT_SLICE)
-            elif select.select([sys.stdin], [], [], MAX_WAIT_SLICE)[0]:
+                time.sleep(KEYBOARD_POLL_PERIOD)
+            elif select.select([sys.stdin], [], [], KEYBOARD_POLL_PERIOD)[0]:
                 return sys.stdin.readline()
         raise Stopped("the run has to halt, and nothing was requested")
 

@@ -1,4 +1,4 @@
-"""How a run ended."""
+"""End of a run: its status, and the problems found at its end."""
 
 from __future__ import annotations
 
@@ -27,27 +27,27 @@ class LoopEnd:
 
 
 HALTED = LoopEnd("HALTED", "halted", "halted by the user")
-"""Somebody wanted the run to end."""
+"""End of a run that a person halted."""
 
 
 def end_of_tree(failure: Failure | None) -> LoopEnd:
-    """Return the end of a run whose tree ended with a failure or None; its items are not judged yet."""
+    """Return the end of a run whose tree failed, or succeeded (None), before the check of the items."""
     if failure is None:
         return LoopEnd("SUCCESS")
     return LoopEnd("FAILURE", str(failure), failure.message, failure.path)
 
 
-def problems_of(do: Callable[[], None]) -> list[str]:
-    """Do one part of the end of a run and return its error, if any, so that the other parts are done, too."""
+def collect_problems(action: Callable[[], None]) -> list[str]:
+    """Call one part of the end of a run, and return its exception as text, so that the other parts follow."""
     try:
-        do()
+        action()
     except Exception as error:
         return [str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"]
     return []
 
 
 def judge_items(accounts: Accounts) -> LoopEnd:
-    """Return the end of a run whose tree succeeded: its items decide whether it is a success."""
+    """Return the end of a run whose tree succeeded; lost or rejected items change its status."""
     items = accounts.summaries()
     lost = [item.item for item in items if item.state == "lost"]
     if lost:
@@ -60,11 +60,11 @@ def judge_items(accounts: Accounts) -> LoopEnd:
     return LoopEnd("SUCCESS")
 
 
-def close_books(accounts: Accounts, *, completed: bool) -> None:
-    """Have the ledger decide the final state of each item, and check the balance.
+def close_accounts(accounts: Accounts, *, completed: bool) -> None:
+    """Let the ledger decide the final state of each item, and check the balance.
 
     Raises:
-        Fault: The number of items seen is not the sum of those placed, rejected, skipped and lost.
+        Fault: The number of seen items is not the sum of the placed, rejected, skipped and lost ones.
     """
     accounts.close(completed=completed)
     counts = accounts.balance()

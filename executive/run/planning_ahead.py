@@ -17,8 +17,8 @@ class PlanningAhead:
     `sort_overhead` and `sort_wrist`, `SelectTarget` later chose that target in all 222 approaches that
     followed a transit.
 
-    Planning ahead never changes a decision of the run. It uses the real cell instead of the recorded one, so
-    nothing of it is recorded and a replay does not need it.
+    Planning ahead never changes a decision of the run. Its reads of the cell are not recorded, so a replay
+    works without it.
 
     Args:
         cell: The real cell, whose answers are not recorded.
@@ -35,18 +35,16 @@ class PlanningAhead:
         event = timed.event
         if isinstance(event, TargetSelected):
             item, bin = event.item, event.bin
-            # A skill may choose an item or a bin that the cell does not know; then no motion can be planned.
-            known = bin in self._cell.bins and item in {
-                target.item for target in self._cell.ledger.find_targets()
-            }
-            self._selected = (item, bin) if known else None
+            # If a skill selects an item or a bin that the cell does not know, no motion can be planned.
+            items = {target.item for target in self._cell.ledger.find_targets()}
+            self._selected = (item, bin) if bin in self._cell.bins and item in items else None
         elif isinstance(event, ToolCommanded):
             self._is_closing = event.action == "close"
         elif isinstance(event, FrameSearched | MotionPlanned):
             self._approach_is_outdated = True
 
     def step(self) -> None:
-        """Plan ahead if this control step showed which motion comes next; called after each tick."""
+        """Plan the next motion as soon as it is known; called after each tick."""
         cell = self._cell
         if self._is_closing and self._selected and cell.ledger.find_held_item() is None and cell.tool.holding:
             self._is_closing = False
@@ -58,8 +56,8 @@ class PlanningAhead:
                 cell.arm.plan_ahead(*approach(cell, target))
 
     def _is_delivering(self) -> bool:
-        """Return True if the present motion takes a held item over a bin: the next approach starts there."""
+        """Return True if the arm carries a held item to a bin, from which the next approach starts."""
         if self._cell.ledger.find_held_item() is None:
             return False
-        end = self._cell.arm.destination
-        return any(bin.contains(end) for bin in self._cell.bins.values())
+        destination = self._cell.arm.destination
+        return any(bin.contains(destination) for bin in self._cell.bins.values())

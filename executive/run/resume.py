@@ -1,4 +1,4 @@
-"""Run that was interrupted: it replays its recorded inputs and resumes where it was interrupted."""
+"""Resumption of an interrupted run: its recorded inputs are replayed, then the real cell takes over."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ from executive.tree.skill_leaf import SkillLeaf
 class ResumedRun(Run):
     """Run on a cell that replays an interrupted run, and may continue on the real cell.
 
-    At each recorded interruption it does the same as the run that was resumed there. Observers get all
-    events, recorders only the events from the moment at which the real cell takes over.
+    At each recorded interruption, the run repeats the actions of the earlier resumption. Observers get all
+    events; recorders get only the events after the real cell has taken over.
 
     Args:
         context: Cell and events of the run.
-        replayed: The work cell of `context`.
+        replayed: Work cell of `context`, which replays the recorded run.
         root: The tree.
         control: Stops, pauses and steps the run.
         mission: Name of the mission.
-        realtime: Pace the run by the wall clock once the real cell has taken over.
+        realtime: True to pace the run by the wall clock after the real cell has taken over.
 
     Attributes:
-        replayed: The work cell.
+        replayed: Work cell that replays the recorded run.
     """
 
     def __init__(
@@ -63,11 +63,11 @@ class ResumedRun(Run):
         control.between_ticks(self._follow_record)
 
     def record(self, recorder: Observer) -> None:
-        """Call `recorder` with every event from the moment at which the real cell takes over."""
+        """Call `recorder` with every event after the real cell has taken over."""
         self._recorders.append(recorder)
 
     def _execute_tree(self) -> RunEnded:
-        """Execute the run as often as it ended as INCOMPLETE and was resumed, and return the last outcome."""
+        """Execute the tree, again after each recorded resumption of an INCOMPLETE end; return its end."""
         outcome = super()._execute_tree()
         while outcome.status == "INCOMPLETE" and self.replayed.is_reopened:
             self._context.advance()
@@ -75,7 +75,7 @@ class ResumedRun(Run):
         return outcome
 
     def _follow_record(self) -> None:
-        """Stop or resume where the recorded run was stopped or resumed; called between two ticks."""
+        """Stop or resume in the same control step as the recorded run; called between two ticks."""
         replayed = self.replayed
         while not replayed.is_live and not replayed.is_over and replayed.interruption is not None:
             self._resume(replayed.interruption)
@@ -83,7 +83,7 @@ class ResumedRun(Run):
             self.control.stop()
 
     def _resume(self, interruption: Interruption) -> None:
-        """Continue after an interruption, in which nothing observed the cell.
+        """Continue after an interruption, during which nothing observed the cell.
 
         Raises:
             Fault: The arm did not come to rest.
@@ -91,7 +91,7 @@ class ResumedRun(Run):
         context, replayed = self._context, self.replayed
         replayed.resume()
         if replayed.is_live:
-            # Not recorded: if the braking is interrupted, the run is resumed at the same control step.
+            # The braking is not recorded: after an interruption, the run is resumed at the same control step.
             require_rest(lambda: come_to_rest(replayed.inner.cell, replayed.inner.advance))
             for recorder in self._recorders:
                 context.observe(recorder, first=True)
@@ -102,10 +102,10 @@ class ResumedRun(Run):
             ticked, intent = interruption.complete, interruption.last_action
             context.emit(RunResumed(ticked, intent, dict(versions())))
         self._is_scene_known &= interruption.last_action != UNKNOWN_ACTION
-        # The arm is no longer where the skills left it: no skill may open the tool there at its end.
         if self._is_scene_known:
             restart_skills(self.root)
         else:
+            # The arm may be elsewhere than the journal says: a halted skill must not open the tool there.
             with replayed.muted(), contextlib.suppress(Fault):
                 restart_skills(self.root)
         require_rest(context.come_to_rest)
@@ -117,7 +117,7 @@ class ResumedRun(Run):
             self._recover_scene()
 
     def _recover_scene(self) -> None:
-        """Observe the scene; after an interruption or a stop meanwhile, the scene stays unknown."""
+        """Observe the scene; the scene stays unknown if the run is interrupted or stopped meanwhile."""
         for _ in recover_scene(self._context.cell):
             self._context.advance()
             replayed = self.replayed
@@ -143,7 +143,7 @@ def restart_skills(root: Behaviour) -> None:
     Control nodes keep their state: the count of attempts continues, and variables keep their values.
 
     Raises:
-        Fault: The clean-up of a skill failed; all the others were halted none the less.
+        Fault: The clean-up of a skill failed; all other skills were halted nevertheless.
     """
     running = [
         node for node in root.iterate() if isinstance(node, SkillLeaf) and node.status is Status.RUNNING
@@ -164,7 +164,7 @@ def reconcile(cell: Cell, last_action: str) -> None:
     """
     believed, holding = cell.ledger.find_held_item(), cell.tool.holding
     if believed is None and holding:
-        # The interruption came after the seal and before the lift: the ledger does not know of the grasp.
+        # The run was interrupted between the seal and its record in the ledger, before the lift.
         cell.tool.open()
     elif believed is not None and not holding and last_action == "close":
         cell.tool.open()

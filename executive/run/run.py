@@ -17,10 +17,10 @@ from executive.mission.build import TreeNode
 from executive.run.outcome import (
     HALTED,
     LoopEnd,
-    close_books,
+    close_accounts,
+    collect_problems,
     end_of_tree,
     judge_items,
-    problems_of,
 )
 from executive.run.run_context import RunContext
 from executive.run.run_control import RunControl
@@ -29,15 +29,15 @@ from executive.tree.halting import halt
 
 
 class Run:
-    """A tree on a work cell, which is executed once.
+    """One execution of a tree on a work cell.
 
     Args:
         context: Cell and events of the run.
         root: The tree, which uses the cell and the events of `context`.
         control: Stops, pauses and steps the run.
         mission: Name of the mission.
-        start: The first event; None: the run continues an earlier one.
-        realtime: Pace the run by the wall clock.
+        start: The first event; None if the run continues an earlier one.
+        realtime: True to pace the run by the wall clock.
 
     Attributes:
         root: The tree.
@@ -60,7 +60,7 @@ class Run:
         self._start = start
         self._realtime = realtime
         self._wall_start = 0.0
-        """Wall time at which the run's clock showed 0, if the run is paced [s]."""
+        """Wall time at time 0 of the run's clock, if the run is paced [s]."""
         self._held_item, self._is_empty = "", False
 
     @property
@@ -92,15 +92,15 @@ class Run:
         Ctrl-C halts the tree and brakes the arm; a second one ends the process at once.
         """
         outcome = self._execute_tree()
-        if broken := problems_of(lambda: self._context.emit(outcome)):
-            outcome = replace(outcome, status="FAULT", reason="fault", message=broken[0], node="")
+        if problems := collect_problems(lambda: self._context.emit(outcome)):
+            outcome = replace(outcome, status="FAULT", reason="fault", message=problems[0], node="")
         return outcome
 
     def items(self) -> dict[str, Any]:
         """Return the ledger's balance, its `unknown` and `doubts`, and a row per item as `rows`."""
         accounts = self.workcell.accounts
-        more = {"unknown": accounts.unknown, "doubts": accounts.doubts, "rows": accounts.summaries()}
-        return {**accounts.balance(), **more}
+        details = {"unknown": accounts.unknown, "doubts": accounts.doubts, "rows": accounts.summaries()}
+        return {**accounts.balance(), **details}
 
     def audit(self) -> Mapping[str, int] | None:
         """Return the true final counts of the objects, or None if they are unknown; only after `execute`."""
@@ -117,12 +117,12 @@ class Run:
             ending = self._tick_to_end()
             problems = [*halt(self.root), *filter(None, [context.come_to_rest()])]
         if ending.traceback:
-            # After braking: a record that cannot be written must not keep the arm from braking.
-            problems += problems_of(lambda: context.emit(FaultRaised(ending.traceback)))
+            # The arm brakes first: a full disk must not prevent the braking.
+            problems += collect_problems(lambda: context.emit(FaultRaised(ending.traceback)))
         succeeded = ending.status == "SUCCESS"
-        problems += problems_of(self._ask_tool)
-        problems += problems_of(self._ask_ledger)
-        problems += problems_of(lambda: close_books(self.workcell.accounts, completed=succeeded))
+        problems += collect_problems(self._note_held_item)
+        problems += collect_problems(self._note_empty_table)
+        problems += collect_problems(lambda: close_accounts(self.workcell.accounts, completed=succeeded))
         if problems and ending.status == "FAULT":
             ending = replace(ending, message="; ".join([ending.message, *problems]))
         elif problems:
@@ -131,7 +131,7 @@ class Run:
 
     def _tick_to_end(self) -> LoopEnd:
         """Tick the tree once in every control step until it ends, or until the run is stopped."""
-        context, control, ticked = self._context, self.control, False
+        context, control, is_tree_ticked = self._context, self.control, False
         try:
             if self._start is not None:
                 context.emit(self._start)
@@ -139,7 +139,7 @@ class Run:
             self._wall_start = time.monotonic() - context.now
             control.wait()
             while not control.stopped:
-                ticked = True
+                is_tree_ticked = True
                 self.root.tick_once()
                 if control.stopped:
                     break
@@ -147,7 +147,7 @@ class Run:
                     return end_of_tree(self.root.failure)
                 context.plan_ahead()
                 context.advance()
-                ticked = False
+                is_tree_ticked = False
                 if self._realtime:
                     time.sleep(max(0.0, self._wall_start + context.now - time.monotonic()))
                 control.wait()
@@ -158,19 +158,19 @@ class Run:
             message = str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"
             node = error.node if isinstance(error, Fault) else ""
             ending = LoopEnd("FAULT", "fault", message, node, traceback.format_exc())
-        broken = problems_of(lambda: context.emit(RunHalted(ticked)))
-        if broken and ending.status != "FAULT":
-            ending = LoopEnd("FAULT", "fault", broken[0])
+        problems = collect_problems(lambda: context.emit(RunHalted(is_tree_ticked)))
+        if problems and ending.status != "FAULT":
+            ending = LoopEnd("FAULT", "fault", problems[0])
         return ending
 
-    def _ask_tool(self) -> None:
-        """Note the item that the tool holds: `something` if the ledger knows no such item."""
+    def _note_held_item(self) -> None:
+        """Store the name of the item in the tool: `something` if the ledger knows no such item."""
         cell = self._context.cell
         if cell.tool.holding:
             self._held_item = cell.ledger.find_held_item() or "something"
 
-    def _ask_ledger(self) -> None:
-        """Note whether the table is believed to be empty."""
+    def _note_empty_table(self) -> None:
+        """Store whether the ledger believes that the table is empty."""
         ledger = self._context.cell.ledger
         self._is_empty = ledger.is_table_empty() and not ledger.unknown
 

@@ -1,4 +1,4 @@
-"""State of one run: its work cell, its recorder of inputs, the count of control steps, and its observers."""
+"""State of one run: work cell, recorder of inputs, number of control steps, and observers."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from executive.replay.recorded_cell import recorded_cell
 from executive.run.planning_ahead import PlanningAhead
 
 MAX_BRAKING_TIME = 2.0
-"""Time after which an arm that was told to brake must be at rest [s]."""
+"""Time after which an arm that was commanded to brake must be at rest [s]."""
 MAX_BRAKING_ATTEMPTS = 4
-"""Number of times that an arm is told to brake; each part of the record may fail to record it once."""
+"""Number of commands to brake; each observer may fail once to record such a command."""
 
 
 class RunContext:
@@ -26,8 +26,7 @@ class RunContext:
     Attributes:
         tick: Number of control steps so far.
         workcell: The work cell.
-        cell: The cell as the tree sees it: all answers are recorded, and the clock shows the time at which
-            the control step began.
+        cell: Cell of the skills: all answers are recorded, and the clock shows the start of the control step.
         planner: Plans motions ahead, or None.
     """
 
@@ -49,7 +48,7 @@ class RunContext:
         return self.tick * self._step + self._ahead
 
     def connect(self, workcell: Workcell, planner: PlanningAhead | None = None) -> None:
-        """Use this work cell from now on."""
+        """Set the work cell and the planner of the run."""
         self.workcell, self.planner = workcell, planner
         if planner is not None:
             self.observe(planner.observe)
@@ -58,7 +57,7 @@ class RunContext:
         self.cell = recorded_cell(workcell.cell, self._recorder, clock, self.emit)
 
     def observe(self, observer: Observer, *, first: bool = False) -> None:
-        """Call `observer` with every event from now on, `first` before all others."""
+        """Call `observer` with every event from now on; with `first`, before all other observers."""
         self._observers.insert(0 if first else len(self._observers), observer)
 
     def emit(self, event: Event) -> None:
@@ -68,11 +67,11 @@ class RunContext:
             observer(timed)
 
     def begin_step(self, tick: int) -> None:
-        """Begin the control step number `tick`: read the clock."""
+        """Begin the control step number `tick`, and read the clock."""
         self.tick = tick
         self._recorder.begin_step()
-        clock, begin = self.workcell.cell.clock, tick * self._step
-        self._ahead = self._recorder.read("clock", lambda: clock.now - begin)
+        clock, step_time = self.workcell.cell.clock, tick * self._step
+        self._ahead = self._recorder.read("clock", lambda: clock.now - step_time)
 
     def advance(self) -> None:
         """Let one control step pass, and begin the next one."""
@@ -80,7 +79,7 @@ class RunContext:
         self.begin_step(self.tick + 1)
 
     def plan_ahead(self) -> None:
-        """Let the arm plan the motion that probably comes next."""
+        """Let the arm plan the probable next motion."""
         if self.planner is not None:
             self.planner.step()
 

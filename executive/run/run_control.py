@@ -6,14 +6,14 @@ import threading
 from collections import deque
 from collections.abc import Callable
 
-MAX_PAUSE_SLICE = 0.05
-"""Time for which a pause blocks the tick thread at once, so that signals are handled [s]."""
+PAUSE_POLL_PERIOD = 0.05
+"""Longest time for which a pause blocks the tick thread without handling signals [s]."""
 
 
 class RunControl:
-    """Commands to a run, from any thread or a signal handler; the run obeys between two ticks.
+    """Commands to a run, from any thread or a signal handler; they take effect between two ticks.
 
-    The run's clock stands still during a pause; in simulation, the world stands still, too.
+    During a pause the clock of the run stands still, and so does a simulated world.
     """
 
     def __init__(self) -> None:
@@ -26,7 +26,7 @@ class RunControl:
 
     @property
     def stopped(self) -> bool:
-        """True from the first call of `stop`."""
+        """True after the first call of `stop`."""
         return self._stopped
 
     @property
@@ -49,13 +49,13 @@ class RunControl:
         self._change.set()
 
     def step(self, ticks: int = 1) -> None:
-        """Let the run tick `ticks` times and pause again; a run that is not paused is paused after them."""
+        """Let the run tick `ticks` times, then pause it."""
         self._steps = self._steps + ticks if self._paused else ticks
         self._paused = True
         self._change.set()
 
     def request(self, word: str) -> None:
-        """Answer the operator's next question; answers given before the question are ignored."""
+        """Answer the present question to the operator; an answer without a question is ignored."""
         self._requests.append(word)
 
     def take_request(self) -> str | None:
@@ -65,7 +65,7 @@ class RunControl:
     def between_ticks(self, callback: Callable[[], None]) -> None:
         """Call `callback` between any two ticks, and repeatedly during a pause.
 
-        It runs on the tick thread, may read the cell, and must return at once.
+        The callback runs on the tick thread, may read the cell, and must return at once.
         """
         self._callbacks.append(callback)
 
@@ -77,7 +77,7 @@ class RunControl:
             if self._steps > 0:
                 self._steps -= 1
                 return
-            self._change.wait(MAX_PAUSE_SLICE)
+            self._change.wait(PAUSE_POLL_PERIOD)
             self._change.clear()
             for callback in self._callbacks:
                 callback()

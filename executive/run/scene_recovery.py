@@ -17,7 +17,7 @@ from executive.manipulation.obstacles import list_obstacles
 from executive.manipulation.tool_goals import DROP_HEIGHT, goal_aside
 
 LOOKS_PER_PLACE = 3
-"""Number of looks from each place of the camera."""
+"""Number of looks from each camera pose."""
 MIN_LOOKS = 5
 """Smallest number of looks from the scan poses."""
 RELEASE_TIME = 0.1
@@ -25,11 +25,11 @@ RELEASE_TIME = 0.1
 
 
 def recover_scene(cell: Cell) -> Steps:
-    """Empty the tool, then look at everything that the camera sees, bins included.
+    """Empty the tool, then look at the table and the bins.
 
     A camera on the arm looks into each bin from above. Afterwards the ledger knows every item that a look has
-    shown, on the table or in a bin. It searches the other items; they are rejected unless the mission finds
-    them.
+    shown, on the table or in a bin. Looks of the mission search for the other items; an item that no look
+    finds is rejected.
 
     Raises:
         Fault: The tool holds an object that cannot be put down.
@@ -40,11 +40,11 @@ def recover_scene(cell: Cell) -> Steps:
     cell.tool.open()
     yield from cell.clock.sleep(RELEASE_TIME)
     poses = cell.camera.scan_poses
-    before, height = cell.camera.capture().X_WC.position, 0.0
+    first_position, height = cell.camera.capture().X_WC.position, 0.0
     is_on_arm = False
     for number in range(max(MIN_LOOKS, LOOKS_PER_PLACE * len(poses))):
         frame = yield from _look(cell, poses[number % len(poses)])
-        is_on_arm |= not np.allclose(before, frame.X_WC.position)
+        is_on_arm |= not np.allclose(first_position, frame.X_WC.position)
         height = max(height, float(cell.arm.tool_pose.position[2]))
         if number == 0:
             cell.ledger.mark_unseen_as_dropped()
@@ -60,7 +60,7 @@ def _put_down(cell: Cell) -> Steps:
     kind = max(cell.classes.values(), key=lambda kind: kind.height)
     goal = goal_aside(cell, kind, DROP_HEIGHT)
     problems = []
-    # In a bin or on the table, a load as high as the highest class may seem to be in collision.
+    # With the tallest class as the load, the arm may seem to be in collision in a bin or on the table.
     for load in (Load(kind, cell.tool.bears), None):
         try:
             yield from _move(cell, goal, Task(load, list_obstacles(cell)))
@@ -75,11 +75,7 @@ def _put_down(cell: Cell) -> Steps:
 
 
 def _look(cell: Cell, goal: Goal | str) -> Generator[None, None, Frame]:
-    """Observe everything that the camera sees when the arm is at a goal, or here if there is no motion.
-
-    Returns:
-        The frame.
-    """
+    """Move to a goal if possible, observe the whole view of the camera, and return the frame."""
     with suppress(Unreachable, Blocked):
         yield from _move(cell, goal, Task(around=list_obstacles(cell)))
     frame = cell.camera.capture()
@@ -92,17 +88,17 @@ def _look(cell: Cell, goal: Goal | str) -> Generator[None, None, Frame]:
         observations = cell.localizer.localize(detections)
     except (Unavailable, NoDepth):
         return frame
-    # The skills report a camera that was moved.
+    # If the camera was moved, the look does not count; a skill of the mission reports the displacement.
     if not cell.camera.displacement(frame):
         cell.ledger.observe(detections, observations)
     return frame
 
 
 def _move(cell: Cell, goal: Goal | str, task: Task) -> Steps:
-    """Yield until the arm is at rest at a goal, or was stopped by a contact.
+    """Yield until the arm is at rest at a goal, or after a collision.
 
     Raises:
-        Unreachable, Blocked: There is no such motion.
+        Unreachable, Blocked: No motion was found.
     """
     planning = cell.arm.plan(goal, task)
     while not planning.ready:

@@ -11,8 +11,9 @@ from types import FrameType
 from executive.run.run_control import RunControl
 
 TERMINATION = (signal.SIGTERM, signal.SIGHUP)
-"""Signals that end a process which nobody interrupts by Ctrl-C."""
+"""Signals other than Ctrl-C that ask a process to end."""
 SIGNALS = (signal.SIGINT, *TERMINATION)
+"""Signals that halt a run."""
 
 
 @contextmanager
@@ -28,13 +29,11 @@ def handle_signals(
     former = {}
     if threading.current_thread() is threading.main_thread():
         former = {number: signal.getsignal(number) for number in numbers}
-        former = {
-            n: known for n, known in former.items() if n == signal.SIGINT or known is not signal.SIG_IGN
-        }
+        former = {n: old for n, old in former.items() if n == signal.SIGINT or old is not signal.SIG_IGN}
 
     def restore() -> None:
-        for number, known in former.items():
-            signal.signal(number, known)
+        for number, old in former.items():
+            signal.signal(number, old)
 
     for number in former:
         signal.signal(number, handler)
@@ -46,7 +45,7 @@ def handle_signals(
 
 @contextmanager
 def stopped_by_signals(control: RunControl) -> Iterator[None]:
-    """Halt the run at the first of the signals; a second one has its former effect."""
+    """Halt the run at the first signal; a second signal has its former effect."""
 
     def halt(number: int, frame: FrameType | None) -> None:
         del number, frame

@@ -1,4 +1,4 @@
-"""Versions of everything a run was made with: this project, Python, the machine, every required package."""
+"""Versions of the software of a run: this project, Python, the machine, and all required packages."""
 
 from __future__ import annotations
 
@@ -10,35 +10,35 @@ from types import MappingProxyType
 
 from packaging.requirements import Requirement
 
-ITSELF = "executive"
-"""The distribution that asks for the others."""
+DISTRIBUTION = "executive"
+"""Name of the distribution of this project."""
 
 
 @functools.cache
 def versions() -> Mapping[str, str]:
-    """Return the version of each by name; a package that is not installed is left out."""
+    """Return the versions by name; packages that are not installed are left out."""
     found = {"python": platform.python_version(), "machine": f"{platform.system()} {platform.machine()}"}
-    for name in (ITSELF, *required()):
+    for name in (DISTRIBUTION, *required()):
         if version := installed(name):
             found[name] = version
     return MappingProxyType(found)
 
 
 def required(extra: str = "") -> tuple[str, ...]:
-    """Return the packages that this project asks for by name on this Python, or those that an extra adds.
+    """Return the names of the packages that this project requires on this Python, or that an extra adds.
 
-    Empty if the project is not installed itself.
+    Empty if the project is not installed.
     """
     try:
-        requirements = [Requirement(line) for line in metadata.requires(ITSELF) or ()]
+        requirements = [Requirement(line) for line in metadata.requires(DISTRIBUTION) or ()]
     except metadata.PackageNotFoundError:
         return ()
-    wanted = [one for one in requirements if one.marker is None or one.marker.evaluate({"extra": extra})]
-    return tuple(one.name for one in wanted if not extra or "extra" in str(one.marker))
+    applicable = [one for one in requirements if one.marker is None or one.marker.evaluate({"extra": extra})]
+    return tuple(one.name for one in applicable if not extra or "extra" in str(one.marker))
 
 
 def installed(name: str) -> str:
-    """Return the version of a distribution, or "" where it is not installed."""
+    """Return the version of a distribution, or "" if it is not installed."""
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
@@ -46,7 +46,7 @@ def installed(name: str) -> str:
 
 
 def installer(name: str) -> str:
-    """Return the program that installed a distribution, for instance `pip`; "" if that is not known."""
+    """Return the program that installed a distribution, for instance `pip`; "" if unknown."""
     try:
         return (metadata.distribution(name).read_text("INSTALLER") or "").strip()
     except metadata.PackageNotFoundError:

@@ -87,7 +87,7 @@ def run_skill(
         except SkillFailed as failure:
             return SkillResult("FAILURE", failure.reason, failure.message, ticks=tick, commanded=commanded)
         if has_succeeded:
-            return SkillResult("SUCCESS", outputs=run.outputs(), ticks=tick, commanded=commanded)
+            return SkillResult("SUCCESS", outputs=run.read_outputs(), ticks=tick, commanded=commanded)
         workcell.advance()
     return SkillResult("RUNNING", ticks=ticks, commanded=commanded)
 

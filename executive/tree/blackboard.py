@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping
 
 
 class Blackboard(Mapping[str, object]):
-    """The variables of one run by name; skills read them when they start and write them when they succeed.
+    """The variables of one run by name; skills read inputs at their start and write outputs on success.
 
-    One store per run, never one per process: many missions may run side by side. Subtrees share it;
-    their arguments are not variables but are put in when the tree is built.
+    Every run has its own blackboard, so that one process can execute several missions. All subtrees share
+    the blackboard; arguments of subtrees are not variables: they are substituted before the tree is built.
     """
 
     def __init__(self) -> None:
@@ -28,6 +28,6 @@ class Blackboard(Mapping[str, object]):
         """Set all these variables at once."""
         self._values.update(values)
 
-    def forget(self, name: str) -> None:
-        """Remove a variable; it need not be there."""
+    def remove(self, name: str) -> None:
+        """Remove a variable, if it exists."""
         self._values.pop(name, None)

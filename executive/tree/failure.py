@@ -11,8 +11,8 @@ class Reason:
     """Name of a failure in a mission.
 
     Attributes:
-        source: Name of a skill, word of a control node, or label.
-        reason: One of its reasons.
+        source: Name of a skill, keyword of a control node, or label.
+        reason: A declared reason of the source.
     """
 
     source: str
@@ -28,10 +28,10 @@ class Failure:
 
     Attributes:
         reason: One of the declared reasons of the skill or of the control node.
-        message: One sentence with numbers.
-        source: Name of the skill, or the word of the control node, that failed.
+        message: One sentence with the measured values that explain the failure.
+        source: Name of the skill, or the keyword of the control node, that failed.
         path: Path of the node that failed.
-        labels: Labels of that node and of the nodes above it that passed the failure on.
+        labels: Labels of the failed node and of the nodes above it that passed the failure on.
     """
 
     reason: str
@@ -44,12 +44,12 @@ class Failure:
         return f"{self.source}.{self.reason}"
 
     def matches(self, names: Iterable[Reason]) -> bool:
-        """Return True if one of the names means this failure."""
+        """Return True if one of the names denotes this failure."""
         return any(
             name.reason == self.reason and (name.source == self.source or name.source in self.labels)
             for name in names
         )
 
-    def seen_from(self, label: str) -> Failure:
-        """Return the failure as it leaves a node with this label ("" for none)."""
+    def with_label(self, label: str) -> Failure:
+        """Return the failure after a node with this label passed it on; "" for a node without label."""
         return replace(self, labels=(*self.labels, label)) if label else self

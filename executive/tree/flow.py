@@ -12,7 +12,7 @@ from executive.tree.failure import Reason
 from executive.tree.keys import Child
 
 UNKNOWN_NAME = "*"
-"""Source or reason of a failure that nothing is known about."""
+"""Source or reason of a failure about which nothing is known."""
 
 
 @dataclass(frozen=True)
@@ -21,19 +21,19 @@ class PossibleTool:
 
     Attributes:
         tool: EMPTY or HOLDING.
-        since: Path of the skill that caused this state; "" for the beginning of the run.
-        after: Last failure that was handled since then, or "".
-        moved: Whether the arm may have been moved since then.
+        cause: Path of the skill that caused this state; "" for the beginning of the run.
+        handled_failure: Last failure that was handled since then, or "".
+        is_arm_moved: True if the arm may have moved since then.
     """
 
     tool: ToolState
-    since: str = ""
-    after: str = ""
-    moved: bool = False
+    cause: str = ""
+    handled_failure: str = ""
+    is_arm_moved: bool = False
 
 
 PossibleTools = frozenset[PossibleTool] | None
-"""Everything the tool may be; None where that cannot be known."""
+"""All possible states of the tool; None if unknown."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class FlowState:
 
     Attributes:
         written: Variables that are certainly written; None if unknown, which is treated as all variables.
-        tools: Everything the tool may be; None where that cannot be known.
+        tools: All possible states of the tool; None if unknown.
     """
 
     written: frozenset[str] | None
@@ -60,36 +60,36 @@ class FlowState:
             written, (self.tools or frozenset()) | (other.tools or frozenset()) if known else None
         )
 
-    def writing(self, names: Iterable[str]) -> FlowState:
-        """Return the state once these variables are written."""
+    def with_variables(self, names: Iterable[str]) -> FlowState:
+        """Return the state after these variables are written."""
         return self if self.written is None else replace(self, written=self.written.union(names))
 
     def without_variable(self, name: str) -> FlowState:
-        """Return the state once a variable is gone."""
+        """Return the state after a variable is removed."""
         return self if self.written is None else replace(self, written=self.written - {name})
 
     def with_tools(self, tools: PossibleTools) -> FlowState:
-        """Return the state with the tool as given."""
+        """Return the state with other possible states of the tool."""
         return replace(self, tools=tools)
 
     def after_handling(self, failure: PossibleFailure) -> FlowState:
         """Return the state after a control node handled the failure that led to it."""
-        tools = [replace(grip, after=str(failure)) for grip in self.tools or ()]
+        tools = [replace(possible, handled_failure=str(failure)) for possible in self.tools or ()]
         return self if self.tools is None else self.with_tools(frozenset(tools))
 
-    def moved(self) -> FlowState:
-        """Return the state once the arm has been moved."""
-        moved = [replace(grip, moved=True) for grip in self.tools or ()]
-        return self if self.tools is None else self.with_tools(frozenset(moved))
+    def after_motion(self) -> FlowState:
+        """Return the state after a motion of the arm."""
+        tools = [replace(possible, is_arm_moved=True) for possible in self.tools or ()]
+        return self if self.tools is None else self.with_tools(frozenset(tools))
 
     def find_tool(self, tool: ToolState) -> PossibleTool | None:
         """Return one way in which the tool may have got into this state; None if it cannot be in it."""
-        found = [grip for grip in self.tools or () if grip.tool is tool]
-        return min(found, key=lambda grip: (grip.since, grip.after)) if found else None
+        found = [possible for possible in self.tools or () if possible.tool is tool]
+        return min(found, key=lambda possible: (possible.cause, possible.handled_failure)) if found else None
 
 
 INITIAL_STATE = FlowState(frozenset(), frozenset({PossibleTool(ToolState.EMPTY)}))
-"""A run begins without variables and with an empty tool."""
+"""State at the start of a run: no variables, an empty tool."""
 
 UNKNOWN = FlowState(None, None)
 """State after a part of the tree whose effects are unknown."""
@@ -100,10 +100,10 @@ class PossibleFailure:
     """A failure that a node may pass on.
 
     Attributes:
-        source: Name of the skill, or the word of the control node, that fails.
-        reason: Its reason.
-        origin: Path of that node.
-        labels: Labels of the nodes it has passed.
+        source: Name of the skill, or the keyword of the control node, that fails.
+        reason: Reason of the failure.
+        origin: Path of the node that fails.
+        labels: Labels of the nodes that passed the failure on.
     """
 
     source: str
@@ -111,18 +111,19 @@ class PossibleFailure:
     origin: str
     labels: frozenset[str] = frozenset()
 
-    def may_match(self, matches: Iterable[Reason]) -> bool:
-        """Return True if one of the names may mean this failure."""
-        return any(self._is(match, unknown=True) for match in matches)
+    def may_match(self, names: Iterable[Reason]) -> bool:
+        """Return True if one of the names may denote this failure."""
+        return any(self._matches(name, unknown=True) for name in names)
 
-    def must_match(self, matches: Iterable[Reason]) -> bool:
-        """Return True if one of the names certainly means this failure."""
-        return any(self._is(match, unknown=False) for match in matches)
+    def must_match(self, names: Iterable[Reason]) -> bool:
+        """Return True if one of the names certainly denotes this failure."""
+        return any(self._matches(name, unknown=False) for name in names)
 
-    def _is(self, match: Reason, unknown: bool) -> bool:
+    def _matches(self, name: Reason, unknown: bool) -> bool:
+        """Return True if a name denotes this failure; with `unknown`, every name matches an unknown part."""
         sources = {self.source, *self.labels}
-        return (match.reason == self.reason or (unknown and self.reason == UNKNOWN_NAME)) and (
-            match.source in sources or (unknown and self.source == UNKNOWN_NAME)
+        return (name.reason == self.reason or (unknown and self.reason == UNKNOWN_NAME)) and (
+            name.source in sources or (unknown and self.source == UNKNOWN_NAME)
         )
 
     def __str__(self) -> str:
@@ -134,17 +135,17 @@ class Flow:
     """Possible ends of a node that is entered in a certain state.
 
     Attributes:
-        success: State after its success; None if it cannot succeed.
+        success: State after success; None if the node cannot succeed.
         failures: State after each possible failure.
-        halted: State after it was halted; None if it always ends in its first tick.
+        halted: State after a halt; None if the node always ends in its first tick.
     """
 
     success: FlowState | None
     failures: Mapping[PossibleFailure, FlowState]
     halted: FlowState | None
 
-    def labelled(self, label: str) -> Flow:
-        """Return the flow of the same node under a label."""
+    def with_label(self, label: str) -> Flow:
+        """Return the flow of the node with a label."""
         if not label:
             return self
         failures: dict[PossibleFailure, FlowState] = {}
@@ -158,66 +159,74 @@ Enter: TypeAlias = Callable[[Child, FlowState], Flow]
 """Function that returns how a child may end if it is entered in a state."""
 
 
-def loop(
-    enter: Enter, child: Child, state: FlowState, again: Callable[[Flow], FlowState | None]
+def find_fixed_point(
+    enter: Enter, child: Child, state: FlowState, next_entry: Callable[[Flow], FlowState | None]
 ) -> tuple[Flow, FlowState]:
     """Return how a repeatedly entered child may end, and the state that holds at every entry.
 
-    `again` returns the state of the next entry, given how the child may end; None if there is no next entry.
+    `next_entry` returns the state of the next entry, given the possible ends of the child; None for no entry.
     """
     entry = state
     while True:
         flow = enter(child, entry)
-        # Variables can only become fewer and tools more, so the loop ends.
-        widened = entry.join(again(flow) or entry)
+        # Each round removes variables or adds states of the tool, so the loop ends.
+        widened = entry.join(next_entry(flow) or entry)
         if widened == entry:
             return flow, entry
         entry = widened
 
 
-def joined(states: Iterable[FlowState | None]) -> FlowState | None:
-    """Return what is true where all these ways meet; None stands for a way that nobody comes."""
+def join_states(states: Iterable[FlowState | None]) -> FlowState | None:
+    """Return the join of all states; None stands for a path that is never taken, also in the result."""
     reached = [state for state in states if state is not None]
     return reduce(FlowState.join, reached) if reached else None
 
 
-def required(tools: PossibleTools, before: ToolState, path: str) -> PossibleTools:
-    """Return what the tool may be once a skill has what it needs: one mistake is reported once."""
-    if before is ANY or tools is None:
+def apply_precondition(tools: PossibleTools, required: ToolState, path: str) -> PossibleTools:
+    """Return the states of the tool that a skill requires; if none is possible, the violation is ignored.
+
+    A violated precondition counts as fulfilled, so that one mistake in a mission is reported once.
+    """
+    if required is ANY or tools is None:
         return tools
-    return frozenset(grip for grip in tools if grip.tool is before) or frozenset({PossibleTool(before, path)})
+    return frozenset(one for one in tools if one.tool is required) or frozenset(
+        {PossibleTool(required, path)}
+    )
 
 
 def tools_after_success(tools: PossibleTools, after: ToolState, path: str) -> PossibleTools:
-    """Return what the tool is after a skill's success; ANY: as before."""
-    if after is ANY or (tools is not None and all(grip.tool is after for grip in tools)):
+    """Return the possible states of the tool after the success of a skill; ANY leaves them unchanged."""
+    if after is ANY or (tools is not None and all(possible.tool is after for possible in tools)):
         return tools
     return frozenset({PossibleTool(after, path)})
 
 
-def tools_after_failure(tools: PossibleTools, left: ToolState | None, path: str) -> PossibleTools:
-    """Return what the tool is after a skill's failure; None: as before, ANY: one or the other."""
-    if left is None or tools is None:
+def tools_after_failure(tools: PossibleTools, after: ToolState | None, path: str) -> PossibleTools:
+    """Return the possible states of the tool after a failure of a skill.
+
+    `after` None leaves them unchanged; `after` ANY adds EMPTY and HOLDING.
+    """
+    if after is None or tools is None:
         return tools
-    if left is ANY:
+    if after is ANY:
         return tools | {PossibleTool(EMPTY, path), PossibleTool(HOLDING, path)}
-    return frozenset({PossibleTool(left, path)})
+    return frozenset({PossibleTool(after, path)})
 
 
-def grips_at_end(flow: Flow, state: FlowState, halts: bool) -> PossibleTools:
-    """Return what the tool may be once a branch of a parallel is over, halted or not."""
-    ends = joined((flow.success, *flow.failures.values(), *((flow.halted, state) if halts else ())))
+def find_tools_at_end(flow: Flow, state: FlowState, halts: bool) -> PossibleTools:
+    """Return the possible states of the tool after the end of a branch; `halts` if it may also be halted."""
+    ends = join_states((flow.success, *flow.failures.values(), *((flow.halted, state) if halts else ())))
     return state.tools if ends is None else ends.tools
 
 
 def combine_branches(before: PossibleTools, ends: Iterable[PossibleTools]) -> PossibleTools:
     """Return the possible states of the tool after parallel branches, at most one of which uses it."""
-    changed = [end for end in ends if _holds(end) != _holds(before)]
+    changed = [end for end in ends if _without_history(end) != _without_history(before)]
     if any(end is None for end in changed):
         return None
-    return frozenset(grip for end in changed for grip in end or ()) if changed else before
+    return frozenset(possible for end in changed for possible in end or ()) if changed else before
 
 
-def _holds(tools: PossibleTools) -> frozenset[tuple[ToolState, str]] | None:
-    """Return what the tool may hold since when; what was dealt with since then leaves it as it is."""
-    return None if tools is None else frozenset((grip.tool, grip.since) for grip in tools)
+def _without_history(tools: PossibleTools) -> frozenset[tuple[ToolState, str]] | None:
+    """Return the possible states of the tool and their causes, without handled failures and motions."""
+    return None if tools is None else frozenset((possible.tool, possible.cause) for possible in tools)

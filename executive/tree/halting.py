@@ -1,7 +1,7 @@
-"""Halting a tree: every running node ends once, whatever the others do.
+"""Halt of a tree: every running node is stopped once, even if the clean-up of another node fails.
 
-py_trees stops at the first exception in a `terminate`, which would leave siblings running, and calls
-it on nodes that finished long ago; the executive halts with this function instead.
+py_trees stops at the first exception of a `terminate`, which leaves siblings running, and also calls the
+`terminate` of nodes that have ended; the executive halts with the function `halt` instead.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from executive.errors import Fault
 
 
 def halt(root: Behaviour) -> list[str]:
-    """End every running node below and including `root`, children first; return what went wrong."""
+    """End every running node in and below `root`, children first; return the messages of failed clean-ups."""
     problems = []
     for node in root.iterate():
         if node.status is Status.RUNNING:
             try:
                 node.stop(Status.INVALID)
             except Exception as error:
-                where = (error.node if isinstance(error, Fault) else "") or node.name
-                problems.append(f"{where}: {error}")
-                # A node whose clean-up failed has ended all the same: nobody may halt it twice.
+                place = (error.node if isinstance(error, Fault) else "") or node.name
+                problems.append(f"{place}: {error}")
+                # A node whose clean-up failed counts as ended: no node is halted twice.
                 node.status = Status.INVALID
     return problems

@@ -17,17 +17,17 @@ MinTimes: TypeAlias = Callable[[Child], float]
 
 @dataclass(frozen=True)
 class NodeFinding:
-    """A mistake in the mission.
+    """A mistake in the mission that a control node finds.
 
     Attributes:
-        at: place: Key, or name of a failure, that contains the mistake; "" for the node itself.
+        place: Key, or name of a failure, that contains the mistake; "" for the node itself.
         code: Code of the finding.
         message: The mistake, one sentence.
         hint: Remedy, or "".
         is_warning: True if the mission can run nevertheless.
     """
 
-    at: str | Reason
+    place: str | Reason
     code: str
     message: str
     hint: str = ""
@@ -42,13 +42,13 @@ class NodeFacts(Protocol):
         """True if the node is halted when a concurrent node has ended."""
 
     def flow(self, child: Child) -> Flow | None:
-        """Return how a child may end; None if it never runs."""
+        """Return how a child may end; None if the child never runs."""
 
     def name(self, child: Child) -> str:
         """Return the name of a child in paths."""
 
-    def place(self, reason: Reason, reader: Reason) -> str:
-        """Return the place of a name of a failure for the reader of another: `line 12`."""
+    def place(self, reason: Reason, seen_from: Reason) -> str:
+        """Return the place of a failure name for a message about the failure name `seen_from`: `line 12`."""
 
     def is_literal(self, key: str) -> bool:
         """Return True if the node gives the value of a key literally, not through a param or an argument."""
@@ -68,13 +68,13 @@ class PassedFailure:
     """A failure that ended a run, at a control node that it passed or in which it began.
 
     Attributes:
-        child: The child that it came from; None if it began in the node.
-        reason: Its name: `Grasp.missed`.
-        names: All its names at this node: `Skill.reason`, and `label.reason` for each label that it passed.
-        handled: The number of failures that the node handled before, by name.
+        child: The child that passed the failure on; None if the failure began in the node.
+        reason: Name of the failure: `Grasp.missed`.
+        names: All names of the failure at this node: `Skill.reason`, and one `label.reason` per label.
+        handled: Number of failures that the node handled before, by name.
         messages: The last message of each handled failure, by name.
-        last: Name of the failure that it handled last, or "".
-        last: Name of the failure that the node handled last, or ""." and "choice: Last decision of the node.
+        last: Name of the failure that the node handled last, or "".
+        choice: Last decision of the node.
         duration: Time from the start of the node to its end [s].
         has_failed: Returns True if a child ran and failed in this activation of the node.
     """
@@ -90,7 +90,7 @@ class PassedFailure:
     has_failed: Callable[[Child], bool]
 
     def is_one_of(self, reasons: Sequence[Reason]) -> bool:
-        """Return True if one of the names means the failure."""
+        """Return True if one of the names denotes the failure."""
         return any(Reason(name.source, name.reason) in self.names for name in reasons)
 
 
@@ -99,7 +99,7 @@ class Advice:
     """A change of the mission after which a failure would not end the run.
 
     Attributes:
-        text: The change, to be followed by its place.
+        text: The change; the message adds the place.
         key: Key to change, or "".
         child: Child to change; None for the node itself.
     """
@@ -109,6 +109,6 @@ class Advice:
     child: Child | None = None
 
 
-def listed(reasons: Sequence[Reason]) -> str:
+def format_reasons(reasons: Sequence[Reason]) -> str:
     """Return names of failures as a text: `Grasp.missed, look.unsure`."""
     return ", ".join(map(str, reasons))

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure, joined
+from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure, join_states
 from executive.tree.keys import Child, key
 from executive.tree.node import ControlNode
 
 
 class Invert(ControlNode):
-    """Succeeds where its body fails; fails with `inverted` where it succeeds."""
+    """Succeed if the body fails; fail with `inverted` if the body succeeds."""
 
-    word = "invert"
+    keyword = "invert"
     reasons = ("inverted",)
     symbol = "¬"
 
-    do: Child = key(bare=True, doc="What is done.")
+    do: Child = key(shorthand=True, doc="Body.")
 
     def step(self) -> Status:
         """Tick the body."""
@@ -26,8 +26,8 @@ class Invert(ControlNode):
         return Status.SUCCESS if status is Status.FAILURE else status
 
     def flow(self, enter: Enter, state: FlowState) -> Flow:
-        """Exchange the ends of the body."""
+        """Exchange success and failure of the body."""
         body = enter(self.do, state)
-        inverted = PossibleFailure(self.word, "inverted", self.path)
+        inverted = PossibleFailure(self.keyword, "inverted", self.path)
         failures = {} if body.success is None else {inverted: body.success}
-        return Flow(joined(body.failures.values()), failures, body.halted)
+        return Flow(join_states(body.failures.values()), failures, body.halted)

@@ -1,4 +1,4 @@
-"""Keys of control nodes: declared in the class body, read by parser, schema, checks and builder."""
+"""Keys of control nodes, declared in the bodies of their classes for parser, schema, checks and builder."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ Child: TypeAlias = Behaviour
 """Child of a control node. In the checker and the diagnosis it is a `StandIn` for a node of the mission."""
 
 
-class Variable(str):
-    """Name of a variable."""
+class VariableName(str):
+    """Name of a variable of the mission."""
 
 
 Children: TypeAlias = tuple[Child, ...]
 Reasons: TypeAlias = tuple[Reason, ...]
-Elements: TypeAlias = tuple[object, ...] | Variable
+Elements: TypeAlias = tuple[object, ...] | VariableName
 """A list in the mission file, or the variable that holds a list."""
 
 
 class Kind(Enum):
-    """Content of a key, by the annotation of its attribute."""
+    """Kind of value that a key holds; follows from the type annotation of the attribute."""
 
     NODE = auto()
     NODES = auto()
@@ -46,19 +46,19 @@ class Key:
     """A key of a control node or of a section.
 
     Attributes:
-        doc: Its meaning, one sentence.
+        doc: Meaning of the key, one sentence.
         default: Value if the key is missing; `...` for a required key.
         ge, gt: Inclusive and exclusive lower bound of a number, or None.
         max_of: Name of the key whose number of nodes is the upper bound of this number, or "".
         max_count: Largest number of nodes in a list, or None.
-        is_bare: True if the value may stand directly under the word of the node (or the key of the section).
-        is_partner: True if the key stands at the same level as the word of the node, as `catch` beside `try`.
-        is_in_path: False if the key is left out of the paths of its nodes.
+        is_shorthand: True if the value may stand directly under the keyword of the node or section.
+        is_sibling: True if the key stands at the level of the keyword of the node, as `catch` beside `try`.
+        is_in_path: False if the paths of the nodes under the key do not contain the key.
         raised_under: For a list of reasons: key that holds the nodes which raise these failures.
         element_of: For a variable: key with the list whose elements the variable takes in turn; or "".
         name: Name in the mission file.
         attribute: Name in the class.
-        kind: Content.
+        kind: Kind of the value.
         type: Type of a constant, or class of a section.
     """
 
@@ -68,10 +68,10 @@ class Key:
     gt: float | None = None
     max_of: str = ""
     max_count: int | None = None
-    is_bare: bool = False
-    is_partner: bool = False
+    is_shorthand: bool = False
+    is_sibling: bool = False
     is_in_path: bool = True
-    of: str = "do"
+    raised_under: str = "do"
     element_of: str = ""
     name: str = ""
     attribute: str = ""
@@ -86,12 +86,12 @@ class Key:
     @property
     def section(self) -> type[KeySection]:
         """The class of the section or sections under the key."""
-        declared: type[KeySection] = self.type
-        return declared
+        section: type[KeySection] = self.type
+        return section
 
-    def adapter(self, most: int | None = None) -> TypeAdapter[Any]:
-        """Return the validator of a constant; `most` is the upper bound of a number, or None."""
-        return _adapter(self.type, self.ge, self.gt, most)
+    def adapter(self, max_value: int | None = None) -> TypeAdapter[Any]:
+        """Return the validator of a constant; `max_value` is the upper bound of a number, or None."""
+        return _make_adapter(self.type, self.ge, self.gt, max_value)
 
 
 def key(
@@ -102,17 +102,17 @@ def key(
     gt: float | None = None,
     max_of: str = "",
     max_count: int | None = None,
-    bare: bool = False,
-    partner: bool = False,
+    shorthand: bool = False,
+    sibling: bool = False,
     in_path: bool = True,
-    of: str = "do",
+    raised_under: str = "do",
     element_of: str = "",
 ) -> Any:
     """Declare a key; see `Key` for the meaning of the arguments.
 
     The key has the name of the attribute, without a trailing underscore.
     """
-    return Key(doc, default, ge, gt, max_of, max_count, bare, partner, in_path, of, element_of)
+    return Key(doc, default, ge, gt, max_of, max_count, shorthand, sibling, in_path, raised_under, element_of)
 
 
 class KeyOwner:
@@ -120,11 +120,11 @@ class KeyOwner:
 
     Attributes:
         keys: The declared keys by their name in the mission file.
-        one_of: Keys of which at least one must be given.
+        any_of: Keys of which a mission must give at least one.
     """
 
     keys: ClassVar[Mapping[str, Key]] = {}
-    one_of: ClassVar[tuple[str, ...]] = ()
+    any_of: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -141,19 +141,19 @@ class KeyOwner:
         cls.keys = keys
 
     def set_keys(self, values: Mapping[str, object]) -> None:
-        """Set the attributes of all keys; `values` holds them by attribute, other keys get their defaults.
+        """Set the attributes of all keys; `values` maps attributes to values; others get their defaults.
 
         Raises:
             TypeError: A required value is missing, or a value belongs to no key.
         """
-        left = dict(values)
-        for declared in self.keys.values():
-            value = left.pop(declared.attribute, declared.default)
+        remaining = dict(values)
+        for declaration in self.keys.values():
+            value = remaining.pop(declaration.attribute, declaration.default)
             if value is ...:
-                raise TypeError(f"{type(self).__name__} needs a value for {declared.attribute}")
-            setattr(self, declared.attribute, tuple(value) if isinstance(value, list) else value)
-        if left:
-            raise TypeError(f"{type(self).__name__} has no key {', '.join(left)}")
+                raise TypeError(f"{type(self).__name__} needs a value for {declaration.attribute}")
+            setattr(self, declaration.attribute, tuple(value) if isinstance(value, list) else value)
+        if remaining:
+            raise TypeError(f"{type(self).__name__} has no key {', '.join(remaining)}")
 
 
 class KeySection(KeyOwner):
@@ -163,24 +163,25 @@ class KeySection(KeyOwner):
         self.set_keys(values)
 
 
-def _complete(declared: Key, attribute: str, hint: Any) -> Key:
+def _complete(declaration: Key, attribute: str, hint: Any) -> Key:
     """Return a key with name, attribute, kind and type, as its attribute and annotation declare them."""
     if get_origin(hint) in (Union, types.UnionType) and types.NoneType in get_args(hint):
         hint = Union[tuple(part for part in get_args(hint) if part is not types.NoneType)]  # noqa: UP007
     base = get_args(hint)[0] if get_origin(hint) is Annotated else hint
-    listed = get_args(base)[0] if get_origin(base) is tuple else None
-    simple = {Child: Kind.NODE, Children: Kind.NODES, Reasons: Kind.REASONS, Variable: Kind.VARIABLE}
-    kind = Kind.ELEMENTS if base == Elements else simple.get(base, Kind.CONSTANT)
+    element = get_args(base)[0] if get_origin(base) is tuple else None
+    kinds = {Child: Kind.NODE, Children: Kind.NODES, Reasons: Kind.REASONS, VariableName: Kind.VARIABLE}
+    kind = Kind.ELEMENTS if base == Elements else kinds.get(base, Kind.CONSTANT)
     if isinstance(base, type) and issubclass(base, KeySection):
         kind = Kind.SECTION
-    elif isinstance(listed, type) and issubclass(listed, KeySection):
-        kind, base = Kind.SECTIONS, listed
-    return replace(declared, name=attribute.rstrip("_"), attribute=attribute, kind=kind, type=base)
+    elif isinstance(element, type) and issubclass(element, KeySection):
+        kind, base = Kind.SECTIONS, element
+    return replace(declaration, name=attribute.rstrip("_"), attribute=attribute, kind=kind, type=base)
 
 
 @cache
-def _adapter(declared: Any, ge: float | None, gt: float | None, le: float | None) -> TypeAdapter[Any]:
-    parts = get_args(declared) if get_origin(declared) in (Union, types.UnionType) else (declared,)
+def _make_adapter(kind: Any, ge: float | None, gt: float | None, le: float | None) -> TypeAdapter[Any]:
+    """Return the validator of a type whose numbers have these bounds."""
+    parts = get_args(kind) if get_origin(kind) in (Union, types.UnionType) else (kind,)
     bounds = Field(ge=ge, gt=gt, le=le)
     bounded = [Annotated[part, bounds] if part in (int, float) else part for part in parts]
     union: Any = Union[tuple(bounded)]  # noqa: UP007

@@ -9,14 +9,14 @@ from executive.tree.node import ControlNode
 
 
 class Loop(ControlNode):
-    """Base of the loops: runs rounds and knows whether a round took any time.
+    """Base of the loops: runs rounds and records whether a round took time.
 
-    A round that begins and ends within one tick lets no time pass, so the next round waits for the next
-    tick; otherwise a body that ends at once would never end the tick. A round that took time is followed by
-    the next within the same tick: a loop costs no idle ticks.
+    After a round that began and ended within one tick, the next round waits for the next tick; otherwise a
+    body that always ends at once would keep the tick from ending. After a round that took time, the next
+    round begins in the same tick, so that a loop causes no idle ticks.
 
     Attributes:
-        took_time: True once the current round was RUNNING at the end of a tick.
+        took_time: True if the current round was RUNNING at the end of a tick.
     """
 
     symbol, shape = "↻", "hexagon"
@@ -32,7 +32,7 @@ class Loop(ControlNode):
             self.took_time = True
         return status
 
-    def next_round(self) -> bool:
-        """Begin the next round; return True if it may run in this tick, because the last one took time."""
+    def begin_round(self) -> bool:
+        """Begin the next round; return True if the last round took time and the next may run in this tick."""
         took_time, self.took_time = self.took_time, False
         return took_time

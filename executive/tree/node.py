@@ -27,14 +27,14 @@ from executive.tree.keys import Child, KeyOwner, KeySection, Kind
 
 
 @dataclass(frozen=True)
-class Site:
-    """Place of a node in a tree, and the parts of the run that it works with.
+class NodeContext:
+    """Place of a node in a tree, and the parts of the run that the node uses.
 
     Attributes:
         path: Unique path from the root of the tree.
         clock: Clock of the run.
         blackboard: Variables of the run.
-        label: Its label in the mission, or "".
+        label: Label of the node in the mission, or "".
         emit: Receives the events of the node.
     """
 
@@ -49,34 +49,33 @@ class ControlNode(KeyOwner, Behaviour):
     """Base of the control nodes.
 
     Attributes:
-        word: Its name in missions and the source of its own failures.
-        reasons: The reasons of its own failures.
-        symbol: Character that stands before its name in drawings.
-        shape: Its shape in Graphviz drawings.
+        keyword: Name of the node in missions, and source of its own failures.
+        reasons: Reasons of the node's own failures.
+        symbol: Character before the name of the node in drawings.
+        shape: Shape of the node in Graphviz drawings.
         remedy: Advice to the mission author how to handle a failure by wrapping the failing node in this
             node; "" if this node handles none.
-        elsewhere: foreign_keywords: Hints by the keyword that other mission languages use for this node, as
-            `selector` for `fallback`.
+        foreign_keywords: Hints by the keyword that other languages use for this node, as `selector`.
         path: Unique path from the root of the tree.
-        label: Its label in the mission, or "".
-        failure: Cause of the failure while its status is FAILURE; else None.
-        subtrees: Names of the subtrees that begin with it, the outermost first.
+        label: Label of the node in the mission, or "".
+        failure: Cause of the failure while the status is FAILURE; else None.
+        subtrees: Names of the subtrees whose root is this node, the outermost first.
     """
 
-    word: ClassVar[str] = ""
+    keyword: ClassVar[str] = ""
     reasons: ClassVar[tuple[str, ...]] = ()
     symbol: ClassVar[str] = "◇"
     shape: ClassVar[str] = "ellipse"
     remedy: ClassVar[str] = ""
-    elsewhere: ClassVar[Mapping[str, str]] = {}
+    foreign_keywords: ClassVar[Mapping[str, str]] = {}
     subtrees: tuple[str, ...] = ()
 
-    def __init__(self, site: Site, **values: object) -> None:
-        super().__init__(site.label or self.word)
-        self.path, self.label = site.path, site.label
-        self.clock, self.blackboard = site.clock, site.blackboard
+    def __init__(self, context: NodeContext, **values: object) -> None:
+        super().__init__(context.label or self.keyword)
+        self.path, self.label = context.path, context.label
+        self.clock, self.blackboard = context.clock, context.blackboard
         self.failure: Failure | None = None
-        self._emit = site.emit
+        self._emit = context.emit
         self.set_keys(values)
         self.children = [child for key in self.keys for child in self.children_of(key)]
         for child in self.children:
@@ -84,31 +83,31 @@ class ControlNode(KeyOwner, Behaviour):
         self._check_constants()
 
     def children_of(self, name: str) -> list[Child]:
-        """Return the nodes that stand under a key, those in its sections included."""
+        """Return the nodes under a key, including those in the sections of the key."""
         key = self.keys[name]
-        return _nodes(getattr(self, key.attribute))
+        return _find_nodes(getattr(self, key.attribute))
 
     @property
     def detail(self) -> str:
-        """Its constants in a few words, for outlines."""
+        """The constants of the node in a few words, for outlines."""
         constants = [key for key in self.keys.values() if key.kind is Kind.CONSTANT]
-        given = {key.name: getattr(self, key.attribute) for key in constants}
+        values = {key.name: getattr(self, key.attribute) for key in constants}
         return ", ".join(
-            f"{name}: {value}" for name, value in given.items() if value != self.keys[name].default
+            f"{name}: {value}" for name, value in values.items() if value != self.keys[name].default
         )
 
-    def when(self, child: Child) -> str:
-        """Return after which failures a child runs, in a few words; "" if it needs none."""
+    def describe_trigger(self, child: Child) -> str:
+        """Return the failures after which a child runs, in a few words; "" for none."""
         del child
         return ""
 
     # The run.
 
     def start(self) -> None:
-        """Begin an activation; called before its first `step`."""
+        """Begin an activation; called before the first `step`."""
 
     def step(self) -> Status:
-        """Continue by one tick and return RUNNING, SUCCESS or FAILURE; set `failure` before FAILURE."""
+        """Continue by one tick; return RUNNING, SUCCESS or FAILURE, the latter with `failure` set."""
         raise NotImplementedError
 
     def clean_up(self) -> None:
@@ -120,24 +119,24 @@ class ControlNode(KeyOwner, Behaviour):
         """Return how the node may end if it is entered in a state; `enter` returns the same for a child."""
         raise NotImplementedError
 
-    def min_time(self, times: MinTimes) -> float:
-        """Return a lower bound of the time in which the node can succeed [s]; `times` has that of a child."""
-        del times
+    def min_time(self, min_time_of: MinTimes) -> float:
+        """Return a lower bound of the time to success [s]; `min_time_of` returns it for a child."""
+        del min_time_of
         return 0.0
 
     def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
-        """Yield mistakes in the mission that only this kind of node knows."""
+        """Yield mistakes in the mission that only this class can find."""
         del facts
         yield from ()
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return why a child can never run; "" if another finding says so."""
+        """Return the reason why a child can never run; "" if another finding reports it."""
         del child
         return ""
 
     @property
     def first_child(self) -> Child | None:
-        """The child that begins in the tick in which the node begins, before all others; None if unknown."""
+        """The child that begins before all others in the first tick of the node; None if unknown."""
         return None
 
     @property
@@ -146,29 +145,29 @@ class ControlNode(KeyOwner, Behaviour):
         return ()
 
     @property
-    def halted(self) -> tuple[Child, ...]:
-        """Children that are halted when another child has ended, even if they would never end themselves."""
+    def halted_by_sibling(self) -> tuple[Child, ...]:
+        """Children that the node halts when another child has ended, so they need not end themselves."""
         return ()
 
     # Explanations.
 
     def explain(self, failure: PassedFailure) -> str:
-        """Return why the node did not handle a failure of a child; "" if it handles none."""
+        """Return why the node did not handle a failure of a child; "" for a node that handles no failures."""
         del failure
         return ""
 
-    def attempt(self, failure: PassedFailure) -> tuple[int, int] | None:
-        """Return the number of the failed attempt and of the allowed ones; None if there are no attempts."""
+    def count_attempts(self, failure: PassedFailure) -> tuple[int, int] | None:
+        """Return the number of the failed attempt and the allowed number, if the node has attempts."""
         del failure
         return None
 
     def advise(self, failure: PassedFailure) -> Iterator[Advice]:
-        """Yield changes after which this node would handle a failure."""
+        """Yield changes of the mission after which this node would handle a failure."""
         del failure
         yield from ()
 
     def contingencies(self) -> Iterator[tuple[str, Child]]:
-        """Yield the children that run only after a failure or at the end, each with its name in a report."""
+        """Yield the children that run only after a failure or at the end, with their names in reports."""
         yield from ()
 
     # Helpers of subclasses.
@@ -178,35 +177,35 @@ class ControlNode(KeyOwner, Behaviour):
         child.tick_once()
         status = child.status
         if status is Status.INVALID:
-            raise Fault(f"{child.name} was ticked and has no status", self.path)
+            raise Fault(f"{child.name} was ticked but has no status", self.path)
         return status
 
     def halt_children(self, children: Iterable[Child]) -> None:
         """End every running node in and below these children, one after the other.
 
         Raises:
-            Fault: The clean-up of some of them failed; all the others were ended nevertheless.
+            Fault: The clean-up of a node failed; all other nodes were ended nevertheless.
         """
         if problems := [problem for child in children for problem in halt(child)]:
             raise Fault("; ".join(problems), self.path)
 
     def failure_of(self, child: Child) -> Failure:
-        """Return the failure of a child; a stock py_trees behaviour has no reason but `failed`."""
+        """Return the failure of a child; a behaviour from py_trees has the only reason `failed`."""
         failure = getattr(child, "failure", None)
         if isinstance(failure, Failure):
             return failure
         return Failure("failed", child.feedback_message, child.name, self.path)
 
     def fail(self, failure: Failure) -> Status:
-        """Pass on a failure from below, and return FAILURE."""
-        self.failure = failure.seen_from(self.label)
+        """Pass on a failure of a child, and return FAILURE."""
+        self.failure = failure.with_label(self.label)
         return Status.FAILURE
 
     def fail_for(self, reason: str, message: str) -> Status:
         """Fail with a reason of this node, and return FAILURE."""
-        return self.fail(Failure(reason, message, self.word, self.path))
+        return self.fail(Failure(reason, message, self.keyword, self.path))
 
-    def choose(self, choice: str, cause: Failure | None = None) -> None:
+    def report_choice(self, choice: str, cause: Failure | None = None) -> None:
         """Report the next step of the node, and the failure that caused it, if any."""
         reason, message = (str(cause), cause.message) if cause else ("", "")
         self._emit(BranchChosen(self.path, choice, reason, message))
@@ -236,10 +235,10 @@ class ControlNode(KeyOwner, Behaviour):
         yield self
 
     def stop(self, new_status: Status = Status.INVALID) -> None:
-        """End with `new_status`; running nodes below are halted first.
+        """Halt the running nodes below, then end with `new_status`.
 
         Raises:
-            Fault: The clean-up of a node below failed; all the others were halted nevertheless.
+            Fault: The clean-up of a node below failed; all other nodes were halted nevertheless.
         """
         was_running = self.status is Status.RUNNING
         try:
@@ -266,20 +265,20 @@ class ControlNode(KeyOwner, Behaviour):
         for key in self.keys.values():
             value = getattr(self, key.attribute)
             if key.kind is Kind.CONSTANT and value != key.default:
-                most = len(self.children_of(key.max_of)) if key.max_of else None
+                max_value = len(self.children_of(key.max_of)) if key.max_of else None
                 try:
-                    key.adapter(most).validate_python(value, strict=True)
+                    key.adapter(max_value).validate_python(value, strict=True)
                 except ValidationError as problems:
-                    found = problems.errors()
-                    problem = next((one for one in found if "than" in one["type"]), found[0])["msg"]
-                    name = f"{self.word}.{key.name}"
+                    errors = problems.errors()
+                    problem = next((one for one in errors if "than" in one["type"]), errors[0])["msg"]
+                    name = f"{self.keyword}.{key.name}"
                     raise InputError(f"{self.path}: {name} cannot be {value!r}: {problem}") from None
 
 
-def _nodes(value: object) -> list[Child]:
+def _find_nodes(value: object) -> list[Child]:
     """Return the nodes in the value of a key."""
     if isinstance(value, KeySection):
-        return [node for key in value.keys.values() for node in _nodes(getattr(value, key.attribute))]
+        return [node for key in value.keys.values() for node in _find_nodes(getattr(value, key.attribute))]
     if isinstance(value, tuple):
-        return [node for item in value for node in _nodes(item)]
+        return [node for item in value for node in _find_nodes(item)]
     return [value] if isinstance(value, Behaviour) else []

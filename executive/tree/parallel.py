@@ -14,8 +14,8 @@ from executive.tree.flow import (
     FlowState,
     PossibleFailure,
     combine_branches,
-    grips_at_end,
-    joined,
+    find_tools_at_end,
+    join_states,
 )
 from executive.tree.inspection import MinTimes, PassedFailure
 from executive.tree.keys import Children, key
@@ -28,30 +28,30 @@ MAX_BRANCHES = 200
 class Parallel(ControlNode):
     """Run all children at the same time.
 
-    If too many fail, the running children may finish before the node fails.
-
     Every running child is ticked once per tick, in order; a child that ended is not run again. The node
-    decides after all of them were ticked:
+    decides after all running children were ticked:
 
-    * Enough have succeeded: success, even if others failed in the same tick; the running ones are halted.
-    * Too many have failed: the others may finish first, or are halted at once with `halt`. The node fails
-      with the first failure; of failures in the same tick, with that of the child listed first.
-      Without `halt`, a motion of the arm by another child is thus completed.
+    * Enough children have succeeded: success, even if others failed in the same tick; running children are
+      halted.
+    * Too many children have failed: the others may finish first, or are halted at once with `halt`. The node
+      fails with the first failure; of failures in the same tick, with that of the child listed first.
+      Without `halt`, another child thus completes its motion of the arm.
 
-    With `wait_for: lead` the node ends as its first child does, in the same tick, and halts the others.
+    With `wait_for: lead`, the node ends as its first child ends, in the same tick, and halts the others.
     """
 
-    word = "parallel"
+    keyword = "parallel"
     symbol, shape = "⇉", "parallelogram"
 
     wait_for: Literal["all", "any", "lead"] | int = key(
         default="all", ge=1, max_of="do",
-        doc="How many must succeed: `all`, `any` or a number; `lead`: the first branch alone.",
+        doc="Number of children that must succeed: `all`, `any` or a number; `lead`: only the first child.",
     )  # fmt: skip
     halt: bool = key(
-        default=False, doc="After a failure halt the others at once instead of letting them finish."
+        default=False,
+        doc="True to halt the others at once after a failure, instead of letting them finish.",
     )
-    do: Children = key(bare=True, max_count=MAX_BRANCHES, doc="What is done at the same time.")
+    do: Children = key(shorthand=True, max_count=MAX_BRANCHES, doc="Nodes to run at the same time.")
 
     @property
     def _has_lead(self) -> bool:
@@ -77,14 +77,14 @@ class Parallel(ControlNode):
         """Begin with all children."""
         self._running = list(self.do)
         self._missing = self._needed
-        self._first: Failure | None = None
-        self._tick = self._follow_lead if self._has_lead else self._run_all
+        self._failure: Failure | None = None
+        self._tick_children = self._tick_lead if self._has_lead else self._tick_all
 
     def step(self) -> Status:
         """Tick every running child."""
-        return self._tick()
+        return self._tick_children()
 
-    def _follow_lead(self) -> Status:
+    def _tick_lead(self) -> Status:
         """Tick the lead; unless it ended, tick the other running children too."""
         lead, *others = self._running
         status = self.run_child(lead)
@@ -92,14 +92,14 @@ class Parallel(ControlNode):
             self.halt_children(others)
             return status if status is Status.SUCCESS else self.fail(self.failure_of(lead))
         for child in others:
-            ended = self.run_child(child)
-            if ended is not Status.RUNNING:
+            status = self.run_child(child)
+            if status is not Status.RUNNING:
                 self._running.remove(child)
-            if ended is Status.FAILURE:
-                self.choose("go on without it", self.failure_of(child))
+            if status is Status.FAILURE:
+                self.report_choice("go on without this branch", self.failure_of(child))
         return Status.RUNNING
 
-    def _run_all(self) -> Status:
+    def _tick_all(self) -> Status:
         has_ended = not self._running
         for child in self._running:
             if self.run_child(child) is not Status.RUNNING:
@@ -112,35 +112,38 @@ class Parallel(ControlNode):
         self._running = [child for child in ticked if child.status is Status.RUNNING]
         self._missing -= sum(child.status is Status.SUCCESS for child in ticked)
         failures = [self.failure_of(child) for child in ticked if child.status is Status.FAILURE]
-        self._first = next(iter(failures), None) if self._first is None else self._first
+        self._failure = next(iter(failures), None) if self._failure is None else self._failure
         if self._missing <= 0:
             self.halt_children(self._running)
             self._report("enough others succeeded", failures)
             return Status.SUCCESS
-        hopeless = self._missing > len(self._running)
-        if self._running and not (hopeless and self.halt):
+        must_fail = self._missing > len(self._running)
+        if self._running and not (must_fail and self.halt):
             self._report(
-                "let the others finish, then fail" if hopeless else "go on with the others", failures
+                "let the others finish, then fail" if must_fail else "go on with the others", failures
             )
             return Status.RUNNING
         self.halt_children(self._running)
-        assert self._first is not None
-        self._report(f"fail with {self._first}", [other for other in failures if other is not self._first])
-        return self.fail(self._first)
+        assert self._failure is not None
+        self._report(
+            f"fail with {self._failure}",
+            [other for other in failures if other is not self._failure],
+        )
+        return self.fail(self._failure)
 
     def _report(self, choice: str, failures: Sequence[Failure]) -> None:
         for failure in failures:
-            self.choose(choice, failure)
+            self.report_choice(choice, failure)
 
     def flow(self, enter: Enter, state: FlowState) -> Flow:
         """Enter all children in the same state and join their ends."""
         flows = [enter(branch, state) for branch in self.do]
-        taken = [grips_at_end(flow, state, halts=True) for flow in flows]
-        halted = joined(flow.halted for flow in flows)
-        halted = halted and halted.with_tools(combine_branches(state.tools, taken))
+        after_halt = [find_tools_at_end(flow, state, halts=True) for flow in flows]
+        halted = join_states(flow.halted for flow in flows)
+        halted = halted and halted.with_tools(combine_branches(state.tools, after_halt))
         failures: dict[PossibleFailure, FlowState] = {}
         if self._has_lead:
-            others = taken[1:]
+            others = after_halt[1:]
             for failure, after in flows[0].failures.items():
                 failures[failure] = after.with_tools(combine_branches(state.tools, [after.tools, *others]))
             end = flows[0].success
@@ -148,7 +151,7 @@ class Parallel(ControlNode):
                 end and end.with_tools(combine_branches(state.tools, [end.tools, *others])), failures, halted
             )
         needed = self._needed
-        ends = [grips_at_end(flow, state, self.halt or needed < len(flows)) for flow in flows]
+        ends = [find_tools_at_end(flow, state, self.halt or needed < len(flows)) for flow in flows]
         if sum(bool(flow.failures) for flow in flows) > len(flows) - needed:
             for index, flow in enumerate(flows):
                 others = [*ends[:index], *ends[index + 1 :]]
@@ -156,23 +159,25 @@ class Parallel(ControlNode):
                     failures[failure] = after.with_tools(
                         combine_branches(state.tools, [after.tools, *others])
                     )
-        return Flow(self._success(flows, state), failures, halted)
+        return Flow(self._find_success(flows, state), failures, halted)
 
-    def _success(self, flows: Sequence[Flow], state: FlowState) -> FlowState | None:
+    def _find_success(self, flows: Sequence[Flow], state: FlowState) -> FlowState | None:
         """Return the state once enough branches have succeeded; None if too few can succeed."""
         succeeding = [flow.success for flow in flows if flow.success is not None]
-        success = joined(succeeding)
+        success = join_states(succeeding)
         if success is None or len(succeeding) < self._needed:
             return None
         if self._needed < len(flows):
-            ends = [grips_at_end(flow, state, halts=True) for flow in flows]
+            ends = [find_tools_at_end(flow, state, halts=True) for flow in flows]
             return success.with_tools(combine_branches(state.tools, ends))
-        everything = success.writing(name for end in succeeding for name in end.written or ())
-        return everything.with_tools(combine_branches(state.tools, [end.tools for end in succeeding]))
+        end = success.with_variables(name for one in succeeding for name in one.written or ())
+        return end.with_tools(combine_branches(state.tools, [one.tools for one in succeeding]))
 
-    def min_time(self, times: MinTimes) -> float:
-        """Return the time of the lead, or the n-th shortest time of a child if n children must succeed."""
-        return times(self.do[0]) if self._has_lead else sorted(map(times, self.do))[self._needed - 1]
+    def min_time(self, min_time_of: MinTimes) -> float:
+        """Return the minimum time of the lead, or the n-th shortest of a child if n must succeed [s]."""
+        return (
+            min_time_of(self.do[0]) if self._has_lead else sorted(map(min_time_of, self.do))[self._needed - 1]
+        )
 
     @property
     def concurrent(self) -> Children:
@@ -180,14 +185,14 @@ class Parallel(ControlNode):
         return self.do
 
     @property
-    def halted(self) -> Children:
-        """The children beside the lead."""
+    def halted_by_sibling(self) -> Children:
+        """All children but the lead, if there is a lead."""
         return self.do[1:] if self._has_lead else ()
 
     def explain(self, failure: PassedFailure) -> str:
         """Return the number of children that must succeed, and the other failures."""
         if self._has_lead:
-            return "ends as its lead does"
+            return "ends as its first child, the lead, ends"
         count = len(self.do)
         needs = {"all": f"all {count}", "any": f"one of its {count}"}
         needed = needs.get(str(self.wait_for), f"{self.wait_for} of its {count}")

@@ -1,4 +1,4 @@
-"""Control nodes by their words, found through the entry-point group `executive.control_nodes`."""
+"""Control nodes by their keywords, found through the entry-point group `executive.control_nodes`."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from executive.cell.protocols import Clock
 from executive.errors import InputError
 from executive.plugins import PluginEntry, registered
 from executive.tree.blackboard import Blackboard
-from executive.tree.node import ControlNode, Site
+from executive.tree.node import ControlNode, NodeContext
 
-CONTROL_NODES = "executive.control_nodes"
+ENTRY_POINT_GROUP = "executive.control_nodes"
 
 ControlNodes: TypeAlias = Mapping[str, type[ControlNode]]
 
-_WORD = re.compile("[a-z][a-z0-9_]*")
+_KEYWORD_PATTERN = re.compile("[a-z][a-z0-9_]*")
 
 
 def control_nodes() -> ControlNodes:
-    """Return the class of every installed control node by its word.
+    """Return the class of every installed control node by its keyword.
 
     Raises:
-        InputError: Two packages register one word, or a class cannot be loaded or lacks a declaration.
+        InputError: Two packages register one keyword, or a class cannot be loaded or lacks a declaration.
     """
-    return _load(tuple(registered(CONTROL_NODES, "control node").values()))
+    return _load(tuple(registered(ENTRY_POINT_GROUP, "control node").values()))
 
 
 @cache
@@ -38,18 +38,18 @@ def _load(entries: tuple[PluginEntry, ...]) -> ControlNodes:
     return nodes
 
 
-def _find_problem(word: str, node: object) -> str:
+def _find_problem(keyword: str, node: object) -> str:
     """Return the reason why a class cannot be used as a control node; "" if it can."""
     if not (isinstance(node, type) and issubclass(node, ControlNode)):
         return "is not a ControlNode subclass"
-    if not _WORD.fullmatch(word) or node.word != word:
-        return f'is named differently: its class has the word "{node.word}", which must be lower case'
+    if not _KEYWORD_PATTERN.fullmatch(keyword) or node.keyword != keyword:
+        return f'must have the name of its class, in lower case: the class has the keyword "{node.keyword}"'
     for method in ("step", "flow"):
         if getattr(node, method) is getattr(ControlNode, method):
             return f"has no method {method}"
-    # Instances have further attributes of py_trees.
-    plain = ControlNode(Site("", cast("Clock", None), Blackboard()))
-    clash = [key.attribute for key in node.keys.values() if hasattr(plain, key.attribute)]
-    if clash or "as" in node.keys:
-        return f'cannot have the key "{(clash or ["as"])[0]}": the name is taken'
+    # Only instances have all attributes of py_trees.
+    instance = ControlNode(NodeContext("", cast("Clock", None), Blackboard()))
+    clashes = [key.attribute for key in node.keys.values() if hasattr(instance, key.attribute)]
+    if clashes or "as" in node.keys:
+        return f'cannot have the key "{(clashes or ["as"])[0]}": the name is taken'
     return ""

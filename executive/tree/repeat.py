@@ -6,42 +6,42 @@ from typing import ClassVar
 
 from py_trees.common import Status
 
-from executive.tree.flow import Enter, Flow, FlowState, joined, loop
-from executive.tree.inspection import MinTimes, PassedFailure, listed
+from executive.tree.flow import Enter, Flow, FlowState, find_fixed_point, join_states
+from executive.tree.inspection import MinTimes, PassedFailure, format_reasons
 from executive.tree.keys import Child, Reasons, key
 from executive.tree.loop import Loop
 
 
 class Repeat(Loop):
-    """Again after a success, so many times or until it fails in a certain way.
+    """Run the body again after each success, up to a number of times or until an expected failure.
 
-    If both are given, the one that comes first ends it with success; any other failure is passed on.
+    With both, whichever comes first ends the loop with success. Any other failure is passed on.
     """
 
-    word = "repeat"
-    elsewhere: ClassVar = {"loop": "It is called repeat here, or while with a condition."}
-    one_of = ("times", "until")
+    keyword = "repeat"
+    foreign_keywords: ClassVar = {"loop": "It is called repeat here, or while with a condition."}
+    any_of = ("times", "until")
 
-    times: int | None = key(default=None, ge=0, doc="How often at most.")
-    until: Reasons = key(default=(), doc="Failures that end it with success.")
-    do: Child = key(doc="What is done.")
+    times: int | None = key(default=None, ge=0, doc="Maximum number of rounds.")
+    until: Reasons = key(default=(), doc="Failures that end the loop with success.")
+    do: Child = key(doc="Body of the loop.")
 
     @property
     def detail(self) -> str:
-        """The end of the loop."""
+        """The conditions that end the loop."""
         ends = [] if self.times is None else [f"{self.times} times"]
         if self.until:
-            ends.append(f"until {listed(self.until)}")
+            ends.append(f"until {format_reasons(self.until)}")
         return " or ".join(ends)
 
     def start(self) -> None:
         """Begin the first round."""
         super().start()
-        self._done = 0
+        self._completed = 0
 
     def step(self) -> Status:
-        """Tick the body; begin the next round in the same tick if this one took time."""
-        while self._done != self.times:
+        """Tick the body; begin the next round in the same tick if the last one took time."""
+        while self._completed != self.times:
             status = self.run_round(self.do)
             if status is Status.RUNNING:
                 return status
@@ -49,10 +49,10 @@ class Repeat(Loop):
                 failure = self.failure_of(self.do)
                 if not failure.matches(self.until):
                     return self.fail(failure)
-                self.choose("done", failure)
+                self.report_choice("done", failure)
                 return Status.SUCCESS
-            self._done += 1
-            if not self.next_round() and self._done != self.times:
+            self._completed += 1
+            if not self.begin_round() and self._completed != self.times:
                 return Status.RUNNING
         return Status.SUCCESS
 
@@ -60,24 +60,26 @@ class Repeat(Loop):
         """Enter the body again in the state after its success."""
         if self.times == 0:
             return Flow(state, {}, None)
-        body, entry = loop(enter, self.do, state, lambda flow: None if self.times == 1 else flow.success)
-        ended = [after for failure, after in body.failures.items() if failure.may_match(self.until)]
-        success = joined((*ended, None if self.times is None else body.success))
+        body, entry = find_fixed_point(
+            enter, self.do, state, lambda flow: None if self.times == 1 else flow.success
+        )
+        finished = [after for failure, after in body.failures.items() if failure.may_match(self.until)]
+        success = join_states((*finished, None if self.times is None else body.success))
         passed = {one: after for one, after in body.failures.items() if not one.must_match(self.until)}
-        return Flow(success, passed, joined((body.halted, entry)))
+        return Flow(success, passed, join_states((body.halted, entry)))
 
-    def min_time(self, times: MinTimes) -> float:
-        """Return the time of all rounds; 0 if a failure may end them."""
-        return 0.0 if self.until else (self.times or 0) * times(self.do)
+    def min_time(self, min_time_of: MinTimes) -> float:
+        """Return the minimum time of all rounds [s]; 0 if a failure may end the loop with success."""
+        return 0.0 if self.until else (self.times or 0) * min_time_of(self.do)
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause, the number of rounds."""
+        """Return the cause: the number of rounds is 0."""
         del child
-        return "it is done 0 times"
+        return "the body runs 0 times"
 
     def explain(self, failure: PassedFailure) -> str:
-        """Return the ends that count as success."""
+        """Return the conditions under which the loop would have succeeded."""
         del failure
         if self.until:
-            return f"ends well only with {listed(self.until)}"
-        return f"a failure ends it before its {self.times} times are over"
+            return f"succeeds only with {format_reasons(self.until)}"
+        return f"a failure ends it before its {self.times} rounds are complete"

@@ -10,25 +10,25 @@ from py_trees.common import Status
 from executive.cell.protocols import Steps
 from executive.skill import Seconds
 from executive.tree.failure import Failure
-from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure, joined, loop
-from executive.tree.inspection import Advice, MinTimes, NodeFacts, NodeFinding, PassedFailure, listed
+from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure, find_fixed_point, join_states
+from executive.tree.inspection import Advice, MinTimes, NodeFacts, NodeFinding, PassedFailure, format_reasons
 from executive.tree.keys import Child, KeySection, Reasons, key
 from executive.tree.loop import Loop
 
 
 class Backoff(KeySection):
-    """Waits that grow from one failure to the next."""
+    """Waiting times that grow from one failure to the next."""
 
-    first: Seconds = key(gt=0, bare=True, doc="Wait before the second attempt [s].")
-    factor: float = key(default=1.0, ge=1, doc="By how much every further wait is longer; 1 if not given.")
+    first: Seconds = key(gt=0, shorthand=True, doc="Wait before the second attempt [s].")
+    factor: float = key(default=1.0, ge=1, doc="Ratio of each wait to the one before; 1 if not given.")
     most: Seconds = key(default=inf, gt=0, doc="Longest wait [s].")
 
     def __str__(self) -> str:
-        grows = f", times {self.factor:g} each" if self.factor != 1 else ""
-        ends = f", at most {self.most:g} s" if isfinite(self.most) else ""
-        return f"{self.first:g} s{grows}{ends}"
+        factor = f", times {self.factor:g} each" if self.factor != 1 else ""
+        limit = f", at most {self.most:g} s" if isfinite(self.most) else ""
+        return f"{self.first:g} s{factor}{limit}"
 
-    def delay(self, attempt: int) -> float:
+    def compute_delay(self, attempt: int) -> float:
         """Return the wait after the failure of an attempt, counted from 1 [s]."""
         try:
             return min(self.first * self.factor ** (attempt - 1), self.most)
@@ -39,25 +39,25 @@ class Backoff(KeySection):
 class Retry(Loop):
     """Run a node again after a failure.
 
-    Failures that are not `on` the list, and the last one, are passed on. Every further attempt is preceded by
-    the wait `backoff` on the run's clock and then by `recover`; if `recover` fails, the retry fails with the
-    failure from which it was recovering.
+    Failures that `on` does not list, and the failure of the last attempt, are passed on. Before every further
+    attempt, the node waits for `backoff` on the clock of the run and then runs `recover`; if `recover` fails,
+    the retry fails with the failure from which it was recovering.
     """
 
-    word = "retry"
+    keyword = "retry"
 
-    attempts: int = key(ge=1, doc="How often at most, first time included.")
-    on: Reasons = key(default=(), doc="Failures worth another attempt; every failure if not given.")
-    recover: Child | None = key(default=None, doc="What is done before every further attempt.")
+    attempts: int = key(ge=1, doc="Maximum number of attempts, including the first.")
+    on: Reasons = key(default=(), doc="Failures after which the body runs again; every failure if not given.")
+    recover: Child | None = key(default=None, doc="Node to run before every further attempt.")
     backoff: Backoff | None = key(
         default=None, doc="Wait before every further attempt [s], or first, factor and most."
     )
-    do: Child = key(doc="What is done.")
+    do: Child = key(doc="Body, run in every attempt.")
 
     @property
     def detail(self) -> str:
         """The number of attempts, their causes and the waits."""
-        after = listed(self.on) or "any failure"
+        after = format_reasons(self.on) or "any failure"
         backoff = "" if self.backoff is None else f", backoff {self.backoff}"
         return f"up to {self.attempts} attempts, on {after}{backoff}"
 
@@ -78,23 +78,23 @@ class Retry(Loop):
                 if self._attempt == self.attempts or (self.on and not failure.matches(self.on)):
                     return self.fail(failure)
                 self._pending, self._wait = failure, self._begin_wait(failure)
-            status = self._prepare(self._pending)
+            status = self._tick_recovery(self._pending)
             if status is not Status.SUCCESS:
                 return status
             self._pending = None
-            if not self.next_round():
+            if not self.begin_round():
                 return Status.RUNNING
 
     def _begin_wait(self, failure: Failure) -> Steps:
         """Report the next attempt; return the wait before it."""
-        delay = 0.0 if self.backoff is None else self.backoff.delay(self._attempt)
+        delay = 0.0 if self.backoff is None else self.backoff.compute_delay(self._attempt)
         self._attempt += 1
-        when = f" in {delay:g} s" if delay else ""
-        self.choose(f"attempt {self._attempt} of {self.attempts}{when}", failure)
+        delay_text = f" in {delay:g} s" if delay else ""
+        self.report_choice(f"attempt {self._attempt} of {self.attempts}{delay_text}", failure)
         return self.clock.sleep(delay)
 
-    def _prepare(self, pending: Failure) -> Status:
-        """Continue the wait, then the recovery."""
+    def _tick_recovery(self, pending: Failure) -> Status:
+        """Continue the wait, then tick the recovery; SUCCESS if the next attempt may begin."""
         if next(self._wait, self) is not self:
             self.took_time = True
             return Status.RUNNING
@@ -102,7 +102,7 @@ class Retry(Loop):
             return Status.SUCCESS
         status = self.run_round(self.recover)
         if status is Status.FAILURE:
-            self.choose("give up: the recovery failed", self.failure_of(self.recover))
+            self.report_choice("give up: the recovery failed", self.failure_of(self.recover))
             return self.fail(pending)
         return status
 
@@ -114,39 +114,41 @@ class Retry(Loop):
         def is_retried(failure: PossibleFailure) -> bool:
             return not self.on or failure.may_match(self.on)
 
-        def again(body: Flow) -> FlowState | None:
+        def next_entry(body: Flow) -> FlowState | None:
             nonlocal waiting
             recovery.clear()
             retried = (after.after_handling(one) for one, after in body.failures.items() if is_retried(one))
-            waiting = joined(retried) if self.attempts != 1 else None
+            waiting = join_states(retried) if self.attempts != 1 else None
             if waiting is None or self.recover is None:
                 return waiting
             recovery.append(enter(self.recover, waiting))
             return recovery[0].success
 
-        body, _ = loop(enter, self.do, state, again)
-        given_up = joined(after for flow in recovery for after in flow.failures.values())
+        body, _ = find_fixed_point(enter, self.do, state, next_entry)
+        given_up = join_states(after for flow in recovery for after in flow.failures.values())
         failures = {
             failure: after.join(given_up or after) if is_retried(failure) else after
             for failure, after in body.failures.items()
         }
         waits = waiting if self.backoff else None
-        return Flow(body.success, failures, joined((body.halted, *(flow.halted for flow in recovery), waits)))
+        return Flow(
+            body.success, failures, join_states((body.halted, *(flow.halted for flow in recovery), waits))
+        )
 
-    def min_time(self, times: MinTimes) -> float:
-        """Return the time of one attempt."""
-        return times(self.do)
+    def min_time(self, min_time_of: MinTimes) -> float:
+        """Return the minimum time of one attempt [s]."""
+        return min_time_of(self.do)
 
     def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
         """Find attempts that change nothing, and a single attempt."""
         skills = facts.skills()
         if not self.backoff and skills and not any(one is None or one.senses or one.moves for one in skills):
-            message = "this retry changes nothing between its attempts: nothing in it looks, moves or waits"
+            message = "this retry changes nothing between its attempts: no node in it looks, moves or waits"
             hint = "Put a look or a motion into do or recover, or wait with backoff."
             yield NodeFinding("", "unchanging-retry", message, hint, is_warning=True)
-        # A param may be 1 in one run and 3 in the next.
+        # The value of a param may differ in another run, so a param is not reported.
         if self.attempts == 1 and facts.is_literal("attempts"):
-            message = "a retry with 1 attempt never tries again"
+            message = "a retry with 1 attempt never runs its body again"
             yield NodeFinding("attempts", "unchanging-retry", message, is_warning=True)
 
     def explain_unreachable(self, child: Child) -> str:
@@ -154,45 +156,45 @@ class Retry(Loop):
         if child is not self.recover:
             return ""
         return (
-            "there is one attempt only" if self.attempts == 1 else "" if self.on else "the body never fails"
+            "there is only one attempt" if self.attempts == 1 else "" if self.on else "the body never fails"
         )
 
     def explain(self, failure: PassedFailure) -> str:
         """Return the failures of all attempts."""
         handled = dict(failure.handled)
-        if self._gave_up(failure):
-            attempt, most = self.attempt(failure)
+        if self._has_given_up(failure):
+            attempt, attempts = self.count_attempts(failure)
             last = f"{failure.last}: {failure.messages[failure.last]}"
-            return f"gave up after attempt {attempt} of {most}: its recovery failed with {last}"
+            return f"gave up after attempt {attempt} of {attempts}: its recovery failed with {last}"
         if self.on and not failure.is_one_of(self.on):
-            before = f"; before: {_counted(handled)}" if handled else ""
-            return f"tries again only after {listed(self.on)}{before}"
+            earlier = f"; failures before: {_format_counts(handled)}" if handled else ""
+            return f"runs again only after {format_reasons(self.on)}{earlier}"
         handled[failure.reason] = handled.get(failure.reason, 0) + 1
         if self.attempts == 1:
             return "has no second attempt"
-        return f"all {self.attempts} attempts failed: {_counted(handled)}"
+        return f"all {self.attempts} attempts failed: {_format_counts(handled)}"
 
-    def attempt(self, failure: PassedFailure) -> tuple[int, int]:
+    def count_attempts(self, failure: PassedFailure) -> tuple[int, int]:
         """Return the number of the failed attempt and the number of allowed attempts."""
         # `handled` counts every failed attempt but the last one, and also a failed recovery.
-        return sum(failure.handled.values()) + (-1 if self._gave_up(failure) else 1), self.attempts
+        return sum(failure.handled.values()) + (-1 if self._has_given_up(failure) else 1), self.attempts
 
     def advise(self, failure: PassedFailure) -> Iterator[Advice]:
-        """Yield a better recovery, or more attempts."""
-        most = self.attempts
-        if self._gave_up(failure):
-            yield Advice(f"deal with {failure.last} in the recovery", child=self.recover)
-        elif (not self.on or failure.is_one_of(self.on)) and self.attempt(failure)[0] == most:
-            yield Advice(f"allow more than {most} attempt{'s' * (most > 1)}", "attempts")
+        """Yield the advice to handle a failure in the recovery, or to allow more attempts."""
+        attempts = self.attempts
+        if self._has_given_up(failure):
+            yield Advice(f"handle {failure.last} in the recovery", child=self.recover)
+        elif (not self.on or failure.is_one_of(self.on)) and self.count_attempts(failure)[0] == attempts:
+            yield Advice(f"allow more than {attempts} attempt{'s' * (attempts > 1)}", "attempts")
 
     def contingencies(self) -> Iterator[tuple[str, Child]]:
         """Yield the recovery."""
         if self.recover is not None:
             yield "recover", self.recover
 
-    def _gave_up(self, failure: PassedFailure) -> bool:
+    def _has_given_up(self, failure: PassedFailure) -> bool:
         return self.recover is not None and failure.has_failed(self.recover)
 
 
-def _counted(handled: dict[str, int]) -> str:
+def _format_counts(handled: dict[str, int]) -> str:
     return ", ".join(f"{count} x {reason}" for reason, count in handled.items())

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure, joined
+from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure, join_states
 from executive.tree.inspection import MinTimes
 from executive.tree.keys import Child, Children, key
 from executive.tree.node import ControlNode
 
 
 class Sequence(ControlNode):
-    """One after the other; fails with the first that fails."""
+    """Run the children in order; fail with the first failure."""
 
-    word = "sequence"
+    keyword = "sequence"
     symbol, shape = "→", "box"
 
-    do: Children = key(bare=True, doc="What is done.")
+    do: Children = key(shorthand=True, doc="Nodes to run, in order.")
 
     def start(self) -> None:
         """Begin with the first child."""
@@ -38,23 +38,23 @@ class Sequence(ControlNode):
         """Enter each child in the state after the one before it."""
         failures: dict[PossibleFailure, FlowState] = {}
         halted = None
-        here: FlowState | None = state
+        entry: FlowState | None = state
         for child in self.do:
-            if here is None:
+            if entry is None:
                 break
-            flow = enter(child, here)
+            flow = enter(child, entry)
             failures.update(flow.failures)
-            here, halted = flow.success, joined((halted, flow.halted))
-        return Flow(here, failures, halted)
+            entry, halted = flow.success, join_states((halted, flow.halted))
+        return Flow(entry, failures, halted)
 
-    def min_time(self, times: MinTimes) -> float:
-        """Return the sum over all children."""
-        return sum(map(times, self.do))
+    def min_time(self, min_time_of: MinTimes) -> float:
+        """Return the sum of the minimum times of all children [s]."""
+        return sum(map(min_time_of, self.do))
 
     def explain_unreachable(self, child: Child) -> str:
         """Return the cause, an earlier child."""
         del child
-        return "what stands before it never succeeds"
+        return "an earlier child never succeeds"
 
     @property
     def first_child(self) -> Child | None:

@@ -16,18 +16,18 @@ from executive.errors import Fault
 from executive.events import NodeEnded, NodeStarted
 from executive.skill import Skill, SkillFailed
 from executive.tree.failure import Failure
-from executive.tree.node import Site
+from executive.tree.node import NodeContext
 from executive.tree.skill_run import SkillRun
 
 
 @dataclass(frozen=True)
 class Wiring:
-    """What a mission connects to a skill.
+    """Values and variables that a mission connects to a skill.
 
     Attributes:
-        constants: Params and inputs with a value from the mission file.
-        inputs: Variable read by each other input.
-        outputs: Variable written by each output.
+        constants: Values of params and inputs from the mission file, by name.
+        inputs: Variables by the names of the inputs that read them.
+        outputs: Variables by the names of the outputs that write them.
     """
 
     constants: Mapping[str, object] = field(default_factory=dict)
@@ -40,23 +40,25 @@ class SkillLeaf(Behaviour):
 
     Attributes:
         path: Unique path from the root of the tree.
-        failure: Why it failed, while its status is FAILURE; else None.
-        skill_type: What it runs.
-        wiring: What the mission connects to it.
-        subtrees: Names of the subtrees that begin with it, the outermost first.
+        failure: Cause of the failure while the status is FAILURE; else None.
+        skill_type: Class of the skill.
+        wiring: Values and variables that the mission connects to the skill.
+        subtrees: Names of the subtrees whose root is this leaf, the outermost first.
     """
 
     subtrees: tuple[str, ...] = ()
 
-    def __init__(self, site: Site, name: str, skill: type[Skill], wiring: Wiring, cell: Cell) -> None:
-        super().__init__(site.label or name)
-        self.path, self.label, self.skill_name = site.path, site.label, name
+    def __init__(
+        self, context: NodeContext, name: str, skill: type[Skill], wiring: Wiring, cell: Cell
+    ) -> None:
+        super().__init__(context.label or name)
+        self.path, self.label, self.skill_name = context.path, context.label, name
         self.failure: Failure | None = None
-        self._emit = site.emit
-        self.skill_type, self.wiring, self._cell, self._blackboard = skill, wiring, cell, site.blackboard
+        self._emit = context.emit
+        self.skill_type, self.wiring, self._cell, self._blackboard = skill, wiring, cell, context.blackboard
         self._run: SkillRun | None = None
         self._item = ""
-        # An item that may be left out narrows a choice; what the skill works on it always has.
+        # The skill acts on the item of a required port; an optional item only narrows a choice.
         self._item_ports = tuple(
             name for name, port in skill.ports.items() if port.refers == "item" and port.default is ...
         )
@@ -64,18 +66,18 @@ class SkillLeaf(Behaviour):
     @property
     def detail(self) -> str:
         """The constants and the renamed variables, for outlines."""
-        said = {name: _shown(value) for name, value in self.wiring.constants.items()}
+        settings = {name: _format_value(value) for name, value in self.wiring.constants.items()}
         wired = {**self.wiring.inputs, **self.wiring.outputs}
-        said |= {port: f"${name}" for port, name in _bare(wired).items() if port != name}
+        settings |= {port: f"${name}" for port, name in _unqualify(wired).items() if port != name}
         if self.label:
-            return ", ".join([self.skill_name, *(f"{key}: {value}" for key, value in said.items())])
-        return ", ".join(f"{key}: {value}" for key, value in said.items())
+            return ", ".join([self.skill_name, *(f"{key}: {value}" for key, value in settings.items())])
+        return ", ".join(f"{key}: {value}" for key, value in settings.items())
 
     def tick_once(self) -> None:
-        """Start the skill or go on by one step.
+        """Start the skill, or continue it by one step.
 
         Raises:
-            Fault: The skill raised anything but a declared failure.
+            Fault: The skill raised another exception than a declared failure.
         """
         try:
             run = self._start() if self._run is None else self._run
@@ -84,18 +86,18 @@ class SkillLeaf(Behaviour):
             self._fail(failed)
         except Exception as error:
             text = str(error) if isinstance(error, Fault) else f"{type(error).__name__}: {error}"
-            raise self._fault(text) from error
+            raise self._end_with_fault(text) from error
         else:
             if has_succeeded:
-                self._succeed(run.outputs())
+                self._succeed(run.read_outputs())
 
     def update(self) -> Status:
-        """Go on by one tick and return the status: py_trees' name for it."""
+        """Continue by one tick and return the status; part of the interface of py_trees."""
         self.tick_once()
         return self.status
 
     def tick(self) -> Iterator[Behaviour]:
-        """Go on by one tick, then yield this node."""
+        """Continue by one tick, then yield this node."""
         self.tick_once()
         yield self
 
@@ -103,7 +105,7 @@ class SkillLeaf(Behaviour):
         """Close the running skill, so that its `finally` runs; a skill that is not running stays as it is.
 
         Raises:
-            Fault: The skill raised, or yielded, while it was being closed.
+            Fault: The skill raised or yielded during its `finally`.
         """
         if self.status is not Status.RUNNING:
             self.status = new_status
@@ -114,32 +116,32 @@ class SkillLeaf(Behaviour):
             if run is not None:
                 run.halt()
         except Fault as fault:
-            raise self._fault(str(fault)) from fault
+            raise self._end_with_fault(str(fault)) from fault
         self._emit_end(new_status)
 
     def _start(self) -> SkillRun:
         self.failure = None
         self.status = Status.RUNNING
-        inputs = self._read()
-        self._item = self._item_of(inputs)
+        inputs = self._read_inputs()
+        self._item = self._find_item(inputs)
         self._emit(NodeStarted(self.path, self.skill_name, self._item))
         self._run = SkillRun(self.skill_type(**self.wiring.constants, **inputs), self._cell)
         return self._run
 
-    def _read(self) -> dict[str, object]:
+    def _read_inputs(self) -> dict[str, object]:
         inputs = {}
         for port, variable in self.wiring.inputs.items():
             if variable in self._blackboard:
                 inputs[port] = self._blackboard[variable]
             elif self.skill_type.ports[port].required:
                 raise Fault(
-                    f'the input "{port}" reads ${variable}, which nothing has written yet; '
+                    f'the input "{port}" reads ${variable}, which no node has written yet; '
                     f"written so far: {', '.join(self._blackboard) or 'nothing'}"
                 )
         return inputs
 
-    def _item_of(self, values: Mapping[str, object]) -> str:
-        """Return the item that these port values are about, or ""."""
+    def _find_item(self, values: Mapping[str, object]) -> str:
+        """Return the item on which the skill acts according to the values of its ports, or ""."""
         for value in values.values():
             if isinstance(value, Target):
                 return value.item
@@ -148,7 +150,7 @@ class SkillLeaf(Behaviour):
     def _succeed(self, values: Mapping[str, object]) -> None:
         outputs = {port: values[port] for port in self.wiring.outputs}
         self._blackboard.write({self.wiring.outputs[port]: value for port, value in outputs.items()})
-        self._item = self._item_of(outputs) or self._item
+        self._item = self._find_item(outputs) or self._item
         self._close(Status.SUCCESS)
         plain = {port: plain_or_type(value) for port, value in outputs.items()}
         self._emit_end(Status.SUCCESS, outputs=plain)
@@ -159,7 +161,7 @@ class SkillLeaf(Behaviour):
         self._close(Status.FAILURE)
         self._emit_end(Status.FAILURE, failed.reason, failed.message)
 
-    def _fault(self, message: str) -> Fault:
+    def _end_with_fault(self, message: str) -> Fault:
         self._close(Status.INVALID)
         self._emit_end(Status.INVALID, "fault", message)
         return Fault(f"{self.name}: {message}", self.path)
@@ -178,10 +180,10 @@ class SkillLeaf(Behaviour):
         self._emit(event)
 
 
-def _bare(wired: Mapping[str, str]) -> dict[str, str]:
-    """Return the variables by port, those a subtree keeps to itself as its author calls them."""
+def _unqualify(wired: Mapping[str, str]) -> dict[str, str]:
+    """Return the variables by port; a variable of a subtree without the name of the subtree."""
     return {port: variable.rpartition(".")[2] for port, variable in wired.items()}
 
 
-def _shown(value: object) -> str:
+def _format_value(value: object) -> str:
     return ", ".join(map(str, value)) if isinstance(value, tuple | list) else str(value)

@@ -1,4 +1,4 @@
-"""One run of a skill, driven one step of its generator at a time."""
+"""One run of a skill: its generator, advanced step by step."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ if TYPE_CHECKING:
 
 
 class SkillRun:
-    """One run of a skill, from its first step until it ends or is halted.
+    """One run of a skill, from its first step until its end or halt.
 
     Args:
-        skill: A fresh instance with its params and inputs.
+        skill: A fresh instance with params and inputs.
         cell: Cell that the skill acts on.
 
     Attributes:
-        skill: The instance that is run.
+        skill: The instance of the skill.
     """
 
     def __init__(self, skill: Skill, cell: Cell) -> None:
@@ -29,15 +29,15 @@ class SkillRun:
         self._steps: Iterator[object] | None = None
 
     def step(self) -> bool:
-        """Advance the skill by one step, starting it at the first call; return True once it has succeeded.
+        """Advance the skill by one step, or start it at the first call; return True if it has succeeded.
 
         Raises:
-            SkillFailed: It failed with a declared reason.
-            Fault: It failed with an undeclared reason, yielded a value, or left an output unset.
+            SkillFailed: The skill failed with a declared reason.
+            Fault: The skill failed with an undeclared reason, yielded a value, or left an output unset.
         """
         try:
             if self._steps is None:
-                # A `run` without any yield is a plain function: it has done its work already.
+                # A `run` without `yield` is a plain function, which is complete when it returns.
                 self._steps = iter(self.skill.run(self._cell) or ())
             # `self` is the sentinel for the end of the generator: a skill cannot yield its own `SkillRun`.
             yielded = next(self._steps, self)
@@ -46,7 +46,7 @@ class SkillRun:
                 raise
             declared = ", ".join(self.skill.reasons) or "none"
             message = f'it failed with the undeclared reason "{failed.reason}"; it declares: {declared}'
-            raise _fault(message, failed) from failed
+            raise _make_fault(message, failed) from failed
         if yielded is None:
             return False
         if yielded is not self:
@@ -56,15 +56,15 @@ class SkillRun:
             raise Fault(f"it succeeded without setting its output {', '.join(unset)}")
         return True
 
-    def outputs(self) -> dict[str, object]:
-        """Return the outputs by name; all are set once the skill has succeeded."""
+    def read_outputs(self) -> dict[str, object]:
+        """Return the outputs by name; all outputs are set after success."""
         return {name: getattr(self.skill, name) for name in self._output_names}
 
     def halt(self) -> None:
         """Close the generator, so that its `finally` runs.
 
         Raises:
-            Fault: The skill raised, or yielded, while it was being closed.
+            Fault: The skill raised or yielded during its `finally`.
         """
         if not isinstance(self._steps, Generator):
             return
@@ -73,14 +73,14 @@ class SkillRun:
         except Exception as error:
             message = f"{type(error).__name__} while it was halted: {error}"
             if isinstance(error, RuntimeError) and "GeneratorExit" in str(error):
-                message = 'it yielded while it was halted; nothing may wait in "finally"'
-            raise _fault(message, error) from error
+                message = 'it yielded while it was halted; "finally" must not contain a yield'
+            raise _make_fault(message, error) from error
 
     @property
     def _output_names(self) -> list[str]:
         return [name for name, port in self.skill.ports.items() if port.direction is Direction.OUT]
 
 
-def _fault(message: str, error: Exception) -> Fault:
+def _make_fault(message: str, error: Exception) -> Fault:
     """Return a fault whose traceback ends where the error was raised."""
     return Fault(message).with_traceback(error.__traceback__)

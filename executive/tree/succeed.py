@@ -1,21 +1,21 @@
-"""Success in any case."""
+"""Success after any end of the body."""
 
 from __future__ import annotations
 
 from py_trees.common import Status
 
-from executive.tree.flow import Enter, Flow, FlowState, joined
+from executive.tree.flow import Enter, Flow, FlowState, join_states
 from executive.tree.keys import Child, key
 from executive.tree.node import ControlNode
 
 
 class Succeed(ControlNode):
-    """Succeeds however its body ends; without a body at once."""
+    """Succeed however the body ends; without a body, succeed at once."""
 
-    word = "succeed"
+    keyword = "succeed"
     symbol = "✓"
 
-    do: Child | None = key(bare=True, default=None, doc="What is done.")
+    do: Child | None = key(shorthand=True, default=None, doc="Body.")
 
     def step(self) -> Status:
         """Tick the body, if any."""
@@ -23,7 +23,7 @@ class Succeed(ControlNode):
             return Status.SUCCESS
         status = self.run_child(self.do)
         if status is Status.FAILURE:
-            self.choose("succeed none the less", self.failure_of(self.do))
+            self.report_choice("succeed despite the failure", self.failure_of(self.do))
         return Status.RUNNING if status is Status.RUNNING else Status.SUCCESS
 
     def flow(self, enter: Enter, state: FlowState) -> Flow:
@@ -31,4 +31,4 @@ class Succeed(ControlNode):
         if self.do is None:
             return Flow(state, {}, None)
         body = enter(self.do, state)
-        return Flow(joined((body.success, *body.failures.values())), {}, body.halted)
+        return Flow(join_states((body.success, *body.failures.values())), {}, body.halted)

@@ -1,4 +1,4 @@
-"""Limit of the duration of a body."""
+"""Time limit of a body."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from executive.tree.keys import Child, key
 from executive.tree.node import ControlNode
 
 CLOCK_TOLERANCE = 0.005
-"""Half a control step, by which a wait may end too early [s]."""
+"""Largest time by which a wait may end too early, half a control step [s]."""
 
 
 class Timeout(ControlNode):
-    """Fails with `timeout` when its body takes longer on the run's clock.
+    """Fail with `timeout` if the body takes longer than a limit on the clock of the run.
 
-    A body that ends in the tick in which its time is up is in time.
+    A body that ends in the tick in which the limit is reached is in time.
     """
 
-    word = "timeout"
+    keyword = "timeout"
     reasons = ("timeout",)
     symbol = "◷"
 
-    seconds: Seconds = key(gt=0, doc="How long it may take [s].")
-    do: Child = key(doc="What is done.")
+    seconds: Seconds = key(gt=0, doc="Maximum duration of the body [s].")
+    do: Child = key(doc="Body.")
 
     @property
     def detail(self) -> str:
@@ -43,10 +43,10 @@ class Timeout(ControlNode):
         status = self.run_child(self.do)
         if status is Status.FAILURE:
             return self.fail(self.failure_of(self.do))
-        # A nanosecond of tolerance: a clock that adds up steps may miss the deadline by rounding.
+        # The tolerance of 1 ns covers rounding of a clock that sums control steps.
         if status is Status.RUNNING and self.clock.now >= self._deadline - 1e-9:
             self.halt_children([self.do])
-            return self.fail_for("timeout", f"not done after {self.seconds:g} s")
+            return self.fail_for("timeout", f"the body was not done after {self.seconds:g} s")
         return status
 
     def flow(self, enter: Enter, state: FlowState) -> Flow:
@@ -54,24 +54,22 @@ class Timeout(ControlNode):
         body = enter(self.do, state)
         failures = dict(body.failures)
         if body.halted is not None:
-            failures[PossibleFailure(self.word, "timeout", self.path)] = body.halted
+            failures[PossibleFailure(self.keyword, "timeout", self.path)] = body.halted
         return Flow(body.success, failures, body.halted)
 
-    def min_time(self, times: MinTimes) -> float:
-        """Return the time of the body."""
-        return times(self.do)
+    def min_time(self, min_time_of: MinTimes) -> float:
+        """Return the minimum time of the body [s]."""
+        return min_time_of(self.do)
 
     def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
-        """Compare the limit with the least time of the body."""
+        """Compare the limit with the minimum time of the body."""
         shortest = facts.min_time(self.do)
         if self.seconds >= shortest - CLOCK_TOLERANCE:
             return
-        message = (
-            f"timeout.seconds is {self.seconds:g} s, but its body takes {shortest:.2f} s at the very least"
-        )
-        parts = [(name, time) for name, time in facts.skill_times(self.do) if time > 0]
-        hint = f"At the least: {', '.join(f'{name} {time:.2f} s' for name, time in parts)}."
-        is_sum = abs(sum(time for _, time in parts) - shortest) <= 1e-9
+        message = f"timeout.seconds is {self.seconds:g} s, but its body takes at least {shortest:.2f} s"
+        skill_times = [(name, time) for name, time in facts.skill_times(self.do) if time > 0]
+        hint = f"Minimum times: {', '.join(f'{name} {time:.2f} s' for name, time in skill_times)}."
+        is_sum = abs(sum(time for _, time in skill_times) - shortest) <= 1e-9
         yield NodeFinding("seconds", "short-timeout", message, hint if is_sum else "")
 
     @property

@@ -1,4 +1,4 @@
-"""Handlers of failures, and a last step after success and failure."""
+"""Handlers of failures, and a node that runs after success and failure."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import ClassVar
 from py_trees.common import Status
 
 from executive.tree.failure import Failure, Reason
-from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure, joined
-from executive.tree.inspection import Advice, MinTimes, NodeFacts, NodeFinding, PassedFailure, listed
+from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure, join_states
+from executive.tree.inspection import Advice, MinTimes, NodeFacts, NodeFinding, PassedFailure, format_reasons
 from executive.tree.keys import Child, KeySection, Reasons, key
 from executive.tree.node import ControlNode
 
@@ -17,36 +17,34 @@ from executive.tree.node import ControlNode
 class Catch(KeySection):
     """A handler of failures."""
 
-    on: Reasons = key(doc="The failures this is for.")
-    do: Child = key(doc="What is done instead.")
+    on: Reasons = key(doc="Failures after which the handler runs.")
+    do: Child = key(doc="Node to run instead.")
 
 
 class TryCatch(ControlNode):
-    """A body, what to do instead when it fails, and what to do in the end either way.
+    """Run a body, a handler if the body fails, and `finally` at the end.
 
-    Succeeds if the body or the handler does. `finally` runs after success and failure, never after a halt or
-    a fault; its own failure counts unless the node is failing already.
+    The node succeeds if the body or the handler succeeds. `finally` runs after success and failure, never
+    after a halt or a fault; a failure of `finally` is passed on unless the node is failing already.
     """
 
-    word = "try"
-    elsewhere: ClassVar = dict.fromkeys(
-        ("if", "else"), "To go another way when something fails, write try and catch."
-    )
+    keyword = "try"
+    foreign_keywords: ClassVar = dict.fromkeys(("if", "else"), "To handle a failure, write try and catch.")
     symbol = "↯"
-    one_of = ("catch", "finally")
+    any_of = ("catch", "finally")
     remedy = "put a try with a catch for it around"
 
-    do: Child = key(bare=True, in_path=False, doc="What is done.")
+    do: Child = key(shorthand=True, in_path=False, doc="Body.")
     catch: tuple[Catch, ...] = key(
-        partner=True, default=(), doc="A list of `on` and `do`: what to do instead after a failure."
+        sibling=True, default=(), doc="Handlers of failures: a list of `on` and `do`."
     )
     finally_: Child | None = key(
-        partner=True, default=None, doc="What is done in the end, after success or failure."
+        sibling=True, default=None, doc="Node to run at the end, after success and failure."
     )
 
-    def when(self, child: Child) -> str:
+    def describe_trigger(self, child: Child) -> str:
         """Return the failures after which a handler runs: `on Grasp.missed`."""
-        return next((f"on {listed(handler.on)}" for handler in self.catch if handler.do is child), "")
+        return next((f"on {format_reasons(handler.on)}" for handler in self.catch if handler.do is child), "")
 
     def start(self) -> None:
         """Begin with the body."""
@@ -62,10 +60,10 @@ class TryCatch(ControlNode):
                 return status
             failure = self.failure_of(current) if status is Status.FAILURE else None
             if current is self.finally_:
-                # The earlier failure is the better explanation.
+                # The failure of body or handler explains more than a failure of `finally`.
                 return self._end_with(self._pending or failure)
-            if failure is not None and current is self.do and (handler := self._handler(failure)):
-                self.choose("catch", failure)
+            if failure is not None and current is self.do and (handler := self._find_handler(failure)):
+                self.report_choice("catch", failure)
                 self._current = handler
             elif self.finally_ is not None:
                 self._pending = failure
@@ -76,7 +74,7 @@ class TryCatch(ControlNode):
     def _end_with(self, failure: Failure | None) -> Status:
         return Status.SUCCESS if failure is None else self.fail(failure)
 
-    def _handler(self, failure: Failure) -> Child | None:
+    def _find_handler(self, failure: Failure) -> Child | None:
         return next((handler.do for handler in self.catch if failure.matches(handler.on)), None)
 
     def flow(self, enter: Enter, state: FlowState) -> Flow:
@@ -92,32 +90,32 @@ class TryCatch(ControlNode):
                 if failure.may_match(catch.on) and not failure.must_match(earlier)
             }
             earlier += catch.on
-            entry = joined(after.after_handling(failure) for failure, after in caught.items())
+            entry = join_states(after.after_handling(failure) for failure, after in caught.items())
             if entry is None:
                 continue
             for failure in caught:
                 if failure.must_match(catch.on):
                     failures.pop(failure, None)
             handler = enter(catch.do, entry)
-            success, halted = joined((success, handler.success)), joined((halted, handler.halted))
+            success, halted = join_states((success, handler.success)), join_states((halted, handler.halted))
             failures.update(handler.failures)
         flow = Flow(success, failures, halted)
-        return flow if self.finally_ is None else _finish(self.finally_, flow, enter)
+        return flow if self.finally_ is None else _append(self.finally_, flow, enter)
 
-    def min_time(self, times: MinTimes) -> float:
-        """Return the time of the fastest of body and handlers, and of `finally`."""
-        fastest = min(times(child) for child in (self.do, *(handler.do for handler in self.catch)))
-        return fastest + (times(self.finally_) if self.finally_ else 0.0)
+    def min_time(self, min_time_of: MinTimes) -> float:
+        """Return the minimum time of the fastest of body and handlers, plus that of `finally` [s]."""
+        fastest = min(min_time_of(child) for child in (self.do, *(handler.do for handler in self.catch)))
+        return fastest + (min_time_of(self.finally_) if self.finally_ else 0.0)
 
     def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
-        """Find every failure in a handler that earlier ones take already, by this name or another."""
+        """Find every failure name in a handler whose failures are caught by earlier names."""
         body = facts.flow(self.do)
         earlier: list[Reason] = []
         for reason in [reason for handler in self.catch for reason in handler.on] if body else ():
             meant = [failure for failure in body.failures if failure.may_match([reason])] if body else []
             if meant and all(failure.must_match(earlier) for failure in meant):
-                taker = next(e for e in earlier if meant[0].must_match([e]))
-                message = f"{reason} is caught already, as {taker} in {facts.place(taker, reason)}"
+                catcher = next(e for e in earlier if meant[0].must_match([e]))
+                message = f"{reason} is caught already, as {catcher} in {facts.place(catcher, reason)}"
                 yield NodeFinding(reason, "unreachable", message, is_warning=True)
             earlier.append(reason)
 
@@ -132,9 +130,9 @@ class TryCatch(ControlNode):
             return "its finally failed"
         if failure.child is not self.do:
             last = failure.last
-            return f"caught {last} ({failure.messages.get(last, '')}), but what it did instead failed"
+            return f"caught {last} ({failure.messages.get(last, '')}), but the handler failed"
         named = [reason for handler in self.catch for reason in handler.on]
-        return f"catches only {listed(named)}" if named else "has no catch"
+        return f"catches only {format_reasons(named)}" if named else "has no catch"
 
     def advise(self, failure: PassedFailure) -> Iterator[Advice]:
         """Yield a further handler for a failure of the body."""
@@ -144,21 +142,21 @@ class TryCatch(ControlNode):
     def contingencies(self) -> Iterator[tuple[str, Child]]:
         """Yield the handlers and `finally`."""
         for handler in self.catch:
-            yield f"catch on {listed(handler.on)}", handler.do
+            yield f"catch on {format_reasons(handler.on)}", handler.do
         if self.finally_ is not None:
             yield "finally", self.finally_
 
 
-def _finish(last: Child, flow: Flow, enter: Enter) -> Flow:
-    """Return how a node may end whose last child runs after each of the ends in `flow`."""
+def _append(last: Child, flow: Flow, enter: Enter) -> Flow:
+    """Return how a node may end whose child `last` runs after each end in `flow`."""
     success, halted = None, flow.halted
     failures: dict[PossibleFailure, FlowState] = {}
     if flow.success is not None:
         end = enter(last, flow.success)
-        success, halted = end.success, joined((halted, end.halted))
+        success, halted = end.success, join_states((halted, end.halted))
         failures.update(end.failures)
     for failure, after in flow.failures.items():
         end = enter(last, after)
-        halted = joined((halted, end.halted))
-        failures[failure] = joined((end.success, *end.failures.values())) or after
+        halted = join_states((halted, end.halted))
+        failures[failure] = join_states((end.success, *end.failures.values())) or after
     return Flow(success, failures, halted)

@@ -6,23 +6,23 @@ from collections.abc import Iterator
 
 from py_trees.common import Status
 
-from executive.tree.flow import Enter, Flow, FlowState, joined, loop
+from executive.tree.flow import Enter, Flow, FlowState, find_fixed_point, join_states
 from executive.tree.inspection import NodeFacts, NodeFinding, PassedFailure
 from executive.tree.keys import Child, key
 from executive.tree.loop import Loop
 
 
 class While(Loop):
-    """Again as long as a condition succeeds, which is asked before every round.
+    """Run the body as long as a condition succeeds; the condition runs before every round.
 
-    Succeeds when the condition fails; a failure of the body is passed on.
+    The loop succeeds when the condition fails; a failure of the body is passed on.
     """
 
-    word = "while"
+    keyword = "while"
     symbol = "↺"
 
-    condition: Child = key(doc="What is asked; its failure ends the loop with success.")
-    do: Child = key(doc="What is done.")
+    condition: Child = key(doc="Condition; its failure ends the loop with success.")
+    do: Child = key(doc="Body of the loop.")
 
     def start(self) -> None:
         """Begin with the condition."""
@@ -30,7 +30,7 @@ class While(Loop):
         self._current = self.condition
 
     def step(self) -> Status:
-        """Tick the current child; begin the next round in the same tick if this one took time."""
+        """Tick the current child; begin the next round in the same tick if the last one took time."""
         while True:
             current = self._current
             status = self.run_round(current)
@@ -40,30 +40,30 @@ class While(Loop):
                 failure = self.failure_of(current)
                 if current is self.do:
                     return self.fail(failure)
-                self.choose("done", failure)
+                self.report_choice("done", failure)
                 return Status.SUCCESS
             if current is self.condition:
                 self._current = self.do
             else:
                 self._current = self.condition
-                if not self.next_round():
+                if not self.begin_round():
                     return Status.RUNNING
 
     def flow(self, enter: Enter, state: FlowState) -> Flow:
         """Enter condition and body in turn until no new state occurs."""
         rounds: list[Flow] = []
 
-        def again(condition: Flow) -> FlowState | None:
+        def next_entry(condition: Flow) -> FlowState | None:
             rounds.clear()
             if condition.success is None:
                 return None
             rounds.append(enter(self.do, condition.success))
             return rounds[0].success
 
-        condition, entry = loop(enter, self.condition, state, again)
+        condition, entry = find_fixed_point(enter, self.condition, state, next_entry)
         failures = {failure: after for flow in rounds for failure, after in flow.failures.items()}
-        halted = joined((condition.halted, entry, *(flow.halted for flow in rounds)))
-        return Flow(joined(condition.failures.values()), failures, halted)
+        halted = join_states((condition.halted, entry, *(flow.halted for flow in rounds)))
+        return Flow(join_states(condition.failures.values()), failures, halted)
 
     def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
         """Find a loop that never ends."""
@@ -73,11 +73,11 @@ class While(Loop):
             yield NodeFinding("", "endless", message, "Use repeat with times or until.")
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause, the condition."""
+        """Return the cause: the condition."""
         del child
         return "the condition never succeeds"
 
     def explain(self, failure: PassedFailure) -> str:
-        """Return the rule of failures of the body."""
+        """Return the rule for failures of the body."""
         del failure
         return "a failure of its body ends it"

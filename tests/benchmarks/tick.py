@@ -29,7 +29,7 @@ from executive.record.recorder import Recorder
 from executive.record.run_directory import RunDirectory
 from executive.skill import Skill
 from executive.tree.blackboard import Blackboard
-from executive.tree.node import Site
+from executive.tree.node import NodeContext
 from executive.tree.retry import Retry
 from executive.tree.sequence import Sequence as SequenceNode
 from executive.tree.skill_leaf import SkillLeaf, Wiring
@@ -120,8 +120,8 @@ def build_ours(nodes: int, last_skill: type[Skill], *observers: Observer) -> Beh
         for observer in observers:
             observer(timed)
 
-    def make_site(name: str) -> Site:
-        return Site(f"tree/repeat/do/{next(number)}:{name}", cell.clock, blackboard, emit=emit)
+    def make_site(name: str) -> NodeContext:
+        return NodeContext(f"tree/repeat/do/{next(number)}:{name}", cell.clock, blackboard, emit=emit)
 
     skills = [*[_SucceedAtOnce] * (nodes - 4), last_skill]
     leaves = [SkillLeaf(make_site(skill.__name__), "leaf", skill, Wiring(), cell) for skill in skills]

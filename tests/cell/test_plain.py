@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from executive.cell.detection import Detection
 from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
-from executive.cell.plain import LONGEST, plain, plain_or_type
+from executive.cell.plain import MAX_INTEGER_BITS, plain, plain_or_type
 from executive.geometry import Pose
 
 
@@ -63,8 +63,8 @@ DUCK = {"label": "duck", "confidence": 0.6, "box": [1, 2.5, 3.0, 4], "rival": 0.
         (b"bytes", "bytes"), (int, "type"), (object(), "object"), (Path("a/b"), "a/b"),
         (FRAME, {"frame": 7, "camera": "overhead", "stamp": 0.333333}),
         (Detection("duck", 0.6, (1, 2.5, np.float64(3), 4)), DUCK),
-        pytest.param(2**LONGEST - 1, 2**LONGEST - 1, id="largest"),
-        pytest.param(-(2**LONGEST), "-0x1" + "0" * (LONGEST // 4), id="too large"),
+        pytest.param(2**MAX_INTEGER_BITS - 1, 2**MAX_INTEGER_BITS - 1, id="largest"),
+        pytest.param(-(2**MAX_INTEGER_BITS), "-0x1" + "0" * (MAX_INTEGER_BITS // 4), id="too large"),
         ("größe", "größe"), ("caf\udce9 ü", "caf\\udce9 ü"), ({"\ud800": 1}, {"\\ud800": 1}),
         (Path("a\udcff"), "a\\udcff"), (np.str_("\udfff"), "\\udfff"),
     ],

@@ -15,7 +15,7 @@ from skills.move_to_scan import MoveToScan
 def test_an_arm_that_runs_into_something_stops_and_the_whole_table_is_in_doubt(
     fake: FakeCell, targets: list[Target]
 ) -> None:
-    fake.arm.runs_into = "link 4 ran into the lamp"
+    fake.arm.next_obstacle = "link 4 ran into the lamp"
     result = run_skill(MoveToScan(pose="aside"), fake)
     assert (result.reason, result.message) == ("blocked", "link 4 ran into the lamp")
     assert fake.arm.at_rest

@@ -17,7 +17,7 @@ from executive.mission.build import Builder
 from executive.mission.check.case import Case
 from executive.mission.check.checks import check
 from executive.mission.expand.expand import expand
-from executive.mission.flow.endings import endings
+from executive.mission.flow.endings import find_endings
 from executive.mission.model.paths import with_paths
 from executive.mission.parse.mission_file import parse_mission
 from executive.mission.source import Source
@@ -207,7 +207,7 @@ def sound(tree: Tree) -> Case | None:
 def run(case: Case, seed: int) -> tuple[World, Any]:
     """Run a mission until it ends or for long enough; return its world and its root."""
     world = World(seed)
-    root = Builder(SKILLS, cast("Cell", world), Blackboard(), ignore).node(case.tree)
+    root = Builder(SKILLS, cast("Cell", world), Blackboard(), ignore).build_node(case.tree)
     while world.ticks < MOST_TICKS:
         root.tick_once()
         if root.status is not Status.RUNNING:
@@ -247,7 +247,7 @@ def hold_against_runs(tree: Tree, seed: int) -> None:
             ends = {(f.source, f.reason, f.origin): after for f, after in flow.result.failures.items()}
             key = failure.source, failure.reason, failure.path
             assert key in ends, f"the checker has not foreseen {key}"
-            assert str(failure) in [f"{ending.source}.{ending.reason}" for ending in endings(flow)]
+            assert str(failure) in [f"{ending.source}.{ending.reason}" for ending in find_endings(flow)]
             state = ends[key]
         assert state.find_tool(HOLDING if world.holding else EMPTY), "the checker thinks the tool otherwise"
 

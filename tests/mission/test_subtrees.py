@@ -10,7 +10,7 @@ import pytest
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission
 from executive.mission.model.nodes import SkillNode
-from executive.mission.model.wiring import variables, wires
+from executive.mission.model.wiring import find_wires, find_written_variables
 from executive.skill import Direction, Skill
 
 Load = Callable[..., LoadedMission]
@@ -24,8 +24,8 @@ def wiring(loaded: LoadedMission, skills: dict[str, type[Skill]]) -> list[str]:
     for node in loaded.tree.walk():
         if isinstance(node, SkillNode):
             skill = skills[node.skill]
-            reads = [f"{w.port.name}<-${w.variable}" for w in wires(node, skill, Direction.IN)]
-            writes = [f"{w.port.name}->${w.variable}" for w in wires(node, skill, Direction.OUT)]
+            reads = [f"{w.port.name}<-${w.variable}" for w in find_wires(node, skill, Direction.IN)]
+            writes = [f"{w.port.name}->${w.variable}" for w in find_wires(node, skill, Direction.OUT)]
             lines.append(" ".join([node.skill, *reads, *writes]))
     return lines
 
@@ -103,7 +103,7 @@ def test_a_loop_in_a_closed_subtree_has_a_variable_of_its_own(load: Load) -> Non
         "    returns: [held]\n"
         "    do: [Look, {for_each: {each: kind, in: [cube], do: {Pick: {only: $kind}}}}]\n"
     )
-    names = [variable.name for node in loaded.tree.walk() for _, variable in variables(node)]
+    names = [variable.name for node in loaded.tree.walk() for _, variable in find_written_variables(node)]
     assert names == ["get.kind"]
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from executive.cell.detection import Detection
 from executive.cell.objects import Target
-from executive.mission.model.port_types import called, element_of, fits
+from executive.mission.model.port_types import describe_type, find_element_type, is_assignable
 
 
 class Special(Target):
@@ -26,7 +26,7 @@ class Special(Target):
     ],
 )  # fmt: skip
 def test_these_fit(given: Any, wanted: Any) -> None:
-    assert fits(given, wanted)
+    assert is_assignable(given, wanted)
 
 
 @pytest.mark.parametrize(
@@ -37,12 +37,12 @@ def test_these_fit(given: Any, wanted: Any) -> None:
     ],
 )  # fmt: skip
 def test_these_do_not_fit(given: Any, wanted: Any) -> None:
-    assert not fits(given, wanted)
+    assert not is_assignable(given, wanted)
 
 
 def test_a_list_has_elements_and_a_text_has_none() -> None:
     types = (list[Target], Sequence[int], tuple[int, ...], list, str, Target)
-    assert [element_of(one) for one in types] == [Target, int, int, Any, None, None]
+    assert [find_element_type(one) for one in types] == [Target, int, int, Any, None, None]
 
 
 @pytest.mark.parametrize(
@@ -53,4 +53,4 @@ def test_a_list_has_elements_and_a_text_has_none() -> None:
     ],
 )  # fmt: skip
 def test_types_have_words(declared: Any, word: str) -> None:
-    assert called(declared) == word
+    assert describe_type(declared) == word

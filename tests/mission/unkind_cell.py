@@ -25,9 +25,9 @@ class UnkindCell(FakeCell):
         self._unkindness = random.Random(seed)
         self.has_dropped = False
         self._longest = self._unkindness.randrange(1, LONGEST) if self._happens(0.2) else LONGEST
-        self._sees_all, self._plan, self._open = self.camera.sees, self.arm.plan, self.tool.open
-        self.tool.seals = lambda: not self._happens(0.2)
-        self.camera.sees = lambda: not self._happens(0.1) and self._sees_all()
+        self._sees_all, self._plan, self._open = self.camera.is_table_visible, self.arm.plan, self.tool.open
+        self.tool.is_sealing = lambda: not self._happens(0.2)
+        self.camera.is_table_visible = lambda: not self._happens(0.1) and self._sees_all()
         self.arm.plan, self.tool.open = self._plan_or_not, self._open_or_not  # type: ignore[method-assign]
         for detector in self.detectors.values():
             detector.answers = self._answer
@@ -45,7 +45,7 @@ class UnkindCell(FakeCell):
 
     def _plan_or_not(self, *args: Any, **more: Any) -> Any:
         if self._happens(0.02):
-            self.arm.runs_into = "the arm ran into something"
+            self.arm.next_obstacle = "the arm ran into something"
         plan = self._plan(*args, **more)
         return replace(plan, outcome=Unreachable("the arm does not like it")) if self._happens(0.03) else plan
 

@@ -38,7 +38,7 @@ def test_a_success_has_no_story() -> None:
          "retry: all 4 attempts failed: 4 x IsHolding.empty"),
         ("  - MoveToScan\n  - Detect\n  - Localize\n"
          "  - retry: {attempts: 4, on: [SelectTarget.unseen], do: [SelectTarget, IsHolding]}\n",
-         "retry: tries again only after SelectTarget.unseen"),
+         "retry: runs again only after SelectTarget.unseen"),
         ("  retry: {attempts: 4, recover: {invert: succeed}, do: IsHolding}\n",
          "retry: gave up after attempt 1 of 4: its recovery failed with invert.inverted: succeed succeeded"),
         ("  try: IsHolding\n  finally: {Wait: {seconds: 0.1}}\n", "try: has no catch"),
@@ -47,10 +47,11 @@ def test_a_success_has_no_story() -> None:
         ("  - MoveToScan\n  - try: [Detect, IsHolding]\n    catch: [{on: [Detect.hidden], do: succeed}]\n",
          "try: catches only Detect.hidden"),
         ("  try: IsHolding\n  catch: [{on: [IsHolding.empty], do: {invert: succeed}}]\n",
-         "try: caught IsHolding.empty (the sensor feels no seal), but what it did instead failed"),
+         "try: caught IsHolding.empty (the sensor feels no seal), but the handler failed"),
         ("  - MoveToScan\n  - repeat: {until: [Detect.hidden], do: [Detect, IsHolding]}\n",
-         "repeat: ends well only with Detect.hidden"),
-        ("  repeat: {times: 3, do: IsHolding}\n", "repeat: a failure ends it before its 3 times are over"),
+         "repeat: succeeds only with Detect.hidden"),
+        ("  repeat: {times: 3, do: IsHolding}\n",
+         "repeat: a failure ends it before its 3 rounds are complete"),
         ("  - MoveToScan\n  - while: {condition: Detect, do: IsHolding}\n",
          "while: a failure of its body ends it"),
         ("  for_each: {each: label, in: [cube, duck], do: IsHolding}\n",
@@ -65,7 +66,7 @@ def test_a_success_has_no_story() -> None:
         ("  parallel:\n    wait_for: any\n    do: [[{Wait: {seconds: 0.1}}, {invert: succeed}], IsHolding]\n",
          "parallel: needs one of its 2 branches; also failed: invert.inverted"),
         ("  parallel:\n    wait_for: lead\n    do: [IsHolding, {Wait: {seconds: 1}}]\n",
-         "parallel: ends as its lead does"),
+         "parallel: ends as its first child, the lead, ends"),
     ],
 )  # fmt: skip
 def test_every_control_node_says_why_it_did_not_stop_a_failure(tree: str, expected: str) -> None:
@@ -83,7 +84,7 @@ def test_a_recovery_that_failed_in_an_earlier_round_explains_nothing() -> None:
     )
     run.fake.detector.answers = lambda look, true: "gone" if look == 2 else true
     story = run.tell()
-    assert story.chain[2].why == "tries again only after IsHolding.empty"
+    assert story.chain[2].why == "runs again only after IsHolding.empty"
 
 
 def test_an_undeclared_reason_is_told_at_the_line_of_its_skill() -> None:
@@ -92,7 +93,7 @@ def test_an_undeclared_reason_is_told_at_the_line_of_its_skill() -> None:
     def seals() -> bool:
         raise discover()["MoveToScan"]().failed("tired", "no more")
 
-    run.fake.tool.seals = seals
+    run.fake.tool.is_sealing = seals
     story = run.tell()
     assert 'raised the undeclared reason "tired"' in story.verdict
     assert re.fullmatch(r"record/test_diagnosis\.py:\d+, in seals", story.raised_at)
@@ -114,7 +115,7 @@ def test_a_fault_says_where_it_was_raised_and_what_is_known_of_the_arm(at_rest, 
     def broken() -> bool:
         raise ZeroDivisionError("vacuum gauge")
 
-    run.fake.tool.seals = broken
+    run.fake.tool.is_sealing = broken
     story = run.tell(at_rest)
     assert (story.arm, story.verdict) == (arm, "Grasp: ZeroDivisionError: vacuum gauge")
     assert story.next[0].startswith(first)
@@ -153,7 +154,7 @@ def test_a_halt_at_a_question_says_so() -> None:
 )  # fmt: skip
 def test_whatever_goes_wrong_its_story_can_be_told(breaks, slips, misses, gone, stop) -> None:
     run = FailedRun("sort_overhead", overrides={"attempts": "2"})
-    run.fake.tool.seals = lambda: breaks.random() >= misses
+    run.fake.tool.is_sealing = lambda: breaks.random() >= misses
     run.fake.detector.answers = lambda look, true: "gone" if breaks.random() < gone else true
     run.slip(slips, vanish=breaks.random() < 0.5)
     if stop is not None:

@@ -46,7 +46,7 @@ def something_higher(fake: FakeCell) -> None:
 
 
 def a_lamp(fake: FakeCell) -> None:
-    fake.arm.runs_into = "link 4 ran into the lamp"
+    fake.arm.next_obstacle = "link 4 ran into the lamp"
 
 
 @pytest.mark.parametrize(
@@ -76,7 +76,7 @@ def test_an_approach_that_meets_something_else_says_what(
 def test_it_does_not_go_where_something_may_have_moved_since(fake: FakeCell, target: Target) -> None:
     fake.ledger.invalidate_positions()
     result = run_skill(Approach(target=target), fake)
-    assert (result.status, result.reason, fake.arm.commanded) == ("FAILURE", "stale", [])
+    assert (result.status, result.reason, fake.arm.commands) == ("FAILURE", "stale", [])
     assert result.message == ("cube-1 was seen at 0.00 s, and the robot may have moved it since; look again")
 
 
@@ -92,7 +92,7 @@ def test_every_further_attempt_comes_down_elsewhere(fake: FakeCell, target: Targ
 def test_a_target_out_of_reach_is_unreachable_and_nothing_moves(fake: FakeCell, look: Look) -> None:
     fake.world.put("cube", 0.80, 0.30)
     result = run_skill(Approach(target=look("full")[0]), fake)
-    assert (result.reason, fake.arm.commanded) == ("unreachable", [])
+    assert (result.reason, fake.arm.commands) == ("unreachable", [])
     assert "more than the arm's 0.85 m" in result.message
 
 
@@ -121,7 +121,7 @@ def test_grasp_holds_and_the_ledger_knows(fake: FakeCell, held: str) -> None:
 
 
 def test_a_grasp_without_a_seal_is_missed_and_lets_go(fake: FakeCell, target: Target) -> None:
-    fake.tool.seals = lambda: False
+    fake.tool.is_sealing = lambda: False
     run_skill(Approach(target=target), fake)
     result = run_skill(Grasp(target=target), fake)
     assert (result.reason, result.message) == ("missed", "no seal on cube-1 0.10 s after contact")
@@ -185,9 +185,9 @@ def test_an_item_is_given_up_with_its_reason_after_the_failures_the_mission_gran
 
 
 def test_move_to_scan_goes_to_the_cameras_first_pose_only_if_the_table_is_out_of_view(fake: FakeCell) -> None:
-    assert (run_skill(MoveToScan(), fake).ticks, fake.arm.commanded) == (0, [])
+    assert (run_skill(MoveToScan(), fake).ticks, fake.arm.commands) == (0, [])
     run_skill(MoveToScan(pose="aside"), fake)
-    fake.camera.sees = lambda: False
+    fake.camera.is_table_visible = lambda: False
     assert run_skill(MoveToScan(), fake).status == "SUCCESS"
     assert np.allclose(fake.arm.tool_pose.position, fake.arm.poses["home"].position)
 

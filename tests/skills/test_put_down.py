@@ -47,7 +47,7 @@ def test_what_falls_on_the_way_is_dropped_where_the_arm_stops(fake: FakeCell, he
 
 
 def test_what_is_torn_off_by_running_into_something_is_dropped(fake: FakeCell, held: str) -> None:
-    fake.arm.runs_into = "the held cube ran into a hand"
+    fake.arm.next_obstacle = "the held cube ran into a hand"
     failure = lost(fake, held, lambda: fake.arm.met is not None)
     assert failure.reason == "dropped"
     assert failure.message.startswith("the seal on cube-1 broke on the way to the safe place, near (")
@@ -64,7 +64,7 @@ def test_what_falls_while_the_way_is_planned_is_dropped_though_there_is_none(
 
 
 def test_a_run_into_something_keeps_what_it_holds(fake: FakeCell, held: str) -> None:
-    fake.arm.runs_into = "the held cube ran into a hand"
+    fake.arm.next_obstacle = "the held cube ran into a hand"
     result = run_skill(PutDown(held=held), fake)
     assert (result.reason, result.message) == ("blocked", "the held cube ran into a hand")
     assert (fake.tool.holding, fake.ledger.find_held_item()) == (True, held)

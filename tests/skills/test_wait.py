@@ -10,7 +10,7 @@ from skills.wait import Wait
 @pytest.mark.parametrize("seconds", [0.0, 0.1, 2.5])
 def test_waiting_takes_its_time_on_the_runs_clock_and_moves_nothing(fake: FakeCell, seconds: float) -> None:
     assert run_skill(Wait(seconds=seconds), fake).status == "SUCCESS"
-    assert (fake.cell.clock.now, fake.arm.commanded) == (pytest.approx(seconds, abs=1 / 240), [])
+    assert (fake.cell.clock.now, fake.arm.commands) == (pytest.approx(seconds, abs=1 / 240), [])
 
 
 def test_waiting_can_be_halted(fake: FakeCell) -> None:

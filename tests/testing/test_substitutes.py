@@ -68,7 +68,7 @@ def test_a_bug_comes_up_in_mid_work_and_the_skill_cleans_up(fake: FakeCell, targ
     with pytest.raises(ZeroDivisionError, match="in the model"):
         run_skill(broken, fake, inputs={"target": target})
     assert fake.steps >= 40
-    assert fake.arm.commanded == ["start", "stop"]
+    assert fake.arm.commands == ["start", "stop"]
 
 
 def test_a_bug_comes_up_in_time_and_as_often_as_it_was_told_to(fake: FakeCell) -> None:
@@ -82,7 +82,7 @@ def test_a_bug_in_finally_comes_up_in_a_halt_and_not_without_one(fake: FakeCell,
     broken = raising_when_halted(Approach, ValueError("in finally"))
     with pytest.raises(Fault, match="ValueError while it was halted: in finally"):
         run_skill(broken, fake, inputs={"target": target}, halt_at=40)
-    assert fake.arm.commanded == ["start", "stop"], "the skill's own finally ran before"
+    assert fake.arm.commands == ["start", "stop"], "the skill's own finally ran before"
     assert run_skill(broken, fake, inputs={"target": target}).status == "SUCCESS"
 
 

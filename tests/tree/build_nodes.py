@@ -16,8 +16,8 @@ from executive.tree.failure import Reason
 from executive.tree.fallback import Fallback
 from executive.tree.for_each import ForEach
 from executive.tree.invert import Invert
-from executive.tree.keys import Variable
-from executive.tree.node import Site
+from executive.tree.keys import VariableName
+from executive.tree.node import NodeContext
 from executive.tree.parallel import Parallel
 from executive.tree.repeat import Repeat
 from executive.tree.retry import Backoff, Retry
@@ -30,27 +30,29 @@ from executive.tree.while_loop import While
 Names = Iterable[tuple[str, str]]
 
 
-def make_site(path: str = "node", label: str = "", emit: Emit = ignore, clock: Any = None) -> Site:
-    return Site(path, clock or Clock(), Blackboard(), label, emit)
+def make_site(path: str = "node", label: str = "", emit: Emit = ignore, clock: Any = None) -> NodeContext:
+    return NodeContext(path, clock or Clock(), Blackboard(), label, emit)
 
 
 def names_of(pairs: Names) -> tuple[Reason, ...]:
     return tuple(Reason(*pair) for pair in pairs)
 
 
-def sequence(site: Site, children: Sequence[Behaviour]) -> SequenceNode:
+def sequence(site: NodeContext, children: Sequence[Behaviour]) -> SequenceNode:
     return SequenceNode(site, do=children)
 
 
-def fallback(site: Site, children: Sequence[Behaviour]) -> Fallback:
+def fallback(site: NodeContext, children: Sequence[Behaviour]) -> Fallback:
     return Fallback(site, do=children)
 
 
-def parallel(site: Site, children: Sequence[Behaviour], wait_for: Any = None, halt: bool = False) -> Parallel:
+def parallel(
+    site: NodeContext, children: Sequence[Behaviour], wait_for: Any = None, halt: bool = False
+) -> Parallel:
     return Parallel(site, do=children, wait_for="all" if wait_for is None else wait_for, halt=halt)
 
 
-def lead(site: Site, children: Sequence[Behaviour]) -> Parallel:
+def lead(site: NodeContext, children: Sequence[Behaviour]) -> Parallel:
     return Parallel(site, do=children, wait_for="lead")
 
 
@@ -59,7 +61,7 @@ def make_backoff(first: float, factor: float = 1.0, most: float = inf) -> Backof
 
 
 def retry(
-    site: Site,
+    site: NodeContext,
     body: Behaviour,
     attempts: int,
     on: Names = (),
@@ -71,21 +73,21 @@ def retry(
     return Retry(site, attempts=attempts, on=names_of(on), recover=recover, backoff=backoff, do=body)
 
 
-def repeat(site: Site, body: Behaviour, times: int | None = None, until: Names = ()) -> Repeat:
+def repeat(site: NodeContext, body: Behaviour, times: int | None = None, until: Names = ()) -> Repeat:
     return Repeat(site, times=times, until=names_of(until), do=body)
 
 
-def while_loop(site: Site, condition: Behaviour, body: Behaviour) -> While:
+def while_loop(site: NodeContext, condition: Behaviour, body: Behaviour) -> While:
     return While(site, condition=condition, do=body)
 
 
-def for_each(site: Site, body: Behaviour, blackboard: Blackboard, each: str, source: Any) -> ForEach:
-    elements = Variable(source) if isinstance(source, str) else tuple(source)
-    return ForEach(replace(site, blackboard=blackboard), each=Variable(each), in_=elements, do=body)
+def for_each(site: NodeContext, body: Behaviour, blackboard: Blackboard, each: str, source: Any) -> ForEach:
+    elements = VariableName(source) if isinstance(source, str) else tuple(source)
+    return ForEach(replace(site, blackboard=blackboard), each=VariableName(each), in_=elements, do=body)
 
 
 def try_catch(
-    site: Site,
+    site: NodeContext,
     body: Behaviour,
     handlers: Iterable[tuple[Names, Behaviour]] = (),
     last: Behaviour | None = None,
@@ -94,13 +96,13 @@ def try_catch(
     return TryCatch(site, do=body, catch=catch, finally_=last)
 
 
-def timeout(site: Site, body: Behaviour, seconds: float, clock: Any) -> Timeout:
+def timeout(site: NodeContext, body: Behaviour, seconds: float, clock: Any) -> Timeout:
     return Timeout(replace(site, clock=clock), seconds=seconds, do=body)
 
 
-def invert(site: Site, body: Behaviour) -> Invert:
+def invert(site: NodeContext, body: Behaviour) -> Invert:
     return Invert(site, do=body)
 
 
-def succeed(site: Site, body: Behaviour | None = None) -> Succeed:
+def succeed(site: NodeContext, body: Behaviour | None = None) -> Succeed:
     return Succeed(site, do=body)

@@ -12,7 +12,7 @@ from scripted_leaf import Leaf
 
 from executive.events import Event
 from executive.tree.blackboard import Blackboard
-from executive.tree.node import Site
+from executive.tree.node import NodeContext
 
 
 @pytest.fixture
@@ -41,8 +41,8 @@ def scope() -> Blackboard:
 
 
 @pytest.fixture
-def site(events: list[Event], clock: Clock, scope: Blackboard) -> Callable[..., Site]:
-    return lambda path="node", label="": Site(path, clock, scope, label, events.append)
+def site(events: list[Event], clock: Clock, scope: Blackboard) -> Callable[..., NodeContext]:
+    return lambda path="node", label="": NodeContext(path, clock, scope, label, events.append)
 
 
 @pytest.fixture

@@ -30,7 +30,7 @@ from scripted_leaf import Leaf
 
 from executive.events import BranchChosen, Event, NodeEnded, NodeStarted
 from executive.tree.blackboard import Blackboard
-from executive.tree.node import Site
+from executive.tree.node import NodeContext
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ def bottom_up(node: Behaviour) -> Iterator[Behaviour]:
     yield node
 
 
-_Make = Callable[[Site, list[Behaviour], tuple[Any, ...], World], Behaviour]
+_Make = Callable[[NodeContext, list[Behaviour], tuple[Any, ...], World], Behaviour]
 
 _NODES: Mapping[str, _Make] = {
     "sequence": lambda site, nodes, options, world: sequence(site, nodes),

@@ -21,12 +21,12 @@ from executive.tree.retry import Backoff, Retry
     ],
 )
 def test_waits_grow_by_the_factor_up_to_the_most(backoff: Backoff, delays: list[float]) -> None:
-    assert [backoff.delay(attempt) for attempt in range(1, 5)] == delays
+    assert [backoff.compute_delay(attempt) for attempt in range(1, 5)] == delays
 
 
 @pytest.mark.parametrize("factor", [2, 2.0])
 def test_no_number_of_attempts_is_too_large(factor: float) -> None:
-    assert make_backoff(0.5, factor, most=8.0).delay(100_000) == 8.0
+    assert make_backoff(0.5, factor, most=8.0).compute_delay(100_000) == 8.0
 
 
 def runs(node: Retry, clock: Any, times: list[float]) -> str:

@@ -119,7 +119,7 @@ def test_a_list_that_nothing_wrote_is_a_fault(make: Any, scope: Blackboard) -> N
     with pytest.raises(Fault) as caught:
         make("todo").tick_once()
     assert (str(caught.value), caught.value.node) == (
-        "for_each: it reads $todo, which nothing has written yet; written so far: targets", "loop",
+        "for_each: it reads $todo, which no node has written yet; written so far: targets", "loop",
     )  # fmt: skip
 
 
@@ -131,7 +131,7 @@ def test_what_is_no_list_is_a_fault(make: Any, scope: Blackboard, value: Any, ki
         node.tick_once()
     assert str(caught.value) == (
         f"for_each: $todo holds a {kind}, not a list; "
-        "go through a variable that holds one, or write the elements in the mission"
+        "name a variable that holds a list, or write the elements in the mission"
     )
     assert halt(node) == []
 

@@ -38,10 +38,10 @@ def names_in(file: Path, words: set[str], classes: dict[str, str]) -> Iterator[s
 
 def test_no_other_file_names_a_control_node() -> None:
     kinds = control_nodes().values()
-    words = {kind.word for kind in kinds} | {USE}
+    words = {kind.keyword for kind in kinds} | {USE}
     # `Sequence` is also a type of Python: imports of its module are found all the same.
-    classes = {kind.__name__: kind.word for kind in kinds if kind.__name__ != "Sequence"}
-    classes |= {kind.__module__: kind.word for kind in kinds}
+    classes = {kind.__name__: kind.keyword for kind in kinds if kind.__name__ != "Sequence"}
+    classes |= {kind.__module__: kind.keyword for kind in kinds}
     own = {Path(inspect.getfile(kind)) for kind in kinds}
     found = {
         (file.relative_to(PACKAGE).as_posix(), name)

@@ -175,7 +175,7 @@ def test_statuses_order_and_failure(
             ],
         ),
         (lambda m: parallel(m.site, m("A", "B: lost", "C: stuck")), ["fail with B.lost, C.stuck"]),
-        (lambda m: lead(m.site, m("A: R R S", "B: R stuck")), ["go on without it, B.stuck"]),
+        (lambda m: lead(m.site, m("A: R R S", "B: R stuck")), ["go on without this branch, B.stuck"]),
     ],
 )
 def test_choices(build: Callable[[Make], Behaviour], choices: list[str]) -> None:

@@ -95,6 +95,6 @@ def test_nothing_depends_on_the_clock_on_the_wall(
 def test_a_node_without_a_status_is_a_fault_and_not_an_interruption(value: Any, leaf: Any, site: Any) -> None:
     inner = sequence(site("here"), [Returning(value), leaf("after")])
     root = fallback(site("root"), [inner, leaf("instead")])
-    with pytest.raises(Fault, match="odd was ticked and has no status") as caught:
+    with pytest.raises(Fault, match="odd was ticked but has no status") as caught:
         root.tick_once()
     assert (caught.value.node, halt(root)) == ("here", [])

@@ -125,11 +125,11 @@ def test_a_bug_in_a_skill_is_a_fault(make: Any, way: str, sentence: str, events:
 
 
 def test_a_missing_input_is_a_fault_that_names_it(make: Any, scope: Blackboard) -> None:
-    scope.forget("input")
+    scope.remove("input")
     with pytest.raises(Fault) as caught:
         make().tick_once()
     assert str(caught.value) == (
-        'Worker: the input "given" reads $input, which nothing has written yet; written so far: nothing'
+        'Worker: the input "given" reads $input, which no node has written yet; written so far: nothing'
     )
 
 
@@ -147,7 +147,7 @@ def test_halting_runs_the_finally_of_the_skill_unless_it_ended(make: Any, ticks:
 @pytest.mark.parametrize(
     ("way", "problem"),
     [
-        ("linger", 'tree/Worker: Worker: it yielded while it was halted; nothing may wait in "finally"'),
+        ("linger", 'tree/Worker: Worker: it yielded while it was halted; "finally" must not contain a yield'),
         ("break late", "tree/Worker: Worker: ValueError while it was halted: a late bug"),
     ],
 )
@@ -221,5 +221,5 @@ def test_a_forgotten_variable_is_gone_and_need_not_have_been_there() -> None:
     scope, other = Blackboard(), Blackboard()
     scope.write({"a": 1, "b": 2})
     for _ in range(2):
-        scope.forget("a")
+        scope.remove("a")
     assert (dict(scope), dict(other)) == ({"b": 2}, {})

@@ -24,7 +24,7 @@ from collections.abc import Iterator
 from py_trees.common import Status
 
 from executive.skill import Seconds
-from executive.tree.flow import Enter, Flow, FlowState, grips_at_end, joined, combine_branches
+from executive.tree.flow import Enter, Flow, FlowState, find_tools_at_end, join_states, combine_branches
 from executive.tree.inspection import MinTimes, PassedFailure
 from executive.tree.keys import Children, key
 from executive.tree.node import ControlNode
@@ -33,11 +33,11 @@ from executive.tree.node import ControlNode
 class Race(ControlNode):
     """All at the same time; the first branch that succeeds halts the others."""
 
-    word = "race"
+    keyword = "race"
     symbol = "⚑"
 
     head_start: Seconds = key(default=0.0, ge=0, doc="Time before the other branches begin [s].")
-    do: Children = key(bare=True, doc="The branches.")
+    do: Children = key(shorthand=True, doc="The branches.")
 
     def start(self) -> None:
         self._running = list(self.do)
@@ -59,15 +59,15 @@ class Race(ControlNode):
 
     def flow(self, enter: Enter, state: FlowState) -> Flow:
         flows = [enter(child, state) for child in self.do]
-        ends = [grips_at_end(flow, state, halts=True) for flow in flows]
+        ends = [find_tools_at_end(flow, state, halts=True) for flow in flows]
         tools = combine_branches(state.tools, ends)
-        success = joined(flow.success for flow in flows)
-        halted = joined(flow.halted for flow in flows)
+        success = join_states(flow.success for flow in flows)
+        halted = join_states(flow.halted for flow in flows)
         failures = {one: after.with_tools(tools) for flow in flows for one, after in flow.failures.items()}
         return Flow(success and success.with_tools(tools), failures, halted and halted.with_tools(tools))
 
-    def min_time(self, times: MinTimes) -> float:
-        return min(times(child) for child in self.do)
+    def min_time(self, min_time_of: MinTimes) -> float:
+        return min(min_time_of(child) for child in self.do)
 
     @property
     def concurrent(self) -> Children:
@@ -183,7 +183,7 @@ def test_a_failure_that_it_passes_on_is_explained(project: Path) -> None:
     [
         ("class Race:\n    pass\n", "is not a ControlNode subclass"),
         ("import nothing_of_this_name\n", "cannot be loaded: ModuleNotFoundError"),
-        (RACE.replace('word = "race"', 'word = "run"'), 'its class has the word "run"'),
+        (RACE.replace('keyword = "race"', 'keyword = "run"'), 'the class has the keyword "run"'),
         (RACE.replace("def flow", "def flows"), "has no method flow"),
         (RACE.replace("do: Children", "status: Children"), 'cannot have the key "status"'),
         (RACE.replace("do: Children =", "do ="), "has no annotation"),

@@ -1,7 +1,6 @@
-"""The typed content of a cell file: where a mission happens and what stands there.
+"""Typed content of a cell file: robot, tool, cameras, table, bins, objects and detectors.
 
-The model is the file: every field below is a key of `missions/cells/*.yaml`, in SI units. Keys that
-end in `_deg` are in degrees, where the field says so.
+Each field is a key of `missions/cells/*.yaml`, in SI units. Values of keys that end in `_deg` are in degrees.
 """
 
 from __future__ import annotations

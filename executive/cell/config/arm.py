@@ -72,7 +72,7 @@ class ArmConfig(Section):
     limits: LimitsConfig
     """Joint limits of the arm."""
     poses_deg: dict[Name, tuple[Angle, ...]] = Field(min_length=1)
-    """Named joint poses, one angle for each joint [degree]; `home` is where a run begins."""
+    """Named joint poses, one angle for each joint [degree]; a run begins in `home`."""
 
     @property
     def joint_count(self) -> int:
@@ -80,7 +80,7 @@ class ArmConfig(Section):
         return len(self.limits.position_deg)
 
     @model_validator(mode="after")
-    def _has_home(self) -> ArmConfig:
+    def _check_poses(self) -> ArmConfig:
         if "home" not in self.poses_deg:
             raise ValueError(f'needs a pose named "home"; there are: {", ".join(self.poses_deg)}')
         for name, pose in self.poses_deg.items():
@@ -96,11 +96,11 @@ class ToolConfig(Section):
     """A suction tool with one bellows cup; `tests/benchmarks/suction_map.py` justifies the constants."""
 
     length: Length = 0.12
-    """From the flange to the cup's lip [m]."""
+    """Distance from the flange to the lip of the cup [m]."""
     cup_radius: Length
     """Radius of the lip [m]."""
     reach: Length = 0.002
-    """Largest distance at which the lip still closes on a surface [m]."""
+    """Largest distance from a surface at which the lip still seals [m]."""
     force: Force
     """Breakaway force of a perfect seal [N]."""
     gap: Length
@@ -117,7 +117,7 @@ class MotionConfig(Section):
     """Parameters of motion planning."""
 
     margin: Distance = 0.005
-    """Smallest distance of arm, tool and load to anything on the way [m]."""
+    """Smallest distance of arm, tool and load from all obstacles during a motion [m]."""
     clearance: Length = 0.04
     """Clearance above the highest wall and pile in the fallback motion, which stops at every corner and is
     used if no direct motion or detour is collision-free [m]."""
@@ -129,6 +129,6 @@ class MotionConfig(Section):
     """Length of the straight vertical segment at the end of a motion into a bin and at the start of a motion
     upwards [m]."""
     planning: float = Field(0.1, ge=0.1, le=60)
-    """Time that planning a motion takes on the run's clock, unless it was planned ahead [s]. Its lower
+    """Time for planning a motion on the clock of the run, unless the motion was planned ahead [s]. The lower
     bound is the 99th percentile of the planning time measured on two cores, 94 ms, rounded up
     (`tests/benchmarks/README.md`)."""

@@ -16,11 +16,11 @@ Turn = Annotated[float, Field(ge=-7, le=7)]
 """A component of a rotation vector [rad], at most a whole turn."""
 
 POSE_AND_FOV_KEYS = ("position", "look_at", "up", "fov_deg")
-"""Keys that say how a camera stands and sees where no calibration does."""
+"""Keys for pose and field of view of a camera without a calibration."""
 
 
 class NoiseConfig(Section):
-    """Sensor noise of a camera, drawn anew for every frame from the run's seed."""
+    """Sensor noise of a camera, sampled for each frame with the seed of the run."""
 
     gain: Share = 0.02
     """Standard deviation of a frame's brightness factor."""
@@ -29,53 +29,53 @@ class NoiseConfig(Section):
 
 
 class DepthConfig(Section):
-    """A depth sensor in register with the camera, and its noise, drawn anew for every frame.
+    """A depth sensor registered to the camera, and its noise, sampled for each frame.
 
-    The defaults stand for a RealSense D435 at 848 x 480 (focal length 425 pixels, baseline 50 mm). By
-    Intel's "Tuning depth cameras for best performance" the RMS error of a stereo camera is
-    z² · subpixel / (focal length · baseline); a subpixel error of 0.08 is taken. What is lost and where,
-    and over how many pixels it errs alike, is assumed.
+    The defaults model a RealSense D435 at 848 x 480 (focal length 425 pixels, baseline 50 mm). By Intel's
+    "Tuning depth cameras for best performance" the RMS error of a stereo camera is
+    z² · subpixel / (focal length · baseline), here with a subpixel error of 0.08. The shares of pixels
+    without a measurement and the correlation of neighbouring pixels are assumed.
     """
 
     floor: Distance = 0.0005
-    """Standard deviation right before the lens [m]."""
+    """Standard deviation at distance 0 [m]."""
     growth: Share = 0.0038
-    """What the square of the distance adds to it [1/m]: at distance z it is floor + growth · z²."""
+    """Coefficient of the square of the distance z [1/m]; the standard deviation is floor + growth · z²."""
     grain: float = Field(1.0, ge=0, le=100)
-    """Standard deviation of the window over which neighbours err alike [pixel]; 0: every one for itself."""
+    """Standard deviation of the window that correlates the noise of neighbours [pixel]; 0: no correlation."""
     step: Distance = 0.001
-    """Distances are whole multiples of this [m]; 0: not rounded."""
+    """Resolution of the distances [m]; 0: not rounded."""
     edge: Length = 0.02
-    """Difference of neighbours that is an edge, where the sensor may see nothing [m]."""
+    """Difference between neighbouring distances that is an edge [m]."""
     edge_width: Natural = 2
-    """How far from an edge that happens [pixel]."""
+    """Distance from an edge up to which pixels may lack a measurement [pixel]."""
     edge_dropout: Share = 0.7
-    """Share of the pixels there without a distance."""
+    """Share of the pixels near an edge without a measurement."""
     dropout: Share = 0.01
-    """Share of the pixels without a distance everywhere."""
+    """Share of all pixels without a measurement."""
 
 
 class TransformConfig(Section):
-    """A change of frame as OpenCV writes it: p' = R p + t."""
+    """A coordinate transformation in OpenCV's form: p' = R p + t."""
 
     rotation: tuple[Turn, Turn, Turn]
-    """Rotation vector, the axis times the angle [rad]: OpenCV's rvec; `cv2.Rodrigues` makes it of R."""
+    """Rotation vector, the axis times the angle [rad]: OpenCV's rvec, from R by `cv2.Rodrigues`."""
     translation: Vector
     """OpenCV's tvec t."""
 
 
 class CalibrationConfig(Section):
-    """Camera matrix and pose as OpenCV's calibration gives them, of images without distortion."""
+    """Camera matrix and pose in the form of OpenCV's calibration, for images without distortion."""
 
     matrix: tuple[Row, Row, Row]
-    """[[fx, 0, cx], [0, fy, cy], [0, 0, 1]] [pixel]; as in OpenCV, pixel centres are whole numbers."""
+    """[[fx, 0, cx], [0, fy, cy], [0, 0, 1]] [pixel]; as in OpenCV, pixel centres have integer coordinates."""
     mount_to_camera: TransformConfig | None = None
-    """From the world (a fixed camera) or the flange (one on the wrist) to it, as `cv2.solvePnP` gives it."""
+    """From the world (fixed camera) or the flange (wrist camera) to the camera, as by `cv2.solvePnP`."""
     camera_to_mount: TransformConfig | None = None
-    """The inverse of `mount_to_camera`, as `cv2.calibrateHandEye` gives it; one of the two must be there."""
+    """Inverse of `mount_to_camera`, as by `cv2.calibrateHandEye`; exactly one of the two is required."""
 
     @model_validator(mode="after")
-    def _is_of_a_camera(self) -> CalibrationConfig:
+    def _check_matrix_and_pose(self) -> CalibrationConfig:
         (fx, skew, _), (zero, fy, _), last = self.matrix
         if fx <= 0 or fy <= 0 or (skew, zero) != (0, 0) or last != (0, 0, 1):
             raise ValueError(
@@ -92,17 +92,17 @@ class CalibrationConfig(Section):
 class CameraConfig(Section):
     """A camera, fixed in the world or mounted on the wrist.
 
-    How it stands and sees is said by `position`, `look_at`, `up` and `fov_deg`, or by its `calibration`.
+    Pose and field of view are `position`, `look_at`, `up` and `fov_deg`, or follow from `calibration`.
     """
 
     mount: Literal["fixed", "wrist"]
-    """`fixed`: where it is said to be is in the world. `wrist`: it is in the flange's frame."""
+    """`fixed`: the pose is in the world frame. `wrist`: the pose is in the frame of the flange."""
     position: Vector | None = None
     """Optical centre."""
     look_at: Vector | None = None
     """A point on the optical axis."""
     up: Vector | None = None
-    """Direction that the top of the image shows."""
+    """Direction of the top of the image."""
     width: int = Field(640, ge=64, le=8192)
     """Image width [pixel]."""
     height: int = Field(480, ge=64, le=8192)
@@ -112,23 +112,23 @@ class CameraConfig(Section):
     calibration: CalibrationConfig | None = None
     """Camera matrix and pose, instead of `position`, `look_at`, `up` and `fov_deg`."""
     table_view: tuple[int, int, int, int]
-    """Left, top, right, bottom [pixel] of the square part of the image that shows the workspace."""
+    """Left, top, right, bottom side [pixel] of the square part of the image that shows the workspace."""
     scan_poses: tuple[Name, ...] = Field(min_length=1)
-    """Arm poses from which it sees the table, best first."""
+    """Arm poses from which the camera sees the table, best first."""
     noise: NoiseConfig = NoiseConfig()
-    """Its sensor noise."""
+    """Sensor noise."""
     depth: DepthConfig | None = None
-    """Its depth sensor; none by default. `depth: {}` is one with the usual noise."""
+    """Depth sensor; none by default. `depth: {}` is a depth sensor with the default noise."""
 
     def area(self, view: str) -> tuple[int, int, int, int]:
-        """Return the part of the image [pixel] that `view` (`table` or `full`) means."""
+        """Return the part of the image [pixel] of a `view` (`table` or `full`)."""
         return self.table_view if view == "table" else (0, 0, self.width, self.height)
 
     @model_validator(mode="after")
-    def _can_be_set_up(self) -> CameraConfig:
+    def _check_view_and_pose(self) -> CameraConfig:
         left, top, right, bottom = self.table_view
-        square = 0 <= left < right <= self.width and 0 <= top < bottom <= self.height
-        if not square or right - left != bottom - top:
+        is_inside = 0 <= left < right <= self.width and 0 <= top < bottom <= self.height
+        if not is_inside or right - left != bottom - top:
             raise ValueError(
                 f"needs a table_view that is a square inside its image of {self.width} x {self.height} "
                 f"pixels, not {list(self.table_view)}"

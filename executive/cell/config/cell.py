@@ -1,4 +1,4 @@
-"""A whole cell file."""
+"""Content of a cell file."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ class LedgerConfig(Section):
 
 
 class CellConfig(Section):
-    """A whole cell file."""
+    """Content of a cell file."""
 
     base: str = Field("", exclude=True)
-    """Another cell file. It gives every key of the first level that this file lacks, and every detector and
-    key of a detector that `detectors` lacks; "" once it has."""
+    """Another cell file. This file inherits each missing top-level key, each missing detector and each
+    missing key of a detector from it; "" after loading."""
     cell: Name
     """Name of the cell."""
     description: str = ""
-    """One sentence."""
+    """Description of the cell in one sentence."""
     kind: str = "sim"
     """Kind of cell (entry-point group `executive.cells`)."""
     arm: ArmConfig
@@ -47,26 +47,26 @@ class CellConfig(Section):
     bins: dict[Name, BinConfig] = Field(min_length=1)
     cameras: dict[Name, CameraConfig] = Field(min_length=1, max_length=1)
     detector: str = ""
-    """The one of `detectors` that missions use unless they name another; "": the first."""
+    """Name of the default detector of missions; "": the first of `detectors`."""
     detectors: dict[Name, DetectorConfig] = Field(min_length=1)
-    """By name. With a `base`, a detector of the same name and kind changes keys of the base's detector,
-    another kind replaces it, another name adds a detector, and a name without a value removes one."""
+    """Detectors by name. With a `base`, a detector of the same name and kind changes keys of the base's
+    detector, another kind replaces it, another name adds one, and a name without a value removes it."""
     localization: Literal["plane", "depth", "ray"] = "plane"
     objects: dict[Name, ObjectConfig] = Field(min_length=1)
     ledger: LedgerConfig = LedgerConfig()
     safe_place: Vector
-    """Where something held may be put down on the table."""
+    """Place on the table for a put-down."""
 
     @field_validator("detectors")
     @classmethod
-    def _the_chosen_one_first(
+    def _put_default_first(
         cls, detectors: dict[str, DetectorConfig], others: ValidationInfo
     ) -> dict[str, DetectorConfig]:
-        """Put the detector that is named before the others: whoever names none takes the first."""
-        chosen = others.data.get("detector", "")
-        if not chosen:
+        """Put the default detector before the others, because a mission that names none uses the first."""
+        default = others.data.get("detector", "")
+        if not default:
             return detectors
-        if chosen not in detectors:
+        if default not in detectors:
             names = ", ".join(detectors)
-            raise ValueError(f'must have the detector "{chosen}", which is to be used; they are: {names}')
-        return {chosen: detectors[chosen], **detectors}
+            raise ValueError(f'must have the detector "{default}", which is to be used; they are: {names}')
+        return {default: detectors[default], **detectors}

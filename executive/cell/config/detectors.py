@@ -1,4 +1,4 @@
-"""Detectors: what kind, and what is known of how they err."""
+"""Detectors: kinds, thresholds and declared error rates."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from executive.cell.error_rates import ErrorRates
 
 
 class DetectorConfig(Section):
-    """A detector: what kind, and what it needs."""
+    """A detector, its thresholds, its declared error rates, and the options of its kind."""
 
     model_config = ConfigDict(extra="allow", frozen=True, use_attribute_docstrings=True)
 
@@ -20,21 +20,21 @@ class DetectorConfig(Section):
     threshold: float = Field(0.5, gt=0, lt=1)
     """Confidence from which a detection counts."""
     floor: float = Field(0.25, gt=0, lt=1)
-    """Confidence under which a box is ignored altogether."""
+    """Confidence below which a box is ignored."""
     latency: Seconds = 0.05
-    """Time from a frame to its answer on the run's clock [s]."""
+    """Time from a frame to the answer on the clock of the run [s]."""
     misses: float = Field(0.03, gt=0, lt=1)
-    """Share of the objects in full view that one look overlooks; this and the next three keys are only for
-    fake detectors, those of others are measured by `executive evaluate`."""
+    """Share of the objects in full view that one look misses. This and the next three keys are only for fake
+    detectors; `executive evaluate` measures the error rates of others."""
     confused: float = Field(0.004, gt=0, lt=1)
-    """Share of the objects it finds that it gives a wrong class."""
+    """Share of the found objects that get a wrong class."""
     invented: float = Field(0.02, gt=0, le=100)
-    """Objects that are not there, per look."""
+    """Number of false detections per look."""
     jitter: float = Field(1.0, gt=0, le=1000)
-    """Standard deviation of the centre of a found box, along each axis [pixel]."""
+    """Standard deviation of the random error of a box's centre, along each axis [pixel]."""
 
     @model_validator(mode="after")
-    def _is_floored(self) -> DetectorConfig:
+    def _check_floor(self) -> DetectorConfig:
         if self.floor > self.threshold:
             raise ValueError(f"needs a floor up to its threshold, {self.threshold:g}, not {self.floor:g}")
         return self
@@ -46,5 +46,5 @@ class DetectorConfig(Section):
 
     @property
     def options(self) -> dict[str, Any]:
-        """The keys that only this kind of detector knows."""
+        """Keys that only this kind of detector has."""
         return dict(self.model_extra or {})

@@ -28,7 +28,7 @@ def check_name(name: str) -> str:
     """Return the name of a class, bin, camera or detector unchanged if it can be part of a file name.
 
     Raises:
-        ValueError: It has other characters than letters, digits, blanks, "_" and "-", or more than 64.
+        ValueError: The name has characters other than letters, digits, blanks, "_" and "-", or more than 64.
     """
     if not NAME_PATTERN.fullmatch(name):
         raise ValueError('must be named by at most 64 letters, digits, blanks, "_" and "-"')

@@ -1,4 +1,4 @@
-"""The fake cell's camera and detectors: blank images, and detectors that know what they would show."""
+"""Camera and detectors of the fake cell: blank images, and detections from the true objects."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from executive.geometry import Pose
 from executive.perception.mounted_camera import MountedCamera
 
 MIN_CONFIDENCE = 0.9
-"""What a fake detector says of what it sees, or its threshold where that is more."""
+"""Smallest confidence of the detections of a fake detector; a higher threshold replaces it."""
 
 
 class FakeCamera(MountedCamera):
-    """A camera where the cell file says, whose images are blank.
+    """A camera at the pose of the cell file, with blank images.
 
     Attributes:
-        sees: Tells whether the whole workspace is in view; the fake arm hides nothing.
-        hides: Parts of the image [pixel] that a test wants hidden.
-        displaced: Displacement in words that a test wants its frames to show.
+        is_table_visible: Returns True if the whole workspace is in view; the fake arm hides nothing.
+        hidden_parts: Parts of the image that are hidden [pixel]; set by tests.
+        displacement_text: Displacement of the camera that its frames show, in words; set by tests.
     """
 
     def __init__(
@@ -41,19 +41,19 @@ class FakeCamera(MountedCamera):
         epoch: Callable[[], int],
     ) -> None:
         super().__init__(name, config, flange, clock, epoch)
-        self.sees: Callable[[], bool] = self._whole_table
-        self.hides: list[Box] = []
-        self.displaced = ""
+        self.is_table_visible: Callable[[], bool] = self._has_whole_table_in_image
+        self.hidden_parts: list[Box] = []
+        self.displacement_text = ""
         self._corners = np.array([(x, y, 0.0) for x in table.x for y in table.y])
 
     def sees_table(self) -> bool:
-        """Tell what `sees` says."""
-        return self.sees()
+        """Return the value of `is_table_visible`."""
+        return self.is_table_visible()
 
     def displacement(self, frame: Frame) -> str:
-        """Return the text of `displaced`."""
+        """Return the value of `displacement_text`."""
         del frame
-        return self.displaced
+        return self.displacement_text
 
     def _sense(self) -> tuple[NDArray[np.uint8], None]:
         return np.zeros((self.config.height, self.config.width, 3), dtype=np.uint8), None
@@ -61,11 +61,11 @@ class FakeCamera(MountedCamera):
     def _find_visible(self, X_WC: Pose) -> NDArray[np.bool_]:
         del X_WC
         visible = np.ones((self.config.height, self.config.width), dtype=bool)
-        for left, top, right, bottom in self.hides:
+        for left, top, right, bottom in self.hidden_parts:
             visible[int(top) : int(bottom), int(left) : int(right)] = False
         return visible
 
-    def _whole_table(self) -> bool:
+    def _has_whole_table_in_image(self) -> bool:
         corners = self._pose().inverse().apply(self._corners) @ self.matrix.T
         pixels = corners[:, :2] / corners[:, 2:]
         inside = (pixels >= 0) & (pixels < (self.config.width, self.config.height))
@@ -74,7 +74,7 @@ class FakeCamera(MountedCamera):
 
 @dataclass(frozen=True)
 class FakeRequest:
-    """An answer that is due at a time."""
+    """A request that is answered at a fixed time `due` [s]."""
 
     due: float
     clock: Clock
@@ -84,34 +84,34 @@ class FakeRequest:
 
     @property
     def ready(self) -> bool:
-        """True once the time has come."""
+        """True if the answer is available."""
         return self.clock.now >= self.due
 
     def result(self) -> Answer:
-        """Return the detections, or raise Unavailable with the sentence scripted."""
+        """Return the detections, or raise Unavailable if `answer` is a message."""
         if isinstance(self.answer, str):
             raise Unavailable(self.answer)
         return Answer(self.detector, tuple(self.answer), self.error_rates)
 
 
-def _truthful(look: int, true: Sequence[Detection]) -> Sequence[Detection]:
+def _answer_truthfully(look: int, true: Sequence[Detection]) -> Sequence[Detection]:
     del look
     return true
 
 
 @dataclass(eq=False)
 class FakeDetector:
-    """A detector that sees every object before the lens, unless `answers` says otherwise for a look.
+    """A detector that finds every object in front of the camera, unless `answers` changes the detections.
 
     Attributes:
-        name: Its name in the cell file.
-        config: Its section of the cell file.
-        world: What it sees.
-        clock: The run's clock.
-        area: Returns the part of the image [pixel] that a view means.
-        answers: Gets the number of the look (from 1) and the true detections, and returns detections, or a
-            sentence to be unavailable with.
-        looks: Looks so far.
+        name: Name of the detector in the cell file.
+        config: Section of the detector in the cell file.
+        world: The world with the true objects.
+        clock: Clock of the run.
+        area: Returns the part of the image that a view names [pixel].
+        answers: Returns detections, or a message if the detector is unavailable; its arguments are the
+            number of the look (from 1) and the true detections.
+        looks: Number of looks so far.
     """
 
     name: str
@@ -119,21 +119,21 @@ class FakeDetector:
     world: FakeWorld
     clock: Clock
     area: Callable[[str], Box]
-    answers: Callable[[int, Sequence[Detection]], Sequence[Detection] | str] = _truthful
+    answers: Callable[[int, Sequence[Detection]], Sequence[Detection] | str] = _answer_truthfully
     looks: int = 0
 
     def request(self, frame: Frame, view: str) -> Request:
-        """Answer with what the searched part of the frame would show, as late as the cell file says."""
+        """Return a request for the objects in a view of a frame; the cell file sets its latency."""
         self.looks += 1
         left, top, right, bottom = self.area(view)
         true = []
-        for thing in self.world.objects:
-            x, y, depth = frame.matrix @ frame.X_WC.inverse().apply(thing.position)
-            if depth <= 0 or thing is self.world.held:
+        for fake_object in self.world.objects:
+            x, y, depth = frame.matrix @ frame.X_WC.inverse().apply(fake_object.position)
+            if depth <= 0 or fake_object is self.world.held:
                 continue
             column, row = x / depth, y / depth
             if left <= column < right and top <= row < bottom:
-                true.append(self._detection(thing.label, column, row, frame.matrix[0, 0] / depth))
+                true.append(self._make_detection(fake_object.label, column, row, frame.matrix[0, 0] / depth))
         return FakeRequest(
             self.clock.now + self.config.latency,
             self.clock,
@@ -143,10 +143,10 @@ class FakeDetector:
         )
 
     def close(self) -> None:
-        """Have nothing to give back."""
+        """Do nothing: the detector holds no resources."""
 
-    def _detection(self, label: str, column: float, row: float, scale: float) -> Detection:
-        """Return the box around an object whose centre is at a pixel, at a `scale` [pixel/m]."""
-        size = scale * self.world.classes[label].radius
-        box = (column - size, row - size, column + size, row + size)
+    def _make_detection(self, label: str, column: float, row: float, scale: float) -> Detection:
+        """Return the detection of an object with its centre at a pixel, at a scale [pixel/m]."""
+        half_side = scale * self.world.classes[label].radius
+        box = (column - half_side, row - half_side, column + half_side, row + half_side)
         return Detection(label, max(MIN_CONFIDENCE, self.config.threshold), box)

@@ -1,4 +1,4 @@
-"""A whole work cell without physics: the real ledger and localizer around fake parts."""
+"""Work cell without physics: fake arm, tool, camera and detectors, with the real ledger and localizer."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ from executive.perception.detectors.screening import screen_detectors
 from executive.perception.localization import build_localizer
 
 ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
-"""Where the classes of the shipped cells go."""
+"""Bins of the classes of the shipped cells."""
 
 
 class SilentOperator:
-    """Asks for what a list says, then quits."""
+    """Operator without a terminal: requests the classes in a list, then quits."""
 
     def __init__(self, requests: Sequence[str] = ()) -> None:
         self._requests = list(requests)
@@ -49,23 +49,22 @@ class SilentOperator:
 class FakeCell(CellWithoutHardware):
     """The cell of a cell file without physics; implements `executive.cell.workcell.Workcell`.
 
-    Bins, classes, table, poses, camera, detectors and ledger are as the cell file says. The arm moves in
-    straight lines, table and bins are solid, the tool always seals, and every detector, of whatever kind,
-    sees everything.
+    Bins, classes, table, poses, camera, detectors and ledger follow the cell file. The arm moves in straight
+    lines, table and bins are solid, the tool always seals, and detectors of every kind find all objects.
 
     Args:
         config: The cell file; by default `bare_table`.
-        seed: Decides which objects lie where.
-        routes: Class label to the bins that are right for it.
+        seed: Random seed of the classes and positions of the objects.
+        routes: Names of the right bins of each class.
         emit: Receives the events of the cell.
-        options: Options of the run; by default with an operator who asks for nothing.
+        options: Options of the run; by default with an operator without requests.
 
     Attributes:
-        world, arm, tool, camera, detectors, ledger: The parts, for a test to arrange and inspect.
+        world, arm, tool, camera, detectors, ledger: The parts of the cell, for tests.
         detector: The first detector.
 
     Raises:
-        InputError: The workspace has no room for the objects, or a window was asked for.
+        InputError: The workspace has no room for the objects, or `options` request a window.
     """
 
     def __init__(
@@ -128,17 +127,17 @@ class FakeCell(CellWithoutHardware):
 
     @staticmethod
     def labels(config: CellConfig, base: Path) -> Mapping[str, tuple[str, ...] | None]:
-        """Return None for every detector: a fake one knows whatever lies there."""
+        """Return None for every detector: a fake detector knows all classes."""
         del base
         return dict.fromkeys(config.detectors)
 
     @staticmethod
     def least_times(config: CellConfig) -> LeastTimes:
-        """Return what things take at the very least in a cell like this."""
+        """Return the minimum times of the stages of a task in a cell of this configuration."""
         return FakeTimes(config)
 
     def log_to(self, path: Path) -> None:
-        """Write the state of the world into a file, now and after every control step."""
+        """Write the state of the world to a log, now and after every control step."""
         self._log = FakeLog(path)
         try:
             self.note()
@@ -146,12 +145,12 @@ class FakeCell(CellWithoutHardware):
             raise InputError(str(fault)) from fault
 
     def note(self) -> None:
-        """Write the present state of the world into the log."""
+        """Write the current state of the world to the log."""
         if self._log is not None:
-            self._log.keep(self.steps, self.last_command, self.world, self.arm)
+            self._log.write_state(self.steps, self.last_command, self.world, self.arm)
 
     def advance(self) -> None:
-        """Let one control step pass."""
+        """Advance arm and log by one control step."""
         if self.world.is_commanded:
             self.last_command, self.world.is_commanded = self.steps, False
         self.arm.advance()
@@ -159,28 +158,28 @@ class FakeCell(CellWithoutHardware):
         self.note()
 
     def visuals(self) -> FakeVisuals:
-        """Return what there is to be seen, for people only."""
+        """Return the shapes in the cell, for display only."""
         return FakeVisuals(self.config, self.world, lambda: self.arm.tool_pose)
 
     def audit(self) -> dict[str, int]:
-        """Return the true final counts of the objects; see `executive.cells.audit.audit_objects`."""
+        """Return the counts of `executive.cells.audit.audit_objects` for the objects of the cell."""
         world = self.world
         objects = []
         for is_removed, group in ((False, world.objects), (True, world.removed)):
-            for one in group:
-                bin = self._find_bin(one)
-                # A resumed run may see an object for the first time in a bin; the ledger takes its middle.
-                places = [*one.stood, self.cell.bins[bin].position] if bin else one.stood
-                objects.append(FinalObject(one.label, bin, places, one.fell, one is world.held, is_removed))
+            for obj in group:
+                bin = self._find_bin(obj)
+                # The first position of an item that a resumed run first saw in a bin is the bin's centre.
+                places = [*obj.stood, self.cell.bins[bin].position] if bin else obj.stood
+                objects.append(FinalObject(obj.label, bin, places, obj.fell, obj is world.held, is_removed))
         return audit_objects(objects, self.ledger.records, self.routes, self.config.ledger.gate)
 
-    def _find_bin(self, one: FakeObject) -> str:
+    def _find_bin(self, fake_object: FakeObject) -> str:
         """Return the name of the bin in which an object lies, or ""."""
-        # An object on the wall of a bin falls into the bin, unless it is inside of another bin.
-        wall = BIN_THICKNESS + self.cell.classes[one.label].radius / 2
+        # An object on the wall of a bin counts as in the bin, unless it is inside another bin.
+        wall = BIN_THICKNESS + self.cell.classes[fake_object.label].radius / 2
         for margin in (0.0, wall):
             for name, bin in self.cell.bins.items():
-                if bin.contains(one.position, margin):
+                if bin.contains(fake_object.position, margin):
                     return name
         return ""
 
@@ -193,28 +192,28 @@ class FakeCell(CellWithoutHardware):
 
 @functools.cache
 def bare_table() -> CellConfig:
-    """Return the shipped overhead cell with nothing on its table: where a skill is tried out."""
+    """Return the shipped overhead cell without objects, for tests of single skills."""
     path = shipped_folder() / "cells" / "overhead.yaml"
     return load_cell(path, {"cell.kind": "fake", "cell.table.objects": "[0, 0]"})
 
 
 def scatter(world: FakeWorld, config: CellConfig, seed: int) -> None:
-    """Put as many objects as the cell file says on the table, of random classes on a grid of places.
+    """Put objects of random classes on random points of a grid; the cell file sets their number.
 
     Raises:
-        InputError: The workspace has no room for so many.
+        InputError: The workspace has no room for this number of objects.
     """
     random = np.random.default_rng(seed)
     count = int(random.integers(*config.table.objects, endpoint=True))
     if problem := _find_lack_of_room(config, count):
         raise InputError(problem)
-    places, _ = _grid(config)
+    places, _ = _grid_points(config)
     for index in random.permutation(len(places))[:count]:
         world.put(str(random.choice(list(config.objects))), *places[index])
 
 
-def _grid(config: CellConfig) -> tuple[list[tuple[float, float]], float]:
-    """Return the places for objects on the table and their distance [m]."""
+def _grid_points(config: CellConfig) -> tuple[list[tuple[float, float]], float]:
+    """Return the grid points for objects on the table [m], and the distance between them [m]."""
     pitch = 2 * max(kind.radius for kind in config.objects.values()) + config.table.gap
     sides = config.table.x, config.table.y
     xs, ys = (np.linspace(low, high, 1 + int((high - low) / pitch)) for low, high in sides)
@@ -222,8 +221,8 @@ def _grid(config: CellConfig) -> tuple[list[tuple[float, float]], float]:
 
 
 def _find_lack_of_room(config: CellConfig, count: int) -> str:
-    """Return a message if the table has not enough places for `count` objects, or ""."""
-    places, pitch = _grid(config)
+    """Return a message if the table lacks room for `count` objects, or ""."""
+    places, pitch = _grid_points(config)
     message = (
         f"{count} objects find no room on the workspace of cell {config.cell}, which has {len(places)} "
         f"places {pitch:.3f} m apart; ask for fewer or widen table.x and table.y"

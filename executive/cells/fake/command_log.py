@@ -1,4 +1,4 @@
-"""Last state of a fake world, from which it can be rebuilt: it has no physics that must be repeated."""
+"""Log with the last state of a fake world, which suffices to rebuild a world without physics."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from executive.geometry import Array, Pose
 
 
 class FakeLog(LogFile):
-    """Keeps the last state of a fake world in a file, written whole after every control step."""
+    """A file with the last state of a fake world, rewritten after every control step."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path, "the state of the world")
         self._length = 0
 
-    def keep(self, steps: int, last_command: int, world: FakeWorld, arm: FakeArm) -> None:
-        """Write the present state, after a number of control steps.
+    def write_state(self, steps: int, last_command: int, world: FakeWorld, arm: FakeArm) -> None:
+        """Write the current state, after a number of control steps.
 
         Raises:
             Fault: The disk does not accept the state.
@@ -34,19 +34,19 @@ class FakeLog(LogFile):
         state = {
             "steps": steps,
             "last_command": last_command,
-            "objects": [vars(thing) for thing in world.objects],
-            "removed": [vars(thing) for thing in world.removed],
-            "held": next((n for n, thing in enumerate(world.objects) if thing is world.held), None),
+            "objects": [vars(obj) for obj in world.objects],
+            "removed": [vars(obj) for obj in world.removed],
+            "held": next((n for n, obj in enumerate(world.objects) if obj is world.held), None),
             "tool": [arm.tool_pose.rotation, arm.tool_pose.position],
         }
         text = json.dumps(state, default=np.ndarray.tolist).encode()
-        # In one go, and never shorter than before: a reader finds one state, followed by blanks.
+        # One write that is never shorter than the one before: a reader finds one state and blanks.
         self._length = max(self._length, len(text))
         self.write(text.ljust(self._length), 0)
 
 
 def restore(path: Path, world: FakeWorld, arm: FakeArm) -> tuple[int, int]:
-    """Bring world and arm into the state in a log, the arm at rest.
+    """Restore world and arm to the state in a log, with the arm at rest.
 
     Returns:
         Number of control steps, and control step of the last command to arm or tool.
@@ -56,8 +56,8 @@ def restore(path: Path, world: FakeWorld, arm: FakeArm) -> tuple[int, int]:
     """
     try:
         state: Mapping[str, Any] = json.loads(path.read_bytes())
-        world.objects[:] = [_read_object(**one) for one in state["objects"]]
-        world.removed[:] = [_read_object(**one) for one in state["removed"]]
+        world.objects[:] = [_read_object(**fields) for fields in state["objects"]]
+        world.removed[:] = [_read_object(**fields) for fields in state["removed"]]
         world.held = None if state["held"] is None else world.objects[state["held"]]
         rotation, position = map(_read_array, state["tool"])
         arm.put(Pose(rotation.reshape(3, 3), position.reshape(3)))

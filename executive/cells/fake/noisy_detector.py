@@ -1,4 +1,4 @@
-"""A detector that errs on purpose: what a mission does about errors is tried out with it."""
+"""Detector that adds errors to the answers of another detector, to test missions against errors."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ from executive.perception.detectors.requests import ChangedRequest
 from executive.perception.detectors.setting import DetectorSetting
 
 MAX_CONFUSED_CONFIDENCE = 0.75
-"""Highest confidence of a detection that is given a wrong class."""
-INVENTED_SIDE_RANGE = (15.0, 40.0)
-"""Shortest and longest side of an invented box [pixel]."""
+"""Largest confidence of a detection with a wrong class."""
+FALSE_BOX_SIDE_RANGE = (15.0, 40.0)
+"""Smallest and largest side of the box of a false detection [pixel]."""
 
 
 class NoisyOptions(Section):
-    """What a noisy detector needs beside the errors it makes."""
+    """Options of a noisy detector in the cell file, in addition to its error rates."""
 
     of: str
-    """The detector of the cell whose answers it spoils."""
+    """Name of the detector of the cell to whose answers errors are added."""
     classes: tuple[str, ...]
-    """The classes it confuses and invents."""
+    """Classes of wrong and false detections."""
 
 
 class NoisyDetector:
-    """Spoils another detector's answers; implements `executive.cell.protocols.Detector`.
+    """Adds errors to the answers of another detector; implements `executive.cell.protocols.Detector`.
 
-    Every look anew, and the same for the same seed, it leaves out a share `misses` of what the other found,
-    gives a share `confused` a wrong class with low confidence, moves every box by a normal deviate of
-    `jitter` along each axis, and adds `invented` boxes in the mean: the very figures of its section of the
-    cell file, which say how far its looks can be trusted.
+    The errors of each look are random and depend on the seed. The detector omits a share `misses` of the
+    detections, gives a share `confused` a wrong class with low confidence, shifts each box along each axis
+    by a normal deviate with standard deviation `jitter`, and adds `invented` boxes on average. The ledger
+    assumes the same rates, because they come from the same section of the cell file.
 
     Attributes:
-        is_fake: True: its error rates are exact as stated, so that they need not be measured.
+        is_fake: True: the error rates in the cell file are exact and need not be measured.
     """
 
     is_fake = True
@@ -53,7 +53,7 @@ class NoisyDetector:
 
     @classmethod
     def from_config(cls, config: DetectorConfig, setting: DetectorSetting) -> NoisyDetector:
-        """Return the detector that a cell file describes.
+        """Return the noisy detector of a section of a cell file.
 
         Raises:
             InputError: An option is missing, unknown or wrong.
@@ -62,7 +62,7 @@ class NoisyDetector:
 
     @staticmethod
     def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionFaults:
-        """Yield every option because of which it could not be built, with a sentence."""
+        """Yield each wrong option, with a message."""
         del base
         wrong = list(find_wrong_options(NoisyOptions, config))
         yield from wrong
@@ -70,46 +70,46 @@ class NoisyDetector:
             yield "of", f'the cell has no detector "{config.options["of"]}"; it has: {", ".join(others)}'
 
     def request(self, frame: Frame, view: str) -> ChangedRequest:
-        """Ask the other detector about `frame`."""
-        asked = self._other.request(frame, view)
-        return ChangedRequest(asked, lambda answer: self._spoilt(answer, frame, view))
+        """Return the request to the other detector, with errors added to its answer."""
+        request = self._other.request(frame, view)
+        return ChangedRequest(request, lambda answer: self._add_errors(answer, frame, view))
 
     def close(self) -> None:
-        """Have nothing to give back."""
+        """Do nothing: the detector holds no resources."""
 
-    def _spoilt(self, answer: Answer, frame: Frame, view: str) -> Answer:
-        """Return an answer with errors, drawn from the seed and the number of the frame."""
+    def _add_errors(self, answer: Answer, frame: Frame, view: str) -> Answer:
+        """Return an answer with errors that depend on the seed and the number of the frame."""
         random = np.random.default_rng([self._setting.seed, frame.id, len(view)])
-        kept = [one for one in answer.found if random.random() >= self._config.misses]
-        found = [self._moved(self._confused(one, random), random) for one in kept]
-        found += [self._invented(frame, view, random) for _ in range(random.poisson(self._config.invented))]
+        kept = [detection for detection in answer.found if random.random() >= self._config.misses]
+        found = [self._shift(self._confuse(detection, random), random) for detection in kept]
+        found += [self._invent(frame, view, random) for _ in range(random.poisson(self._config.invented))]
         found.sort(key=lambda detection: -detection.confidence)
         return Answer(self._setting.name, tuple(found), self._config.error_rates)
 
-    def _confused(self, detection: Detection, random: np.random.Generator) -> Detection:
+    def _confuse(self, detection: Detection, random: np.random.Generator) -> Detection:
         if random.random() >= self._config.confused:
             return detection
         wrong = [label for label in self._options.classes if label != detection.label]
         return replace(
             detection,
             label=str(random.choice(wrong)),
-            confidence=self._confidence(MAX_CONFUSED_CONFIDENCE, random),
+            confidence=self._draw_confidence(MAX_CONFUSED_CONFIDENCE, random),
         )
 
-    def _moved(self, detection: Detection, random: np.random.Generator) -> Detection:
+    def _shift(self, detection: Detection, random: np.random.Generator) -> Detection:
         right, down = random.normal(0.0, self._config.jitter, 2)
         x0, y0, x1, y1 = detection.box
         return replace(detection, box=(x0 + right, y0 + down, x1 + right, y1 + down))
 
-    def _invented(self, frame: Frame, view: str, random: np.random.Generator) -> Detection:
+    def _invent(self, frame: Frame, view: str, random: np.random.Generator) -> Detection:
         height, width = frame.image.shape[:2]
         left, top, right, bottom = (
             self._setting.camera.table_view if view == "table" else (0, 0, width, height)
         )
         x, y = random.uniform((left, top), (right, bottom))
-        half_width, half_height = random.uniform(*INVENTED_SIDE_RANGE, 2) / 2
+        half_width, half_height = random.uniform(*FALSE_BOX_SIDE_RANGE, 2) / 2
         box = (x - half_width, y - half_height, x + half_width, y + half_height)
-        return Detection(str(random.choice(self._options.classes)), self._confidence(1.0, random), box)
+        return Detection(str(random.choice(self._options.classes)), self._draw_confidence(1.0, random), box)
 
-    def _confidence(self, most: float, random: np.random.Generator) -> float:
-        return float(random.uniform(self._config.floor, most))
+    def _draw_confidence(self, max_confidence: float, random: np.random.Generator) -> float:
+        return float(random.uniform(self._config.floor, max_confidence))

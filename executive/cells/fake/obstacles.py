@@ -1,4 +1,4 @@
-"""Table top and bins of the fake cell, which neither the tool tip nor its load can enter."""
+"""Obstacles of the fake cell: table top and bins, for the tool tip and its load."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from executive.motion.clearance_model import MAX_PENETRATION
 
 
 class Collision(NamedTuple):
-    """The place where a path leads farthest into an obstacle.
+    """The deepest penetration of a path into an obstacle.
 
     Attributes:
         part: The colliding part: the tool or its load.
         obstacle: The table, or the name of a bin.
-        depth: How far the part is inside [m].
-        place: The place in words, for the text of an error.
+        depth: Depth of the part inside the obstacle [m].
+        place: Position of the tool in words, for the message of an error.
     """
 
     part: str
@@ -48,24 +48,24 @@ class FakeObstacles:
         self._top = np.concatenate([[0.0], (middles + halves)[:, 2]])
 
     def find_collision(self, tips: Array, load: ObjectClass | None) -> Collision | None:
-        """Return where a path of the tool tip leads into an obstacle, or None.
+        """Return the deepest collision along a path of the tool tip, or None.
 
-        The path may start inside an obstacle, but must not go deeper into it.
+        The path may start inside an obstacle, but must not go deeper into this obstacle.
 
         Args:
             tips: Positions of the tool tip along the path `(N, 3)` [m]; the first is the current position.
             load: Class of the held object, or None. With a load, the lower end of the load is checked
-            instead of the tool tip.
+                instead of the tool tip.
         """
         height, radius = (load.height, load.radius + load.ring) if load else (0.0, self._cup_radius)
         x_y = tips[:, None, :2]
-        beside = np.maximum(self._low - x_y, x_y - self._high)
-        distance = np.linalg.norm(np.maximum(beside, 0.0), axis=2) + np.minimum(beside.max(axis=2), 0.0)
+        outside = np.maximum(self._low - x_y, x_y - self._high)
+        distance = np.linalg.norm(np.maximum(outside, 0.0), axis=2) + np.minimum(outside.max(axis=2), 0.0)
         depth = np.minimum(radius - distance, self._top - (tips[:, 2:] - height))
         excess = depth - np.maximum(depth[0], MAX_PENETRATION)
-        at, number = (int(index) for index in np.unravel_index(np.argmax(excess), excess.shape))
-        if excess[at, number] <= 0:
+        i, obstacle = (int(index) for index in np.unravel_index(np.argmax(excess), excess.shape))
+        if excess[i, obstacle] <= 0:
             return None
-        x, y, z = tips[at]
+        x, y, z = tips[i]
         part, place = f"the held {load.label}" if load else "the tool", f"({x:.3f}, {y:.3f}, {z:.3f}) m"
-        return Collision(part, self._names[number], float(depth[at, number]), f"with the tool at {place}")
+        return Collision(part, self._names[obstacle], float(depth[i, obstacle]), f"with the tool at {place}")

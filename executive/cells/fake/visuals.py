@@ -1,4 +1,4 @@
-"""The fake cell as a person sees it: bins, objects as cylinders, and the tool, which is all of its arm."""
+"""Shapes of the fake cell for display: bins, objects as cylinders, and the tool as the whole arm."""
 
 from __future__ import annotations
 
@@ -15,47 +15,47 @@ from executive.geometry import Pose
 TOOL, TOOL_COLOUR = "tool", (0.25, 0.28, 0.32)
 TABLE_COLOUR = (0.86, 0.78, 0.66)
 TABLE_THICKNESS = 0.02
-"""What lies under the workspace, for the eye only [m]."""
+"""Thickness of the displayed table [m]."""
 TABLE_MARGIN = 0.12
-"""How far the table goes on beyond the workspace [m]."""
+"""Width of the displayed table around the workspace [m]."""
 
 
 class FakeVisuals:
-    """Everything in a fake cell; implements `executive.cell.visuals.Visuals`.
+    """Shapes of a fake cell; implements `executive.cell.visuals.Visuals`.
 
     Args:
         config: The cell file.
-        world: With all its objects in it.
-        tool: Tells where the tool centre point is.
+        world: The world with all its objects.
+        tool: Returns the pose of the tool centre point.
     """
 
     def __init__(self, config: CellConfig, world: FakeWorld, tool: Callable[[], Pose]) -> None:
         self._world = world
         self._tool = tool
         self._names: dict[FakeObject, str] = {
-            thing: f"object {number}" for number, thing in enumerate(world.objects)
+            fake_object: f"object {number}" for number, fake_object in enumerate(world.objects)
         }
-        self._shapes = (*_fixed(config), *_tool(config), *self._objects(config))
+        self._shapes = (*_fixed_shapes(config), *_tool_shapes(config), *self._object_shapes(config))
 
     @property
     def shapes(self) -> Sequence[Shape]:
-        """Every solid."""
+        """All shapes of the cell."""
         return self._shapes
 
     def poses(self) -> Mapping[str, Pose]:
-        """Return where the tool and the objects are, by name."""
-        places = {self._names[thing]: Pose.of(thing.position) for thing in self._world.objects}
+        """Return the poses of the tool and of the objects, by name."""
+        places = {self._names[obj]: Pose.of(obj.position) for obj in self._world.objects}
         return {TOOL: self._tool(), **places}
 
-    def _objects(self, config: CellConfig) -> Iterator[Shape]:
-        for thing, name in self._names.items():
-            kind = config.objects[thing.label]
-            size = (2 * kind.radius, 2 * kind.radius, kind.height)
-            yield Shape(name, "cylinder", size, Pose.of((0.0, 0.0, 0.0)), kind.colours[0])
+    def _object_shapes(self, config: CellConfig) -> Iterator[Shape]:
+        for fake_object, name in self._names.items():
+            object_class = config.objects[fake_object.label]
+            size = (2 * object_class.radius, 2 * object_class.radius, object_class.height)
+            yield Shape(name, "cylinder", size, Pose.of((0.0, 0.0, 0.0)), object_class.colours[0])
 
 
-def _fixed(config: CellConfig) -> Iterator[Shape]:
-    """Yield the table and the bins."""
+def _fixed_shapes(config: CellConfig) -> Iterator[Shape]:
+    """Yield the shapes of the table and of the bins."""
     (left, right), (near, far) = config.table.x, config.table.y
     size = (right - left + 2 * TABLE_MARGIN, far - near + 2 * TABLE_MARGIN, TABLE_THICKNESS)
     middle = Pose.of(((left + right) / 2, (near + far) / 2, -TABLE_THICKNESS / 2))
@@ -66,7 +66,7 @@ def _fixed(config: CellConfig) -> Iterator[Shape]:
             yield Shape("", "box", size, Pose.of(np.add(bin.position, place)), bin.colour)
 
 
-def _tool(config: CellConfig) -> Iterator[Shape]:
-    """Yield the tool, whose frame is at its tip, z pointing out of it."""
+def _tool_shapes(config: CellConfig) -> Iterator[Shape]:
+    """Yield the shape of the tool; its frame is at the tip, with z out of the tool."""
     size = (2 * TOOL_RADIUS, 2 * TOOL_RADIUS, config.tool.length)
     yield Shape(TOOL, "cylinder", size, Pose.of((0.0, 0.0, -config.tool.length / 2)), TOOL_COLOUR)

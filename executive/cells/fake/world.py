@@ -1,4 +1,4 @@
-"""A table without physics: objects are points that are picked, carried and let go."""
+"""World without physics: a table with objects that the tool picks, carries and releases."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from executive.geometry import Array
 from executive.mission.findings import alternatives
 
 MAX_SEAL_OFFSET = 0.012
-"""How far beside an object's centre the fake cup still seals [m]."""
+"""Largest horizontal distance between the cup and the sealing ring of an object for a seal [m]."""
 
 TOUCH_DISTANCE = 0.002
-"""How far above or below an object's upper side the fake cup is on it [m]."""
+"""Largest vertical distance between the cup and the top of an object for contact [m]."""
 
 
 @dataclass(eq=False)
 class FakeObject:
-    """One object on the fake table.
+    """One object of a fake world.
 
     Attributes:
-        label: Its class.
-        position: Its centre `(3,)` [m].
-        stood: Where that was in the beginning, and wherever the object fell or was put since `(3,)` [m].
-        fell: Whether it fell from the tool, and was not in it again.
+        label: Class of the object.
+        position: Centre of the object `(3,)` [m].
+        stood: Positions `(3,)` [m] at the start, and after each fall and each placement.
+        fell: True if the object fell from the tool and was not in the tool again.
     """
 
     label: str
@@ -39,13 +39,13 @@ class FakeObject:
 
 @dataclass(eq=False)
 class FakeWorld:
-    """Everything on the fake table.
+    """Objects and bins of a fake cell.
 
     Attributes:
-        classes: What objects there may be.
-        objects: The objects, in the order they were put down.
-        removed: Those that somebody took away.
-        bins: What objects may lie in.
+        classes: Classes of the objects, by label.
+        objects: The objects, in the order in which they were added.
+        removed: The removed objects.
+        bins: The bins of the cell.
         held: The object at the tool, or None.
         is_commanded: True if arm or tool was commanded in this control step.
     """
@@ -58,19 +58,19 @@ class FakeWorld:
     is_commanded: bool = False
 
     def put(self, label: str, x: float, y: float) -> FakeObject:
-        """Stand an object on the table and return it.
+        """Put a new object on the table and return the object.
 
         Args:
-            label: Its class.
-            x: Where its centre is [m].
-            y: Where its centre is [m].
+            label: Class of the object.
+            x: Position of the centre along x [m].
+            y: Position of the centre along y [m].
 
         Raises:
-            InputError: The cell knows no such class.
+            InputError: The cell has no such class.
         """
         if label not in self.classes:
             raise InputError(
-                f'nothing of the class "{label}" can be put on the fake table. '
+                f'no object of the class "{label}" can be put on the fake table. '
                 f"{alternatives(label, self.classes, 'The cell file has the classes')}"
             )
         position = np.array([x, y, self.classes[label].height / 2])
@@ -78,51 +78,51 @@ class FakeWorld:
         self.objects.append(added)
         return added
 
-    def remove(self, thing: FakeObject) -> None:
-        """Take an object away that is not held."""
-        self.objects.remove(thing)
-        self.removed.append(thing)
+    def remove(self, fake_object: FakeObject) -> None:
+        """Remove an object that is not held."""
+        self.objects.remove(fake_object)
+        self.removed.append(fake_object)
 
-    def roll_off(self, thing: FakeObject) -> None:
+    def roll_off(self, fallen: FakeObject) -> None:
         """Move a fallen object from the wall of a bin into that bin, or off other objects on the table.
 
-        It is moved off each of the other objects once. An object inside a bin stays where it is.
+        The object is moved off each of the other objects once. An object inside a bin is not moved.
         """
-        if self._fall_into_bin(thing):
+        if self._fall_into_bin(fallen):
             return
-        radius = self.classes[thing.label].radius
+        radius = self.classes[fallen.label].radius
         for other in self.objects:
-            apart = radius + self.classes[other.label].radius
-            way = thing.position[:2] - other.position[:2]
-            distance = float(np.linalg.norm(way))
-            if other is not thing and distance < apart:
-                way = way / distance if distance else np.array((1.0, 0.0))
-                thing.position[:2] = other.position[:2] + apart * way
-        self._fall_into_bin(thing)
+            min_distance = radius + self.classes[other.label].radius
+            direction = fallen.position[:2] - other.position[:2]
+            distance = float(np.linalg.norm(direction))
+            if other is not fallen and distance < min_distance:
+                direction = direction / distance if distance else np.array((1.0, 0.0))
+                fallen.position[:2] = other.position[:2] + min_distance * direction
+        self._fall_into_bin(fallen)
 
-    def _fall_into_bin(self, thing: FakeObject) -> bool:
-        """Move an object from the wall of a bin into the bin; return True if it is in a bin then."""
-        radius = self.classes[thing.label].radius
-        if any(bin.contains(thing.position) for bin in self.bins):
+    def _fall_into_bin(self, fallen: FakeObject) -> bool:
+        """Move an object from the wall of a bin into the bin; return True if the object is now in a bin."""
+        radius = self.classes[fallen.label].radius
+        if any(bin.contains(fallen.position) for bin in self.bins):
             return True
         for bin in self.bins:
-            if bin.contains(thing.position, BIN_THICKNESS + radius / 2):
+            if bin.contains(fallen.position, BIN_THICKNESS + radius / 2):
                 inside = np.maximum(bin.size[:2] / 2 - radius, 0.0)
-                offset = thing.position[:2] - bin.position[:2]
-                thing.position[:2] = bin.position[:2] + np.clip(offset, -inside, inside)
+                offset = fallen.position[:2] - bin.position[:2]
+                fallen.position[:2] = bin.position[:2] + np.clip(offset, -inside, inside)
                 return True
         return False
 
-    def top(self, thing: FakeObject) -> float:
-        """Return the height of an object's upper side [m]."""
-        return float(thing.position[2]) + self.classes[thing.label].height / 2
+    def top(self, fake_object: FakeObject) -> float:
+        """Return the height of the top of an object [m]."""
+        return float(fake_object.position[2]) + self.classes[fake_object.label].height / 2
 
-    def under(self, tip: Array) -> FakeObject | None:
-        """Return the object whose upper side the cup at `tip` `(3,)` [m] is on, if any."""
-        for thing in self.objects:
-            beside = float(np.linalg.norm(thing.position[:2] - tip[:2]))
-            off = abs(beside - self.classes[thing.label].ring)
-            near = off <= MAX_SEAL_OFFSET and abs(self.top(thing) - tip[2]) <= TOUCH_DISTANCE
-            if near and thing is not self.held:
-                return thing
+    def find_touched_object(self, tip: Array) -> FakeObject | None:
+        """Return the object whose top a cup at `tip` `(3,)` [m] touches, or None."""
+        for fake_object in self.objects:
+            radius = float(np.linalg.norm(fake_object.position[:2] - tip[:2]))
+            offset = abs(radius - self.classes[fake_object.label].ring)
+            is_near = offset <= MAX_SEAL_OFFSET and abs(self.top(fake_object) - tip[2]) <= TOUCH_DISTANCE
+            if is_near and fake_object is not self.held:
+                return fake_object
         return None

@@ -13,7 +13,7 @@ from executive.mission.flow.analysis import Analysis
 from executive.mission.model.mission import Mission
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
 from executive.mission.model.values import Reference
-from executive.mission.model.wiring import Wire, wires, written_below
+from executive.mission.model.wiring import Wire, find_variables_written_in, find_wires
 from executive.skill import Direction, Skill
 from executive.tree.registry import ControlNodes
 
@@ -27,10 +27,10 @@ class Case:
         tree: The tree that runs, expanded, with paths; an unknown node where it could not be read.
         unused: Expanded subtrees that nothing uses.
         skills: Installed skills by name.
-        control: Installed control nodes by word.
+        control: Installed control nodes by keyword.
         cell: The cell, or None where its file has findings of its own.
         labels: For every detector of the cell the classes its model knows, None where it cannot be known.
-        least: Lower bounds of what things take in the cell, or None where they are not known.
+        min_times: Lower bounds of what things take in the cell, or None where they are not known.
     """
 
     mission: Mission
@@ -40,7 +40,7 @@ class Case:
     control: ControlNodes
     cell: CellConfig | None
     labels: Mapping[str, tuple[str, ...] | None]
-    least: LeastTimes | None
+    min_times: LeastTimes | None
 
     @cached_property
     def flow(self) -> Analysis:
@@ -50,7 +50,7 @@ class Case:
     @cached_property
     def written(self) -> set[str]:
         """Variables that something in the tree may write."""
-        return written_below(self.tree, self.skills)
+        return find_variables_written_in(self.tree, self.skills)
 
     def nodes(self) -> Iterator[Node]:
         """Yield every node, also of the subtrees that nothing uses."""
@@ -80,21 +80,21 @@ class Case:
         }
 
     @cached_property
-    def doors(self) -> Mapping[str, UseNode]:
+    def library_uses(self) -> Mapping[str, UseNode]:
         """For every node that stands in a library, the `use` in the mission's own file that leads to it."""
-        doors: dict[str, UseNode] = {}
+        uses: dict[str, UseNode] = {}
 
-        def walk(node: Node, door: UseNode | None) -> None:
+        def walk(node: Node, use: UseNode | None) -> None:
             if node.mark.source is own:
-                door = node if isinstance(node, UseNode) else None
-            elif door is not None:
-                doors[node.path] = door
+                use = node if isinstance(node, UseNode) else None
+            elif use is not None:
+                uses[node.path] = use
             for child in node.children:
-                walk(child, door)
+                walk(child, use)
 
         own = self.tree.mark.source
         walk(self.tree, None)
-        return doors
+        return uses
 
     def constant_hint(self, reference: Reference) -> str:
         """Return what to write where a variable stands in the place of a constant."""
@@ -108,7 +108,7 @@ class Case:
         is_written = isinstance(word, str) and word in self.written
         return f"For the variable write ${word}." if is_written else ""
 
-    def wires(self, node: Node, direction: Direction) -> Iterator[Wire]:
+    def find_wires(self, node: Node, direction: Direction) -> Iterator[Wire]:
         """Yield the variables that a node reads or writes through the ports of its skill, if it is one."""
         if isinstance(node, SkillNode) and node.skill in self.skills:
-            yield from wires(node, self.skills[node.skill], direction)
+            yield from find_wires(node, self.skills[node.skill], direction)

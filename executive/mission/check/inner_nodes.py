@@ -8,11 +8,11 @@ from typing import cast
 from executive.mission.check.case import Case
 from executive.mission.check.min_times import min_time
 from executive.mission.findings import Finding, error, warning
-from executive.mission.model.instance import count_in, inspection_instance, node_of
-from executive.mission.model.nodes import InnerNode, Node, Part, SectionNode, SkillNode, parts
+from executive.mission.model.instance import find_upper_bound, inspection_instance, node_of
+from executive.mission.model.nodes import InnerNode, Node, Part, SectionNode, SkillNode, iterate_parts
 from executive.mission.model.paths import name_of
 from executive.mission.model.typed import WrongType, read_constant
-from executive.mission.model.values import Literal, Match, Reference
+from executive.mission.model.values import FailureName, Literal, Reference
 from executive.mission.words import describe
 from executive.skill import Skill
 from executive.tree.failure import Reason
@@ -21,14 +21,14 @@ from executive.tree.inspection import NodeFinding
 from executive.tree.keys import Child, Key, Kind
 
 
-def constants(case: Case) -> Iterator[Finding]:
+def check_constants(case: Case) -> Iterator[Finding]:
     """Find every constant of a control node that is none, out of bounds, or not known before the run."""
     for node in case.inner_nodes():
-        yield from _constants(case, node, node.kind.word)
+        yield from _constants(case, node, node.kind.keyword)
 
 
 def _constants(case: Case, owner: InnerNode | SectionNode, name: str) -> Iterator[Finding]:
-    for key, value in parts(owner):
+    for key, value in iterate_parts(owner):
         if isinstance(value, SectionNode):
             yield from _constants(case, value, key.name)
         elif isinstance(value, tuple):
@@ -36,7 +36,7 @@ def _constants(case: Case, owner: InnerNode | SectionNode, name: str) -> Iterato
                 if isinstance(item, SectionNode):
                     yield from _constants(case, item, key.name)
         elif key.kind is Kind.CONSTANT:
-            yield from _constant(case, f"{name}.{key.name}", key, value, count_in(owner, key))
+            yield from _constant(case, f"{name}.{key.name}", key, value, find_upper_bound(owner, key))
         elif key.kind is Kind.ELEMENTS and isinstance(value, Literal) and not isinstance(value.value, list):
             given = f"{describe(value.value)}{value.origin_note}"
             message = f"{name}.{key.name} takes a list or a variable, not {given}"
@@ -45,46 +45,46 @@ def _constants(case: Case, owner: InnerNode | SectionNode, name: str) -> Iterato
             yield error(value.mark, "wrong-type", message, hint)
 
 
-def _constant(case: Case, name: str, key: Key, value: Part, most: int | None) -> Iterator[Finding]:
+def _constant(case: Case, name: str, key: Key, value: Part, max_value: int | None) -> Iterator[Finding]:
     if isinstance(value, Reference):
         message = f"{name} is a constant, and ${value.name} is neither param nor argument here"
         yield error(value.mark, "unknown-param", message, case.constant_hint(value))
     elif isinstance(value, Literal):
         try:
-            read_constant(key, value.value, most)
+            read_constant(key, value.value, max_value)
         except WrongType as problem:
             is_param = problem.code == "wrong-type" and value.value in [*case.mission.params]
             hint = f"For the param write ${value.value}." if is_param else ""
             yield error(value.mark, problem.code, f"{name} {problem}{value.origin_note}", hint)
 
 
-def complaints(case: Case) -> Iterator[Finding]:
+def check_class_rules(case: Case) -> Iterator[Finding]:
     """Find the mistakes that only the class of a control node knows."""
     halted = {node.path for node in _halted(case)}
     for node in case.inner_nodes():
-        for complaint in inspection_instance(node).check(CaseFacts(case, node, node.path in halted)):
-            yield _finding(node, complaint)
+        for finding in inspection_instance(node).check(CaseFacts(case, node, node.path in halted)):
+            yield _finding(node, finding)
 
 
 def _halted(case: Case) -> Iterator[Node]:
     """Yield every node that is halted when a concurrent one has ended."""
     for node in case.inner_nodes():
-        for child in inspection_instance(node).halted:
+        for child in inspection_instance(node).halted_by_sibling:
             yield from node_of(child).walk()
 
 
-def _finding(node: InnerNode, complaint: NodeFinding) -> Finding:
+def _finding(node: InnerNode, finding: NodeFinding) -> Finding:
     mark, note = node.mark, ""
-    if isinstance(complaint.at, Match):
-        mark = complaint.at.mark
-    elif isinstance(value := node.values.get(str(complaint.at)), Literal):
+    if isinstance(finding.place, FailureName):
+        mark = finding.place.mark
+    elif isinstance(value := node.values.get(str(finding.place)), Literal):
         mark, note = value.mark, value.origin_note
-    report = warning if complaint.is_warning else error
-    return report(mark, complaint.code, complaint.message + note, complaint.hint)
+    report = warning if finding.is_warning else error
+    return report(mark, finding.code, finding.message + note, finding.hint)
 
 
 class CaseFacts:
-    """Knowledge of the checker about a control node; implements `Facts`."""
+    """Knowledge of the checker about a control node; implements `NodeFacts`."""
 
     def __init__(self, case: Case, node: InnerNode, is_halted_by_sibling: bool) -> None:
         self._case, self._node = case, node
@@ -98,9 +98,9 @@ class CaseFacts:
         """Return the name of a child in paths."""
         return name_of(node_of(child))
 
-    def place(self, reason: Reason, reader: Reason) -> str:
+    def place(self, reason: Reason, seen_from: Reason) -> str:
         """Return the place of a name of a failure for the reader of another."""
-        return cast("Match", reason).mark.place(cast("Match", reader).mark.source)
+        return cast("FailureName", reason).mark.place(cast("FailureName", seen_from).mark.source)
 
     def is_literal(self, key: str) -> bool:
         """Return True if the mission file gives the value of a key there."""

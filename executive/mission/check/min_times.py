@@ -9,7 +9,7 @@ from executive.mission.check.case import Case
 from executive.mission.model.instance import has_valid_constants, inspection_instance, node_of
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
 from executive.mission.model.typed import WrongType, convert
-from executive.mission.model.wiring import literals
+from executive.mission.model.wiring import find_literals
 from executive.skill import HOLDING, Param, Port
 
 
@@ -27,11 +27,11 @@ def min_time(case: Case, node: Node) -> float:
 
 def _skill(case: Case, node: SkillNode) -> float:
     skill = case.skills.get(node.skill)
-    if skill is None or case.least is None:
+    if skill is None or case.min_times is None:
         return 0.0
     declared: Mapping[str, Param | Port] = {**skill.params, **skill.ports}
     given = {name: param.default for name, param in skill.params.items() if not param.required}
-    for name, value in literals(node):
+    for name, value in find_literals(node):
         try:
             given[name] = convert(value.value, declared[name].type)
         except (KeyError, WrongType):
@@ -40,9 +40,9 @@ def _skill(case: Case, node: SkillNode) -> float:
     entry = case.flow.entry.get(node.path)
     tools = entry.tools if entry else None
     carries = skill.tool_state[0] is HOLDING
-    from_elsewhere = carries and (tools is None or any(grip.moved for grip in tools))
+    from_elsewhere = carries and (tools is None or any(tool.is_arm_moved for tool in tools))
     # How long a carry takes is known from where objects lie, not from wherever the arm went with its load.
-    return skill.shortest(_FromAnywhere(case.least) if from_elsewhere else case.least, given)
+    return skill.shortest(_FromAnywhere(case.min_times) if from_elsewhere else case.min_times, given)
 
 
 class _FromAnywhere:

@@ -10,12 +10,12 @@ from executive.mission.findings import Finding, error
 from executive.mission.model.instance import inspection_instance, node_of
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
 from executive.mission.model.paths import word_of
-from executive.mission.model.wiring import references, variables
+from executive.mission.model.wiring import find_read_variables, find_written_variables
 from executive.mission.source import Mark
 from executive.skill import Direction
 
 
-def shared_resources(case: Case) -> Iterator[Finding]:
+def find_shared_resources(case: Case) -> Iterator[Finding]:
     """Find every two branches that run at the same time and use the same part of the cell."""
     for branches in _concurrent(case):
         for first, second in combinations([_uses(case, branch) for branch in branches], 2):
@@ -23,9 +23,9 @@ def shared_resources(case: Case) -> Iterator[Finding]:
             clashes = {(first[part].mark, second[part].mark): part for part in second if part in first}
             for part in clashes.values():
                 one, other = first[part], second[part]
-                door = case.doors.get(other.path)
-                mark = door.mark if door else other.mark
-                who = f'{other.skill} in the subtree "{door.name}"' if door else other.skill
+                use = case.library_uses.get(other.path)
+                mark = use.mark if use else other.mark
+                who = f'{other.skill} in the subtree "{use.name}"' if use else other.skill
                 message = (
                     f"{who} uses the {part} while {one.skill} in {one.mark.place(mark.source)} may use it, "
                     "in another branch of the same parallel"
@@ -34,7 +34,7 @@ def shared_resources(case: Case) -> Iterator[Finding]:
                 yield error(mark, "shared-resource", message, hint)
 
 
-def shared_variables(case: Case) -> Iterator[Finding]:
+def find_shared_variables(case: Case) -> Iterator[Finding]:
     """Find every two branches that run at the same time and write the same variable."""
     for branches in _concurrent(case):
         for first, second in combinations([_writes(case, branch) for branch in branches], 2):
@@ -48,7 +48,7 @@ def shared_variables(case: Case) -> Iterator[Finding]:
                     yield error(mark, "shared-variable", message, hint)
 
 
-def racing_reads(case: Case) -> Iterator[Finding]:
+def find_racing_reads(case: Case) -> Iterator[Finding]:
     """Find every variable that one branch reads while another may write it."""
     for branches in _concurrent(case):
         known = [
@@ -90,9 +90,9 @@ def _reads(case: Case, branch: Node) -> Iterator[tuple[Node, str, str, Mark]]:
         entry = case.flow.entry.get(node.path)
         if entry is None:
             continue
-        for reference in references(node):
+        for reference in find_read_variables(node):
             yield node, word_of(node), reference.name, reference.mark
-        for wire in case.wires(node, Direction.IN):
+        for wire in case.find_wires(node, Direction.IN):
             # What is surely not written yet is told as unwritten.
             if entry.written is None or wire.variable in entry.written or not wire.port.required:
                 yield node, str(wire), wire.variable, wire.mark
@@ -116,10 +116,10 @@ def _writes(case: Case, branch: Node) -> dict[str, tuple[str, Mark, str]]:
     """Return the first writer of every variable below `branch`, its place, and how to call it otherwise."""
     writers: dict[str, tuple[str, Mark, str]] = {}
     for node in branch.walk():
-        for key, variable in variables(node):
+        for key, variable in find_written_variables(node):
             hint = f"Write to another variable there, as {key.name}: other."
             writers.setdefault(variable.name, (word_of(node), variable.mark, hint))
-        for wire in case.wires(node, Direction.OUT):
+        for wire in case.find_wires(node, Direction.OUT):
             hint = f"Write to another variable there, as {wire.port.name}: $other."
             writers.setdefault(wire.variable, (wire.skill, wire.mark, hint))
     return writers

@@ -10,10 +10,10 @@ from executive.mission.check.case import Case
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.model.nodes import InnerNode, Node
 from executive.mission.model.paths import word_of
-from executive.mission.model.port_types import called, element_of, fits
-from executive.mission.model.typed import input_fault
+from executive.mission.model.port_types import describe_type, find_element_type, is_assignable
+from executive.mission.model.typed import find_input_problem
 from executive.mission.model.values import Literal, Reference
-from executive.mission.model.wiring import Wire, variables
+from executive.mission.model.wiring import Wire, find_written_variables
 from executive.mission.source import Mark
 from executive.mission.words import describe
 from executive.skill import Direction, Port
@@ -46,11 +46,11 @@ Loops = Mapping[str, Sequence[Writer]]
 """What the loops around a node write to their variables."""
 
 
-def port_types(case: Case) -> Iterator[Finding]:
+def check_port_types(case: Case) -> Iterator[Finding]:
     """Find every input wired to a variable that may hold something else than it takes."""
     written: dict[str, list[Writer]] = {}
     for node in case.tree.walk():
-        for wire in case.wires(node, Direction.OUT):
+        for wire in case.find_wires(node, Direction.OUT):
             writer = Writer(str(wire), node.mark, wire.port.type, wire.port.refers)
             written.setdefault(wire.variable, []).append(writer)
 
@@ -59,7 +59,7 @@ def port_types(case: Case) -> Iterator[Finding]:
             sources = loop.sources({**written, **loops})
             yield from loop.no_lists(sources)
             loops = {**loops, loop.variable: [element for s in sources for element in loop.elements(s)]}
-        for wire in case.wires(node, Direction.IN):
+        for wire in case.find_wires(node, Direction.IN):
             for writer in loops.get(wire.variable, written.get(wire.variable, ())):
                 yield from _misfits(case, wire, writer)
         for child in node.children:
@@ -73,12 +73,12 @@ class ElementType:
     """A control node that writes the elements of a list to a variable.
 
     Attributes:
-        word: Its word.
+        keyword: Its keyword.
         key: Key of the list.
         source: The list, or the variable that holds it.
     """
 
-    word: str
+    keyword: str
     mark: Mark
     variable: str
     key: str
@@ -88,21 +88,21 @@ class ElementType:
         """Return the possible lists: the one in the file, or those written to the variable."""
         if isinstance(self.source, Literal):
             listed = self.source.value, self.source.mark
-            return [Writer(self.word, self.mark, list[Any], "", (listed,))]
+            return [Writer(self.keyword, self.mark, list[Any], "", (listed,))]
         return writers.get(self.source.name, ())
 
     def no_lists(self, sources: Iterable[Writer]) -> Iterator[Finding]:
         """Find every source that is no list; one in the file has a check of its own."""
         if not isinstance(self.source, Reference):
             return
-        name, mark, what = self.source.name, self.source.mark, f"{self.word}.{self.key}"
+        name, mark, what = self.source.name, self.source.mark, f"{self.keyword}.{self.key}"
         for source in sources:
             for value, place in source.values or ():
                 if not isinstance(value, list):
                     message = f"{what} takes a list, but for ${name} stands {describe(value)} here"
                     yield error(place, "port-type", message, f"It is read in {mark.place(place.source)}.")
-            if source.values is None and element_of(source.type) is None:
-                message = f"{what} takes a list, but ${name} holds {called(source.type)}"
+            if source.values is None and find_element_type(source.type) is None:
+                message = f"{what} takes a list, but ${name} holds {describe_type(source.type)}"
                 yield error(mark, "port-type", message, f"It is written by {source.seen_from(mark)}.")
 
     def elements(self, source: Writer) -> Iterator[Writer]:
@@ -115,13 +115,13 @@ class ElementType:
                 if isinstance(value, list)
                 for index, element in enumerate(value)
             ]
-            yield Writer(self.word, self.mark, Any, "", tuple(values))
-        elif (element := element_of(source.type)) is not None:
-            yield Writer(self.word, self.mark, element, source.refers)
+            yield Writer(self.keyword, self.mark, Any, "", tuple(values))
+        elif (element := find_element_type(source.type)) is not None:
+            yield Writer(self.keyword, self.mark, element, source.refers)
 
 
 def _loops(node: Node) -> Iterator[ElementType]:
-    for key, variable in variables(node):
+    for key, variable in find_written_variables(node):
         source = node.values.get(key.element_of) if isinstance(node, InnerNode) else None
         if isinstance(source, Literal | Reference):
             yield ElementType(word_of(node), node.mark, variable.name, key.element_of, source)
@@ -132,7 +132,7 @@ def _misfits(case: Case, wire: Wire, writer: Writer) -> Iterator[Finding]:
     port, wanted = wire.port, f"{wire} takes {_wanted(wire.port)}"
     for value, mark in writer.values or ():
         known = case.names.get(port.refers)
-        if input_fault(value, port):
+        if find_input_problem(value, port):
             message = f"{wanted}, but for ${wire.variable} stands {describe(value)} here"
             yield error(mark, "port-type", message, f"It is read in {wire.mark.place(mark.source)}.")
         elif known is not None and isinstance(value, str) and value not in known:
@@ -141,8 +141,8 @@ def _misfits(case: Case, wire: Wire, writer: Writer) -> Iterator[Finding]:
     if writer.values is not None:
         return
     holds = ""
-    if not fits(writer.type, port.type):
-        holds = called(writer.type)
+    if not is_assignable(writer.type, port.type):
+        holds = describe_type(writer.type)
     elif port.refers and writer.refers != port.refers:
         holds = f"the name of {_a(writer.refers)}" if writer.refers else "any text"
     if holds:
@@ -151,7 +151,7 @@ def _misfits(case: Case, wire: Wire, writer: Writer) -> Iterator[Finding]:
 
 
 def _wanted(port: Port) -> str:
-    return f"the name of {_a(port.refers)}" if port.refers else called(port.type)
+    return f"the name of {_a(port.refers)}" if port.refers else describe_type(port.type)
 
 
 def _a(noun: str) -> str:

@@ -16,7 +16,7 @@ from executive.tree.flow import PossibleTool
 from executive.tree.node import ControlNode
 
 
-def unreachable(case: Case) -> Iterator[Finding]:
+def find_unreachable(case: Case) -> Iterator[Finding]:
     """Find the first node of every part of the tree that can never run."""
     yield from _unreachable(case.tree, case.flow)
 
@@ -38,39 +38,39 @@ def _explain_unreachable(model: ControlNode, child: Node) -> str:
     return model.explain_unreachable(stand_in)
 
 
-def tool_states(case: Case) -> Iterator[Finding]:
+def check_tool_states(case: Case) -> Iterator[Finding]:
     """Find every skill that needs an empty tool where it may hold something, or the other way round."""
     flow = case.flow
     for path, entry in flow.entry.items():
         node = flow.nodes[path]
         if not isinstance(node, SkillNode) or node.skill not in case.skills:
             continue
-        before, door = case.skills[node.skill].tool_state[0], case.doors.get(path)
-        mark = door.mark if door else node.mark
-        who = f'{node.skill} in the subtree "{door.name}"' if door else node.skill
-        if before is EMPTY and (grip := entry.find_tool(HOLDING)):
+        before, use = case.skills[node.skill].tool_state[0], case.library_uses.get(path)
+        mark = use.mark if use else node.mark
+        who = f'{node.skill} in the subtree "{use.name}"' if use else node.skill
+        if before is EMPTY and (possible := entry.find_tool(HOLDING)):
             message = f"{who} needs an empty tool, but something may still be held here"
-            hint = f"{_since(flow, grip, mark)} Put it down on every way from there to here."
+            hint = f"{_since(flow, possible, mark)} Put it down on every way from there to here."
             yield error(mark, "tool-state", message, hint)
-        if before is HOLDING and (grip := entry.find_tool(EMPTY)):
+        if before is HOLDING and (possible := entry.find_tool(EMPTY)):
             message = f"{who} needs something in the tool, but it may be empty here"
-            yield error(mark, "tool-state", message, _since(flow, grip, mark))
+            yield error(mark, "tool-state", message, _since(flow, possible, mark))
 
 
-def held_at_the_end(case: Case) -> Iterator[Finding]:
+def check_tool_at_end(case: Case) -> Iterator[Finding]:
     """Find out whether the mission may succeed with something in the tool."""
     flow = case.flow
-    if flow.result.success and (grip := flow.result.success.find_tool(HOLDING)):
+    if flow.result.success and (possible := flow.result.success.find_tool(HOLDING)):
         message = "the mission may end well with something still in the tool"
-        yield warning(case.tree.mark, "tool-state", message, _since(flow, grip, case.tree.mark))
+        yield warning(case.tree.mark, "tool-state", message, _since(flow, possible, case.tree.mark))
 
 
-def _since(flow: Analysis, grip: PossibleTool, mark: Mark) -> str:
+def _since(flow: Analysis, possible: PossibleTool, mark: Mark) -> str:
     """Return since when the tool may be so, and which failure led on from there."""
-    node = flow.nodes.get(grip.since)
-    after = f", when {grip.after} is dealt with" if grip.after else ""
+    node = flow.nodes.get(possible.cause)
+    after = f", when {possible.handled_failure} is dealt with" if possible.handled_failure else ""
     if node is None:
         return f"Nothing has been grasped before{after}."
     name = node.skill if isinstance(node, SkillNode) else "the node"
-    verb = "may hold something" if grip.tool is HOLDING else "may be empty"
+    verb = "may hold something" if possible.tool is HOLDING else "may be empty"
     return f"It {verb} since {name} in {node.mark.place(mark.source)}{after}."

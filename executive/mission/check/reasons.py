@@ -8,14 +8,14 @@ from executive.mission.check.case import Case
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.flow.analysis import Analysis
 from executive.mission.model import grammar
-from executive.mission.model.nodes import InnerNode, Node, SectionNode, SkillNode, nodes_of, parts
-from executive.mission.model.values import Match
+from executive.mission.model.nodes import InnerNode, Node, SectionNode, SkillNode, iterate_parts, nodes_of
+from executive.mission.model.values import FailureName
 from executive.mission.source import Mark
 from executive.tree.flow import UNKNOWN_NAME, PossibleFailure
 from executive.tree.keys import Key, Kind
 
 
-def labels(case: Case) -> Iterator[Finding]:
+def check_labels(case: Case) -> Iterator[Finding]:
     """Find every label that stands for two nodes, or is a word of the language."""
     first: dict[str, Mark] = {}
     # Paths contain the words and the slots of all control nodes.
@@ -40,7 +40,7 @@ def labels(case: Case) -> Iterator[Finding]:
             yield error(mark, "duplicate-label", message)
 
 
-def matches(case: Case) -> Iterator[Finding]:
+def check_failure_names(case: Case) -> Iterator[Finding]:
     """Find every failure that is waited for and cannot come, or that more than one node could mean."""
     for node in case.flow.nodes.values():
         for match, where, body in _expectations(node):
@@ -62,26 +62,26 @@ def matches(case: Case) -> Iterator[Finding]:
                 yield error(match.mark, "ambiguous", message, hint)
 
 
-def _expectations(node: Node) -> Iterator[tuple[Match, str, Node]]:
+def _expectations(node: Node) -> Iterator[tuple[FailureName, str, Node]]:
     """Yield every failure a node waits for, its word, and the body it should come from."""
     if not isinstance(node, InnerNode):
         return
     for key, match in _matches(node):
-        for body in nodes_of(node.values[key.of]) if key.of in node.values else ():
-            yield match, node.kind.word, body
+        for body in nodes_of(node.values[key.raised_under]) if key.raised_under in node.values else ():
+            yield match, node.kind.keyword, body
 
 
-def _matches(owner: InnerNode | SectionNode) -> Iterator[tuple[Key, Match]]:
+def _matches(owner: InnerNode | SectionNode) -> Iterator[tuple[Key, FailureName]]:
     """Yield the names of failures in the keys of a node and of its sections."""
-    for key, value in parts(owner):
+    for key, value in iterate_parts(owner):
         for item in value if isinstance(value, tuple) else (value,):
-            if isinstance(item, Match):
+            if isinstance(item, FailureName):
                 yield key, item
             elif isinstance(item, SectionNode):
                 yield from _matches(item)
 
 
-def _impossible(case: Case, flow: Analysis, match: Match, where: str, body: Node) -> Finding:
+def _impossible(case: Case, flow: Analysis, match: FailureName, where: str, body: Node) -> Finding:
     inside = _reasons(flow, body)
     if match.source in inside:
         leaving = ", ".join(sorted({str(failure) for failure in flow.flows[body.path].failures}))
@@ -99,7 +99,7 @@ def _impossible(case: Case, flow: Analysis, match: Match, where: str, body: Node
     return error(match.mark, "unknown-skill", f'there is no skill or label "{match.source}"', hint)
 
 
-def _unknown(case: Case, flow: Analysis, match: Match, body: Node) -> Finding | None:
+def _unknown(case: Case, flow: Analysis, match: FailureName, body: Node) -> Finding | None:
     """Return a finding where what a name means has no such reason, wherever it stands."""
     skill = case.skills.get(match.source)
     reasons = skill.reasons if skill else _reasons(flow, body).get(match.source)
@@ -117,14 +117,14 @@ def _reasons(flow: Analysis, body: Node) -> dict[str, list[str]]:
             skill = flow.skill(node.skill)
             reasons.setdefault(node.skill, []).extend(skill.reasons if skill else ())
         elif isinstance(node, InnerNode) and node.kind.reasons:
-            reasons.setdefault(node.kind.word, []).extend(node.kind.reasons)
+            reasons.setdefault(node.kind.keyword, []).extend(node.kind.reasons)
         if node.label and node.path in flow.flows:
             passed = flow.flows[node.path].failures
             reasons.setdefault(node.label, []).extend(failure.reason for failure in passed)
     return {source: list(dict.fromkeys(found)) for source, found in reasons.items()}
 
 
-def _meant(flow: Analysis, match: Match, coming: list[PossibleFailure]) -> list[Node]:
+def _meant(flow: Analysis, match: FailureName, coming: list[PossibleFailure]) -> list[Node]:
     """Return the nodes that a name means; a label means whatever fails under it, and so one thing."""
     if any(match.source in failure.labels for failure in coming):
         return []

@@ -7,15 +7,15 @@ from collections.abc import Iterator
 from executive.mission.check.case import Case
 from executive.mission.findings import Finding, alternatives, error, suggest
 from executive.mission.model.nodes import SkillNode
-from executive.mission.model.typed import WrongType, convert, input_fault
+from executive.mission.model.typed import WrongType, convert, find_input_problem
 from executive.mission.model.values import Literal
-from executive.mission.model.wiring import literals
+from executive.mission.model.wiring import find_literals
 from executive.mission.source import Mark
 from executive.mission.words import describe
 from executive.skill import Direction, Param, Port
 
 
-def unknown_skills(case: Case) -> Iterator[Finding]:
+def find_unknown_skills(case: Case) -> Iterator[Finding]:
     """Find every skill that is not installed."""
     for node in case.nodes():
         if isinstance(node, SkillNode) and node.skill not in case.skills:
@@ -23,7 +23,7 @@ def unknown_skills(case: Case) -> Iterator[Finding]:
             yield error(node.mark, "unknown-skill", f'there is no skill "{node.skill}"', hint)
 
 
-def settings(case: Case) -> Iterator[Finding]:
+def check_settings(case: Case) -> Iterator[Finding]:
     """Find every setting of a skill that is unknown, missing, or has a value that does not fit."""
     for node, skill in case.known_skills():
         known: dict[str, Param | Port] = {**skill.params, **skill.ports}
@@ -32,8 +32,8 @@ def settings(case: Case) -> Iterator[Finding]:
                 hint = alternatives(name, known, f"{node.skill} takes")
                 yield error(setting.key, "unknown-param", f'{node.skill} has no param or port "{name}"', hint)
             elif isinstance(setting.value, Literal):
-                yield from _value_faults(case, node, known[name], setting.value)
-                yield from _unknown_names(case, node, known[name], setting.value)
+                yield from _check_value(case, node, known[name], setting.value)
+                yield from _find_unknown_names(case, node, known[name], setting.value)
             elif name in skill.params:
                 variable = f"${setting.value.name}"
                 message = (
@@ -47,24 +47,26 @@ def settings(case: Case) -> Iterator[Finding]:
                 yield error(node.mark, "missing-param", f'{node.skill} needs the param "{param.name}"', hint)
 
 
-def _value_faults(case: Case, node: SkillNode, declared: Param | Port, value: Literal) -> Iterator[Finding]:
+def _check_value(case: Case, node: SkillNode, declared: Param | Port, value: Literal) -> Iterator[Finding]:
     """Yield a finding if a value does not fit the param or port that it is given to."""
     name, code, hint, sentence = f"{node.skill}.{declared.name}", "wrong-type", "", ""
     if isinstance(declared, Param):
-        code, sentence = _param_fault(declared, value.value)
+        code, sentence = _find_param_problem(declared, value.value)
     elif declared.direction is Direction.IN:
-        sentence, hint = input_fault(value.value, declared), case.variable_hint(value.value)
+        sentence, hint = find_input_problem(value.value, declared), case.variable_hint(value.value)
     else:
         sentence = f"{name} is an output: it takes the variable to write, as ${declared.name}"
         if value.origin:
             sentence = f"{name} is an output and cannot write the constant {value.origin.split()[0]}"
-        yield error(value.used or value.mark, code, sentence)
+        yield error(value.reference_mark or value.mark, code, sentence)
         return
     if sentence:
         yield error(value.mark, code, f"{name} {sentence}{value.origin_note}", hint)
 
 
-def _unknown_names(case: Case, node: SkillNode, declared: Param | Port, value: Literal) -> Iterator[Finding]:
+def _find_unknown_names(
+    case: Case, node: SkillNode, declared: Param | Port, value: Literal
+) -> Iterator[Finding]:
     """Find every name of something that the cell does not have."""
     if declared.refers not in case.names or value.value == declared.default:
         return
@@ -79,7 +81,7 @@ def _unknown_names(case: Case, node: SkillNode, declared: Param | Port, value: L
             yield error(mark, f"unknown-{declared.refers}", message, hint)
 
 
-def _param_fault(param: Param, value: object) -> tuple[str, str]:
+def _find_param_problem(param: Param, value: object) -> tuple[str, str]:
     """Return code and sentence of a value that does not fit a param; the sentence is "" if it does."""
     try:
         converted = convert(value, param.type)
@@ -101,7 +103,7 @@ def _param_fault(param: Param, value: object) -> tuple[str, str]:
     return "", ""
 
 
-def routes(case: Case) -> Iterator[Finding]:
+def check_routes(case: Case) -> Iterator[Finding]:
     """Find every route of an unknown class or to an unknown bin."""
     if case.cell is None:
         return
@@ -115,7 +117,7 @@ def routes(case: Case) -> Iterator[Finding]:
                 yield error(bin.mark, "unknown-bin", f'the cell has no bin "{bin.name}"', hint)
 
 
-def known_classes(case: Case) -> Iterator[Finding]:
+def find_unseen_classes(case: Case) -> Iterator[Finding]:
     """Find every class that the mission names and no detector's model knows."""
     models = {name: labels for name, labels in case.labels.items() if labels is not None}
     if len(models) < len(case.labels) or not models or case.cell is None:
@@ -133,7 +135,7 @@ def _named_classes(case: Case) -> Iterator[tuple[str, Mark]]:
     """Yield every class in the routes and in the settings of skills, with its place."""
     yield from ((route.label, route.key) for route in case.mission.routes)
     for node, skill in case.known_skills():
-        for name, value in literals(node):
+        for name, value in find_literals(node):
             declared = skill.params.get(name) or skill.ports.get(name)
             if declared is not None and declared.refers == "class" and isinstance(value.value, str):
                 yield value.value, value.mark

@@ -9,7 +9,12 @@ from executive.mission.findings import Finding, alternatives, error, suggest, wa
 from executive.mission.model.nodes import Node, UseNode
 from executive.mission.model.paths import word_of
 from executive.mission.model.values import Named, Reference
-from executive.mission.model.wiring import references, variables, wires, written_below
+from executive.mission.model.wiring import (
+    find_read_variables,
+    find_variables_written_in,
+    find_wires,
+    find_written_variables,
+)
 from executive.mission.source import Mark
 from executive.skill import Direction, Skill
 
@@ -17,7 +22,7 @@ Read = tuple[Node, str, str, Mark]
 """A node that reads, what reads it (`Approach.target`), the variable, and where the mission says so."""
 
 
-def unwritten_inputs(case: Case) -> Iterator[Finding]:
+def find_unwritten_inputs(case: Case) -> Iterator[Finding]:
     """Find everything in the mission's own file that reads a variable not written on every way to it."""
     for _, what, variable, mark in _unwritten(case, libraries=False):
         # Inside a subtree its own variables go by their bare names.
@@ -30,19 +35,19 @@ def unwritten_inputs(case: Case) -> Iterator[Finding]:
             yield error(mark, "unwritten", message, _who_could(case, variable))
 
 
-def unwritten_needs(case: Case) -> Iterator[Finding]:
+def find_unwritten_library_inputs(case: Case) -> Iterator[Finding]:
     """Find every use of a library's subtree that lacks variables it reads: told there, once for all."""
     lacking: dict[str, dict[str, str]] = {}
     for node, what, variable, _ in _unwritten(case, libraries=True):
-        lacking.setdefault(case.doors[node.path].path, {}).setdefault(variable, what)
-    doors = {door.path: door for door in case.doors.values()}
+        lacking.setdefault(case.library_uses[node.path].path, {}).setdefault(variable, what)
+    uses = {use.path: use for use in case.library_uses.values()}
     for path, missing in lacking.items():
-        door = doors[path]
+        use = uses[path]
         names = " and ".join(f"${name} (for {what})" for name, what in sorted(missing.items()))
         are = "is" if len(missing) == 1 else "are"
-        message = f'the subtree "{door.name}" needs {names}, which {are} not written on every way to here'
-        hints = [f"${name} is written by {_who(case, name, door.mark)}." for name in sorted(missing)]
-        yield error(door.mark, "unwritten", message, " ".join(hints))
+        message = f'the subtree "{use.name}" needs {names}, which {are} not written on every way to here'
+        hints = [f"${name} is written by {_who(case, name, use.mark)}." for name in sorted(missing)]
+        yield error(use.mark, "unwritten", message, " ".join(hints))
 
 
 def _unwritten(case: Case, libraries: bool) -> Iterator[Read]:
@@ -51,20 +56,20 @@ def _unwritten(case: Case, libraries: bool) -> Iterator[Read]:
         entry = case.flow.entry.get(node.path)
         if entry is None or entry.written is None or variable in entry.written:
             continue
-        in_library = node.path in case.doors and mark.source is not case.tree.mark.source
+        in_library = node.path in case.library_uses and mark.source is not case.tree.mark.source
         if in_library is libraries:
             yield node, what, variable, mark
 
 
-def unread_variables(case: Case) -> Iterator[Finding]:
+def find_unread_variables(case: Case) -> Iterator[Finding]:
     """Find every variable that the mission names for an output and that nothing reads."""
     read = {variable for _, _, variable, _ in _reads(case, case.tree, all_inputs=True)}
     for node in case.tree.walk():
-        for _, variable in variables(node):
+        for _, variable in find_written_variables(node):
             if variable.name not in read | set(case.mission.params):
                 message = f"nothing in this {word_of(node)} reads ${variable.name}"
                 yield warning(variable.mark, "unread", message, f"Write ${variable.name} where it is meant.")
-        for wire in case.wires(node, Direction.OUT):
+        for wire in case.find_wires(node, Direction.OUT):
             if wire.explicit and wire.variable not in read:
                 message = f"{wire} writes ${wire.variable}, which nothing reads"
                 yield warning(wire.mark, "unread", message)
@@ -72,17 +77,19 @@ def unread_variables(case: Case) -> Iterator[Finding]:
             continue
         for setting in node.returns.values():
             name = setting.value.name if isinstance(setting.value, Reference) else ""
-            if name in node.promised and name not in read:
+            if name in node.returned and name not in read:
                 message = f"nothing reads ${name}, which the subtree returns here"
                 yield warning(setting.value.mark, "unread", message)
 
 
-def taken_names(case: Case) -> Iterator[Finding]:
+def find_overwritten_loop_variables(case: Case) -> Iterator[Finding]:
     """Find every loop whose variable something else writes too: it is gone when the loop ends."""
-    writers = {wire.variable: wire for node in case.tree.walk() for wire in case.wires(node, Direction.OUT)}
+    writers = {
+        wire.variable: wire for node in case.tree.walk() for wire in case.find_wires(node, Direction.OUT)
+    }
 
     def walk(node: Node, around: Mapping[str, Named]) -> Iterator[Finding]:
-        for _, each in variables(node):
+        for _, each in find_written_variables(node):
             other = writers.get(each.name)
             place = other.mark if other else around[each.name].mark if each.name in around else None
             if place is not None:
@@ -97,7 +104,7 @@ def taken_names(case: Case) -> Iterator[Finding]:
     yield from walk(case.tree, {})
 
 
-def broken_promises(case: Case) -> Iterator[Finding]:
+def find_unwritten_returns(case: Case) -> Iterator[Finding]:
     """Find every variable that a subtree says it `returns` and that it does not write before it succeeds."""
     for use in case.tree.walk():
         if not isinstance(use, UseNode) or use.body is None:
@@ -106,8 +113,8 @@ def broken_promises(case: Case) -> Iterator[Finding]:
         after = case.flow.bodies.get(use.path)
         if after is None or after.written is None:
             continue
-        written = written_below(use.body, case.skills)
-        for (name, mark), variable in zip((subtree.returns or {}).items(), use.promised, strict=True):
+        written = find_variables_written_in(use.body, case.skills)
+        for (name, mark), variable in zip((subtree.returns or {}).items(), use.returned, strict=True):
             if variable not in written:
                 message = f'the subtree "{use.name}" returns ${name}, which nothing in it writes'
                 shown = sorted(word.rpartition(".")[2] for word in written)
@@ -121,9 +128,9 @@ def broken_promises(case: Case) -> Iterator[Finding]:
 def _reads(case: Case, tree: Node, all_inputs: bool = False) -> Iterator[Read]:
     """Yield everything that needs a variable; with `all_inputs` also what can do without it."""
     for node in tree.walk():
-        for reference in references(node):
+        for reference in find_read_variables(node):
             yield node, word_of(node), reference.name, reference.mark
-        for wire in case.wires(node, Direction.IN):
+        for wire in case.find_wires(node, Direction.IN):
             if all_inputs or wire.port.required or wire.explicit:
                 yield node, str(wire), wire.variable, wire.mark
 
@@ -132,7 +139,7 @@ def _writers(case: Case, variable: str, mark: Mark) -> str:
     """Return who writes a variable and where, the first in the file first, or ""."""
     found: dict[str, None] = {}
     for node, skill in sorted(case.known_skills(), key=lambda pair: pair[0].mark.line):
-        if any(wire.variable == variable for wire in wires(node, skill, Direction.OUT)):
+        if any(wire.variable == variable for wire in find_wires(node, skill, Direction.OUT)):
             found[f"{node.skill} in {node.mark.place(mark.source)}"] = None
     return " and ".join(found) or "the loop around its body alone"
 

@@ -16,13 +16,13 @@ from executive.mission.model.mission import Mission, Subtree
 from executive.mission.model.nodes import Node, SectionNode, SkillNode, UnknownNode, UseNode
 from executive.mission.model.paths import word_of
 from executive.mission.model.values import Named, Reference, Setting, Value
-from executive.mission.model.wiring import variables, written_below
+from executive.mission.model.wiring import find_variables_written_in, find_written_variables
 from executive.mission.source import Mark
 from executive.skill import Direction, Skill
 
-_DEEPEST = 40
-_MOST_NODES = 5000
-_OUTSIDE = "^"
+_MAX_DEPTH = 40
+_MAX_NODES = 5000
+_OUTER_PREFIX = "^"
 """Stands before the variables of the place of use while those of the subtree are renamed."""
 
 Names = Mapping[str, Value]
@@ -46,7 +46,7 @@ class Expanded:
 def expand(mission: Mission, skills: Mapping[str, type[Skill]]) -> Expanded:
     """Return the mission's tree with nothing left to look up but variables."""
     expander = _Expander(mission, skills)
-    tree = None if mission.tree is None else expander.whole(mission.tree, expander.params)
+    tree = None if mission.tree is None else expander.expand_tree(mission.tree, expander.params)
     unused = []
     used = {use.name for tree in mission.trees.values() for use in tree.do.walk() if isinstance(use, UseNode)}
     for subtree in mission.trees.values():
@@ -58,9 +58,9 @@ def expand(mission: Mission, skills: Mapping[str, type[Skill]]) -> Expanded:
         defaults = {name: argument.default for name, argument in subtree.args.items()}
         given = {name: default for name, default in defaults.items() if default is not None}
         if len(given) == len(defaults):
-            body = expander.whole(subtree.do, {**expander.params, **given})
+            body = expander.expand_tree(subtree.do, {**expander.params, **given})
             unused += [body] if body else []
-    expander.findings += expander.unused_names()
+    expander.findings += expander.find_unused_names()
     return Expanded(tree, tuple(unused), tuple(expander.findings))
 
 
@@ -79,13 +79,13 @@ class _Expander:
         self._outermost: Mark | None = None
         self._uses: Counter[str] = Counter()
 
-    def whole(self, tree: Node, names: Names) -> Node | None:
+    def expand_tree(self, tree: Node, names: Names) -> Node | None:
         try:
-            return self._node(tree, names, (), 0)
+            return self._expand_node(tree, names, (), 0)
         except _TooLargeError:
             return None
 
-    def unused_names(self) -> Iterator[Finding]:
+    def find_unused_names(self) -> Iterator[Finding]:
         """Find every param and argument that no `$name` of a tree that was put in refers to."""
         for name, param in self.mission.params.items() if self.mission.tree else ():
             if ("", name) not in self._looked_up and f"${name}" not in param.mark.source.text:
@@ -98,46 +98,45 @@ class _Expander:
                     message = f'nothing in the subtree "{subtree.name}" uses its argument "{name}"'
                     yield error(argument.mark, "unused-argument", message)
 
-    def _node(self, node: Node, names: Names, inside: tuple[str, ...], depth: int) -> Node:
+    def _expand_node(self, node: Node, names: Names, inside: tuple[str, ...], depth: int) -> Node:
         self._count += 1
-        if depth > _DEEPEST or self._count > _MOST_NODES:
-            deep, large = f"is more than {_DEEPEST} levels deep", f"has more than {_MOST_NODES} nodes"
-            message = f"with its subtrees put in, the tree {deep if depth > _DEEPEST else large}"
+        if depth > _MAX_DEPTH or self._count > _MAX_NODES:
+            deep, large = f"is more than {_MAX_DEPTH} levels deep", f"has more than {_MAX_NODES} nodes"
+            message = f"with its subtrees put in, the tree {deep if depth > _MAX_DEPTH else large}"
             self.findings.append(error(self._outermost or node.mark, "too-large", message))
             raise _TooLargeError
 
-        def filled(part: Any) -> Any:
+        def fill(part: Any) -> Any:
             """Return a part of the node with everything looked up."""
             if isinstance(part, Node):
-                return self._node(part, names, inside, depth + 1)
+                return self._expand_node(part, names, inside, depth + 1)
             if isinstance(part, Reference):
-                return self._resolved(part, names, inside)
-            return _with_parts(part, filled)
+                return self._resolve(part, names, inside)
+            return _map_parts(part, fill)
 
-        self.findings += self._shadowed(node, names)
-        rebuilt: Node = _with_parts(node, filled)
-        return self._use(rebuilt, inside, depth) if isinstance(rebuilt, UseNode) else rebuilt
+        self.findings += self._find_shadowed(node, names)
+        rebuilt: Node = _map_parts(node, fill)
+        return self._expand_use(rebuilt, inside, depth) if isinstance(rebuilt, UseNode) else rebuilt
 
-    def _shadowed(self, node: Node, names: Names) -> Iterator[Finding]:
+    def _find_shadowed(self, node: Node, names: Names) -> Iterator[Finding]:
         """Find every variable that a node would write under the name of a param or argument."""
-        for _, variable in variables(node):
+        for _, variable in find_written_variables(node):
             if variable.name in names:
-                message = (
-                    f"{word_of(node)} would write ${variable.name}, but that is {self._sort(variable.name)}"
-                )
+                owner = self._describe_name(variable.name)
+                message = f"{word_of(node)} would write ${variable.name}, but that is {owner}"
                 yield error(variable.mark, "shadowed-param", message, "Call one of them otherwise.")
         if not isinstance(node, SkillNode) or node.skill not in self.skills:
             return
         for name, port in self.skills[node.skill].ports.items():
             if port.direction is Direction.OUT and name in names and name not in node.settings:
-                message = f"{node.skill}.{name} would write ${name}, but that is {self._sort(name)}"
+                message = f"{node.skill}.{name} would write ${name}, but that is {self._describe_name(name)}"
                 hint = f"Rename that, or write {name}: $other."
                 yield error(node.mark, "shadowed-param", message, hint)
 
-    def _sort(self, name: str) -> str:
+    def _describe_name(self, name: str) -> str:
         return "a param of the mission" if name in self.params else "an argument here"
 
-    def _resolved(self, reference: Reference, names: Names, inside: tuple[str, ...]) -> Value:
+    def _resolve(self, reference: Reference, names: Names, inside: tuple[str, ...]) -> Value:
         value = names.get(reference.name)
         # Who writes a name a little wrong has not forgotten it.
         meant = reference.name if value is not None else suggest(reference.name, names)
@@ -149,12 +148,12 @@ class _Expander:
             return value
         # The place of the value is the one to correct; the place of its use is named beside it.
         origin = f"${reference.name} in {reference.mark.place(value.mark.source)}"
-        return replace(value, origin=origin, used=reference.mark)
+        return replace(value, origin=origin, reference_mark=reference.mark)
 
-    def _use(self, use: UseNode, inside: tuple[str, ...], depth: int) -> Node:
+    def _expand_use(self, use: UseNode, inside: tuple[str, ...], depth: int) -> Node:
         self.used.add(use.name)
         subtree = self.mission.trees.get(use.name)
-        if subtree is None and not self.mission.whole:
+        if subtree is None and not self.mission.is_complete:
             return use
         if subtree is None:
             self.used.add(suggest(use.name, self.mission.trees) or "")
@@ -166,8 +165,8 @@ class _Expander:
             message = f"a subtree cannot use itself: {ring}"
             self.findings.append(error(use.mark, "recursive-use", message))
             return use
-        arguments = self._arguments(use, subtree)
-        returns = self._returns(use, subtree)
+        arguments = self._find_arguments(use, subtree)
+        returns = self._name_returns(use, subtree)
         if arguments is None:
             return use
         self._uses[use.name] += 1
@@ -175,42 +174,42 @@ class _Expander:
         # A library knows its own arguments only: it must mean the same in every mission.
         around: Names = {} if subtree.library else self.params
         if subtree.returns is None:
-            body = self._node(subtree.do, {**around, **arguments}, (*inside, use.name), depth + 1)
+            body = self._expand_node(subtree.do, {**around, **arguments}, (*inside, use.name), depth + 1)
             return replace(use, body=body)
-        arguments = {name: _from_outside(value) for name, value in arguments.items()}
-        body = self._node(subtree.do, {**around, **arguments}, (*inside, use.name), depth + 1)
+        arguments = {name: _mark_as_outer(value) for name, value in arguments.items()}
+        body = self._expand_node(subtree.do, {**around, **arguments}, (*inside, use.name), depth + 1)
         return replace(
-            use, body=self._with_own_variables(use, body, returns), promised=tuple(returns.values())
+            use, body=self._rename_own_variables(use, body, returns), returned=tuple(returns.values())
         )
 
-    def _with_own_variables(self, use: UseNode, body: Node, returns: Mapping[str, str]) -> Node:
+    def _rename_own_variables(self, use: UseNode, body: Node, returns: Mapping[str, str]) -> Node:
         """Return the body with the variables that it keeps to itself under names of their own."""
         number = self._uses[use.name]
         own = f"{use.name}." if number == 1 else f"{use.name}-{number}."
-        kept = written_below(body, self.skills)
+        kept = find_variables_written_in(body, self.skills)
 
         def rename(name: str) -> str:
-            if name.startswith(_OUTSIDE):
-                return name.removeprefix(_OUTSIDE)
+            if name.startswith(_OUTER_PREFIX):
+                return name.removeprefix(_OUTER_PREFIX)
             if name in returns:
                 return returns[name]
             return own + name if name in kept else name
 
-        def renamed(part: Any) -> Any:
+        def rename_part(part: Any) -> Any:
             if isinstance(part, Reference | Named):
                 return replace(part, name=rename(part.name))
-            part = _with_parts(part, renamed)
+            part = _map_parts(part, rename_part)
             if isinstance(part, UseNode):
-                return replace(part, promised=tuple(map(rename, part.promised)))
+                return replace(part, returned=tuple(map(rename, part.returned)))
             if isinstance(part, SkillNode) and part.skill in self.skills:
                 ports = self.skills[part.skill].ports
                 return replace(part, names={port: rename(part.names.get(port, port)) for port in ports})
             return part
 
-        result: Node = renamed(body)
+        result: Node = rename_part(body)
         return result
 
-    def _returns(self, use: UseNode, subtree: Subtree) -> dict[str, str]:
+    def _name_returns(self, use: UseNode, subtree: Subtree) -> dict[str, str]:
         """Return what each variable that the subtree returns is called at the place of use."""
         known = subtree.returns or {}
         names = {name: name for name in known}
@@ -226,7 +225,7 @@ class _Expander:
                 self.findings.append(error(setting.value.mark, "wrong-type", message))
         return names
 
-    def _arguments(self, use: UseNode, subtree: Subtree) -> dict[str, Value] | None:
+    def _find_arguments(self, use: UseNode, subtree: Subtree) -> dict[str, Value] | None:
         """Return the value of every argument of the subtree, or None if one is missing."""
         for name, setting in use.arguments.items():
             if name not in subtree.args:
@@ -246,11 +245,11 @@ class _Expander:
         return values if len(values) == len(subtree.args) else None
 
 
-def _from_outside(value: Value) -> Value:
-    return replace(value, name=_OUTSIDE + value.name) if isinstance(value, Reference) else value
+def _mark_as_outer(value: Value) -> Value:
+    return replace(value, name=_OUTER_PREFIX + value.name) if isinstance(value, Reference) else value
 
 
-def _with_parts(part: Any, change: Callable[[Any], Any]) -> Any:
+def _map_parts(part: Any, change: Callable[[Any], Any]) -> Any:
     """Return a node, or a part of one, with `change` made to everything that stands directly in it."""
     if isinstance(part, tuple):
         return tuple([change(item) for item in part])

@@ -11,7 +11,7 @@ from dataclasses import replace
 from executive.mission.findings import suggest
 from executive.mission.model.instance import inspection_instance, node_of
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
-from executive.mission.model.wiring import wires
+from executive.mission.model.wiring import find_wires
 from executive.skill import Direction, Skill
 from executive.tree.flow import (
     INITIAL_STATE,
@@ -20,8 +20,8 @@ from executive.tree.flow import (
     Flow,
     FlowState,
     PossibleFailure,
-    joined,
-    required,
+    apply_precondition,
+    join_states,
     tools_after_failure,
     tools_after_success,
 )
@@ -66,7 +66,7 @@ class Analysis:
         self.entry[node.path] = state.join(self.entry.get(node.path, state))
         key = node.path, state
         if key not in self._known:
-            flow = self._flow(node, state).labelled(node.label)
+            flow = self._flow(node, state).with_label(node.label)
             self._known[key] = self.flows[node.path] = flow
         return self._known[key]
 
@@ -93,10 +93,10 @@ class Analysis:
         if skill is None:
             return Flow(UNKNOWN, {PossibleFailure(node.skill, UNKNOWN_NAME, node.path): UNKNOWN}, UNKNOWN)
         before, after = skill.tool_state
-        state = state.with_tools(required(state.tools, before, node.path))
-        outputs = [wire.variable for wire in wires(node, skill, Direction.OUT)]
-        end = state.moved() if skill.moves else state
-        success = end.writing(outputs).with_tools(tools_after_success(end.tools, after, node.path))
+        state = state.with_tools(apply_precondition(state.tools, before, node.path))
+        outputs = [wire.variable for wire in find_wires(node, skill, Direction.OUT)]
+        end = state.after_motion() if skill.moves else state
+        success = end.with_variables(outputs).with_tools(tools_after_success(end.tools, after, node.path))
 
         def left(by: str) -> FlowState:
             return end.with_tools(tools_after_failure(end.tools, skill.tool_left.get(by), node.path))
@@ -107,7 +107,7 @@ class Analysis:
     def _use(self, node: UseNode, body: Node, state: FlowState) -> Flow:
         flow = self._run(body, state)
         # One use may be entered in several states: in a finally, in a loop.
-        self.bodies[node.path] = joined((self.bodies.get(node.path), flow.success))
+        self.bodies[node.path] = join_states((self.bodies.get(node.path), flow.success))
         # A broken promise is one finding there, not one at every reader.
-        promised = flow.success and flow.success.writing(node.promised)
-        return replace(flow, success=promised)
+        returned = flow.success and flow.success.with_variables(node.returned)
+        return replace(flow, success=returned)

@@ -26,7 +26,7 @@ class Ending:
     line: int
 
 
-def endings(flow: Analysis) -> tuple[Ending, ...]:
+def find_endings(flow: Analysis) -> tuple[Ending, ...]:
     """Return everything that can still end the mission, in the order of the tree."""
     order = {path: index for index, path in enumerate(flow.nodes)}
     found = sorted(flow.result.failures, key=lambda failure: (order[failure.origin], failure.reason))

@@ -29,21 +29,21 @@ LABEL = "[a-z_][a-z0-9_]*"
 """How labels are written."""
 
 AS = GrammarKey("label", "A name of its own, for `on`, `until` and `catch`.")
-"""The key `as` beside the word of any node."""
+"""The key `as` beside the keyword of any node."""
 
 SEQUENCE = "sequence"
-"""Word of the control node that a bare list stands for."""
+"""Keyword of the control node that a bare list stands for."""
 
 USE = "use"
 """Word before the name of a subtree."""
 
-USE_PARTNERS: Mapping[str, GrammarKey] = {
+USE_SIBLINGS: Mapping[str, GrammarKey] = {
     "with": GrammarKey("values", "Values of the subtree's arguments."),
     "returns": GrammarKey("variables", "Other names for the variables it returns: `its: $mine`."),
 }
 """Keys that stand beside `use`."""
 
-ELSEWHERE: Mapping[str, str] = {
+FOREIGN_KEYWORDS: Mapping[str, str] = {
     "then": "One after the other is a list.",
     "do": "Only control nodes have a do; elsewhere the node stands there itself.",
     "with": "It stands beside use, not below it.",

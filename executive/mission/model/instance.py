@@ -13,12 +13,12 @@ from py_trees.common import Status
 from executive.cell.protocols import Clock
 from executive.mission.model.nodes import InnerNode, Node, Part, SectionNode, nodes_of
 from executive.mission.model.typed import WrongType, read_constant
-from executive.mission.model.values import Literal, Match, Named
+from executive.mission.model.values import FailureName, Literal, Named
 from executive.tree.blackboard import Blackboard
-from executive.tree.keys import Child, Key, Kind, Variable
-from executive.tree.node import ControlNode, Site
+from executive.tree.keys import Child, Key, Kind, VariableName
+from executive.tree.node import ControlNode, NodeContext
 
-Build = Callable[[Node], Child]
+BuildChild = Callable[[Node], Child]
 """Function that returns a child for a node of the mission."""
 
 
@@ -49,13 +49,13 @@ def inspection_instance(node: InnerNode) -> ControlNode:
 
     A wrong constant, about which another check complains, is replaced by a default or by a large number.
     """
-    site = Site(node.path, cast("Clock", None), Blackboard(), node.label)
-    return instance(node, site, StandIn)
+    context = NodeContext(node.path, cast("Clock", None), Blackboard(), node.label)
+    return make_instance(node, context, StandIn)
 
 
-def instance(node: InnerNode, site: Site, build: Build) -> ControlNode:
+def make_instance(node: InnerNode, context: NodeContext, build: BuildChild) -> ControlNode:
     """Return the control node that a node of the mission describes; `build` makes its children."""
-    return node.kind(site, **_values(node, build))
+    return node.kind(context, **_values(node, build))
 
 
 def has_valid_constants(node: InnerNode) -> bool:
@@ -65,7 +65,7 @@ def has_valid_constants(node: InnerNode) -> bool:
         value = part.value if isinstance(part, Literal) else None
         if key.kind is Kind.CONSTANT and (part is not None or key.is_required):
             try:
-                read_constant(key, value, count_in(node, key))
+                read_constant(key, value, find_upper_bound(node, key))
             except WrongType:
                 return False
         elif key.kind is Kind.ELEMENTS and isinstance(part, Literal) and not isinstance(part.value, list):
@@ -73,33 +73,37 @@ def has_valid_constants(node: InnerNode) -> bool:
     return True
 
 
-def count_in(owner: InnerNode | SectionNode, key: Key) -> int | None:
+def find_upper_bound(owner: InnerNode | SectionNode, key: Key) -> int | None:
     """Return the largest allowed number of a constant, if it counts nodes under another key."""
     return len(nodes_of(owner.values[key.max_of])) if key.max_of in owner.values else None
 
 
-def _values(owner: InnerNode | SectionNode, build: Build) -> Mapping[str, object]:
+def _values(owner: InnerNode | SectionNode, build: BuildChild) -> Mapping[str, object]:
     keys = (key for key in owner.kind.keys.values() if key.is_required or key.name in owner.values)
     return {key.attribute: _value(owner, key, owner.values.get(key.name), build) for key in keys}
 
 
-def _value(owner: InnerNode | SectionNode, key: Key, part: Part | None, build: Build) -> object:
+def _value(owner: InnerNode | SectionNode, key: Key, part: Part | None, build: BuildChild) -> object:
     """Return the value of an attribute."""
     if isinstance(part, Node):
         return build(part)
     if isinstance(part, SectionNode):
         return part.kind(**_values(part, build))
     if isinstance(part, tuple):
-        return tuple(item if isinstance(item, Match) else _value(owner, key, item, build) for item in part)
+        return tuple(
+            item if isinstance(item, FailureName) else _value(owner, key, item, build) for item in part
+        )
     if isinstance(part, Named):
-        return Variable(part.name)
+        return VariableName(part.name)
     if key.kind is Kind.ELEMENTS:
         elements = part.value if isinstance(part, Literal) else None
-        return tuple(elements) if isinstance(elements, list) else Variable(getattr(part, "name", ""))
+        return tuple(elements) if isinstance(elements, list) else VariableName(getattr(part, "name", ""))
     if key.kind is not Kind.CONSTANT:
         return ()
     try:
-        return read_constant(key, part.value if isinstance(part, Literal) else None, count_in(owner, key))
+        return read_constant(
+            key, part.value if isinstance(part, Literal) else None, find_upper_bound(owner, key)
+        )
     except WrongType:
         return _placeholder(key)
 

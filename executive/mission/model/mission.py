@@ -88,7 +88,7 @@ class Mission:
         params: The mission's constants, overrides applied.
         tree: The tree as written; None where it could not be read.
         trees: The subtrees by name, those of the libraries included once they are read.
-        whole: False where a library or a subtree could not be read, so that there may be more of them.
+        is_complete: False where a library or a subtree could not be read, so that there may be more of them.
     """
 
     name: str
@@ -99,4 +99,4 @@ class Mission:
     routes: tuple[Route, ...] = ()
     tree: Node | None = None
     trees: Mapping[str, Subtree] = field(default_factory=dict)
-    whole: bool = True
+    is_complete: bool = True

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeAlias
 
-from executive.mission.model.values import Match, Named, Setting, Value
+from executive.mission.model.values import FailureName, Named, Setting, Value
 from executive.mission.source import Mark
 from executive.tree.keys import Key, KeyOwner
 from executive.tree.node import ControlNode
@@ -100,7 +100,7 @@ class InnerNode(Node):
     @cached_property
     def children(self) -> tuple[Node, ...]:
         """The nodes under its keys, those in sections included."""
-        return tuple(node for _, value in parts(self) for node in nodes_of(value))
+        return tuple(node for _, value in iterate_parts(self) for node in nodes_of(value))
 
 
 @dataclass(frozen=True)
@@ -110,14 +110,14 @@ class UseNode(Node):
     Attributes:
         arguments: Values of its arguments.
         returns: Other names for the variables it returns.
-        promised: The variables it returns, as they are called here.
+        returned: The variables it returns, as they are called here.
         body: The subtree with the arguments put in; None until the mission is expanded.
     """
 
     name: str
     arguments: Mapping[str, Setting]
     returns: Mapping[str, Setting] = field(default_factory=dict)
-    promised: tuple[str, ...] = ()
+    returned: tuple[str, ...] = ()
     body: Node | None = None
 
     @property
@@ -126,11 +126,11 @@ class UseNode(Node):
         return () if self.body is None else (self.body,)
 
 
-Part: TypeAlias = "Value | Named | Node | SectionNode | tuple[Node | Match | SectionNode, ...]"
+Part: TypeAlias = "Value | Named | Node | SectionNode | tuple[Node | FailureName | SectionNode, ...]"
 """Value of a key of a control node."""
 
 
-def parts(of: InnerNode | SectionNode) -> Iterator[tuple[Key, Part]]:
+def iterate_parts(of: InnerNode | SectionNode) -> Iterator[tuple[Key, Part]]:
     """Yield the keys that are given, in the order of their declaration, with their values."""
     for name, key in of.kind.keys.items():
         if name in of.values:
@@ -140,7 +140,7 @@ def parts(of: InnerNode | SectionNode) -> Iterator[tuple[Key, Part]]:
 def nodes_of(part: Part) -> list[Node]:
     """Return the nodes in the value of a key."""
     if isinstance(part, SectionNode):
-        return [node for _, value in parts(part) for node in nodes_of(value)]
+        return [node for _, value in iterate_parts(part) for node in nodes_of(value)]
     if isinstance(part, tuple):
-        return [node for item in part if not isinstance(item, Match) for node in nodes_of(item)]
+        return [node for item in part if not isinstance(item, FailureName) for node in nodes_of(item)]
     return [part] if isinstance(part, Node) else []

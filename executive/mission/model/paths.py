@@ -17,7 +17,7 @@ from executive.mission.model.nodes import (
     SkillNode,
     UnknownNode,
     UseNode,
-    parts,
+    iterate_parts,
 )
 from executive.tree.keys import Kind
 
@@ -33,14 +33,14 @@ def name_of(node: Node) -> str:
 
 
 def word_of(node: Node) -> str:
-    """Return the name of the skill or subtree, or the word of the control node."""
+    """Return the name of the skill or subtree, or the keyword of the control node."""
     match node:
         case SkillNode():
             return node.skill
         case UseNode():
             return node.name
         case InnerNode():
-            return node.kind.word
+            return node.kind.keyword
     return "unknown"
 
 
@@ -65,7 +65,7 @@ def _placed(node: Node, parent: str, slot: str, name: str | None = None) -> Node
 def _parts(owner: InnerNode | SectionNode, path: str, prefix: str = "") -> dict[str, Part]:
     """Return the values of an owner with their paths; `prefix` is the slot of a section in its node."""
     placed: dict[str, Part] = {}
-    for key, value in parts(owner):
+    for key, value in iterate_parts(owner):
         # The only child of a section has the name of the section.
         name = prefix if prefix and key.name == "do" else _join(prefix, key.name)
         if isinstance(value, Node):

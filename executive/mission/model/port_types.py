@@ -15,23 +15,23 @@ _WORDS = {
 }
 
 
-def fits(given: Any, wanted: Any) -> bool:
+def is_assignable(given: Any, wanted: Any) -> bool:
     """Tell whether every value of the type `given` is one of the type `wanted`."""
     if given is Any or wanted is Any or given == wanted or given is NoReturn:
         return True
     if _is_union(given):
-        return all(fits(part, wanted) for part in get_args(given))
+        return all(is_assignable(part, wanted) for part in get_args(given))
     if _is_union(wanted):
-        return any(fits(given, part) for part in get_args(wanted))
+        return any(is_assignable(given, part) for part in get_args(wanted))
     if given is int and wanted is float:
         return True
     if not issubclass(_class_of(given), _class_of(wanted)):
         return False
     inner = zip(get_args(given), get_args(wanted), strict=False)
-    return all(fits(one, other) for one, other in inner if ... not in (one, other))
+    return all(is_assignable(one, other) for one, other in inner if ... not in (one, other))
 
 
-def element_of(listed: Any) -> Any:
+def find_element_type(listed: Any) -> Any:
     """Return the type of the elements of a list type, or None where it is no list."""
     if listed is Any:
         return Any
@@ -41,15 +41,15 @@ def element_of(listed: Any) -> Any:
     return Union[tuple(arguments)] if arguments else Any  # noqa: UP007 - made of as many as there are
 
 
-def called(declared: Any) -> str:
+def describe_type(declared: Any) -> str:
     """Return what values of a type are called in a sentence."""
     if declared in _WORDS:
         return _WORDS[declared]
     if _is_union(declared):
-        return " or ".join(called(part) for part in get_args(declared))
-    element = element_of(declared)
+        return " or ".join(describe_type(part) for part in get_args(declared))
+    element = find_element_type(declared)
     if element is not None and declared is not Any:
-        return "a list" if element is Any else f"a list of {called(element).removeprefix('a ')}"
+        return "a list" if element is Any else f"a list of {describe_type(element).removeprefix('a ')}"
     return getattr(declared, "__name__", str(declared))
 
 

@@ -11,7 +11,7 @@ from typing import Any, Union, get_args, get_origin
 
 from pydantic import TypeAdapter, ValidationError
 
-from executive.mission.model.port_types import fits
+from executive.mission.model.port_types import is_assignable
 from executive.mission.words import describe, violation
 from executive.skill import Port
 from executive.tree.keys import Key
@@ -44,9 +44,9 @@ def is_plain(declared: Any) -> bool:
     return False
 
 
-def input_fault(value: object, port: Port) -> str:
+def find_input_problem(value: object, port: Port) -> str:
     """Return what is wrong with a value in a mission file for an input, to follow its name, or ""."""
-    if value is None and fits(type(None), port.type):
+    if value is None and is_assignable(type(None), port.type):
         return ""
     # Items exist only in a run: no file can name one.
     if not is_plain(port.type) or port.refers == "item":
@@ -69,13 +69,13 @@ def convert(value: object, declared: Any) -> Any:
     return _read(_adapter(declared), value)
 
 
-def read_constant(key: Key, value: object, most: int | None = None) -> Any:
-    """Return a plain value as a constant of a control node; `most` is the largest allowed number, or None.
+def read_constant(key: Key, value: object, max_value: int | None = None) -> Any:
+    """Return a plain value as a constant of a control node; numbers are at most `max_value`.
 
     Raises:
         WrongType: The value does not fit, or is out of bounds.
     """
-    return _read(key.adapter(most), value)
+    return _read(key.adapter(max_value), value)
 
 
 def _read(adapter: TypeAdapter[Any], value: object) -> Any:

@@ -24,7 +24,7 @@ class Literal:
     value: Any
     mark: Mark
     origin: str = ""
-    used: Mark | None = None
+    reference_mark: Mark | None = None
     elements: tuple[Mark, ...] = ()
 
     @property
@@ -65,7 +65,7 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Match(Reason):
+class FailureName(Reason):
     """`Skill.reason` or `label.reason` in an `on`, `catch` or `until`, with its place."""
 
     mark: Mark

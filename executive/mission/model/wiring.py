@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from executive.mission.model.nodes import InnerNode, Node, SkillNode, parts
+from executive.mission.model.nodes import InnerNode, Node, SkillNode, iterate_parts
 from executive.mission.model.values import Literal, Named, Reference
 from executive.mission.source import Mark
 from executive.skill import Direction, Port, Skill
@@ -34,7 +34,7 @@ class Wire:
         return f"{self.skill}.{self.port.name}"
 
 
-def wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Iterator[Wire]:
+def find_wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Iterator[Wire]:
     """Yield how every port of this direction is connected; an input with a value of its own is not."""
     for port in skill.ports.values():
         if port.direction is not direction:
@@ -47,34 +47,34 @@ def wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Iterator
             yield Wire(node.skill, port, setting.value.name, setting.value.mark, explicit=True)
 
 
-def literals(node: SkillNode) -> Iterator[tuple[str, Literal]]:
+def find_literals(node: SkillNode) -> Iterator[tuple[str, Literal]]:
     """Yield every setting with a value instead of a variable."""
     for name, setting in node.settings.items():
         if isinstance(setting.value, Literal):
             yield name, setting.value
 
 
-def variables(node: Node) -> Iterator[tuple[Key, Named]]:
+def find_written_variables(node: Node) -> Iterator[tuple[Key, Named]]:
     """Yield the keys of a control node that name a variable which it writes, with the variable."""
     if isinstance(node, InnerNode):
-        for key, value in parts(node):
+        for key, value in iterate_parts(node):
             if isinstance(value, Named):
                 yield key, value
 
 
-def references(node: Node) -> Iterator[Reference]:
+def find_read_variables(node: Node) -> Iterator[Reference]:
     """Yield the variables that a control node reads."""
     if isinstance(node, InnerNode):
-        for key, value in parts(node):
+        for key, value in iterate_parts(node):
             if key.kind is Kind.ELEMENTS and isinstance(value, Reference):
                 yield value
 
 
-def written_below(root: Node, skills: Mapping[str, type[Skill]]) -> set[str]:
+def find_variables_written_in(root: Node, skills: Mapping[str, type[Skill]]) -> set[str]:
     """Return the variables that something in the tree may write."""
     written = set()
     for node in root.walk():
-        written |= {variable.name for _, variable in variables(node)}
+        written |= {variable.name for _, variable in find_written_variables(node)}
         if isinstance(node, SkillNode) and node.skill in skills:
-            written |= {wire.variable for wire in wires(node, skills[node.skill], Direction.OUT)}
+            written |= {wire.variable for wire in find_wires(node, skills[node.skill], Direction.OUT)}
     return written

@@ -26,7 +26,7 @@ BASE = "base"
 DETECTORS = "detectors"
 """The key whose value is merged with that of the base, detector by detector."""
 
-DEEPEST = 5
+MAX_BASE_FILES = 5
 """How many files may stand below a cell file, each the base of the one before."""
 
 
@@ -130,9 +130,9 @@ class _CellParts:
             if any(file.samefile(path) for file in files):
                 ring = " -> ".join(file.name for file in (*files, path))
                 raise InputError(f'"{named.text}" is itself based on this file: {ring}')
-            if len(files) > DEEPEST:
+            if len(files) > MAX_BASE_FILES:
                 raise InputError(
-                    f"at most {DEEPEST} files may stand below {files[0].name}, one as base of another"
+                    f"at most {MAX_BASE_FILES} files may stand below {files[0].name}, one as base of another"
                 )
             source = read_source(path)
             root = self.tree(path, source, files)

@@ -12,7 +12,7 @@ from executive.cell.config import BinConfig, CellConfig
 from executive.geometry import Array
 from executive.mission.parse.validate import KeyPath
 
-TOLERANCE = 0.0005
+MAX_OVERLAP = 0.0005
 """Largest overlap that is accepted [m]: the outer walls of two bins may touch."""
 
 
@@ -27,19 +27,19 @@ def find_overlaps(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     safe_place = np.array([config.safe_place[:2], config.safe_place[:2]])
     workspace = np.array([config.table.x, config.table.y]).T
     for (name, outline), (other, other_outline) in combinations(outlines.items(), 2):
-        if (shift := _find_shift(outline, other_outline)) > TOLERANCE:
+        if (shift := _find_shift(outline, other_outline)) > MAX_OVERLAP:
             yield (
                 ("bins", other, "position"),
                 f'the bins "{name}" and "{other}" overlap; move one of them by {shift:.3f} m',
             )
     for name, outline in outlines.items():
-        if (shift := _find_shift(outline, workspace, radius)) > TOLERANCE:
+        if (shift := _find_shift(outline, workspace, radius)) > MAX_OVERLAP:
             yield (
                 ("bins", name, "position"),
                 f'the bin "{name}" is too near to the workspace (table.x, table.y), around which objects '
                 f"need {radius:.3f} m; move the bin or the workspace by {shift:.3f} m",
             )
-        if (shift := _find_shift(outline, safe_place, radius)) > TOLERANCE:
+        if (shift := _find_shift(outline, safe_place, radius)) > MAX_OVERLAP:
             yield (
                 ("safe_place",),
                 f'the bin "{name}" is too near to the safe place, around which an object needs {radius:.3f} '

@@ -26,15 +26,15 @@ def unread(mark: Mark) -> model.Node:
     return model.UnknownNode(mark, "")
 
 
-def bare_key(kind: type[ControlNode] | type[DeclaredSection]) -> Key | None:
-    """Return the key whose value may stand directly under the word of a node or section, or None."""
-    return next((key for key in kind.keys.values() if key.is_bare), None)
+def shorthand_key(kind: type[ControlNode] | type[DeclaredSection]) -> Key | None:
+    """Return the key whose value may stand directly under the keyword of a node or section, or None."""
+    return next((key for key in kind.keys.values() if key.is_shorthand), None)
 
 
 def inner_keys(kind: type[ControlNode] | type[DeclaredSection]) -> Mapping[str, Key]:
-    """Return the keys of the mapping under the word; none if no mapping may stand there."""
-    inner = {name: key for name, key in kind.keys.items() if not key.is_partner}
-    return {} if all(key.is_bare for key in inner.values()) else inner
+    """Return the keys of the mapping under the keyword; none if no mapping may stand there."""
+    inner = {name: key for name, key in kind.keys.items() if not key.is_sibling}
+    return {} if all(key.is_shorthand for key in inner.values()) else inner
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Head:
     """A control node in the file: its mapping, its word with its place, its label and its value."""
 
     node: yaml.Mapping
-    word: str
+    keyword: str
     mark: Mark
     label: str
     value: yaml.Node
@@ -51,16 +51,16 @@ class Head:
 def read_control(parser: NodeParser, head: Head, kind: type[ControlNode]) -> model.Node:
     """Return a control node with the values of its keys, or an unknown node."""
     reader = _Reader(parser)
-    values = reader.read_inner(head.word, head.mark, head.value, kind)
-    beside = {name: key for name, key in kind.keys.items() if key.is_partner}
+    values = reader.read_inner(head.keyword, head.mark, head.value, kind)
+    beside = {name: key for name, key in kind.keys.items() if key.is_sibling}
     for name, key in beside.items():
         if (value := head.node.get(name)) is not None:
-            fields = Fields(head.word, head.mark, head.node, head.node.keys, parser.findings)
+            fields = Fields(head.keyword, head.mark, head.node, head.node.keys, parser.findings)
             reader.read(fields, key, value, value.mark, values)
-    if reader.has_valid_constants and kind.one_of and not any(_is_given(head, name) for name in kind.one_of):
-        where = " beside it" if set(kind.one_of) <= set(beside) else ""
-        listed = " or ".join(f'"{name}"' for name in kind.one_of)
-        parser.refuse(head.mark, "missing-key", f"{head.word} needs {listed}{where}")
+    if reader.has_valid_constants and kind.any_of and not any(_is_given(head, name) for name in kind.any_of):
+        where = " beside it" if set(kind.any_of) <= set(beside) else ""
+        listed = " or ".join(f'"{name}"' for name in kind.any_of)
+        parser.refuse(head.mark, "missing-key", f"{head.keyword} needs {listed}{where}")
     missing = [key.kind for name, key in kind.keys.items() if key.is_required and name not in values]
     if Kind.NODES in missing:
         return unread(head.mark)
@@ -89,9 +89,9 @@ class _Reader:
     def read_inner(
         self, owner: str, mark: Mark, value: yaml.Node, kind: type[ControlNode] | type[DeclaredSection]
     ) -> dict[str, Part]:
-        """Return the values of the keys under the word of a node or section."""
+        """Return the values of the keys under the keyword of a node or section."""
         values: dict[str, Part] = {}
-        bare, inner = bare_key(kind), inner_keys(kind)
+        bare, inner = shorthand_key(kind), inner_keys(kind)
         is_short = (
             isinstance(value, yaml.YamlSequence) if bare and bare.kind is Kind.NODES else bare is not None
         )
@@ -122,7 +122,7 @@ class _Reader:
                 is_empty = isinstance(value, yaml.Scalar) and value.value is None
                 return (
                     None
-                    if is_empty and key.is_bare and not key.is_required
+                    if is_empty and key.is_shorthand and not key.is_required
                     else self.parser.node(value, mark)
                 )
             case Kind.NODES:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 from executive.mission.findings import Finding, alternatives, error
-from executive.mission.model.values import Literal, Match, Reference, Setting, Value
+from executive.mission.model.values import FailureName, Literal, Reference, Setting, Value
 from executive.mission.source import Mark
 from executive.mission.text.yaml_text import Mapping, Node, Scalar, YamlSequence, plain, scalars
 from executive.mission.words import describe
@@ -81,7 +81,7 @@ class Fields:
         node = self.get(key)
         return None if node is None else value_of(node, self.findings)
 
-    def matches(self, key: str) -> tuple[Match, ...]:
+    def matches(self, key: str) -> tuple[FailureName, ...]:
         """Return the `Skill.reason` names under `key`: one, or a list of them."""
         node = self.get(key)
         if node is None:
@@ -93,7 +93,7 @@ class Fields:
         for item in self.items(key):
             written = item.text if isinstance(item, Scalar) else ""
             if form := _MATCH.fullmatch(written):
-                found.append(Match(form[1], form[2], item.mark))
+                found.append(FailureName(form[1], form[2], item.mark))
             else:
                 shown = f'"{written}"' if written else describe(plain(item))
                 message = f"{self.owner}.{key} names failures as Skill.reason or label.reason, not {shown}"

@@ -9,7 +9,7 @@ from dataclasses import replace
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.model import grammar
 from executive.mission.model import nodes as model
-from executive.mission.parse.control import Head, bare_key, inner_keys, read_control, unread
+from executive.mission.parse.control import Head, inner_keys, read_control, shorthand_key, unread
 from executive.mission.parse.fields import settings_of
 from executive.mission.source import Mark
 from executive.mission.text.yaml_text import Entry, Mapping, Node, Scalar, YamlSequence, plain
@@ -73,7 +73,7 @@ class NodeParser:
     def _word(self, node: Scalar) -> model.Node:
         word = node.text
         kind = self._control.get(word)
-        if kind is not None and (bare := bare_key(kind)) is not None and not bare.is_required:
+        if kind is not None and (bare := shorthand_key(kind)) is not None and not bare.is_required:
             return model.InnerNode(node.mark, "", kind, {})
         if isinstance(node.value, str) and _SKILL.fullmatch(word):
             return model.SkillNode(node.mark, "", word, {})
@@ -103,8 +103,8 @@ class NodeParser:
             return model.UnknownNode(head.key.mark, label, (self._head(node, head, ""), *parts))
         name = head.key.text
         kind = self._control.get(name)
-        partners = [key.name for key in kind.keys.values() if key.is_partner] if kind else []
-        allowed = (name, "as", *(grammar.USE_PARTNERS if name == grammar.USE else partners))
+        siblings = [key.name for key in kind.keys.values() if key.is_sibling] if kind else []
+        allowed = (name, "as", *(grammar.USE_SIBLINGS if name == grammar.USE else siblings))
         for entry in words:
             if entry not in heads and entry.key.text not in allowed:
                 inside = kind is not None and entry.key.text in inner_keys(kind)
@@ -116,7 +116,7 @@ class NodeParser:
         return replace(read, label_mark=written.mark) if (written := node.get("as")) else read
 
     def _head(self, node: Mapping, head: Entry, label: str) -> model.Node:
-        """Return the node of one word in a mapping, with the partners that stand beside it."""
+        """Return the node of one word in a mapping, with the siblings that stand beside it."""
         name = head.key.text
         if name == grammar.USE:
             return self._use(node, head, label)
@@ -131,7 +131,7 @@ class NodeParser:
         """Return the use of a subtree."""
         arguments, returns = (
             {} if (given := node.get(key)) is None else settings_of(given, key, self.findings)
-            for key in grammar.USE_PARTNERS
+            for key in grammar.USE_SIBLINGS
         )
         if not (isinstance(head.value, Scalar) and isinstance(head.value.value, str)):
             message = f"use takes the name of a subtree, not {describe(plain(head.value))}"
@@ -153,11 +153,11 @@ class NodeParser:
     def _unknown(self, mark: Mark, word: str) -> None:
         alike = {name.lower(): name for name in self._skills}
         skill = alike.get(word.replace("_", "").replace(" ", "").lower())
-        elsewhere = dict(grammar.ELSEWHERE)
+        elsewhere = dict(grammar.FOREIGN_KEYWORDS)
         for name, kind in self._control.items():
-            partners = [key.name for key in kind.keys.values() if key.is_partner]
-            elsewhere |= dict.fromkeys(partners, f"It stands beside {name}, not below it.")
-            elsewhere |= kind.elsewhere
+            siblings = [key.name for key in kind.keys.values() if key.is_sibling]
+            elsewhere |= dict.fromkeys(siblings, f"It stands beside {name}, not below it.")
+            elsewhere |= kind.foreign_keywords
         hint = elsewhere.get(word) or (f'Did you mean the skill "{skill}"?' if skill else "")
         if not hint:
             known = alternatives(word, self._words, "Control nodes are")

@@ -79,7 +79,7 @@ def read_mission(
         for named in mission.libraries
     }
     texts = {name: text for name, text in read.items() if text is not None}
-    whole = len(texts) == len(read)
+    is_complete = len(texts) == len(read)
     cell_path: Path | None
     cell: CellFile | None
     if given is None:
@@ -87,7 +87,12 @@ def read_mission(
     else:
         cell_path, cell = given.path, CellFile(given.config, Source(str(given.path), ""), None, ())
     return MissionFiles(
-        source, replace(mission, trees=trees, whole=whole), texts, cell, cell_path, tuple(findings)
+        source,
+        replace(mission, trees=trees, is_complete=is_complete),
+        texts,
+        cell,
+        cell_path,
+        tuple(findings),
     )
 
 

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from executive.mission.model import grammar
 from executive.mission.model.grammar import GrammarKey
-from executive.mission.parse.control import bare_key, inner_keys
+from executive.mission.parse.control import inner_keys, shorthand_key
 from executive.mission.parse.fields import NAME
 from executive.mission.parse.params import TYPES
 from executive.mission.schema.types import (
@@ -76,14 +76,14 @@ def _node(skills: Skills, control: ControlNodes) -> Json:
     bodiless = [
         {"const": word, "title": word, "description": _sentence(kind), **ALTERNATIVE}
         for word, kind in control.items()
-        if (bare := bare_key(kind)) is not None and not bare.is_required
+        if (bare := shorthand_key(kind)) is not None and not bare.is_required
     ]
-    partners: dict[str, Json] = {grammar.USE: _properties(grammar.USE_PARTNERS)}
+    siblings: dict[str, Json] = {grammar.USE: _properties(grammar.USE_SIBLINGS)}
     demands: dict[str, Json] = {}
     for word, kind in control.items():
-        beside = {name: key for name, key in kind.keys.items() if key.is_partner}
-        partners[word] = {name: _key(key) for name, key in beside.items()}
-        demands[word] = _one_of(kind.one_of) if set(kind.one_of) & set(beside) else {}
+        beside = {name: key for name, key in kind.keys.items() if key.is_sibling}
+        siblings[word] = {name: _key(key) for name, key in beside.items()}
+        demands[word] = _any_of(kind.any_of) if set(kind.any_of) & set(beside) else {}
     return {
         "title": "A node",
         "anyOf": [
@@ -95,7 +95,7 @@ def _node(skills: Skills, control: ControlNodes) -> Json:
         "minItems": 1,
         "dependencies": {
             head: {
-                "properties": {head: _ref(head), "as": label, **partners.get(head, {})},
+                "properties": {head: _ref(head), "as": label, **siblings.get(head, {})},
                 "additionalProperties": False,
                 **demands.get(head, {}),
             }
@@ -112,14 +112,14 @@ def _node(skills: Skills, control: ControlNodes) -> Json:
 
 
 def _form(kind: type[ControlNode]) -> Json:
-    """Return the schema of the value under the word of a control node."""
-    bare, inner = bare_key(kind), inner_keys(kind)
+    """Return the schema of the value under the keyword of a control node."""
+    bare, inner = shorthand_key(kind), inner_keys(kind)
     shapes = [_value_of(bare)] if bare else []
     if inner:
-        demand = _one_of(kind.one_of) if set(kind.one_of) <= set(inner) else {}
+        demand = _any_of(kind.any_of) if set(kind.any_of) <= set(inner) else {}
         shapes.append({**_object(inner), **demand})
     whole = shapes[0] if len(shapes) == 1 else {"anyOf": shapes}
-    return {"title": kind.word, "description": _sentence(kind), **whole}
+    return {"title": kind.keyword, "description": _sentence(kind), **whole}
 
 
 def _sentence(kind: type[ControlNode]) -> str:
@@ -143,7 +143,7 @@ def _value_of(key: Key) -> Json:
     """Return the schema of the value of a key of a control node."""
     match key.kind:
         case Kind.NODE:
-            is_needed = key.is_required or not key.is_bare
+            is_needed = key.is_required or not key.is_shorthand
             return _ref("node") if is_needed else {"allOf": [{"anyOf": [_ref("node"), {"type": "null"}]}]}
         case Kind.NODES:
             return _KINDS["nodes"]
@@ -157,7 +157,7 @@ def _value_of(key: Key) -> Json:
             section = _object(key.section.keys)
             return {**section, "type": ["array", "object"], "items": section}
         case Kind.SECTION:
-            section, bare = _object(key.section.keys), bare_key(key.section)
+            section, bare = _object(key.section.keys), shorthand_key(key.section)
             if bare is None:
                 return section
             written = bare.adapter().json_schema()
@@ -166,7 +166,7 @@ def _value_of(key: Key) -> Json:
     return or_reference(*written.get("anyOf", [written]))
 
 
-def _one_of(keys: Sequence[str]) -> Json:
+def _any_of(keys: Sequence[str]) -> Json:
     """Return the demand that one of these keys at least is there."""
     return {"anyOf": [{"required": [key]} for key in keys]} if keys else {}
 

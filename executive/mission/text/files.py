@@ -12,7 +12,7 @@ from executive.errors import InputError
 from executive.mission.findings import alternatives
 from executive.mission.source import Source
 
-_LARGEST = 1_000_000
+_MAX_FILE_SIZE = 1_000_000
 
 
 def shipped_folder() -> Path:
@@ -88,8 +88,10 @@ def read_source(path: Path) -> Source:
     try:
         if path.exists() and not path.is_file():
             raise InputError(f"{path} is {_kind_of(path)}, not a file")
-        if path.stat().st_size > _LARGEST:
-            raise InputError(f"{path} is larger than {_LARGEST} bytes; it cannot be a mission or a cell")
+        if path.stat().st_size > _MAX_FILE_SIZE:
+            raise InputError(
+                f"{path} is larger than {_MAX_FILE_SIZE} bytes; it cannot be a mission or a cell"
+            )
         return Source(_shown(path), path.read_bytes().decode("utf-8-sig"))
     except FileNotFoundError:
         raise InputError(f"there is no file {path}") from None

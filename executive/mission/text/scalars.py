@@ -17,7 +17,7 @@ _HEXADECIMAL = re.compile(r"0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _INFINITE = re.compile(r"[-+]?\.(inf|Inf|INF)")
 _NAN = frozenset({".nan", ".NaN", ".NAN"})
-_LONGEST_NUMBER = 300
+_MAX_NUMBER_LENGTH = 300
 
 ScalarValue = None | bool | int | float | str
 
@@ -30,7 +30,7 @@ def core_value(text: str) -> ScalarValue:
         return True
     if text in _FALSE:
         return False
-    if text[0] not in "+-.0123456789" or len(text) > _LONGEST_NUMBER:
+    if text[0] not in "+-.0123456789" or len(text) > _MAX_NUMBER_LENGTH:
         return text
     if _INTEGER.fullmatch(text):
         return _whole(int(text))

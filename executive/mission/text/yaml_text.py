@@ -18,9 +18,9 @@ from executive.mission.findings import Finding, error
 from executive.mission.source import Mark, Source
 from executive.mission.text.scalars import ScalarValue, core_value
 
-_DEEPEST = 50
-_HALF = re.compile("[\ud800-\udfff]")
-_MOST_NODES = 20_000
+_MAX_DEPTH = 50
+_SURROGATE = re.compile("[\ud800-\udfff]")
+_MAX_NODES = 20_000
 _ADVICE = {
     "mapping values are not allowed here": (
         "Is a colon missing at the end of the line above, or are braces, as in Detect: {view: full}? "
@@ -159,8 +159,8 @@ class _Composer:
         if event.anchor not in self._anchors:
             raise self._unsound(self._mark(event), "alias", f'nothing above is marked "&{event.anchor}"')
         node, size = self._anchors[event.anchor]
-        if depth + _height(node) > _DEEPEST:
-            raise self._unsound(self._mark(event), "too-deep", f"nested more than {_DEEPEST} levels deep")
+        if depth + _height(node) > _MAX_DEPTH:
+            raise self._unsound(self._mark(event), "too-deep", f"nested more than {_MAX_DEPTH} levels deep")
         self._add(size, event)
         return node
 
@@ -171,15 +171,17 @@ class _Composer:
             _Unsound: There are too many.
         """
         self._count += count
-        if self._count > _MOST_NODES:
-            message = f"the file has more than {_MOST_NODES} keys and values, those behind aliases included"
+        if self._count > _MAX_NODES:
+            message = f"the file has more than {_MAX_NODES} keys and values, those behind aliases included"
             raise self._unsound(self._mark(event), "too-large", message)
 
     def _value(self, event: Any, depth: int) -> Node:
         if isinstance(event, yaml.ScalarEvent):
             return self._scalar(event)
-        if depth >= _DEEPEST:
-            raise self._unsound(self._mark(event, 1), "too-deep", f"nested more than {_DEEPEST} levels deep")
+        if depth >= _MAX_DEPTH:
+            raise self._unsound(
+                self._mark(event, 1), "too-deep", f"nested more than {_MAX_DEPTH} levels deep"
+            )
         if isinstance(event, yaml.SequenceStartEvent):
             items = []
             while not isinstance(item := next(self._events), yaml.SequenceEndEvent):
@@ -189,10 +191,10 @@ class _Composer:
 
     def _scalar(self, event: Any) -> Scalar:
         text, mark = event.value, self._mark(event)
-        if _HALF.search(text):
+        if _SURROGATE.search(text):
             # An escape can name one; no file or terminal can take it.
             self._refuse(mark, "yaml", "half of a surrogate pair is no character")
-            text = _HALF.sub("?", text)
+            text = _SURROGATE.sub("?", text)
         return Scalar(mark, core_value(text) if event.implicit[0] else text, text)
 
     def _mapping(self, event: Any, depth: int) -> Mapping:

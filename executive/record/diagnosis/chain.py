@@ -49,7 +49,7 @@ class Link:
     @property
     def attempt(self) -> tuple[int, int] | None:
         """Number of the failed attempt and of the allowed ones; None for a node that does not count."""
-        return self.model.attempt(self.failure) if self.model else None
+        return self.model.count_attempts(self.failure) if self.model else None
 
 
 def chain(tree: Node, timeline: Timeline, origin: str, failure: str) -> tuple[Link, ...]:

@@ -6,7 +6,7 @@ import types
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, Union, get_args, get_origin
 
-from executive.mission.model.port_types import called, element_of
+from executive.mission.model.port_types import describe_type, find_element_type
 from executive.skill import ANY, EMPTY, HOLDING, ToolState
 from executive.testing.conformance.declarations import HALT
 from executive.testing.conformance.rehearsal import MAX_TIME, SkillRehearsal, is_same
@@ -75,7 +75,7 @@ def outputs_fit(runs: SkillRuns) -> Iterator[str]:
             if not _is_of(value, declared):
                 yield (
                     f"{rehearsal.where} {runs.name}.{name} is of the type {type(value).__name__}, not "
-                    f"{called(declared)}. Set what it declares, or declare what it is."
+                    f"{describe_type(declared)}. Set what it declares, or declare what it is."
                 )
 
 
@@ -223,5 +223,5 @@ def _is_of(value: Any, declared: Any) -> bool:
     kind = origin or declared
     if isinstance(kind, type) and not isinstance(value, kind):
         return False
-    element = None if isinstance(value, str | Mapping) else element_of(declared)
+    element = None if isinstance(value, str | Mapping) else find_element_type(declared)
     return element is None or all(_is_of(one, element) for one in value)

@@ -144,7 +144,7 @@ class SkillRehearsal:
                 has_succeeded = run.step()
                 self.durations.append(perf_counter() - began)
                 if has_succeeded:
-                    self.outputs = run.outputs()
+                    self.outputs = run.read_outputs()
                     return "SUCCESS"
                 cell.advance()
                 self.ticks += 1

@@ -9,7 +9,7 @@ from typing import Any, Union, get_args, get_origin
 
 from executive.cell.detection import Detections
 from executive.cell.objects import Target
-from executive.mission.model.port_types import called
+from executive.mission.model.port_types import describe_type
 from executive.skill import ANY, EMPTY, HOLDING, Direction, Param, Port, Skill
 from executive.testing.conformance.stage import Stage, set_up
 
@@ -93,7 +93,7 @@ def begin(skill: type[Skill], situation: Situation, arrange: Arrange) -> tuple[S
         elif declared.required:
             missing.append(declared)
     if missing:
-        told = " and ".join(f'"{declared.name}" ({called(declared.type)})' for declared in missing)
+        told = " and ".join(f'"{declared.name}" ({describe_type(declared.type)})' for declared in missing)
         given = ", ".join(f'"{declared.name}": ...' for declared in missing)
         raise NotArranged(
             f"no value can be made up for {told}. Give it in a test: "

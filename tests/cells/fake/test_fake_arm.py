@@ -146,7 +146,7 @@ def test_a_load_that_the_plan_did_not_know_of_stops_the_arm_where_it_touches(fak
     assert fake.arm.met.startswith("the held cube ran into the table, with the tool at (0.500, 0.000, 0.04")
     assert places[:, 2].min() == pytest.approx(0.05, abs=TOOL_SPEED * STEP)
     assert places[:, 2].min() >= 0.05
-    assert fake.arm.commanded == ["start", "stop"]
+    assert fake.arm.commands == ["start", "stop"]
     go(fake, Goal((0.5, 0.0, 0.1)))
     assert fake.arm.met is None
 
@@ -167,7 +167,7 @@ def test_it_goes_to_a_named_pose_straight_or_else_over_the_wall(fake: FakeCell) 
 
 def test_a_motion_that_runs_into_something_ends_half_way_and_the_next_does_not(fake: FakeCell) -> None:
     start = fake.arm.tool_pose.position
-    fake.arm.runs_into = "a hand"
+    fake.arm.next_obstacle = "a hand"
     places = go(fake, "aside")
     aside = fake.arm.poses["aside"].position
     assert np.linalg.norm(places[-1] - start) == pytest.approx(np.linalg.norm(aside - start) / 2, rel=0.05)

@@ -138,7 +138,7 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
         f"{EMPTY} it was halted at tick 25, and the arm still moves. {REST}",
     ]),
     ("halts_at_once", faulty.WaitsInFinally, [
-        f"{EMPTY} at tick 1 it yielded while it was halted; nothing may wait in \"finally\". {FINALLY}",
+        f"{EMPTY} at tick 1 it yielded while it was halted; \"finally\" must not contain a yield. {FINALLY}",
     ]),
     ("repeats_itself", faulty.DependsOnChance, [
         f"{EMPTY}, twice the same, it set its outputs to different values. {CHANCE}",

@@ -237,7 +237,7 @@ def test_no_way_is_found_after_the_usual_time(is_blocked: bool, error: type[Exce
     with pytest.raises(error, match="as the test wants it"):
         planning.result()
     result = run_skill(MoveToScan, cell, inputs={"pose": "aside"})
-    assert (result.status, cell.fake.arm.commanded) == ("FAILURE", [])
+    assert (result.status, cell.fake.arm.commands) == ("FAILURE", [])
 
 
 def test_nothing_that_the_arm_hides_is_believed_and_it_is_told_once_a_control_step() -> None:

@@ -47,7 +47,7 @@ def unnumbered(told: str) -> str:
 def test_an_object_that_slips_out_of_the_cup_every_time(abroad) -> None:
     run = FailedRun(PICK, objects=CUBE)
     seals = iter([False])
-    run.fake.tool.seals = lambda: next(seals, True)
+    run.fake.tool.is_sealing = lambda: next(seals, True)
     run.slip()
     assert (
         text(run)
@@ -72,7 +72,7 @@ def test_a_time_that_is_over(abroad) -> None:
     body = "".join(f"    {line}\n" for line in PICK.splitlines())
     tree = "  timeout:\n    seconds: $patience\n    do:\n" + body
     story = FailedRun(tree, objects=CUBE, overrides={"patience": "1.0"}).tell()
-    assert story.verdict == "timeout: not done after 1 s during Transit of cube-1"
+    assert story.verdict == "timeout: the body was not done after 1 s during Transit of cube-1"
     assert (story.node.path, story.node.place) == ("tree/timeout", "trial.yaml:7")
     assert story.next == [
         "take cube-1 out of the tool before another run",
@@ -87,7 +87,7 @@ def test_an_exception_in_a_part(abroad) -> None:
     def broken() -> bool:
         raise ZeroDivisionError("vacuum gauge")
 
-    run.fake.tool.seals = broken
+    run.fake.tool.is_sealing = broken
     assert (
         text(run, tail=TAIL + GO_ON)
         == """\
@@ -120,7 +120,7 @@ def test_a_detector_that_gives_no_answer(at_home) -> None:
 
 def test_a_camera_that_was_moved_is_mounted_again_and_its_failure_not_caught(at_home) -> None:
     run = FailedRun("sort_overhead", objects=CUBE)
-    run.fake.camera.displaced = "camera overhead is not where the cell file says"
+    run.fake.camera.displacement_text = "camera overhead is not where the cell file says"
     story = run.tell()
     assert story.reason == "Detect.camera_moved"
     assert story.next == ["mount camera and bins as the cell file says, or measure the pose again"]
@@ -156,7 +156,7 @@ def test_an_arm_whose_way_is_barred_whenever_it_carries(at_home) -> None:
     run = FailedRun("sort_overhead", objects=CUBE)
 
     def bar_the_way() -> None:
-        run.fake.arm.runs_into = "link 5 met a wrench" if run.fake.world.held else None
+        run.fake.arm.next_obstacle = "link 5 met a wrench" if run.fake.world.held else None
 
     run.at_every_step(bar_the_way)
     assert (
@@ -164,8 +164,8 @@ def test_an_arm_whose_way_is_barred_whenever_it_carries(at_home) -> None:
         == """\
 FAILURE after 2.11 s: PutDown of cube-1 failed (blocked): link 5 met a wrench
 why nothing in missions/sort_overhead.yaml stopped it, from the root down:
-  repeat                ends well only with choice.no_candidate (line N)
-  carry_and_watch: try  caught Transit.blocked (link 5 met a wrench), but what it did instead failed
+  repeat                succeeds only with choice.no_candidate (line N)
+  carry_and_watch: try  caught Transit.blocked (link 5 met a wrench), but the handler failed
                         (missions/library/sorting.yaml:N)
   put_aside: try        catches only PutDown.dropped (missions/library/sorting.yaml:N)
   PutDown of cube-1     tree/2:repeat/do/carry_and_watch/try/catch/4/put_aside/try/do/PutDown

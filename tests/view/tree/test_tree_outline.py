@@ -11,7 +11,7 @@ from executive.mission.outline import Connection, OutlineNode, children, outline
 from executive.skill import In, Metres, Out, Skill, param, port
 from executive.tree.blackboard import Blackboard
 from executive.tree.failure import Reason
-from executive.tree.node import Site
+from executive.tree.node import NodeContext
 from executive.tree.retry import Retry
 from executive.tree.sequence import Sequence
 from executive.tree.skill_leaf import SkillLeaf, Wiring
@@ -35,8 +35,8 @@ class Pick(Skill):
     reasons: ClassVar = ("missed", "blocked")
 
 
-def make_site(path: str, label: str = "") -> Site:
-    return Site(path, CELL, Blackboard(), label)
+def make_site(path: str, label: str = "") -> NodeContext:
+    return NodeContext(path, CELL, Blackboard(), label)
 
 
 def pick(path: str, label: str = "", wiring: Wiring | None = None) -> SkillLeaf:
