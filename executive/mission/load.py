@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+
+from pydantic import JsonValue
 
 from executive.cell.config import CellConfig
 from executive.cell.workcell import CellKind
@@ -59,7 +60,7 @@ class LoadedMission:
     overrides: Mapping[str, str] = field(default_factory=dict)
 
     @property
-    def params(self) -> dict[str, Any]:
+    def params(self) -> dict[str, JsonValue]:
         """The mission's params as plain values, overrides applied."""
         return {name: param.value.value for name, param in self.mission.params.items()}
 

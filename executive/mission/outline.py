@@ -5,8 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 from py_trees.behaviour import Behaviour
 
@@ -14,6 +13,8 @@ from executive.tree.node import ControlNode
 from executive.tree.skill_leaf import SkillLeaf
 
 _NUMBER = re.compile(r"[0-9]+:")
+SKILL = "skill"
+"""Kind of the leaves that run a skill."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ class OutlineNode:
     subtrees: tuple[str, ...] = ()
     skill: str = ""
     doc: str = ""
-    params: Mapping[str, Any] = field(default_factory=dict)
+    params: Mapping[str, object] = field(default_factory=dict)
     reads: tuple[Connection, ...] = ()
     writes: tuple[Connection, ...] = ()
     reasons: tuple[str, ...] = ()
@@ -99,17 +100,20 @@ def children(nodes: Sequence[OutlineNode]) -> list[list[int]]:
 def _outline(node: Behaviour, parent: Behaviour | None, depth: int = 0) -> Iterator[OutlineNode]:
     path = _path(node)
     place = path.removeprefix(f"{_path(parent) if parent else 'tree'}/")
-    facts = _skill_facts(node) if isinstance(node, SkillLeaf) else _inner_facts(node)
     label, detail = getattr(node, "label", ""), getattr(node, "detail", "")
-    if label and not isinstance(node, SkillLeaf):
-        detail = ", ".join(part for part in (facts["kind"], detail) if part)
-    title = label or facts.get("skill") or facts["kind"]
+    kind = _kind(node)
+    if label and kind != SKILL:
+        detail = ", ".join(part for part in (kind, detail) if part)
+    title = label or (node.skill_name if isinstance(node, SkillLeaf) else kind)
     subtrees = tuple(getattr(node, "subtrees", ()))
     slot = _slot(place, parent, node, title, subtrees) if parent else ""
     when = parent.describe_trigger(node) if isinstance(parent, ControlNode) else ""
-    yield OutlineNode(
-        path, _name(place), depth, detail, title=title, subtrees=subtrees, slot=slot, when=when, **facts
-    )
+    drawn = OutlineNode(path, _name(place), depth, detail, kind, title, slot, when, subtrees)
+    if isinstance(node, SkillLeaf):
+        yield _add_skill(drawn, node)
+    else:
+        style = node if isinstance(node, ControlNode) else ControlNode
+        yield replace(drawn, symbol=style.symbol, shape=style.shape)
     for child in node.children:
         yield from _outline(child, node, depth + 1)
 
@@ -118,11 +122,11 @@ def _path(node: Behaviour) -> str:
     return str(getattr(node, "path", node.name))
 
 
-def _inner_facts(node: Behaviour) -> dict[str, str]:
-    """Return the facts of a control node; a stock py_trees behaviour has the name of its class."""
-    if isinstance(node, ControlNode):
-        return {"kind": node.keyword, "symbol": node.symbol, "shape": node.shape}
-    return {"kind": type(node).__name__.lower(), "symbol": ControlNode.symbol, "shape": ControlNode.shape}
+def _kind(node: Behaviour) -> str:
+    """Return the keyword of a control node; a py_trees behaviour has the name of its class."""
+    if isinstance(node, SkillLeaf):
+        return SKILL
+    return node.keyword if isinstance(node, ControlNode) else type(node).__name__.lower()
 
 
 def _name(place: str) -> str:
@@ -152,9 +156,9 @@ def _slot(place: str, parent: Behaviour, node: Behaviour, title: str, subtrees: 
     return " ".join(parts)
 
 
-def _skill_facts(node: SkillLeaf) -> dict[str, Any]:
-    """Return what an outline says of a skill only."""
-    skill, wiring = node.skill_type, node.wiring
+def _add_skill(node: OutlineNode, leaf: SkillLeaf) -> OutlineNode:
+    """Return `node` with the declarations of the skill and the wiring of its leaf."""
+    skill, wiring = leaf.skill_type, leaf.wiring
     ports = skill.ports
 
     def connections(wires: Mapping[str, str]) -> tuple[Connection, ...]:
@@ -162,14 +166,14 @@ def _skill_facts(node: SkillLeaf) -> dict[str, Any]:
             Connection(port, variable, ports[port].default is ...) for port, variable in wires.items()
         )
 
-    return {
-        "kind": "skill",
-        "skill": node.skill_name,
-        "doc": (inspect.getdoc(skill) or "").partition("\n")[0],
-        "params": dict(wiring.constants),
-        "reads": connections(wiring.inputs),
-        "writes": connections(wiring.outputs),
-        "reasons": tuple(skill.reasons),
-        "senses": skill.senses,
-        "uses": tuple(skill.uses),
-    }
+    return replace(
+        node,
+        skill=leaf.skill_name,
+        doc=(inspect.getdoc(skill) or "").partition("\n")[0],
+        params=dict(wiring.constants),
+        reads=connections(wiring.inputs),
+        writes=connections(wiring.outputs),
+        reasons=tuple(skill.reasons),
+        senses=skill.senses,
+        uses=tuple(skill.uses),
+    )

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Sequence
+
+from pydantic_core import ErrorDetails
 
 from executive.mission.findings import suggest
 
@@ -33,7 +34,7 @@ _BOUNDS = {
 }
 
 
-def describe(value: Any) -> str:
+def describe(value: object) -> str:
     """Return what a plain value is, for the end of a sentence."""
     if value is None:
         return "nothing"
@@ -43,10 +44,12 @@ def describe(value: Any) -> str:
         return f"{value:g}" if isinstance(value, float) else str(value)
     if isinstance(value, str):
         return f'the text "{value}"'
-    return "a mapping" if isinstance(value, Mapping) else f"a list of {len(value)}"
+    if isinstance(value, Sequence):
+        return f"a list of {len(value)}"
+    return "a mapping"
 
 
-def violation(problem: Mapping[str, Any]) -> str:
+def violation(problem: ErrorDetails) -> str:
     """Return what one of pydantic's errors says, to follow the name of the value."""
     kind, given = problem["type"], problem["input"]
     context = problem.get("ctx", {})

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, KeysView, Mapping
 from dataclasses import fields, is_dataclass
-from typing import Any
 
 from pydantic import JsonValue, TypeAdapter, ValidationError
 from pydantic_core import from_json
@@ -39,7 +38,7 @@ _ADAPTERS: Mapping[str, TypeAdapter[Event]] = {name: TypeAdapter(kind) for name,
 
 def journal_schema() -> dict[str, JsonValue]:
     """Return the JSON Schema of one line of a journal."""
-    definitions: dict[str, Any] = {}
+    definitions: dict[str, JsonValue] = {}
     for name, adapter in _ADAPTERS.items():
         schema = adapter.json_schema(ref_template="#/definitions/{model}")
         definitions |= schema.pop("$defs", {})

@@ -6,7 +6,6 @@ import time
 import traceback
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 from py_trees.common import Status
 
@@ -96,11 +95,9 @@ class Run:
             outcome = replace(outcome, status="FAULT", reason="fault", message=problems[0], node="")
         return outcome
 
-    def items(self) -> dict[str, Any]:
-        """Return the ledger's balance, its `unknown` and `doubts`, and a row per item as `rows`."""
-        accounts = self.workcell.accounts
-        details = {"unknown": accounts.unknown, "doubts": accounts.doubts, "rows": accounts.summaries()}
-        return {**accounts.balance(), **details}
+    def items(self) -> dict[str, int]:
+        """Return the counts of the items by final state; see `Accounts.balance`."""
+        return self.workcell.accounts.balance()
 
     def audit(self) -> Mapping[str, int] | None:
         """Return the true final counts of the objects, or None if they are unknown; only after `execute`."""

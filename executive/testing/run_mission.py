@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from executive.cell.cell_wrapper import innermost
-from executive.cell.workcell import Workcell
+from executive.cell.workcell import Accounts, Workcell
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.events import FaultInjected, NodeEnded, NodeStarted, Observer, RunEnded, TimedEvent
@@ -33,13 +33,15 @@ class MissionResult(RunEnded):
 
     Attributes:
         events: Everything the run told its observers, in order.
-        items: The ledger's balance, and a row per item under `rows`.
+        items: Counts of the items by final state; see `Accounts.balance`.
+        accounts: The ledger, with the final state of each item.
         audit: What really became of the objects, or None where nobody can know.
         cell: The cell it ran in, closed; without what was wrapped around it.
     """
 
     events: Sequence[TimedEvent]
-    items: Mapping[str, Any]
+    items: Mapping[str, int]
+    accounts: Accounts
     audit: Mapping[str, int] | None
     cell: Any
 
@@ -121,7 +123,12 @@ def run_mission(
         run.observe(workcell.hear)
         outcome = run.execute()
         return MissionResult(
-            **asdict(outcome), events=events, items=run.items(), audit=run.audit(), cell=innermost(workcell)
+            **asdict(outcome),
+            events=events,
+            items=run.items(),
+            accounts=workcell.accounts,
+            audit=run.audit(),
+            cell=innermost(workcell),
         )
     finally:
         run.close()

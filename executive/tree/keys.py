@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum, auto
 from functools import cache
-from typing import Annotated, Any, ClassVar, TypeAlias, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, TypeAlias, Union, cast, get_args, get_origin, get_type_hints
 
 from py_trees.behaviour import Behaviour
 from pydantic import Field, TypeAdapter
@@ -59,7 +59,7 @@ class Key:
         name: Name in the mission file.
         attribute: Name in the class.
         kind: Kind of the value.
-        type: Type of a constant, or class of a section.
+        value_type: Type of a constant, or class of a section.
     """
 
     doc: str
@@ -76,7 +76,7 @@ class Key:
     name: str = ""
     attribute: str = ""
     kind: Kind = Kind.CONSTANT
-    type: Any = None
+    value_type: object = None
 
     @property
     def is_required(self) -> bool:
@@ -86,12 +86,11 @@ class Key:
     @property
     def section(self) -> type[KeySection]:
         """The class of the section or sections under the key."""
-        section: type[KeySection] = self.type
-        return section
+        return cast("type[KeySection]", self.value_type)
 
-    def adapter(self, max_value: int | None = None) -> TypeAdapter[Any]:
+    def adapter(self, max_value: int | None = None) -> TypeAdapter[object]:
         """Return the validator of a constant; `max_value` is the upper bound of a number, or None."""
-        return _make_adapter(self.type, self.ge, self.gt, max_value)
+        return _make_adapter(self.value_type, self.ge, self.gt, max_value)
 
 
 def key(
@@ -126,7 +125,7 @@ class KeyOwner:
     keys: ClassVar[Mapping[str, Key]] = {}
     any_of: ClassVar[tuple[str, ...]] = ()
 
-    def __init_subclass__(cls, **kwargs: Any) -> None:
+    def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
         declared = {name: value for name, value in vars(cls).items() if isinstance(value, Key)}
         hints = get_type_hints(cls, include_extras=True) if declared else {}
@@ -163,26 +162,32 @@ class KeySection(KeyOwner):
         self.set_keys(values)
 
 
-def _complete(declaration: Key, attribute: str, hint: Any) -> Key:
+def _complete(declaration: Key, attribute: str, hint: object) -> Key:
     """Return a key with name, attribute, kind and type, as its attribute and annotation declare them."""
     if get_origin(hint) in (Union, types.UnionType) and types.NoneType in get_args(hint):
         hint = Union[tuple(part for part in get_args(hint) if part is not types.NoneType)]  # noqa: UP007
     base = get_args(hint)[0] if get_origin(hint) is Annotated else hint
     element = get_args(base)[0] if get_origin(base) is tuple else None
-    kinds = {Child: Kind.NODE, Children: Kind.NODES, Reasons: Kind.REASONS, VariableName: Kind.VARIABLE}
+    kinds: dict[object, Kind] = {
+        Child: Kind.NODE,
+        Children: Kind.NODES,
+        Reasons: Kind.REASONS,
+        VariableName: Kind.VARIABLE,
+    }
     kind = Kind.ELEMENTS if base == Elements else kinds.get(base, Kind.CONSTANT)
     if isinstance(base, type) and issubclass(base, KeySection):
         kind = Kind.SECTION
     elif isinstance(element, type) and issubclass(element, KeySection):
         kind, base = Kind.SECTIONS, element
-    return replace(declaration, name=attribute.rstrip("_"), attribute=attribute, kind=kind, type=base)
+    return replace(declaration, name=attribute.rstrip("_"), attribute=attribute, kind=kind, value_type=base)
 
 
 @cache
-def _make_adapter(kind: Any, ge: float | None, gt: float | None, le: float | None) -> TypeAdapter[Any]:
+def _make_adapter(
+    declared: object, ge: float | None, gt: float | None, le: float | None
+) -> TypeAdapter[object]:
     """Return the validator of a type whose numbers have these bounds."""
-    parts = get_args(kind) if get_origin(kind) in (Union, types.UnionType) else (kind,)
+    parts = get_args(declared) if get_origin(declared) in (Union, types.UnionType) else (declared,)
     bounds = Field(ge=ge, gt=gt, le=le)
     bounded = [Annotated[part, bounds] if part in (int, float) else part for part in parts]
-    union: Any = Union[tuple(bounded)]  # noqa: UP007
-    return TypeAdapter(union)
+    return TypeAdapter(cast("type[object]", Union[tuple(bounded)]))  # noqa: UP007

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from executive.cell.workcell import Workcell
 from executive.cells.fake.cell import FakeCell
-from executive.events import MotionPlanned, RunEnded, TimedEvent
+from executive.events import ItemChanged, MotionPlanned, RunEnded, TimedEvent
 from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import cell_kind, discover
 from executive.record.result import agrees
@@ -34,7 +33,8 @@ class Done:
     """A mission that was run: its outcome, the ledger's items, the audit, and if each plan was made ahead."""
 
     outcome: RunEnded
-    items: dict[str, Any]
+    items: dict[str, int]
+    rows: Sequence[ItemChanged]
     audit: dict[str, int]
     ahead: list[bool]
 
@@ -59,7 +59,7 @@ def execute(mission: LoadedMission, seed: int, kind: Callable[..., Workcell] = F
     run = assemble(mission, discover(), options, [observe])
     try:
         outcome = run.execute()
-        return Done(outcome, run.items(), dict(run.audit() or {}), ahead)
+        return Done(outcome, run.items(), run.workcell.accounts.summaries(), dict(run.audit() or {}), ahead)
     finally:
         run.close()
 
@@ -120,7 +120,7 @@ def test_only_rehearsals_are_left_out_of_the_simulated_world() -> None:
 )
 def test_no_kit_gets_a_part_twice_and_a_full_table_gives_two_whole_kits(seed: int, second: list[str]) -> None:
     kits: dict[str, list[str]] = {}
-    for row in execute(loaded("kit_fasteners"), seed).items["rows"]:
+    for row in execute(loaded("kit_fasteners"), seed).rows:
         kits.setdefault(row.bin, []).append(row.label)
     assert sorted(kits["tray_1"]) == ["bolt", "nut", "washer"]
     assert sorted(kits["tray_2"]) == second
@@ -130,8 +130,8 @@ def test_no_kit_gets_a_part_twice_and_a_full_table_gives_two_whole_kits(seed: in
 def test_no_bin_gets_more_than_its_quota(quota: int) -> None:
     overrides = {"quota": str(quota), "cell.table.objects": "[6, 6]"}
     done = execute(load_mission(MISSIONS["sort_by_priority"], discover(), overrides), 5)
-    placed = [row.label for row in done.items["rows"] if row.bin]
-    there = [row.label for row in done.items["rows"]]
+    placed = [row.label for row in done.rows if row.bin]
+    there = [row.label for row in done.rows]
     assert {label: placed.count(label) for label in placed} == {
         label: min(quota, there.count(label)) for label in set(there)
     }

@@ -15,6 +15,7 @@ from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 
 from executive.cell.plain import plain
+from executive.cell.workcell import Workcell
 from executive.cells.fake.cell import FakeCell
 from executive.mission.build import build
 from executive.mission.load import LoadedMission, load_mission
@@ -59,12 +60,9 @@ class Interleaved:
 
     def story(self) -> Story:
         self._fake.accounts.close(completed=self._root.status is Status.SUCCESS)
-        accounts = self._fake.accounts
-        told = {"unknown": accounts.unknown, "doubts": accounts.doubts, "rows": accounts.summaries()}
-        items = {**accounts.balance(), **told}
         return (
             self._root.status.value, self._context.tick, self._trace.hexdigest(), variables(self._root),
-            items, self._fake.audit(),
+            items_of(self._fake), self._fake.audit(),
         )  # fmt: skip
 
 
@@ -87,13 +85,21 @@ def variables(root: Behaviour) -> list[dict[str, Any]]:
     return [plain(scope) for scope in scopes.values()]
 
 
+def items_of(workcell: Workcell) -> dict[str, object]:
+    """Return the counts and the final states of the items, and the labels and doubts of the ledger."""
+    accounts = workcell.accounts
+    details = {"unknown": accounts.unknown, "doubts": accounts.doubts, "rows": accounts.summaries()}
+    return {**accounts.balance(), **details}
+
+
 def story_of(name: str, seed: int) -> Story:
     trace = Trace()
     run = assemble(loaded(name), skills(), RunOptions(seed, [], kind=FakeCell), [trace])
     try:
         outcome = run.execute()
         return (
-            outcome.status, outcome.ticks, trace.hexdigest(), variables(run.root), run.items(), run.audit(),
+            outcome.status, outcome.ticks, trace.hexdigest(), variables(run.root),
+            items_of(run.workcell), run.audit(),
         )  # fmt: skip
     finally:
         run.close()

@@ -55,7 +55,7 @@ def test_what_the_tool_holds_at_the_end_is_told(missions: Path) -> None:
 
     run = make(missions, stop)
     held = run.execute().holds
-    assert held in {row.item for row in run.items()["rows"]}
+    assert held in {row.item for row in run.workcell.accounts.summaries()}
 
 
 @pytest.mark.parametrize("kind", [ItemChanged, RunEnded, FaultRaised])

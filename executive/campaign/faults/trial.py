@@ -120,7 +120,7 @@ class _Trying:
             message=outcome.message,
             node=outcome.node,
             missing=self._rehearsal.placed - items["placed"],
-            items={name: count for name, count in items.items() if name != "rows"},
+            items=items,
             audit=audit,
             robot_time=outcome.robot_time,
             entered=frozenset(self._activations.counts),

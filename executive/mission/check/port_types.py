@@ -33,9 +33,9 @@ class Writer:
 
     name: str
     mark: Mark
-    type: Any
+    type: object
     refers: str
-    values: tuple[tuple[Any, Mark], ...] | None = None
+    values: tuple[tuple[object, Mark], ...] | None = None
 
     def seen_from(self, mark: Mark) -> str:
         """Return what it is and where, for who reads the file of `mark`."""

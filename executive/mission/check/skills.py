@@ -73,7 +73,7 @@ def _find_unknown_names(
     choices = declared.choices if isinstance(declared, Param) else None
     words = [*case.names[declared.refers], *(choices or ())]
     name, listed = f"{node.skill}.{declared.name}", isinstance(value.value, list)
-    for index, word in enumerate(value.value if listed else [value.value]):
+    for index, word in enumerate(value.value if isinstance(value.value, list) else [value.value]):
         if isinstance(word, str) and word not in words:
             message = f'the cell has no {declared.refers} "{word}" for {name}'
             hint = case.variable_hint(word) or alternatives(word, words, f"{name} takes")
@@ -88,9 +88,10 @@ def _find_param_problem(param: Param, value: object) -> tuple[str, str]:
     except WrongType as problem:
         return "wrong-type", str(problem)
     unit = f" {param.unit}" if param.unit else ""
-    if param.ge is not None and converted < param.ge:
+    number = converted if isinstance(converted, int | float) else None
+    if number is not None and param.ge is not None and number < param.ge:
         return "out-of-range", f"must be at least {param.ge:g}{unit}, not {describe(value)}"
-    if param.le is not None and converted > param.le:
+    if number is not None and param.le is not None and number > param.le:
         return "out-of-range", f"must be at most {param.le:g}{unit}, not {describe(value)}"
     # Where a param names something of the cell, its choices are further words, checked with the cell.
     if param.choices is not None and not param.refers and converted not in param.choices:

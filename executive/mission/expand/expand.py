@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import TypeVar, cast
 
 from executive.mission.findings import Finding, alternatives, error, suggest, warning
 from executive.mission.model.mission import Mission, Subtree
@@ -26,7 +26,9 @@ _OUTER_PREFIX = "^"
 """Stands before the variables of the place of use while those of the subtree are renamed."""
 
 Names = Mapping[str, Value]
-"""What `$name` stands for where it is not a variable."""
+"""Values of `$name` for params and arguments, by name."""
+
+P = TypeVar("P")
 
 
 @dataclass(frozen=True)
@@ -106,7 +108,7 @@ class _Expander:
             self.findings.append(error(self._outermost or node.mark, "too-large", message))
             raise _TooLargeError
 
-        def fill(part: Any) -> Any:
+        def fill(part: object) -> object:
             """Return a part of the node with everything looked up."""
             if isinstance(part, Node):
                 return self._expand_node(part, names, inside, depth + 1)
@@ -115,7 +117,7 @@ class _Expander:
             return _map_parts(part, fill)
 
         self.findings += self._find_shadowed(node, names)
-        rebuilt: Node = _map_parts(node, fill)
+        rebuilt = _map_parts(node, fill)
         return self._expand_use(rebuilt, inside, depth) if isinstance(rebuilt, UseNode) else rebuilt
 
     def _find_shadowed(self, node: Node, names: Names) -> Iterator[Finding]:
@@ -195,7 +197,7 @@ class _Expander:
                 return returns[name]
             return own + name if name in kept else name
 
-        def rename_part(part: Any) -> Any:
+        def rename_part(part: object) -> object:
             if isinstance(part, Reference | Named):
                 return replace(part, name=rename(part.name))
             part = _map_parts(part, rename_part)
@@ -206,8 +208,7 @@ class _Expander:
                 return replace(part, names={port: rename(part.names.get(port, port)) for port in ports})
             return part
 
-        result: Node = rename_part(body)
-        return result
+        return cast("Node", rename_part(body))
 
     def _name_returns(self, use: UseNode, subtree: Subtree) -> dict[str, str]:
         """Return what each variable that the subtree returns is called at the place of use."""
@@ -249,12 +250,14 @@ def _mark_as_outer(value: Value) -> Value:
     return replace(value, name=_OUTER_PREFIX + value.name) if isinstance(value, Reference) else value
 
 
-def _map_parts(part: Any, change: Callable[[Any], Any]) -> Any:
-    """Return a node, or a part of one, with `change` made to everything that stands directly in it."""
+def _map_parts(part: P, change: Callable[[object], object]) -> P:
+    """Return a node, or a part of a node, with `change` applied to each of its direct parts."""
+    mapped: object = part
     if isinstance(part, tuple):
-        return tuple([change(item) for item in part])
-    if isinstance(part, dict):
-        return {key: change(item) for key, item in part.items()}
-    if isinstance(part, Node | Setting | SectionNode):
-        return replace(part, **{field.name: change(getattr(part, field.name)) for field in fields(part)})
-    return part
+        mapped = tuple([change(item) for item in part])
+    elif isinstance(part, dict):
+        mapped = {key: change(item) for key, item in part.items()}
+    elif isinstance(part, Node | Setting | SectionNode):
+        values = {field.name: change(getattr(part, field.name)) for field in fields(part)}
+        mapped = replace(part, **values)  # type: ignore[arg-type] # `change` keeps the type of each field.
+    return cast("P", mapped)

@@ -110,8 +110,8 @@ def _value(owner: InnerNode | SectionNode, key: Key, part: Part | None, build: B
 
 def _placeholder(key: Key) -> object:
     """Return a value instead of a wrong constant: the default, or a very large number."""
-    if key.type in (int, float):
-        return sys.maxsize if key.type is int else math.inf
+    if key.value_type in (int, float):
+        return sys.maxsize if key.value_type is int else math.inf
     if not key.is_required:
         return key.default
-    return next(iter(get_args(key.type)), key.type() if key.type in (bool, str) else None)
+    return next(iter(get_args(key.value_type)), key.value_type() if key.value_type in (bool, str) else None)

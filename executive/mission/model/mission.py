@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+
+from pydantic import JsonValue
 
 from executive.mission.model.nodes import Node
 from executive.mission.model.values import Literal, Named, Value
@@ -64,7 +65,7 @@ class MissionParam:
     type: str = ""
     minimum: float | None = None
     maximum: float | None = None
-    choices: tuple[Any, ...] | None = None
+    choices: tuple[JsonValue, ...] | None = None
     doc: str = ""
 
 

@@ -15,7 +15,7 @@ _WORDS = {
 }
 
 
-def is_assignable(given: Any, wanted: Any) -> bool:
+def is_assignable(given: object, wanted: object) -> bool:
     """Tell whether every value of the type `given` is one of the type `wanted`."""
     if given is Any or wanted is Any or given == wanted or given is NoReturn:
         return True
@@ -31,7 +31,7 @@ def is_assignable(given: Any, wanted: Any) -> bool:
     return all(is_assignable(one, other) for one, other in inner if ... not in (one, other))
 
 
-def find_element_type(listed: Any) -> Any:
+def find_element_type(listed: object) -> object:
     """Return the type of the elements of a list type, or None where it is no list."""
     if listed is Any:
         return Any
@@ -41,22 +41,22 @@ def find_element_type(listed: Any) -> Any:
     return Union[tuple(arguments)] if arguments else Any  # noqa: UP007 - made of as many as there are
 
 
-def describe_type(declared: Any) -> str:
+def describe_type(declared: object) -> str:
     """Return what values of a type are called in a sentence."""
     if declared in _WORDS:
         return _WORDS[declared]
     if _is_union(declared):
         return " or ".join(describe_type(part) for part in get_args(declared))
     element = find_element_type(declared)
-    if element is not None and declared is not Any:
+    if element is not None and declared is not object:
         return "a list" if element is Any else f"a list of {describe_type(element).removeprefix('a ')}"
     return getattr(declared, "__name__", str(declared))
 
 
-def _is_union(declared: Any) -> bool:
+def _is_union(declared: object) -> bool:
     return get_origin(declared) in (Union, types.UnionType)
 
 
-def _class_of(declared: Any) -> type:
+def _class_of(declared: object) -> type:
     origin = get_origin(declared) or declared
     return origin if isinstance(origin, type) else object

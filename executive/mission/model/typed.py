@@ -7,7 +7,7 @@ import json
 import math
 import types
 import typing
-from typing import Any, Union, get_args, get_origin
+from typing import Any, Union, cast, get_args, get_origin
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -32,7 +32,7 @@ class WrongType(Exception):
         self.code = code
 
 
-def is_plain(declared: Any) -> bool:
+def is_plain(declared: object) -> bool:
     """Tell whether values of this type can be written in a mission file."""
     if declared in _SCALARS or declared in _CONTAINERS or declared is Ellipsis:
         return True
@@ -58,7 +58,7 @@ def find_input_problem(value: object, port: Port) -> str:
     return ""
 
 
-def convert(value: object, declared: Any) -> Any:
+def convert(value: object, declared: object) -> object:
     """Return a plain value as the declared type: lists become tuples, whole numbers floats.
 
     Raises:
@@ -69,7 +69,7 @@ def convert(value: object, declared: Any) -> Any:
     return _read(_adapter(declared), value)
 
 
-def read_constant(key: Key, value: object, max_value: int | None = None) -> Any:
+def read_constant(key: Key, value: object, max_value: int | None = None) -> object:
     """Return a plain value as a constant of a control node; numbers are at most `max_value`.
 
     Raises:
@@ -78,7 +78,7 @@ def read_constant(key: Key, value: object, max_value: int | None = None) -> Any:
     return _read(key.adapter(max_value), value)
 
 
-def _read(adapter: TypeAdapter[Any], value: object) -> Any:
+def _read(adapter: TypeAdapter[object], value: object) -> object:
     if isinstance(value, float) and not math.isfinite(value):
         raise WrongType(f"must be a finite number, not {value}")
     try:
@@ -94,5 +94,5 @@ def _read(adapter: TypeAdapter[Any], value: object) -> Any:
 
 
 @functools.lru_cache(maxsize=256)
-def _adapter(declared: Any) -> TypeAdapter[Any]:
-    return TypeAdapter(declared)
+def _adapter(declared: object) -> TypeAdapter[object]:
+    return TypeAdapter(cast("type[object]", declared))

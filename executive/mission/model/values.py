@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+
+from pydantic import JsonValue
 
 from executive.mission.source import Mark
 from executive.tree.failure import Reason
@@ -21,7 +22,7 @@ class Literal:
         elements: Where the elements stand, if it is a list written in the file.
     """
 
-    value: Any
+    value: JsonValue
     mark: Mark
     origin: str = ""
     reference_mark: Mark | None = None

@@ -6,6 +6,8 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
+from pydantic import JsonValue
+
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.model.values import FailureName, Literal, Reference, Setting, Value
 from executive.mission.source import Mark
@@ -167,7 +169,7 @@ def _misplaced_dollars(node: Node) -> Iterator[Finding]:
             yield error(scalar.mark, "bad-reference", message, hint)
 
 
-def _unescaped(value: object) -> object:
+def _unescaped(value: JsonValue) -> JsonValue:
     """Return a plain value with every `$$` in its texts as `$`."""
     if isinstance(value, str):
         return value.replace("$$", "$")

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping as Mapped
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
+
+from pydantic import JsonValue
 
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.model import grammar
@@ -18,7 +20,13 @@ from executive.mission.source import Mark
 from executive.mission.text.yaml_text import Mapping, Node, plain
 from executive.mission.words import describe
 
-TYPES: Mapped[str, Any] = {"text": str, "integer": int, "number": float, "boolean": bool, "list": list[Any]}
+TYPES: Mapped[str, object] = {
+    "text": str,
+    "integer": int,
+    "number": float,
+    "boolean": bool,
+    "list": list[Any],
+}
 """The types a param may have, by the word for them."""
 
 
@@ -85,12 +93,18 @@ def _impossible(param: MissionParam) -> str:
     return ""
 
 
-def _any_value(param: MissionParam) -> Any:
+def _any_value(param: MissionParam) -> JsonValue:
     """Return a value that a param could have, so that one that is missing is told once, not at every use."""
     if param.choices:
         return param.choices[0]
     least = param.minimum if param.minimum is not None else 1
-    values = {"text": "", "integer": int(least), "number": float(least), "boolean": False, "list": [None]}
+    values: dict[str, JsonValue] = {
+        "text": "",
+        "integer": int(least),
+        "number": float(least),
+        "boolean": False,
+        "list": [None],
+    }
     return values.get(param.type)
 
 
@@ -103,7 +117,7 @@ def _declared_type(fields: Fields, findings: list[Finding]) -> str:
     return ""
 
 
-def _type_of(value: Any) -> str:
+def _type_of(value: object) -> str:
     kinds = {word: getattr(kind, "__origin__", kind) for word, kind in TYPES.items()}
     return next((word for word, kind in kinds.items() if type(value) is kind), "")
 
@@ -135,7 +149,7 @@ def _checked(name: str, param: MissionParam, value: Literal, findings: list[Find
     fitting = value.value
     if param.type:
         try:
-            fitting = convert(value.value, TYPES[param.type])
+            fitting = cast("JsonValue", convert(value.value, TYPES[param.type]))
         except WrongType as problem:
             findings.append(error(value.mark, "wrong-type", f"{name} {problem}"))
             return None
@@ -145,7 +159,7 @@ def _checked(name: str, param: MissionParam, value: Literal, findings: list[Find
     return replace(param, value=replace(value, value=fitting))
 
 
-def _out_of_bounds(param: MissionParam, value: Any) -> str:
+def _out_of_bounds(param: MissionParam, value: object) -> str:
     if isinstance(value, int | float):
         if param.minimum is not None and value < param.minimum:
             return f"must be at least {param.minimum:g}"

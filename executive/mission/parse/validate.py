@@ -7,9 +7,10 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from types import NoneType
-from typing import Any, Generic, TypeVar, get_args, get_origin
+from typing import Generic, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
 
 from executive.mission.findings import Finding, alternatives, error
 from executive.mission.source import Mark
@@ -72,7 +73,7 @@ def dotted(path: KeyPath) -> str:
     return text.removeprefix(".")
 
 
-def _finding(root: Node, model: type[BaseModel], problem: Any) -> Finding:
+def _finding(root: Node, model: type[BaseModel], problem: ErrorDetails) -> Finding:
     path: KeyPath = problem["loc"]
     kind = problem["type"]
     inside, last = path[:-1], path[-1] if path else ""
@@ -97,9 +98,9 @@ def _finding(root: Node, model: type[BaseModel], problem: Any) -> Finding:
     return error(mark_of(root, path), code, f"{name} {violation(problem)}")
 
 
-def _annotation(model: Any, path: KeyPath) -> Any:
+def _annotation(model: object, path: KeyPath) -> object:
     """Return the declared type of the value at `path`, or None where it cannot be told."""
-    here: Any = model
+    here: object = model
     for step in path:
         if isinstance(here, type) and issubclass(here, BaseModel):
             field = here.model_fields.get(str(step))
@@ -113,7 +114,7 @@ def _annotation(model: Any, path: KeyPath) -> Any:
     return here
 
 
-def _without_none(annotation: Any) -> Any:
+def _without_none(annotation: object) -> object:
     """Return `T` for the declared type `T | None`, and any other type as it is."""
     kinds = [kind for kind in get_args(annotation) if kind is not NoneType]
     return kinds[0] if NoneType in get_args(annotation) and len(kinds) == 1 else annotation

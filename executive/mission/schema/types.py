@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping
-from typing import Any
+from typing import TypeAlias, cast
 
 from pydantic import TypeAdapter
-from pydantic.json_schema import GenerateJsonSchema
-from pydantic_core import to_jsonable_python
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+from pydantic_core import core_schema, to_jsonable_python
 
 from executive.cell.config import CellConfig
 from executive.mission.model.typed import is_plain
 from executive.skill import Direction, Param, Port, Skill
 
-Json = dict[str, Any]
+Json: TypeAlias = JsonSchemaValue
 """A JSON Schema, or a part of one."""
 
 ALTERNATIVE: Json = {"allOf": [True]}
@@ -28,7 +28,7 @@ DIALECT = "http://json-schema.org/draft-07/schema#"
 class Draft07(GenerateJsonSchema):
     """Pydantic's JSON Schema in the words of draft-07, without titles made up from names in the code."""
 
-    def tuple_schema(self, schema: Any) -> Json:
+    def tuple_schema(self, schema: core_schema.TupleSchema) -> Json:
         """Return the schema of a tuple, whose places draft-07 lists under `items`."""
         written = super().tuple_schema(schema)
         places = written.pop("prefixItems", None)
@@ -37,21 +37,21 @@ class Draft07(GenerateJsonSchema):
         alike = all(place == places[0] for place in places)
         return {**written, "items": places[0] if alike else places}
 
-    def model_schema(self, schema: Any) -> Json:
+    def model_schema(self, schema: core_schema.ModelSchema) -> Json:
         """Return the schema of a section."""
         written = super().model_schema(schema)
         del written["title"]
         return written
 
-    def field_title_should_be_set(self, schema: Any) -> bool:
+    def field_title_should_be_set(self, schema: object) -> bool:
         """Return False for every field."""
         del schema
         return False
 
 
-def type_schema(declared: Any) -> Json:
+def type_schema(declared: object) -> Json:
     """Return the schema of the plain values of a Python type."""
-    return TypeAdapter(declared).json_schema(schema_generator=Draft07)
+    return TypeAdapter(cast("type[object]", declared)).json_schema(schema_generator=Draft07)
 
 
 def cell_schema() -> Json:

@@ -10,9 +10,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import yaml
+from pydantic import JsonValue
 
 from executive.mission.findings import Finding, error
 from executive.mission.source import Mark, Source
@@ -83,7 +83,7 @@ class Mapping:
 Node = Scalar | YamlSequence | Mapping
 
 
-def plain(node: Node) -> Any:
+def plain(node: Node) -> JsonValue:
     """Return the node as plain Python values."""
     if isinstance(node, Scalar):
         return node.value
@@ -126,7 +126,7 @@ class _Composer:
         self.source = source
         self.findings: list[Finding] = []
         # The parser in Python: its messages do not change with the libyaml that happens to be there.
-        self._events: Iterator[Any] = yaml.parse(source.text, Loader=yaml.SafeLoader)
+        self._events: Iterator[yaml.Event] = yaml.parse(source.text, Loader=yaml.SafeLoader)
         self._anchors: dict[str, tuple[Node, int]] = {}
         self._count = 0
 
@@ -143,9 +143,11 @@ class _Composer:
             )
         return root
 
-    def _node(self, event: Any, depth: int) -> Node:
+    def _node(self, event: yaml.Event, depth: int) -> Node:
         if isinstance(event, yaml.AliasEvent):
             return self._alias(event, depth)
+        # Only these events begin a node: the parser checks the grammar.
+        assert isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent)
         before = self._count
         self._add(1, event)
         if event.tag is not None:
@@ -155,7 +157,7 @@ class _Composer:
             self._anchors[event.anchor] = node, self._count - before
         return node
 
-    def _alias(self, event: Any, depth: int) -> Node:
+    def _alias(self, event: yaml.AliasEvent, depth: int) -> Node:
         if event.anchor not in self._anchors:
             raise self._unsound(self._mark(event), "alias", f'nothing above is marked "&{event.anchor}"')
         node, size = self._anchors[event.anchor]
@@ -164,7 +166,7 @@ class _Composer:
         self._add(size, event)
         return node
 
-    def _add(self, count: int, event: Any) -> None:
+    def _add(self, count: int, event: yaml.Event) -> None:
         """Count keys and values.
 
         Raises:
@@ -175,7 +177,7 @@ class _Composer:
             message = f"the file has more than {_MAX_NODES} keys and values, those behind aliases included"
             raise self._unsound(self._mark(event), "too-large", message)
 
-    def _value(self, event: Any, depth: int) -> Node:
+    def _value(self, event: yaml.Event, depth: int) -> Node:
         if isinstance(event, yaml.ScalarEvent):
             return self._scalar(event)
         if depth >= _MAX_DEPTH:
@@ -189,7 +191,7 @@ class _Composer:
             return YamlSequence(self._mark(event, 1), tuple(items))
         return self._mapping(event, depth)
 
-    def _scalar(self, event: Any) -> Scalar:
+    def _scalar(self, event: yaml.ScalarEvent) -> Scalar:
         text, mark = event.value, self._mark(event)
         if _SURROGATE.search(text):
             # An escape can name one; no file or terminal can take it.
@@ -197,7 +199,7 @@ class _Composer:
             text = _SURROGATE.sub("?", text)
         return Scalar(mark, core_value(text) if event.implicit[0] else text, text)
 
-    def _mapping(self, event: Any, depth: int) -> Mapping:
+    def _mapping(self, event: yaml.Event, depth: int) -> Mapping:
         entries: dict[str, Entry] = {}
         while not isinstance(start := next(self._events), yaml.MappingEndEvent):
             key = self._node(start, depth + 1)
@@ -214,8 +216,9 @@ class _Composer:
                 entries[key.text] = Entry(key, value)
         return Mapping(self._mark(event, 1), tuple(entries.values()))
 
-    def _mark(self, event: Any, length: int = 0) -> Mark:
+    def _mark(self, event: yaml.Event, length: int = 0) -> Mark:
         start, end = event.start_mark, event.end_mark
+        assert start is not None and end is not None, "the parser marks every event"
         if not length:
             same_line = start.line == end.line
             length = max(1, end.column - start.column) if same_line else 1000

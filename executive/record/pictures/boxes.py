@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +24,11 @@ def draw_boxes(image: NDArray[np.uint8], scene: PictureScene, scale: float) -> N
     if not scene.seen:
         return image
     numbers = np.arange(len(scene.seen))
-    colours: Any = sv.ColorPalette.from_hex([class_colour(seen.label, scene.classes) for seen in scene.seen])
-    every: Any = sv.Detections(np.array([seen.box for seen in scene.seen]) * scale, class_id=numbers)
-    rest, chosen = every[numbers != scene.chosen], every[numbers == scene.chosen]
+    colours = sv.ColorPalette.from_hex([class_colour(seen.label, scene.classes) for seen in scene.seen])
+    every = sv.Detections(np.array([seen.box for seen in scene.seen]) * scale, class_id=numbers)
+    rest, chosen = (
+        cast("sv.Detections", every[mask]) for mask in (numbers != scene.chosen, numbers == scene.chosen)
+    )
     rim = sv.Color.from_hex(RIM)
     for shown, colour, thickness in (
         (rest, colours, THIN), (chosen, rim, THICK + 2 * RIM_WIDTH), (chosen, colours, THICK),

@@ -110,9 +110,10 @@ def _default_fault(param: Param) -> str:
         return f": {problem}"
     if value is None:
         return ""
-    if param.ge is not None and value < param.ge:
+    number = value if isinstance(value, int | float) else None
+    if number is not None and param.ge is not None and number < param.ge:
         return f", which is less than {param.ge!r}"
-    if param.le is not None and value > param.le:
+    if number is not None and param.le is not None and number > param.le:
         return f", which is more than {param.le!r}"
     # Where a param names something of the cell, its choices are further words.
     if param.choices is not None and not param.refers and value not in param.choices:
