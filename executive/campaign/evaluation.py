@@ -26,7 +26,7 @@ from executive.perception.envelope.measurement import (
     read_measurements,
 )
 from executive.perception.localization import build_localizer
-from executive.record.whole_file import write_whole
+from executive.record.atomic_file import write_atomically
 from executive.training.evaluation.asking import CellDetector
 from executive.training.evaluation.evaluate import (
     MIN_CONFIDENCE,
@@ -264,5 +264,5 @@ def store_evaluation(
     )
     instead = "name another file with --out, and copy it into the folder of your cell file"
     with explained(InputError, f"the measurement {path} cannot be written", instead):
-        write_whole(path, format_measurements(read_measurements(path), measurement))
+        write_atomically(path, format_measurements(read_measurements(path), measurement))
     return path

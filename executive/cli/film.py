@@ -37,8 +37,7 @@ def command(
     """
     with stdout_kept_clean():
         from executive.cli.progress import bar
-        from executive.record.find_run import find_run
-        from executive.record.run_directory import RunDirectory
+        from executive.record.run_directory import RunDirectory, find_run
         from executive.view.film.film import HOLD, film
         from executive.view.film.formats import file_for, format_of
         from executive.view.film.source import FilmSource

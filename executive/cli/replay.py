@@ -27,9 +27,9 @@ def command(ctx: click.Context, run: str, edited: Path | None, runs: Path, as_js
     """
     with stdout_kept_clean():
         from executive.plugins import discover
-        from executive.record.find_run import find_run
         from executive.record.journal import read_journal
         from executive.record.replay import replay
+        from executive.record.run_directory import find_run
 
         path = find_run(run, runs)
         done = replay(path, read_journal(path / "journal.jsonl"), discover(), edited)

@@ -20,7 +20,7 @@ def command(run: str, runs: Path, as_json: bool) -> None:
     Every run leaves one; a run that was killed has none yet.
     """
     with stdout_kept_clean():
-        from executive.record.find_run import find_run
+        from executive.record.run_directory import find_run
         from executive.view.report.page import write_report
 
         file = write_report(find_run(run, runs))

@@ -145,13 +145,13 @@ def _start(
 def _resume(name: str, options: RunOptions, runs: Path, record: RecordOptions) -> tuple[Result, RunStarted]:
     """Resume a run; return its result and its start."""
     from executive.plugins import discover
-    from executive.record.find_run import find_run
-    from executive.record.journal import read_journal, start_of
+    from executive.record.journal import find_start, read_journal
     from executive.record.resumed_run import resume_run
+    from executive.record.run_directory import find_run
 
     path = find_run(name, runs)
     result = resume_run(path, discover(), options, record)
-    return result, start_of(read_journal(path / "journal.jsonl"), path, "run the mission again")
+    return result, find_start(read_journal(path / "journal.jsonl"), path, "run the mission again")
 
 
 @contextlib.contextmanager

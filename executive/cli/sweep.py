@@ -51,7 +51,7 @@ def command(
         from executive.cli.progress import bar, print_halting
         from executive.mission.load import load_mission
         from executive.plugins import cell_kind, discover
-        from executive.record.run_directory import check_place
+        from executive.record.run_directory import check_runs_folder
 
         # What is wrong with the mission, or with the place, is told once and not for every seed.
         loaded = load_mission(mission, discover(), overrides, cell_kind)
@@ -59,7 +59,7 @@ def command(
             from executive.cells.sim.scene_file import load_scene
 
             load_scene(scene, loaded.cell_config)
-        check_place(runs)
+        check_runs_folder(runs)
         with bar(mission) as progress:
             jobs = [Job(mission, seed, overrides, runs, frames, scene) for seed in seeds]
             results = sweep(jobs, workers=workers, progress=progress, halting=print_halting)

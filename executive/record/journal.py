@@ -1,9 +1,10 @@
-"""Journal of a run: everything that happened, one JSON object per line, never rewritten."""
+"""Journal of a run: its recorded events, one JSON object per line, which only one process writes."""
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import fcntl
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,34 +14,41 @@ from pydantic_core import from_json
 from executive.errors import Fault, InputError, RecordLost, explained, reason_of
 from executive.events import ItemChanged, RunEnded, RunStarted, TimedEvent, ToolCommanded
 from executive.record.journal_format import decode_all, encode
-from executive.record.lock import lock
+
+LOCKS = Path("/proc/locks")
+"""File in which Linux lists all locks with the processes that hold them."""
 
 
 class Journal:
-    """Appends every event to a file, as it happens.
+    """Observer that appends each event to a file.
 
-    What the tool is about to do is on the disk before it does it, and so are every placement and the end:
-    after a power cut the record says what may be in the tool and what surely is in a bin. No other process
-    can write to it meanwhile; the kernel gives it free when this one ends, in whatever way.
+    Commands of the tool, placements and the end of the run are synced to the disk before the run continues.
+    After a power cut, the journal shows which item the tool may hold and which items are in a bin. The kernel
+    releases the lock on the file when the process ends.
 
     Args:
         path: The file.
-        again: Go on with the journal that is there, the torn end of its last line cut off; otherwise there
-            must be none.
+        resume: True to append to an existing journal, after an incomplete last line is removed; False to
+            create a journal.
 
     Raises:
-        InputError: It is being written already, holds a run although a new one begins, or cannot be opened.
+        InputError: A process writes the file, a new journal is not empty, or the file cannot be opened.
     """
 
-    def __init__(self, path: Path, *, again: bool = False) -> None:
+    def __init__(self, path: Path, *, resume: bool = False) -> None:
         self._path = path
-        self._broken = False
-        self._unsynced = False
+        self._has_failed = False
+        self._is_synced = True
         with explained(InputError, f'cannot open the journal "{path}"'):
-            file = os.open(path, os.O_RDWR | os.O_APPEND | (0 if again else os.O_CREAT), 0o644)
+            file = os.open(path, os.O_RDWR | os.O_APPEND | (0 if resume else os.O_CREAT), 0o644)
             try:
-                lock(file, path)
-                self._length = _mended(file) if again else _empty(file, path)
+                _lock(file, path)
+                if not resume and os.fstat(file).st_size:
+                    raise InputError(
+                        f'"{path}" is the record of another run; a new run needs a directory of its own, '
+                        "for instance below another --runs DIR"
+                    )
+                self._length = _repair(file) if resume else 0
             except BaseException:
                 os.close(file)
                 raise
@@ -50,12 +58,11 @@ class Journal:
         """Append an event if its kind is recorded.
 
         Raises:
-            RecordLost: The disk does not take it, or another program deleted, replaced or truncated the file:
-                the run must not go on unrecorded.
-                Later events are dropped without another fault, so that the arm can be brought to rest.
-            Fault: JSON cannot hold the event; only this event is missing.
+            RecordLost: Writing failed, or another program deleted, replaced or truncated the file.
+                Later events are dropped without a second fault, so that the arm can be brought to rest.
+            Fault: JSON cannot represent the event; only this event is missing.
         """
-        if self._file is None or self._broken or not timed.event.is_recorded:
+        if self._file is None or self._has_failed or not timed.event.is_recorded:
             return
         line = encode(timed)
         try:
@@ -65,8 +72,8 @@ class Journal:
             if is_placement or isinstance(event, ToolCommanded | RunEnded):
                 self._sync(self._file)
         except OSError as error:
-            self._broken = True
-            # A part of the line is of no use to anybody.
+            self._has_failed = True
+            # An incomplete line cannot be read.
             with contextlib.suppress(OSError):
                 if os.fstat(self._file).st_size > self._length:
                     os.ftruncate(self._file, self._length)
@@ -76,38 +83,38 @@ class Journal:
             ) from error
 
     def close(self) -> None:
-        """Bring everything to the disk and close the file; more calls do nothing.
+        """Sync the file to the disk and close the file; further calls have no effect.
 
         Raises:
-            Fault: The disk does not take it, or the file was deleted, and `append` has not said so.
+            Fault: The last lines may be missing, and no earlier error has reported the lost record.
         """
         if self._file is None:
             return
         file, self._file = self._file, None
-        believe = "believe what you see in the cell rather than the record"
+        advice = "believe what you see in the cell rather than the record"
         try:
-            with explained(Fault, f'the journal "{self._path}" may lack its last lines', believe):
-                if self._unsynced and not self._broken:
+            with explained(Fault, f'the journal "{self._path}" may lack its last lines', advice):
+                if not self._is_synced and not self._has_failed:
                     self._sync(file)
         finally:
-            # What it could say, the sync has said.
+            # An error of the disk has been reported by the sync.
             with contextlib.suppress(OSError):
                 os.close(file)
 
     def _write(self, file: int, line: bytes) -> None:
-        """Write all of `line`; a disk that is nearly full takes a part of it first."""
-        # One unbuffered write per line: what was said before a crash is in the file.
+        """Write a line, in several parts if the disk is nearly full."""
+        # Unbuffered, so that the file holds all events before a crash of the process.
         rest = line
         while rest:
             rest = rest[os.write(file, rest) :]
         self._length += len(line)
-        self._unsynced = True
+        self._is_synced = False
 
     def _sync(self, file: int) -> None:
         os.fsync(file)
-        self._unsynced = False
+        self._is_synced = True
         status = os.fstat(file)
-        # The disk takes what is written to a deleted file, and forgets it when the file is closed.
+        # Writing to a deleted file causes no error; its content is lost when the file is closed.
         if not self._path.exists():
             raise FileNotFoundError(errno.ENOENT, "it was deleted while the run went on")
         if not os.path.samestat(status, self._path.stat()):
@@ -121,41 +128,41 @@ class Journal:
 
 
 def read_journal(path: Path) -> list[TimedEvent]:
-    """Return the events of a journal in order; that of line `n` is at `n - 1`.
+    """Return the events of a journal, one for each line.
 
-    A line that a power cut left incomplete at the end, or zeros in its place, are left out.
+    A power cut may leave an incomplete line or zeros at the end of the file; both are ignored.
 
     Raises:
-        InputError: The file cannot be read, has another format, or a line holds no event.
+        InputError: The file cannot be read, has another format, or has a line without an event.
     """
     with explained(InputError, f'cannot read the journal "{path}"'):
         content = path.read_bytes()
-    return decode_all(content[: _whole(content)].splitlines(), str(path))
+    return decode_all(content[: _valid_length(content)].splitlines(), str(path))
 
 
-def start_of(events: Sequence[TimedEvent], path: Path, otherwise: str) -> RunStarted:
+def find_start(events: Sequence[TimedEvent], path: Path, advice: str) -> RunStarted:
     """Return the start of the run in the directory `path`.
 
     Raises:
-        InputError: It had not begun; `otherwise` says what follows from that.
+        InputError: The journal ends before the start of the run; the message ends with `advice`.
     """
     for timed in events:
         if isinstance(timed.event, RunStarted):
             return timed.event
-    raise InputError(f'the run in "{path}" had not begun when it was cut off; {otherwise}')
+    raise InputError(f'the run in "{path}" had not begun when it was cut off; {advice}')
 
 
-def ending_of(events: Sequence[TimedEvent]) -> RunEnded | None:
-    """Return the end of a run by its journal, or None if the run was cut off or goes on.
+def find_end(events: Sequence[TimedEvent]) -> RunEnded | None:
+    """Return the end of a run by its journal, or None if the run was interrupted or is running.
 
-    A resumed run has ended only when it ended again.
+    Only the end of the last resumption counts as the end of a resumed run.
     """
     last = events[-1].event if events else None
     return last if isinstance(last, RunEnded) else None
 
 
-def _whole(content: bytes) -> int:
-    """Return the number of bytes in whole lines of a journal; the last line may lack its line end."""
+def _valid_length(content: bytes) -> int:
+    """Return the number of bytes in complete lines of a journal; the last line may lack its line feed."""
     written = content.rstrip(b"\0")
     last = written.rfind(b"\n") + 1
     try:
@@ -165,11 +172,11 @@ def _whole(content: bytes) -> int:
     return len(written)
 
 
-def _mended(file: int) -> int:
-    """Cut the torn end off the journal, so that the next line is one by itself; return its length."""
+def _repair(file: int) -> int:
+    """Remove an incomplete last line of a journal, add a missing line feed, and return the length [bytes]."""
     with open(file, "rb", closefd=False) as journal:
         content = journal.read()
-    length = _whole(content)
+    length = _valid_length(content)
     os.ftruncate(file, length)
     if length and content[length - 1 : length] != b"\n":
         length += os.write(file, b"\n")
@@ -177,11 +184,32 @@ def _mended(file: int) -> int:
     return length
 
 
-def _empty(file: int, path: Path) -> int:
-    """Return the length of a new journal: 0."""
-    if os.fstat(file).st_size:
+def _lock(file: int, path: Path) -> None:
+    """Lock the open journal for this process until the file is closed.
+
+    Raises:
+        InputError: Another process, or another part of this process, has locked the journal.
+        OSError: The file system does not support locks.
+    """
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        holder = _find_lock_holder(file)
+        writer, end = (f"process {holder}", f'"kill {holder}"') if holder else ("another process", "Ctrl-C")
         raise InputError(
-            f'"{path}" is the record of another run; a new run needs a directory of its own, '
-            "for instance below another --runs DIR"
-        )
-    return 0
+            f'the run directory "{path.parent}" is in use: {writer} writes its journal, and two runs cannot '
+            f"share it; wait until that run has ended, or end it with {end}"
+        ) from error
+
+
+def _find_lock_holder(file: int) -> int | None:
+    """Return the id of the process that holds the lock on `file`, or None if the id is unknown."""
+    status = os.fstat(file)
+    file_id = f"{os.major(status.st_dev):02x}:{os.minor(status.st_dev):02x}:{status.st_ino}"
+    with contextlib.suppress(OSError):
+        for line in LOCKS.read_text().splitlines():
+            # 1: FLOCK  ADVISORY  WRITE 4711 fe:00:5309462 0 EOF
+            fields = line.split()
+            if fields[1:2] == ["FLOCK"] and fields[5] == file_id and int(fields[4]) > 0:
+                return int(fields[4])
+    return None

@@ -23,33 +23,33 @@ if TYPE_CHECKING:
 _NODES = TypeAdapter(list[OutlineNode])
 
 
-def recorded_mission(
+def read_mission_of_run(
     path: Path, run: RunStarted, skills: Mapping[str, type[Skill]], mission: Path | None = None
 ) -> LoadedMission:
-    """Return the mission that a run directory holds, with the params and the cell of that run.
+    """Return the mission of a run directory, with the params and the cell of the run.
 
     Args:
         path: The run directory.
         run: Start of the run.
         skills: Installed skills by name.
-        mission: Another mission file to put in its place, or None.
+        mission: Mission file that replaces the recorded mission, or None.
 
     Raises:
-        MissionError: Something is wrong with the mission: the skills it uses are others by now.
-        InputError: The directory lacks a file.
+        MissionError: The mission has errors, for instance because installed skills have changed.
+        InputError: A file of the directory cannot be read.
     """
     from executive.mission.load import load_mission
 
     overrides = {key: text for key, text in run.overrides.items() if not key.startswith("cell.")}
-    given = GivenCell(recorded_cell(path), Path(run.base) / "cell.yaml")
+    given = GivenCell(read_cell(path), Path(run.base) / "cell.yaml")
     return load_mission(mission or path / "mission.yaml", skills, overrides, cell=given)
 
 
-def recorded_cell(path: Path) -> CellConfig:
-    """Return the cell of the run in a directory.
+def read_cell(path: Path) -> CellConfig:
+    """Return the configuration of the cell in a run directory.
 
     Raises:
-        InputError: It cannot be read.
+        InputError: The file of the cell cannot be read.
     """
     try:
         return CellConfig(**yaml.safe_load((path / "cell.yaml").read_text(encoding="utf-8")))
@@ -57,19 +57,19 @@ def recorded_cell(path: Path) -> CellConfig:
         raise InputError(f'the run directory "{path}" holds no cell that can be read: {error}') from error
 
 
-def tree_text(nodes: Sequence[OutlineNode]) -> str:
-    """Return an outline as JSON; values that JSON lacks become text."""
+def format_tree(nodes: Sequence[OutlineNode]) -> str:
+    """Return an outline as JSON; values that JSON cannot represent become text."""
     return to_json(list(nodes), inf_nan_mode="strings", fallback=str, indent=1).decode() + "\n"
 
 
 def read_tree(path: Path) -> list[OutlineNode]:
-    """Return the outline that a file holds: the tree of a run as it was built.
+    """Return the outline of the built tree of a run from a file.
 
     Raises:
-        InputError: There is no such file, or something else is in it.
+        InputError: The file cannot be read or holds no outline.
     """
-    since = "every run leaves one beside its journal since version 0.1"
-    with explained(InputError, f'cannot read the tree "{path}"', since):
+    hint = "every run leaves one beside its journal since version 0.1"
+    with explained(InputError, f'cannot read the tree "{path}"', hint):
         content = path.read_bytes()
     try:
         return _NODES.validate_json(content)

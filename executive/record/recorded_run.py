@@ -16,7 +16,7 @@ from executive.events import Observer, RunEnded, TimedEvent
 from executive.mission.outline import outline
 from executive.mission.text.files import read_source
 from executive.record.diagnosis.diagnose import diagnose
-from executive.record.recorded_mission import tree_text
+from executive.record.recorded_mission import format_tree
 from executive.record.recorder import Recorder
 from executive.record.result import ENDED, ItemCounts, Result, audit_of, requests_of, write_result
 from executive.record.run_directory import RunDirectory
@@ -111,7 +111,7 @@ def new_directory(run: Run, loaded: LoadedMission, options: RunOptions, runs: Pa
         mission=loaded.text,
         params=loaded.params,
         cell=loaded.cell_config.model_dump(mode="json", exclude_unset=True),
-        tree=tree_text(outline(run.root)),
+        tree=format_tree(outline(run.root)),
         libraries=loaded.libraries,
         scene=scene,
     )

@@ -20,7 +20,7 @@ from executive.events import (
     ToolCommanded,
 )
 from executive.mission.load import LoadedMission
-from executive.record.recorded_mission import recorded_mission
+from executive.record.recorded_mission import read_mission_of_run
 from executive.record.timeline.activation import skill_name
 from executive.replay.input_log import InputLog
 from executive.run.assembly import assemble_replay
@@ -95,7 +95,7 @@ def replay(
         raise InputError(
             f'"{path}" holds no run that can be replayed: its journal holds no answers of a cell'
         )
-    loaded = recorded_mission(path, run, skills, mission)
+    loaded = read_mission_of_run(path, run, skills, mission)
     edited = mission is not None and loaded.text != (path / "mission.yaml").read_text(encoding="utf-8")
     return compare(loaded, skills, log, run.seed, edited=edited)
 

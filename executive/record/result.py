@@ -13,11 +13,11 @@ from executive.cell.plain import plain
 from executive.cell.workcell import PLACES
 from executive.errors import ExecutiveError, explained
 from executive.events import RunResumed, TimedEvent
+from executive.record.atomic_file import write_atomically
 from executive.record.diagnosis.diagnosis import Diagnosis
-from executive.record.journal import ending_of
+from executive.record.journal import find_end
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline.timeline import PlanningTotals, Timeline
-from executive.record.whole_file import write_whole
 
 QUIT = "quit"
 """Word of the operator who wants nothing more."""
@@ -121,7 +121,9 @@ def write_result(path: Path, result: Result) -> None:
     """
     elsewhere = "the journal beside it tells how the run ended, and so does what --json prints"
     with explained(ExecutiveError, f'cannot write the result "{path}"', elsewhere):
-        write_whole(path, json.dumps(plain(result), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+        write_atomically(
+            path, json.dumps(plain(result), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+        )
 
 
 def read_result(directory: RunDirectory, events: Sequence[TimedEvent]) -> Result | None:
@@ -133,7 +135,7 @@ def read_result(directory: RunDirectory, events: Sequence[TimedEvent]) -> Result
         result = TypeAdapter(Result).validate_json(directory.result.read_bytes())
     except (OSError, ValueError):
         return None
-    ending = ending_of(events)
+    ending = find_end(events)
     if ending is not None:
         return result if (result.status, result.ticks) == (ending.status, ending.ticks) else None
     # If the disk did not take the end, only the result contains it.

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from executive.errors import InputError
 from executive.events import MotionPlanned, RequestGiven, RunStarted, TimedEvent
-from executive.record.journal import ending_of, read_journal, start_of
-from executive.record.recorded_mission import recorded_mission
+from executive.record.journal import find_end, find_start, read_journal
+from executive.record.recorded_mission import read_mission_of_run
 from executive.record.recorded_run import Recording, RecordOptions
 from executive.record.recorder import Recorder
 from executive.record.replay import compare
@@ -64,12 +64,12 @@ def resume_run(
     began = time.perf_counter()
     directory = RunDirectory(path)
     # Before anything else: from here on no other process writes to the directory.
-    recorder = Recorder(directory, frames=record.frames, again=True)
+    recorder = Recorder(directory, frames=record.frames, resume=True)
     try:
         events = read_journal(directory.journal)
-        log, start = InputLog.of(events), start_of(events, path, "run the mission again")
+        log, start = InputLog.of(events), find_start(events, path, "run the mission again")
         has_ended, seed = _has_ended(directory, events), start.seed
-        loaded = recorded_mission(path, start, skills)
+        loaded = read_mission_of_run(path, start, skills)
         # Without the step of a halt or of a bug in a skill: a corrected skill may continue there.
         certain = log if log.halt is None else log.before(log.halt.tick)
         replay = compare(loaded, skills, certain, seed)
@@ -103,7 +103,7 @@ def _has_ended(directory: RunDirectory, events: Sequence[TimedEvent]) -> bool:
     Raises:
         InputError: The run cannot be resumed.
     """
-    ending = ending_of(events)
+    ending = find_end(events)
     if ending is None:
         return False
     if ending.status == "INCOMPLETE" and ending.holds:

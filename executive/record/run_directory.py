@@ -1,4 +1,4 @@
-"""Directory of a run: named by the wall clock, filled with what is needed to repeat the run."""
+"""Directory of a run: its name, the files from which the run can be repeated, and the search for it."""
 
 from __future__ import annotations
 
@@ -13,13 +13,15 @@ from tempfile import TemporaryDirectory
 import yaml
 
 from executive.errors import InputError, reason_of
-from executive.record.whole_file import write_whole
+from executive.record.atomic_file import write_atomically
 
-NO_ROOM = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
-"""What the system says where more space would help."""
+LATEST = "latest"
+"""Name of the link to the last run directory."""
 SCENE = "scene.yaml"
-_ELSEWHERE = "name another place with --runs DIR"
 """Name of the copy of the scene file."""
+NO_SPACE_ERRORS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
+"""Error numbers of a full disk, an exceeded quota and a file that is too large."""
+_USE_OTHER_FOLDER = "name another place with --runs DIR"
 
 
 class RunDirectory:
@@ -27,12 +29,12 @@ class RunDirectory:
 
     Attributes:
         path: `RUNS/<YYYY-MM-DD>/<HH-MM-SS>_<mission>_s<seed>`.
-        journal: File with everything that happened, one JSON object per line.
-        world: File from which a simulated world can be rebuilt as the run left it.
-        tree: File with the tree as it was built.
-        report: File with the page that explains the run.
-        result: File with the object that `executive run --json` prints.
-        frames: Folder of the camera images behind the decisions.
+        journal: File with the recorded events, one JSON object per line.
+        world: File from which the last state of a simulated world can be rebuilt.
+        tree: File with the outline of the built tree.
+        report: HTML page that explains the run.
+        result: File with the output of `executive run --json`.
+        frames: Folder with pictures of selections and failures.
     """
 
     def __init__(self, path: Path) -> None:
@@ -52,16 +54,16 @@ class RunDirectory:
 
     @staticmethod
     def create(runs: Path, *, mission: str, seed: int, started: datetime) -> RunDirectory:
-        """Make a new directory below `runs` and return it.
+        """Make a directory below `runs`, named by the time `started`, and return the directory.
 
-        `started` only names it. A second run in the same second gets the suffix `-2`, a third `-3`.
+        Further runs that start in the same second get the suffix `-2`, `-3`, ....
 
         Raises:
-            InputError: `runs` cannot be written to.
+            InputError: The directory cannot be made.
         """
         day = runs / started.strftime("%Y-%m-%d")
         name = f"{started.strftime('%H-%M-%S')}_{mission}_s{seed}"
-        with refusing(f'make a run directory below "{runs}"'):
+        with convert_os_errors(f'make a run directory below "{runs}"'):
             day.mkdir(parents=True, exist_ok=True)
             path = _make_unique(day, name)
         return RunDirectory(path)
@@ -76,60 +78,76 @@ class RunDirectory:
         libraries: Mapping[str, str] | None = None,
         scene: str = "",
     ) -> None:
-        """Write the mission's text as it was read, the params as they were resolved, and the cell.
+        """Write and sync the inputs of the run, and let the link `runs/latest` point to this directory.
 
-        `tree` is the text of `tree.json` and `scene` that of `scene.yaml`, "" for none. The text of every
-        library goes where the mission looks for it, beside the mission. All of it is on the disk before the
-        run begins; then `runs/latest` points at this directory. Params and cell are of values that YAML
-        knows, and are kept to the last digit: the run may be repeated with them.
+        Args:
+            mission: Text of the mission file.
+            params: Resolved params, as values that YAML can represent exactly.
+            cell: Content of the cell file, as values that YAML can represent exactly.
+            tree: Text of `tree.json`, or "".
+            libraries: Text of each library, by its path relative to the mission.
+            scene: Text of the scene file, or "".
 
         Raises:
-            InputError: The directory cannot be written to; no file in it is half-written.
+            InputError: A file cannot be written; no file is incomplete.
         """
-        with refusing(f'write to the run directory "{self.path}"'):
-            # First, and under no name of the record's own.
+        with convert_os_errors(f'write to the run directory "{self.path}"'):
+            # Libraries are written first and must not replace files of the record.
             for reference, text in (libraries or {}).items():
                 library = self.path / reference
                 if library not in (self.journal, self.result) and self.frames not in library.parents:
                     library.parent.mkdir(parents=True, exist_ok=True)
-                    write_whole(library, text)
-            write_whole(self.path / "mission.yaml", mission)
+                    write_atomically(library, text)
+            write_atomically(self.path / "mission.yaml", mission)
             for name, content in (("params.yaml", params), ("cell.yaml", cell)):
                 text = yaml.safe_dump(dict(content), sort_keys=False, allow_unicode=True)
-                write_whole(self.path / name, text)
+                write_atomically(self.path / name, text)
             if tree:
-                write_whole(self.tree, tree)
+                write_atomically(self.tree, tree)
             if scene:
-                write_whole(self.path / SCENE, scene)
+                write_atomically(self.path / SCENE, scene)
         _point_latest(self.path.parents[1], self.path)
 
 
-def check_place(runs: Path) -> None:
-    """Make `runs` if need be, and see that something can be made in it.
+def check_runs_folder(runs: Path) -> None:
+    """Make the folder `runs` if it does not exist, and check that directories can be made in it.
 
     Raises:
-        InputError: Nothing can.
+        InputError: No directory can be made.
     """
-    with refusing(f'make a run directory below "{runs}"'):
+    with convert_os_errors(f'make a run directory below "{runs}"'):
         runs.mkdir(parents=True, exist_ok=True)
-        # Trying tells more than the permissions do: the whole file system may be read-only.
+        # The permissions do not show whether the file system is read-only.
         with TemporaryDirectory(prefix=".try-", dir=runs):
             pass
 
 
 @contextlib.contextmanager
-def refusing(what: str, instead: str = _ELSEWHERE) -> Iterator[None]:
-    """Raise what the file system refuses as an InputError: what was tried, and what to do instead."""
+def convert_os_errors(action: str, advice: str = _USE_OTHER_FOLDER) -> Iterator[None]:
+    """Raise an OSError of the block as an InputError that names the failed action and ends with advice."""
     try:
         yield
     except OSError as error:
-        raise refused(what, error, instead) from error
+        space = "free some space or " if error.errno in NO_SPACE_ERRORS else ""
+        raise InputError(f"cannot {action}: {reason_of(error)}; {space}{advice}") from error
 
 
-def refused(what: str, error: OSError, instead: str = _ELSEWHERE) -> InputError:
-    """Return the sentence for an act that the file system refused, with what to do instead."""
-    space = "free some space or " if error.errno in NO_ROOM else ""
-    return InputError(f"cannot {what}: {reason_of(error)}; {space}{instead}")
+def find_run(name: str, runs: Path) -> Path:
+    """Return a run directory by its path, by its path below `runs`, or the last one by the name `latest`.
+
+    Raises:
+        InputError: There is no run directory of this name.
+    """
+    for path in (Path(name), runs / name):
+        # Path.is_file raises an error for a name that is too long.
+        if os.path.isfile(path / "journal.jsonl"):
+            return path.resolve()
+    known = sorted((path.parent for path in runs.glob("*/*/journal.jsonl")), reverse=True)
+    hint = f"the last ones there: {', '.join(str(path.relative_to(runs)) for path in known[:3])}"
+    raise InputError(
+        f'"{name}" is no run directory, nor is there one of that name below "{runs}"; '
+        f"{hint if known else 'there is none at all; say where they are with --runs DIR'}"
+    )
 
 
 def _make_unique(day: Path, name: str) -> Path:
@@ -139,16 +157,15 @@ def _make_unique(day: Path, name: str) -> Path:
         path = day / (name if number == 1 else f"{name}-{number}")
         try:
             path.mkdir()
+            return path
         except FileExistsError:
             number += 1
-        else:
-            return path
 
 
 def _point_latest(runs: Path, path: Path) -> None:
-    """Make `runs/latest` a link to `path`, in one step, so that no reader finds it missing."""
-    fresh = runs / f".latest-{os.getpid()}"
-    # The link is a convenience: a file system without links must not cost the run.
+    """Replace the link `runs/latest` by a link to `path`, atomically."""
+    link = runs / f".latest-{os.getpid()}"
+    # A run needs no link, and some file systems do not support links.
     with contextlib.suppress(OSError):
-        fresh.symlink_to(path.relative_to(runs), target_is_directory=True)
-        fresh.replace(runs / "latest")
+        link.symlink_to(path.relative_to(runs), target_is_directory=True)
+        link.replace(runs / LATEST)

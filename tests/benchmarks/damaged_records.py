@@ -22,13 +22,12 @@ from executive.cells.sim.command_log import is_log
 from executive.cli.options import runs_option
 from executive.errors import ExecutiveError, InputError
 from executive.events import NodeEnded, RunResumed, TimedEvent
-from executive.record.find_run import LATEST, find_run
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.replay import compare, replay
 from executive.record.result import Result, disagreement
 from executive.record.resumed_run import resume_run
-from executive.record.run_directory import RunDirectory
+from executive.record.run_directory import LATEST, RunDirectory, find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
 from executive.view.film.film import film

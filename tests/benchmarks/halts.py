@@ -236,7 +236,7 @@ class _RunWithHalts:
         self._journal_path = Path(
             shutil.copyfile(self._journal_path, self._journal_path.with_name("child.jsonl"))
         )
-        self._journal = Journal(self._journal_path, again=True)
+        self._journal = Journal(self._journal_path, resume=True)
         self._commands, self._commands_before_stop = [*self._commands], len(self._commands)
         self._motion = self._arm._motion if isinstance(self._arm, SimArm) else None
         self._run.control.stop()

@@ -24,13 +24,13 @@ from executive.errors import ExecutiveError
 from executive.events import ItemChanged, NodeEnded, NodeStarted, TimedEvent
 from executive.geometry import Array
 from executive.plugins import cell_kind
-from executive.record.find_run import LATEST, find_run
-from executive.record.journal import ending_of, read_journal
-from executive.record.recorded_mission import recorded_mission
+from executive.record.journal import find_end, read_journal
+from executive.record.recorded_mission import read_mission_of_run
 from executive.record.recorded_run import RecordOptions
 from executive.record.replay import compare
 from executive.record.result import Result, disagreement
 from executive.record.resumed_run import resume_run
+from executive.record.run_directory import LATEST, find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
 from executive.testing.faults.hand import Hand, Thing
@@ -101,7 +101,7 @@ def run_and_kill(subject: Subject, seed: int, runs: Path, delay: float) -> bool:
         entries = read_journal(find_run(LATEST, runs) / "journal.jsonl")
     except ExecutiveError:
         return False
-    return InputLog.of(entries).start is not None and ending_of(entries) is None
+    return InputLog.of(entries).start is not None and find_end(entries) is None
 
 
 def resume_killed_run(subject: Subject, seed: int, runs: Path, change: str) -> Figures:
@@ -159,7 +159,7 @@ def change_world(subject: Subject, seed: int, path: Path, past: InputLog, change
                 done.append(f"moved {thing.label}")
 
     assert past.start is not None
-    loaded = recorded_mission(path, past.start, subject.skills)
+    loaded = read_mission_of_run(path, past.start, subject.skills)
     meanwhile(path / "world.log", loaded, seed, act, subject.kind or cell_kind(loaded.cell_config.kind))
     return "".join(done)
 

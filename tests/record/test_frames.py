@@ -13,7 +13,7 @@ from executive.cell.frame import Frame, FrameTaken
 from executive.events import DetectedObject, NodeEnded, TargetSelected, TimedEvent
 from executive.geometry import Pose
 from executive.record import frames as module
-from executive.record.frames import KEPT, Frames, picture_of
+from executive.record.frames import MAX_LOOKS, PictureRecorder, find_picture
 from executive.record.pictures.drawer import Drawer
 
 CUBE = detected("cube")
@@ -45,9 +45,9 @@ def failed(name: str, reason: str, item: str = "", tick: int = 90) -> list[Timed
     return [at(tick, event, 2.0)]
 
 
-def shown(folder, *events: list[TimedEvent]) -> Frames:
+def shown(folder, *events: list[TimedEvent]) -> PictureRecorder:
     """Return an observer that has seen events."""
-    frames = Frames(folder)
+    frames = PictureRecorder(folder)
     for event in chain.from_iterable(events):
         frames(event)
     return frames
@@ -92,12 +92,12 @@ def test_a_picture_says_what_the_run_is_about(tmp_path, drawn):
     assert (scene.mission, scene.clock, scene.age) == ("sort", 0.75, 0.25)
     assert (scene.camera, scene.detector) == ("overhead", "embedded")
     assert (scene.phase, scene.item, scene.bin, scene.attempts) == ("SelectTarget", "cube-1", "red_bin", 1)
-    assert [(seen.label, seen.box) for seen in scene.seen] == [
+    assert [(seen.label, seen.box) for seen in scene.detections] == [
         ("duck", (20, 90, 50, 120)),
         ("cube", (20, 40, 50, 70)),
     ]
-    assert (scene.chosen, scene.failure, scene.message) == (1, "", "")
-    assert scene.fates == {"yellow_bin": ["duck-1"]}
+    assert (scene.selected, scene.failure, scene.message) == (1, "", "")
+    assert scene.outcomes == {"yellow_bin": ["duck-1"]}
     assert scene.classes == ("cube", "duck")
 
 
@@ -113,7 +113,7 @@ def test_a_picture_says_what_the_run_is_about(tmp_path, drawn):
 def test_the_chosen_box_is_the_nearest_else_the_only_of_its_class(tmp_path, drawn, found, position, expected):
     known = [] if position is None else item("cube-1", "seen", position=position)
     shown(tmp_path, look(1, *found), known, decision())
-    assert drawn["000012_cube-1.jpg"].chosen == expected
+    assert drawn["000012_cube-1.jpg"].selected == expected
 
 
 def test_a_failed_attempt_is_drawn_on_what_was_decided_from(tmp_path, drawn):
@@ -125,8 +125,8 @@ def test_a_failed_attempt_is_drawn_on_what_was_decided_from(tmp_path, drawn):
     scene = drawn["000090_cube-1_missed.jpg"]
     assert (scene.failure, scene.message) == ("Grasp.missed", "it was missed")
     assert (scene.phase, scene.attempts, scene.age) == ("Grasp", 1, 1.5)
-    assert len(scene.seen) == 1
-    assert (scene.chosen, scene.item, scene.bin) == (0, "cube-1", "red_bin")
+    assert len(scene.detections) == 1
+    assert (scene.selected, scene.item, scene.bin) == (0, "cube-1", "red_bin")
 
 
 def test_a_look_that_leads_to_nothing_is_drawn_once(tmp_path, drawn):
@@ -136,7 +136,7 @@ def test_a_look_that_leads_to_nothing_is_drawn_once(tmp_path, drawn):
     )  # fmt: skip
     ((name, scene),) = drawn.items()
     assert name == "000020_unseen.jpg"
-    assert (scene.failure, scene.item, scene.chosen) == ("SelectTarget.unseen", "", None)
+    assert (scene.failure, scene.item, scene.selected) == ("SelectTarget.unseen", "", None)
 
 
 def test_what_fails_because_a_skill_failed_is_not_drawn_again(tmp_path, drawn):
@@ -145,21 +145,21 @@ def test_what_fails_because_a_skill_failed_is_not_drawn_again(tmp_path, drawn):
 
 
 def test_an_earlier_look_is_found_again_and_old_ones_are_forgotten(tmp_path, drawn):
-    looks = [look(number, CUBE) for number in range(KEPT + 1)]
+    looks = [look(number, CUBE) for number in range(MAX_LOOKS + 1)]
     frames = shown(tmp_path, *looks, decision(frame=1), decision(frame=0, tick=13))
     assert list(drawn) == ["000012_cube-1.jpg"]
-    assert frames.problem == f"pictures left out: 1 of a look before the last {KEPT}"
+    assert frames.problem == f"pictures left out: 1 of a look before the last {MAX_LOOKS}"
 
 
 def test_what_the_last_decision_rests_on_is_kept(tmp_path, drawn):
-    looks = [look(number) for number in range(1, 2 * KEPT)]
+    looks = [look(number) for number in range(1, 2 * MAX_LOOKS)]
     missed = failed("Grasp", "missed", "cube-1")
-    shown(tmp_path, look(0, CUBE), decision(frame=0), *looks, missed, decision(frame=KEPT, tick=91))
+    shown(tmp_path, look(0, CUBE), decision(frame=0), *looks, missed, decision(frame=MAX_LOOKS, tick=91))
     assert list(drawn) == ["000012_cube-1.jpg", "000090_cube-1_missed.jpg"]
 
 
 def test_a_long_run_keeps_its_first_pictures_and_says_what_it_left_out(tmp_path, drawn, monkeypatch):
-    monkeypatch.setattr(module, "MOST", 3)
+    monkeypatch.setattr(module, "MAX_PICTURES", 3)
     frames = shown(tmp_path, look(1, CUBE), *(decision(tick=tick) for tick in range(5)))
     assert list(drawn) == ["000000_cube-1.jpg", "000001_cube-1.jpg", "000002_cube-1.jpg"]
     assert frames.problem == "pictures left out: 2 beyond the 3 that a run keeps"
@@ -195,5 +195,5 @@ def test_the_last_picture_of_an_item_and_a_reason_is_found_again(tmp_path, item,
         "000090_cube-1_missed.jpg", "1000000_cube-1_missed.jpg", "000004_cube-1.jpg",
     ):  # fmt: skip
         (tmp_path / file).touch()
-    found = picture_of(tmp_path, item, reason)
+    found = find_picture(tmp_path, item, reason)
     assert (found and found.name) == name

@@ -37,7 +37,7 @@ from executive.events import (
     ToolCommanded,
 )
 from executive.record import journal_format
-from executive.record.journal import Journal, ending_of, read_journal, start_of
+from executive.record.journal import Journal, find_end, find_start, read_journal
 from executive.record.journal_format import KINDS, encode, journal_schema
 
 NODE, END = NodeStarted("a"), run_ended()
@@ -57,8 +57,8 @@ def syncs(monkeypatch):
     return sizes
 
 
-def write(path, *events, again=False):
-    with closing(Journal(path, again=again)) as journal:
+def write(path, *events, resume=False):
+    with closing(Journal(path, resume=resume)) as journal:
         for event in events:
             journal(event)
 
@@ -95,10 +95,10 @@ def full(*args):
 
 
 @pytest.mark.parametrize("taken", [0, 1, 17])
-@pytest.mark.parametrize("again", [False, True])
-def test_a_full_disk_is_one_fault_then_silence_and_no_part_of_a_line(path, monkeypatch, again, taken):
-    path.write_bytes(FIRST[:-1] * again)
-    journal = Journal(path, again=again)
+@pytest.mark.parametrize("resume", [False, True])
+def test_a_full_disk_is_one_fault_then_silence_and_no_part_of_a_line(path, monkeypatch, resume, taken):
+    path.write_bytes(FIRST[:-1] * resume)
+    journal = Journal(path, resume=resume)
     journal(at(0, NODE))
     before = path.read_bytes()
     write, parts = os.write, iter([taken] * (taken > 0))
@@ -107,7 +107,7 @@ def test_a_full_disk_is_one_fault_then_silence_and_no_part_of_a_line(path, monke
         journal(at(1, NODE))
     journal(at(1, END))
     journal.close()
-    assert path.read_bytes() == before == FIRST * again + encode(at(0, NODE))
+    assert path.read_bytes() == before == FIRST * resume + encode(at(0, NODE))
 
 
 def test_what_reaches_the_disk_only_at_the_close_is_not_believed_unseen(path, monkeypatch):
@@ -163,7 +163,7 @@ def test_a_line_the_disk_takes_in_parts_is_whole(path, monkeypatch):
     take = os.write
     monkeypatch.setattr(os, "write", lambda file, line: take(file, line[:5]))
     write(path, at(0, run_started()), at(1, END))
-    assert ending_of(read_journal(path)) == END
+    assert find_end(read_journal(path)) == END
 
 
 LAST = encode(at(2, NodeStarted("ä")))[:-1]
@@ -189,7 +189,7 @@ def test_a_torn_end_is_left_out_and_cut_off_where_the_journal_goes_on(path, cont
     ticks = [1, 2][: ENDS[content]]
     assert [timed.tick for timed in read_journal(path)] == ticks
     resumed = at(3, RunResumed(3, "", {}))
-    write(path, resumed, again=True)
+    write(path, resumed, resume=True)
     if ticks:
         assert [timed.tick for timed in read_journal(path)] == [*ticks, 3]
     else:
@@ -198,7 +198,7 @@ def test_a_torn_end_is_left_out_and_cut_off_where_the_journal_goes_on(path, cont
 
 def test_a_torn_end_is_cut_on_the_disk_before_anything_is_appended(path, syncs):
     path.write_bytes(FIRST + LAST[:5])
-    write(path, again=True)
+    write(path, resume=True)
     assert syncs == [len(FIRST)]
 
 
@@ -206,13 +206,13 @@ def test_a_new_run_needs_a_new_journal_and_one_that_goes_on_an_old_one(path):
     with pytest.raises(InputError, match=r"cannot read the journal .* no such file"):
         read_journal(path)
     with pytest.raises(InputError, match=r'cannot open the journal ".*": no such file or directory'):
-        Journal(path, again=True)
+        Journal(path, resume=True)
     assert list(path.parent.iterdir()) == []
     path.write_bytes(FIRST)
     with pytest.raises(InputError, match="the record of another run; a new run needs a directory of its own"):
         Journal(path)
     assert path.read_bytes() == FIRST
-    Journal(path, again=True).close()
+    Journal(path, resume=True).close()
 
 
 @pytest.mark.parametrize(
@@ -292,7 +292,7 @@ def test_a_journal_of_the_first_format_is_named(path, first, version):
 def test_a_run_has_ended_if_nothing_comes_after_its_end(kinds, ended):
     samples = {"run": run_started(), "node": NODE, "end": END, "resume": RunResumed(1, "", {})}
     events = [at(tick, samples[kind]) for tick, kind in enumerate(kinds.split())]
-    assert ending_of(events) == (END if ended else None)
+    assert find_end(events) == (END if ended else None)
 
 
 def test_every_kind_of_event_comes_back_as_it_was(path):
@@ -315,7 +315,7 @@ def test_every_kind_of_event_comes_back_as_it_was(path):
 
 def test_a_text_that_is_not_unicode_is_kept_readable(path):
     write(path, at(0, run_started(file="caf\udce9.yaml")))
-    assert start_of(read_journal(path), path, "").file == "caf?.yaml"
+    assert find_start(read_journal(path), path, "").file == "caf?.yaml"
 
 
 @pytest.mark.parametrize("value", [float("nan"), {"a": [float("inf")]}, object(), b"", {1, 2}, {(1,): 2}])
@@ -325,7 +325,7 @@ def test_a_value_that_is_not_json_is_a_fault_and_the_journal_goes_on(path, value
         with pytest.raises(Fault, match="the journal cannot hold an event of kind InputRead: "):
             journal(at(0, read("arm.q", value)))
         journal(at(1, END))
-    assert ending_of(read_journal(path)) == END
+    assert find_end(read_journal(path)) == END
 
 
 def test_the_schema_that_ships_describes_the_events():

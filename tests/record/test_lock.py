@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from executive.errors import InputError
-from executive.record import lock as module
+from executive.record import journal as module
 from executive.record.journal import Journal
 
 HOLD = (
@@ -47,7 +47,7 @@ def test_a_second_run_is_told_which_process_writes_there(tmp_path, holder):
 
 def test_where_nobody_tells_which_process_it_is_it_is_another(tmp_path, holder, monkeypatch):
     monkeypatch.setattr(module, "LOCKS", tmp_path / "none")
-    assert "is in use: another process writes its journal" in refusal(tmp_path / "journal.jsonl", again=True)
+    assert "is in use: another process writes its journal" in refusal(tmp_path / "journal.jsonl", resume=True)
 
 
 @pytest.mark.parametrize(
@@ -61,11 +61,11 @@ def test_a_process_that_holds_another_lock_is_not_named(tmp_path, holder, monkey
     state = (tmp_path / "journal.jsonl").stat()
     file = f"{os.major(state.st_dev):02x}:{os.minor(state.st_dev):02x}:{state.st_ino}"
     module.LOCKS.write_text(f"1: {line} 0 EOF\n\n".format(pid=holder.pid, file=file))
-    assert "another process" in refusal(tmp_path / "journal.jsonl", again=True)
+    assert "another process" in refusal(tmp_path / "journal.jsonl", resume=True)
 
 
 def test_the_lock_is_given_up_when_the_journal_is_closed_and_not_before(tmp_path):
     path = tmp_path / "journal.jsonl"
     with closing(Journal(path)):
         assert f"process {os.getpid()} writes" in refusal(path)
-    Journal(path, again=True).close()
+    Journal(path, resume=True).close()

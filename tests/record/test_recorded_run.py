@@ -90,4 +90,4 @@ def test_whatever_ends_a_run_early_view_journal_and_cell_are_closed(run, tmp_pat
     assert view.seen[-1] == other.seen[-1] == "closed"
     left = tmp_path / "runs" / "latest"
     assert not (left / "result.json").exists()
-    Journal(left / "journal.jsonl", again=True).close()
+    Journal(left / "journal.jsonl", resume=True).close()

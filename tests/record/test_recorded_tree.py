@@ -8,7 +8,7 @@ import pytest
 
 from executive.errors import InputError
 from executive.mission.outline import Connection, OutlineNode
-from executive.record.recorded_mission import read_tree, tree_text
+from executive.record.recorded_mission import format_tree, read_tree
 
 LEAF = OutlineNode(
     "tree/retry/do/Grasp", "do: Grasp", 1, "", "skill", "Grasp", "do", "on Grasp.missed", ("pick",), "Grasp",
@@ -19,7 +19,7 @@ LEAF = OutlineNode(
 def test_a_tree_is_read_as_it_was_written_and_values_that_json_lacks_as_text(tmp_path):
     file = tmp_path / "tree.json"
     odd = OutlineNode("a", "a", 0, "", "skill", "A", params={"x": math.inf, "y": object})
-    file.write_text(tree_text([LEAF, odd]))
+    file.write_text(format_tree([LEAF, odd]))
     leaf, read = read_tree(file)
     assert leaf == LEAF
     assert read.params["x"] == "Infinity" and "object" in read.params["y"]

@@ -8,7 +8,7 @@ import pytest
 from events import at, run_ended
 
 from executive.events import NodeStarted
-from executive.record.frames import Frames
+from executive.record.frames import PictureRecorder
 from executive.record.journal import read_journal
 from executive.record.recorder import Recorder
 from executive.record.run_directory import RunDirectory
@@ -27,7 +27,7 @@ def full(*args):
 
 def test_a_picture_that_cannot_be_drawn_is_told_and_ends_nothing(directory, monkeypatch):
     # No event can be asked for its data.
-    monkeypatch.setattr(Frames, "__call__", lambda self, event: event["kind"])
+    monkeypatch.setattr(PictureRecorder, "__call__", lambda self, event: event["kind"])
     recorder = Recorder(directory)
     recorder(STATUS)
     recorder(END)
@@ -38,8 +38,8 @@ def test_a_picture_that_cannot_be_drawn_is_told_and_ends_nothing(directory, monk
 
 def test_the_pictures_are_waited_for_whatever_became_of_the_journal(directory, monkeypatch):
     closed = []
-    monkeypatch.setattr(Frames, "close", lambda self, wait: closed.append(wait))
-    monkeypatch.setattr(Frames, "problem", "no pictures were drawn: file exists")
+    monkeypatch.setattr(PictureRecorder, "close", lambda self, wait: closed.append(wait))
+    monkeypatch.setattr(PictureRecorder, "problem", "no pictures were drawn: file exists")
     monkeypatch.setattr(os, "fsync", full)
     recorder = Recorder(directory)
     recorder(STATUS)

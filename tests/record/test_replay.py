@@ -19,10 +19,10 @@ from executive.events import (
 )
 from executive.mission.load import load_mission
 from executive.plugins import discover
-from executive.record.find_run import find_run
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.replay import Replay, compare, replay
+from executive.record.run_directory import find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
 from executive.testing.faults import during, seal_fails

@@ -19,12 +19,12 @@ from executive.errors import InputError
 from executive.events import ItemChanged, MotionPlanned, NodeEnded, NodeStarted, RunResumed, TimedEvent
 from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import discover
-from executive.record.find_run import find_run
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.replay import replay
 from executive.record.result import Result
 from executive.record.resumed_run import resume_run
+from executive.record.run_directory import find_run
 from executive.run.assembly import RunOptions
 from executive.testing.faults.hand import Hand
 from executive.testing.oracle import oracle_cell

@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from executive.errors import InputError
-from executive.record.run_directory import RunDirectory, check_place, refused
+from executive.record.run_directory import RunDirectory, check_runs_folder, convert_os_errors
 
 STARTED = datetime(2026, 11, 21, 3, 15, 42)
 
@@ -40,7 +40,7 @@ def test_latest_points_to_the_last_run_and_survives_moving_the_folder(tmp_path):
 def test_what_repeats_a_run_is_on_the_disk_and_libraries_lie_where_the_mission_looks(tmp_path, monkeypatch):
     synced = []
     monkeypatch.setattr(os, "fsync", lambda file: synced.append(os.fstat(file).st_ino))
-    check_place(tmp_path)
+    check_runs_folder(tmp_path)
     directory = create(tmp_path)
     libraries = {"library/sorting.yaml": "library: sorting\n", "own.yaml": "library: own\n"}
     directory.save_inputs(
@@ -52,7 +52,7 @@ def test_what_repeats_a_run_is_on_the_disk_and_libraries_lie_where_the_mission_l
     assert synced == [(directory.path / name).stat().st_ino for name in (*left, "cell.yaml")]
 
 
-@pytest.mark.parametrize("make", [create, check_place])
+@pytest.mark.parametrize("make", [create, check_runs_folder])
 def test_a_place_that_cannot_be_written_to_is_a_sentence(tmp_path, make):
     (tmp_path / "file").touch()
     with pytest.raises(InputError) as raised:
@@ -66,7 +66,9 @@ def test_a_place_that_cannot_be_written_to_is_a_sentence(tmp_path, make):
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT, errno.EFBIG])
 def test_space_is_spoken_of_where_it_is_what_is_missing(number):
     reason = os.strerror(number)
-    assert str(refused("write", OSError(number, reason))) == (
+    with pytest.raises(InputError) as raised, convert_os_errors("write"):
+        raise OSError(number, reason)
+    assert str(raised.value) == (
         f"cannot write: {reason.lower()}; free some space or name another place with --runs DIR"
     )
 

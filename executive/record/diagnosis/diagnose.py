@@ -14,7 +14,7 @@ from executive.mission.model.paths import name_of
 from executive.record.diagnosis.advice import advice
 from executive.record.diagnosis.case import FailedRun, verdict
 from executive.record.diagnosis.diagnosis import DecidingNode, Diagnosis, ItemFailure, LostItem, PassedNode
-from executive.record.frames import picture_of
+from executive.record.frames import find_picture
 from executive.record.result import ENDED
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline.activation import Reading, skill_name
@@ -136,7 +136,7 @@ def _picture(case: FailedRun, run: Path) -> str:
     if case.lost and item is not None and item.failure is not None:
         reason = item.failure.reason
     for about in dict.fromkeys([(case.item, reason), (case.item, "")]):
-        file = picture_of(run / "frames", *about)
+        file = find_picture(run / "frames", *about)
         if file is not None:
             return file.relative_to(run).as_posix()
     return ""

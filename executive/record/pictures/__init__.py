@@ -1,1 +1,1 @@
-"""The pictures behind the decisions: what one shows, how it is drawn, and the process that draws it."""
+"""Pictures of selections and failures: content, drawing, and the thread that draws."""

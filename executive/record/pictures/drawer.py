@@ -1,4 +1,4 @@
-"""Thread that draws pictures beside a run."""
+"""Thread that draws pictures during a run."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from concurrent.futures import wait as wait_for
 from pathlib import Path
 
 from executive.errors import ExecutiveError, explained
+from executive.record.atomic_file import atomic_replacement
 from executive.record.pictures.draw import draw
 from executive.record.pictures.scene import PictureScene
-from executive.record.whole_file import replacing
 
 MAX_WAITING = 64
-"""Pictures that may wait for the thread [about 1.2 MB each]; beyond that they are dropped."""
+"""Maximum number of queued pictures [about 1.2 MB each]; further pictures are dropped."""
 
 CLOSE_TIMEOUT = 30.0
-"""Time after which pictures that are still waiting are given up at the end of a run [s]."""
+"""Time after the end of a run after which queued pictures are dropped [s]."""
 
 QUALITY = 80
-"""Quality of the JPEG files, 0 to 100: a 640 pixel wide picture takes 40 to 50 kB."""
+"""Quality of the JPEG files, 0 to 100; a picture of 640 pixels width has 40 to 50 kB."""
 
 
 class Drawer:
@@ -32,21 +32,21 @@ class Drawer:
         """Reason for which pictures are missing, or "" if none is."""
 
     def draw(self, name: str, scene: PictureScene) -> bool:
-        """Have `scene` drawn to the file `name` of the folder; False if too many wait already."""
+        """Queue a scene for the file `name` of the folder; return False if the queue is full."""
         if sum(not picture.done() for picture in self._pictures) >= MAX_WAITING:
             return False
         self._pictures.append(self._thread.submit(self._save, self._folder / name, scene))
         return True
 
     def close(self, *, wait: bool = True) -> None:
-        """Finish the waiting pictures, without `wait` only the one under way; `problem` names a lack."""
+        """Finish the queued pictures; if `wait` is False, finish only the current picture."""
         unfinished = wait_for(self._pictures, CLOSE_TIMEOUT).not_done if wait else set()
         if unfinished:
             self.problem = f"{len(unfinished)} pictures were not drawn within {CLOSE_TIMEOUT:.0f} s"
         self._thread.shutdown(wait=False, cancel_futures=True)
 
     def _save(self, path: Path, scene: PictureScene) -> None:
-        """Save a picture; keep the first error only, because a traceback would keep its scene."""
+        """Save a picture, and store the text of the first error; an exception would keep its scene."""
         try:
             save(path, scene)
         except Exception as error:
@@ -54,7 +54,7 @@ class Drawer:
 
 
 def save(path: Path, scene: PictureScene) -> None:
-    """Draw `scene` and write the file; its ending says the format.
+    """Draw a scene to a file, whose suffix determines the image format.
 
     Raises:
         ExecutiveError: The file cannot be written.
@@ -67,5 +67,5 @@ def save(path: Path, scene: PictureScene) -> None:
         raise ExecutiveError(f'cannot make the folder "{path.parent}": {error.strerror}') from error
     image = cv2.cvtColor(draw(scene), cv2.COLOR_RGB2BGR)
     _, data = cv2.imencode(path.suffix, image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
-    with explained(ExecutiveError, f'cannot write the picture "{path}"'), replacing(path) as part:
+    with explained(ExecutiveError, f'cannot write the picture "{path}"'), atomic_replacement(path) as part:
         part.write_bytes(data.tobytes())

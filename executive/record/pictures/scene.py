@@ -1,4 +1,4 @@
-"""Content of a picture as plain data, which knows of neither a run directory nor drawing."""
+"""Content of a picture."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ class PictureScene:
 
     Attributes:
         image: `(H, W, 3)` uint8, RGB.
-        visible: `(H, W)` bool, False where the arm hides the scene; None where nobody can tell.
-        seen: Every detection in the image.
-        chosen: Number of the detection that it is all about, or None.
+        visible: `(H, W)` bool, False for pixels on which the arm hides the scene; None if unknown.
+        detections: All detections in the image.
+        selected: Index of the detection of `item`, or None.
         mission: Name of the mission.
-        clock: The moment, on the run's clock [s].
+        clock: Time on the clock of the run [s].
         camera: Name of the camera.
         detector: Name of the detector.
         age: Time since the image was taken [s].
-        phase: What the robot is doing: the skills that run.
-        item: What `chosen` is believed to be, or "".
-        bin: Where that item goes, or "".
-        attempts: How many attempts at that item have failed so far.
-        failure: Skill and reason of what went wrong (`Grasp.missed`), or "".
-        message: What went wrong, in a sentence, or "".
-        fates: Items by what became of them: a bin's name, `in the tool`, `rejected`.
-        classes: Every class known by now; the place in this list decides on the colour.
+        phase: Names of the running skills.
+        item: Name of the selected item, or "".
+        bin: Name of the destination of the item, or "".
+        attempts: Number of failed attempts to pick the item.
+        failure: Skill and reason of the failure (`Grasp.missed`), or "".
+        message: Message of the failure, or "".
+        outcomes: Names of items by bin, or by state (`in the tool`, `rejected`, ...).
+        classes: Detected classes; the index of a class determines its colour.
     """
 
     image: NDArray[np.uint8]
     visible: NDArray[np.bool_] | None = None
     _: KW_ONLY
-    seen: Sequence[Detection] = ()
-    chosen: int | None = None
+    detections: Sequence[Detection] = ()
+    selected: int | None = None
     mission: str = ""
     clock: float = 0.0
     camera: str = ""
@@ -51,5 +51,5 @@ class PictureScene:
     attempts: int = 0
     failure: str = ""
     message: str = ""
-    fates: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    outcomes: Mapping[str, Sequence[str]] = field(default_factory=dict)
     classes: Sequence[str] = ()

@@ -1,4 +1,4 @@
-"""The strip below an image: what it is about, what the robot does, and what became of everything."""
+"""Strip below an image with the subject of the picture, the running skills and the outcomes of all items."""
 
 from __future__ import annotations
 
@@ -15,36 +15,36 @@ HEIGHT = 116
 """Height of the strip [pixel]."""
 
 MARGIN, LINE = 8, 16
-"""Free space around text, and from line to line [pixel]."""
+"""Margin around text, and line height [pixel]."""
 
 ROWS = (HEIGHT - 2 * MARGIN) // LINE
-"""Lines of text that fit."""
+"""Number of text lines in a strip."""
 
-# Sizes of text in OpenCV's unit, width of the names of bins [pixel], share of what stands left of them.
-_TITLE, _TEXT = 0.52, 0.4
-_NAMES = 88
-_SHARE = 0.55
+# Font scales of OpenCV, width of the column of outcomes [pixel], and share of the width left of this column.
+_TITLE_SCALE, _TEXT_SCALE = 0.52, 0.4
+_OUTCOME_WIDTH = 88
+_LEFT_SHARE = 0.55
 
 
 @dataclass(frozen=True)
 class StripText:
-    """What a strip says.
+    """Text of a strip.
 
     Attributes:
-        title: What the picture is about.
-        lines: What there is to know about it.
-        notes: Where and when, and what the shading means.
-        fates: Name of a bin or state, and the items there.
+        title: Failure, item and bin.
+        lines: Running skills with the number of failed attempts, and the message of the failure.
+        notes: Mission, time and meaning of the shading; camera, detector and age of the image.
+        outcomes: Names of bins or states, each with the names of items.
     """
 
     title: str
     lines: tuple[str, ...]
     notes: tuple[str, ...]
-    fates: tuple[tuple[str, tuple[str, ...]], ...]
+    outcomes: tuple[tuple[str, tuple[str, ...]], ...]
 
 
 def strip_text(scene: PictureScene) -> StripText:
-    """Return what the strip of a scene says."""
+    """Return the text of the strip of a scene."""
     choice = f"{scene.item} to {scene.bin}" if scene.bin else scene.item
     title = ": ".join(filter(None, (scene.failure, scene.item))) if scene.failure else choice
     phase = f"phase: {scene.phase}" if scene.phase else ""
@@ -55,57 +55,57 @@ def strip_text(scene: PictureScene) -> StripText:
     hidden = scene.visible is not None and not scene.visible.all()
     shading = "shaded: behind the arm" if hidden else ""
     notes = ("   ".join(filter(None, (scene.mission, f"{scene.clock:.2f} s", shading))), seen)
-    fates = tuple((fate, tuple(items)) for fate, items in scene.fates.items())
-    return StripText(title, lines, tuple(filter(None, notes)), fates)
+    outcomes = tuple((outcome, tuple(items)) for outcome, items in scene.outcomes.items())
+    return StripText(title, lines, tuple(filter(None, notes)), outcomes)
 
 
 def draw_strip(scene: PictureScene, width: int, left: int = 0) -> NDArray[np.uint8]:
-    """Return the strip of a scene, `(HEIGHT, width, 3)` BGR, its first `left` columns free."""
+    """Return the strip of a scene, `(HEIGHT, width, 3)` BGR, with `left` empty pixel columns first."""
     strip = np.full((HEIGHT, width, 3), bgr(GROUND), np.uint8)
-    said = strip_text(scene)
-    middle = left + round(_SHARE * (width - left))
+    text = strip_text(scene)
+    middle = left + round(_LEFT_SHARE * (width - left))
     room = middle - left - 2 * MARGIN
     colour = WARNING if scene.failure else INK
-    _write(strip, fitted(said.title, _fits(room, _TITLE)), left + MARGIN, 0, colour, _TITLE)
-    lines = [line for text in said.lines for line in wrapped(text, _fits(room, _TEXT))]
-    free = ROWS - 1 - len(said.notes)
-    if len(lines) > free:
-        lines[free - 1] = fitted(" ".join(lines[free - 1 :]), _fits(room, _TEXT))
-    for row, line in enumerate(lines[:free], start=1):
+    _write(strip, shorten(text.title, _fits(room, _TITLE_SCALE)), left + MARGIN, 0, colour, _TITLE_SCALE)
+    lines = [line for part in text.lines for line in wrap(part, _fits(room, _TEXT_SCALE))]
+    max_lines = ROWS - 1 - len(text.notes)
+    if len(lines) > max_lines:
+        lines[max_lines - 1] = shorten(" ".join(lines[max_lines - 1 :]), _fits(room, _TEXT_SCALE))
+    for row, line in enumerate(lines[:max_lines], start=1):
         _write(strip, line, left + MARGIN, row, INK)
-    for row, note in enumerate(said.notes, start=ROWS - len(said.notes)):
-        _write(strip, fitted(note, _fits(room, _TEXT)), left + MARGIN, row, FAINT)
-    if not said.fates:
+    for row, note in enumerate(text.notes, start=ROWS - len(text.notes)):
+        _write(strip, shorten(note, _fits(room, _TEXT_SCALE)), left + MARGIN, row, FAINT)
+    if not text.outcomes:
         _write(strip, "nothing sorted yet", middle, 0, FAINT)
-    for row, (fate, items) in enumerate(_shown(said.fates)):
-        _write(strip, fitted(fate, _fits(_NAMES - MARGIN, _TEXT)), middle, row, FAINT)
-        listing = listed(items, _fits(width - middle - _NAMES - MARGIN, _TEXT))
-        _write(strip, listing, middle + _NAMES, row, INK)
+    for row, (outcome, items) in enumerate(_merge_last(text.outcomes)):
+        _write(strip, shorten(outcome, _fits(_OUTCOME_WIDTH - MARGIN, _TEXT_SCALE)), middle, row, FAINT)
+        listing = join_last(items, _fits(width - middle - _OUTCOME_WIDTH - MARGIN, _TEXT_SCALE))
+        _write(strip, listing, middle + _OUTCOME_WIDTH, row, INK)
     return strip
 
 
-def wrapped(text: str, fits: Callable[[str], bool]) -> list[str]:
-    """Return a text in lines that fit."""
+def wrap(text: str, fits: Callable[[str], bool]) -> list[str]:
+    """Return a text as lines that fit, broken between words."""
     lines: list[str] = []
     for word in text.split():
         longer = f"{lines[-1]} {word}" if lines else word
         if lines and fits(longer):
             lines[-1] = longer
         else:
-            lines.append(fitted(word, fits))
+            lines.append(shorten(word, fits))
     return lines
 
 
-def fitted(text: str, fits: Callable[[str], bool]) -> str:
-    """Return a text, cut at its end until it fits."""
+def shorten(text: str, fits: Callable[[str], bool]) -> str:
+    """Return a text that fits, shortened at its end if necessary."""
     if fits(text):
         return text
     length = next((n for n in range(len(text) - 1, 0, -1) if fits(f"{text[:n]}...")), 0)
     return f"{text[:length]}..."
 
 
-def listed(names: Sequence[str], fits: Callable[[str], bool]) -> str:
-    """Return as many of the last names as fit, then `+3` for those left out."""
+def join_last(names: Sequence[str], fits: Callable[[str], bool]) -> str:
+    """Return the last names that fit, followed by the number of omitted names (`+3`)."""
     for left_out in range(len(names)):
         text = ", ".join(names[left_out:]) + (f" +{left_out}" if left_out else "")
         if fits(text):
@@ -113,21 +113,25 @@ def listed(names: Sequence[str], fits: Callable[[str], bool]) -> str:
     return str(len(names)) if names else ""
 
 
-def _shown(fates: Sequence[tuple[str, tuple[str, ...]]]) -> Sequence[tuple[str, tuple[str, ...]]]:
-    """Return as many fates as there are rows; the last one stands for those left out."""
-    if len(fates) <= ROWS:
-        return fates
-    rest = [item for _, items in fates[ROWS - 1 :] for item in items]
-    return [*fates[: ROWS - 1], (f"{len(fates) - ROWS + 1} more", tuple(rest))]
+def _merge_last(outcomes: Sequence[tuple[str, tuple[str, ...]]]) -> Sequence[tuple[str, tuple[str, ...]]]:
+    """Return at most `ROWS` outcomes; the last row merges all outcomes that do not fit."""
+    if len(outcomes) <= ROWS:
+        return outcomes
+    rest = [item for _, items in outcomes[ROWS - 1 :] for item in items]
+    return [*outcomes[: ROWS - 1], (f"{len(outcomes) - ROWS + 1} more", tuple(rest))]
 
 
 def _fits(room: float, scale: float) -> Callable[[str], bool]:
+    """Return a predicate for texts that are at most `room` pixels wide."""
     import cv2
 
     return lambda text: cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, 1)[0][0] <= room
 
 
-def _write(strip: NDArray[np.uint8], text: str, x: int, row: int, colour: str, scale: float = _TEXT) -> None:
+def _write(
+    strip: NDArray[np.uint8], text: str, x: int, row: int, colour: str, scale: float = _TEXT_SCALE
+) -> None:
+    """Write a text in a colour to a row of the strip, from column `x` [pixel]."""
     import cv2
 
     baseline = MARGIN + row * LINE + LINE - 5

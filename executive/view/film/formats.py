@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image, ImageColor
 
 from executive.errors import InputError, explained
-from executive.record.whole_file import replacing
+from executive.record.atomic_file import atomic_replacement
 from executive.view.film.ink import FAILURE, RUNNING, SUCCESS
 
 GIF_SIZE = (960, 540)
@@ -122,5 +122,5 @@ def file_for(path: Path, *, force: bool) -> Iterator[Path]:
             f'"{path}" is there already; name another file with -o, or write over it with --force'
         )
     instead = "name another place with -o"
-    with explained(InputError, f'cannot write the film "{path}"', instead), replacing(path) as part:
+    with explained(InputError, f'cannot write the film "{path}"', instead), atomic_replacement(path) as part:
         yield part

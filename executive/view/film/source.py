@@ -5,8 +5,8 @@ from __future__ import annotations
 from executive.cells.sim.command_log import is_log
 from executive.errors import InputError
 from executive.events import ItemChanged
-from executive.record.journal import ending_of, read_journal, start_of
-from executive.record.recorded_mission import read_tree, recorded_cell
+from executive.record.journal import find_end, find_start, read_journal
+from executive.record.recorded_mission import read_cell, read_tree
 from executive.record.result import read_result
 from executive.record.run_directory import RunDirectory
 from executive.replay.input_log import InputLog
@@ -36,17 +36,17 @@ class FilmSource:
         _require_log(directory)
         events = read_journal(directory.journal)
         self.directory = directory
-        self.start = start_of(events, directory.path, "there is nothing to film")
+        self.start = find_start(events, directory.path, "there is nothing to film")
         self.events = InputLog.of(events).events
         self.nodes = read_tree(directory.tree)
-        self.config = recorded_cell(directory.path)
+        self.config = read_cell(directory.path)
         self.bins = {
             name: "#" + "".join(f"{round(255 * share):02x}" for share in bin.colour)
             for name, bin in self.config.bins.items()
         }
         changes = (one.event for one in self.events if isinstance(one.event, ItemChanged))
         self.items = len({change.item for change in changes})
-        self.result = read_result(directory, events) or ending_of(events)
+        self.result = read_result(directory, events) or find_end(events)
 
 
 def _require_log(directory: RunDirectory) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from executive.mission.text.files import shipped_folder
 from executive.record.diagnosis.text import resume_command
-from executive.record.journal import ending_of, read_journal, start_of
+from executive.record.journal import find_end, find_start, read_journal
 from executive.record.recorded_mission import read_tree
 from executive.record.result import ENDED, read_result, requests_of
 from executive.record.run_directory import RunDirectory
@@ -50,9 +50,9 @@ class ReportFacts:
         directory = RunDirectory(path)
         events = read_journal(directory.journal)
         self.path = path
-        self.start = start_of(events, path, "there is nothing to report")
+        self.start = find_start(events, path, "there is nothing to report")
         self.result = read_result(directory, events)
-        self.ended = self.result or ending_of(events)
+        self.ended = self.result or find_end(events)
         self.status = CUT_OFF if self.ended is None else self.ended.status
         self.nodes = read_tree(directory.tree)
         self.timeline = Timeline.of(events)

@@ -12,12 +12,12 @@ from markupsafe import Markup
 
 from executive.errors import ExecutiveError
 from executive.perception.evidence import describe_unknown
+from executive.record.atomic_file import write_atomically
 from executive.record.diagnosis import text
 from executive.record.pictures.palette import PALETTE
 from executive.record.result import disagreement
-from executive.record.run_directory import RunDirectory, refusing
+from executive.record.run_directory import RunDirectory, convert_os_errors
 from executive.record.timeline.activation import by_node, count_ends, last_failure
-from executive.record.whole_file import write_whole
 from executive.view.report.facts import ReportFacts
 from executive.view.report.lanes import draw_lanes
 from executive.view.report.shares import LOOK, RETRY, WAITING
@@ -54,8 +54,8 @@ def write_report(path: Path) -> Path:
     file = RunDirectory(path).report
     page = report(ReportFacts(path))
     instead = "copy the run directory to where you may write, and have the report of the copy made"
-    with refusing(f'write the report "{file}"', instead):
-        write_whole(file, page)
+    with convert_os_errors(f'write the report "{file}"', instead):
+        write_atomically(file, page)
     return file
 
 

@@ -14,8 +14,8 @@ from executive.record.pictures.scene import PictureScene
 
 SCENE = PictureScene(
     np.full((480, 640, 3), 150, np.uint8),
-    seen=[Detection("cube", 0.9, (100, 200, 160, 260))],
-    chosen=0,
+    detections=[Detection("cube", 0.9, (100, 200, 160, 260))],
+    selected=0,
     classes=("cube",),
 )
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from executive.record.pictures.scene import PictureScene
-from executive.record.pictures.strip import HEIGHT, ROWS, draw_strip, fitted, listed, strip_text, wrapped
+from executive.record.pictures.strip import HEIGHT, ROWS, draw_strip, join_last, shorten, strip_text, wrap
 
 IMAGE = np.zeros((48, 64, 3), np.uint8)
 
@@ -28,9 +28,9 @@ def at_most(count: int):
 )  # fmt: skip
 def test_a_decision_is_told_with_its_bin_and_a_failure_with_its_reason(scene, title, lines):
     fates = {"red_bin": ["cube-1", "cube-2"], "rejected": ["duck-1"]}
-    said = strip_text(PictureScene(IMAGE, fates=fates, **scene))
+    said = strip_text(PictureScene(IMAGE, outcomes=fates, **scene))
     assert (said.title, said.lines) == (title, lines)
-    assert said.fates == (("red_bin", ("cube-1", "cube-2")), ("rejected", ("duck-1",)))
+    assert said.outcomes == (("red_bin", ("cube-1", "cube-2")), ("rejected", ("duck-1",)))
 
 
 def test_the_strip_says_where_and_when():
@@ -46,21 +46,21 @@ def test_the_strip_says_where_and_when():
     [(30, "a-1, a-2, a-3, a-4"), (17, "a-2, a-3, a-4 +1"), (12, "a-3, a-4 +2"), (7, "a-4 +3"), (3, "4")],
 )
 def test_a_long_list_keeps_its_newest(room, expected):
-    assert listed(["a-1", "a-2", "a-3", "a-4"], at_most(room)) == expected
-    assert listed([], at_most(room)) == ""
+    assert join_last(["a-1", "a-2", "a-3", "a-4"], at_most(room)) == expected
+    assert join_last([], at_most(room)) == ""
 
 
 def test_a_text_is_wrapped_between_words_and_cut_where_it_must():
-    assert wrapped("no seal on cube-1", at_most(8)) == ["no seal", "on", "cube-1"]
-    assert wrapped("unreachable", at_most(8)) == ["unrea..."]
-    assert fitted("short", at_most(8)) == "short"
+    assert wrap("no seal on cube-1", at_most(8)) == ["no seal", "on", "cube-1"]
+    assert wrap("unreachable", at_most(8)) == ["unrea..."]
+    assert shorten("short", at_most(8)) == "short"
 
 
 @pytest.mark.parametrize("width", [640, 320])
 def test_whatever_is_said_there_is_room_for_it(width):
     many = {f"bin_{number}_with_a_long_name": [f"cube-{number}"] * 40 for number in range(ROWS + 3)}
     long = {"item": "cube-1" * 20, "bin": "red", "message": "word " * 100, "camera": "c" * 90}
-    strip = draw_strip(PictureScene(IMAGE, fates=many, **long), width)
+    strip = draw_strip(PictureScene(IMAGE, outcomes=many, **long), width)
     assert strip.shape == (HEIGHT, width, 3)
     edges = (strip[:3], strip[-3:], strip[:, -3:])
     assert all(len(np.unique(edge.reshape(-1, 3), axis=0)) == 1 for edge in edges)  # Nothing is cut off.

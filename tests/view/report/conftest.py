@@ -13,8 +13,8 @@ import pytest
 from executive.cells.fake.cell import FakeCell
 from executive.mission.load import load_mission
 from executive.plugins import discover
-from executive.record.find_run import find_run
 from executive.record.recorded_run import record_run
+from executive.record.run_directory import find_run
 from executive.run.assembly import RunOptions
 
 MISSION = """\

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from executive.record.whole_file import write_whole
+from executive.record.atomic_file import write_atomically
 
 
 def test_a_file_gets_a_content_that_is_on_the_disk(tmp_path, monkeypatch):
     sizes = []
     monkeypatch.setattr(os, "fsync", lambda file: sizes.append(os.fstat(file).st_size))
-    write_whole(tmp_path / "a.txt", "größe\n")
+    write_atomically(tmp_path / "a.txt", "größe\n")
     assert (tmp_path / "a.txt").read_bytes() == "größe\n".encode()
     assert sizes == [len("größe\n".encode())]
     assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
@@ -25,12 +25,12 @@ def test_what_was_there_before_stays_where_the_writing_stops(tmp_path, monkeypat
     def fails(*args):
         raise error
 
-    write_whole(tmp_path / "a.txt", "before")
+    write_atomically(tmp_path / "a.txt", "before")
     monkeypatch.setattr(os, call, fails)
     monkeypatch.setattr(Path, "replace", lambda self, target: os.replace(self, target))
     with pytest.raises(type(error)):
-        write_whole(tmp_path / "a.txt", "after")
+        write_atomically(tmp_path / "a.txt", "after")
     with pytest.raises(UnicodeEncodeError):
-        write_whole(tmp_path / "a.txt", "caf\udce9")
+        write_atomically(tmp_path / "a.txt", "caf\udce9")
     assert (tmp_path / "a.txt").read_text() == "before"
     assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
