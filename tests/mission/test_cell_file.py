@@ -36,7 +36,7 @@ def complaint(text: str, overrides: dict[str, str] | None = None) -> str:
         ("force: 12.0", "force: strong", 'c.yaml:12:34: error[wrong-type]: tool.force must be a number, not the text "strong"\n'),
         ("force: 12.0", "force: '12'", 'tool.force must be a number, not the text "12"\n'),
         ("force: 12.0", "force: 0", "error[out-of-range]: tool.force must be at least 0.001, not 0\n"),
-        ("force: 12.0", "force: .inf", 'error[not-finite]: ".inf" is not a number one can reach\n'),
+        ("force: 12.0", "force: .inf", 'error[not-finite]: ".inf" is not a finite number\n'),
         ("x: [0.4, 0.6]", "x: [0.4]", "c.yaml:13:9: error[wrong-length]: table.x has 1 of the 2 values it needs\n"),
         ("x: [0.4, 0.6]", "x: [0.4, b]", 'c.yaml:13:18: error[wrong-type]: table.x[1] must be a number, not the text "b"\n'),
         ("mount: fixed", "mount: fixd", 'cameras.top.mount must be "fixed" or "wrist", not the text "fixd" (did you mean "fixed"?)\n'),

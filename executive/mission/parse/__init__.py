@@ -1,1 +1,1 @@
-"""From positioned text to the model, and everything that is wrong with its form."""
+"""Parsers from YAML nodes to the typed model, with findings for malformed input."""

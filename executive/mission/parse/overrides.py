@@ -1,4 +1,4 @@
-"""Values given beside the file: `--set name=value` for params, `--set cell.key.key=value` for the cell."""
+"""Values from the command line: `--set name=value` for params, `--set cell.key.key=value` for the cell."""
 
 from __future__ import annotations
 
@@ -14,41 +14,41 @@ CELL = "cell."
 
 
 def override_source(key: str, value: str) -> Source:
-    """Return the text that findings about an override show."""
+    """Return the source of an override, for findings."""
     return Source("--set", f"{key}={value}")
 
 
 def override_node(key: str, value: str, as_text: bool = False) -> tuple[Node | None, list[Finding]]:
-    """Return the value of an override as a node that stands in its `--set`, or what is wrong with it."""
+    """Return the value of an override as a node, or None, and the findings."""
     source = override_source(key, value)
     whole = source.mark(1, len(key) + 2, max(1, len(value)))
     if as_text:
         return Scalar(whole, value, value), []
     if not value.strip():
         return Scalar(whole, None, value), []
-    # Blanks in place of the key keep the columns right.
+    # Blanks replace the key, so that the columns of findings are correct.
     padded = Source("--set", " " * (len(key) + 1) + value)
     root, findings = parse_yaml(padded)
     shown = [replace(finding, excerpt=source.text) for finding in findings]
-    return (_moved(root, whole) if root else None), shown
+    return (_move(root, whole) if root else None), shown
 
 
 def override_cell(root: Node, overrides: Mapped[str, str]) -> tuple[Node, list[Finding]]:
-    """Return the cell file's tree with every `cell.<key>.<key>=value` put in its place."""
+    """Return the nodes of a cell file with the values of all overrides `cell.<key>.<key>=value`."""
     findings: list[Finding] = []
     for key, value in overrides.items():
         if not key.startswith(CELL):
             continue
-        node, wrong = override_node(key, value)
-        findings += wrong
+        node, override_findings = override_node(key, value)
+        findings += override_findings
         path = key.removeprefix(CELL).split(".")
         if node is not None and _is_known(root, path, node, findings):
-            root = _put(root, path, node, findings)
+            root = _set_value(root, path, node, findings)
     return root, findings
 
 
 def _is_known(root: Node, path: list[str], value: Node, findings: list[Finding]) -> bool:
-    """Tell whether the cell has the section an override begins with; if not, it is a finding."""
+    """Return True if the cell has the section at the start of `path`; otherwise add a finding."""
     written = root.keys if isinstance(root, Mapping) else ()
     if len(path) == 1 or path[0] in (*written, *CellConfig.model_fields):
         return True
@@ -57,7 +57,7 @@ def _is_known(root: Node, path: list[str], value: Node, findings: list[Finding])
     return False
 
 
-def _put(root: Node, path: list[str], value: Node, findings: list[Finding]) -> Node:
+def _set_value(root: Node, path: list[str], value: Node, findings: list[Finding]) -> Node:
     first, *rest = path
     if not isinstance(root, Mapping):
         message = f'there is no key "{first}" there: the value above it is no mapping'
@@ -65,22 +65,22 @@ def _put(root: Node, path: list[str], value: Node, findings: list[Finding]) -> N
         return root
     entry = root.entry(first)
     if entry is None:
-        # What the file leaves at its default; whether the cell knows it is for validation to say.
+        # The file leaves the key at its default. Validation rejects unknown keys later.
         for key in reversed(rest):
             value = Mapping(value.mark, (Entry(Scalar(value.mark, key, key), value),))
         return replace(root, entries=(*root.entries, Entry(Scalar(value.mark, first, first), value)))
     if rest:
-        changed = Entry(entry.key, _put(entry.value, rest, value, findings))
+        changed = Entry(entry.key, _set_value(entry.value, rest, value, findings))
     else:
         changed = Entry(replace(entry.key, mark=value.mark), value)
     return replace(root, entries=tuple(changed if e is entry else e for e in root.entries))
 
 
-def _moved(node: Node, mark: Mark) -> Node:
-    """Return the node standing as a whole at `mark`: an override is short enough for one place."""
+def _move(node: Node, mark: Mark) -> Node:
+    """Return the node with `mark` as the place of all its parts."""
     if isinstance(node, Scalar):
         return replace(node, mark=mark)
     if isinstance(node, Mapping):
-        moved = tuple(Entry(replace(e.key, mark=mark), _moved(e.value, mark)) for e in node.entries)
+        moved = tuple(Entry(replace(e.key, mark=mark), _move(e.value, mark)) for e in node.entries)
         return replace(node, mark=mark, entries=moved)
-    return replace(node, mark=mark, items=tuple(_moved(item, mark) for item in node.items))
+    return replace(node, mark=mark, items=tuple(_move(item, mark) for item in node.items))

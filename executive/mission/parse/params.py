@@ -1,4 +1,4 @@
-"""The params of a mission: constants with a type, bounds and a value that may be given beside the file."""
+"""Parser for the params of a mission: constants with a type, bounds and a value, which `--set` overrides."""
 
 from __future__ import annotations
 
@@ -27,24 +27,24 @@ TYPES: Mapped[str, object] = {
     "boolean": bool,
     "list": list[Any],
 }
-"""The types a param may have, by the word for them."""
+"""Python types of params, by their names in a mission."""
 
 
 def parse_params(fields: Fields, overrides: Mapped[str, str]) -> dict[str, MissionParam]:
-    """Return the params of a mission file, with the values given beside the file put in."""
+    """Return the params of a mission file with the values of the overrides."""
     params: dict[str, MissionParam] = {}
 
     def read(name: str, mark: Mark, node: Node) -> None:
         if not NAME.fullmatch(name):
             fields.findings.append(error(mark, "bad-name", f'"{name}" cannot be written as ${name}'))
-        params[name] = _param(name, mark, node, name in overrides, fields.findings)
+        params[name] = _read_param(name, mark, node, name in overrides, fields.findings)
 
     fields.mapping("params", read)
     for name, value in overrides.items():
         if name.startswith(CELL):
             continue
         if name in params:
-            params[name] = _given(name, value, params[name], fields.findings)
+            params[name] = _apply_override(name, value, params[name], fields.findings)
         else:
             mark = override_source(name, value).mark(1, 1, max(1, len(name)))
             hint = alternatives(name, params, "The mission's params")
@@ -53,39 +53,39 @@ def parse_params(fields: Fields, overrides: Mapped[str, str]) -> dict[str, Missi
     return params
 
 
-def _param(name: str, mark: Mark, node: Node, given: bool, findings: list[Finding]) -> MissionParam:
-    """Return a param as it is declared: by its default alone, or by a mapping."""
+def _read_param(name: str, mark: Mark, node: Node, given: bool, findings: list[Finding]) -> MissionParam:
+    """Return a param that is declared by its default or by a mapping."""
     if not isinstance(node, Mapping):
-        return MissionParam(mark, literal_of(node), _type_of(plain(node)))
+        return MissionParam(mark, literal_of(node), _infer_type(plain(node)))
     fields = Fields(f'the param "{name}"', mark, node, grammar.PARAM, findings)
     default = fields.get("default")
-    kind = _declared_type(fields, findings) or _type_of(None if default is None else plain(default))
+    kind = _read_type(fields, findings) or _infer_type(None if default is None else plain(default))
     choices = fields.get("choices")
     param = MissionParam(
         mark,
         Literal(None, mark) if default is None else literal_of(default),
         kind,
-        _bound(fields, "min", findings),
-        _bound(fields, "max", findings),
+        _read_bound(fields, "min", findings),
+        _read_bound(fields, "max", findings),
         None if choices is None else tuple(plain(item) for item in fields.items("choices")),
         fields.text("doc"),
     )
-    # What is wrong is told here, not again wherever the param is used.
-    fallback = replace(param, value=Literal(_any_value(param), mark))
-    if sentence := _impossible(param):
+    # A valid value prevents further findings at every use of the param.
+    fallback = replace(param, value=Literal(_choose_valid_value(param), mark))
+    if problem := _explain_impossible(param):
         code, key = ("empty-list", "choices") if param.choices == () else ("out-of-range", "min")
-        findings.append(error(fields.value_mark(key), code, f"{name} can have no value: {sentence}"))
+        findings.append(error(fields.value_mark(key), code, f"{name} can have no value: {problem}"))
         return fallback
     if default is not None:
-        return _checked(name, param, param.value, findings) or fallback
+        return _check_value(name, param, param.value, findings) or fallback
     if not given:
         message = f'the param "{name}" has no default and was not given'
         findings.append(error(mark, "missing-param", message, f"Give it with --set {name}=..."))
     return fallback
 
 
-def _impossible(param: MissionParam) -> str:
-    """Return why no value fits the declaration, or ""."""
+def _explain_impossible(param: MissionParam) -> str:
+    """Return the reason why no value fits the declaration, or ""."""
     if param.choices == ():
         return "no choices"
     if param.minimum is not None and param.maximum is not None and param.minimum > param.maximum:
@@ -93,22 +93,22 @@ def _impossible(param: MissionParam) -> str:
     return ""
 
 
-def _any_value(param: MissionParam) -> JsonValue:
-    """Return a value that a param could have, so that one that is missing is told once, not at every use."""
+def _choose_valid_value(param: MissionParam) -> JsonValue:
+    """Return a valid value for a param; a missing value is reported only at the declaration."""
     if param.choices:
         return param.choices[0]
-    least = param.minimum if param.minimum is not None else 1
+    minimum = param.minimum if param.minimum is not None else 1
     values: dict[str, JsonValue] = {
         "text": "",
-        "integer": int(least),
-        "number": float(least),
+        "integer": int(minimum),
+        "number": float(minimum),
         "boolean": False,
         "list": [None],
     }
     return values.get(param.type)
 
 
-def _declared_type(fields: Fields, findings: list[Finding]) -> str:
+def _read_type(fields: Fields, findings: list[Finding]) -> str:
     written = fields.text("type")
     if not written or written in TYPES:
         return written
@@ -117,12 +117,12 @@ def _declared_type(fields: Fields, findings: list[Finding]) -> str:
     return ""
 
 
-def _type_of(value: object) -> str:
+def _infer_type(value: object) -> str:
     kinds = {word: getattr(kind, "__origin__", kind) for word, kind in TYPES.items()}
     return next((word for word, kind in kinds.items() if type(value) is kind), "")
 
 
-def _bound(fields: Fields, key: str, findings: list[Finding]) -> float | None:
+def _read_bound(fields: Fields, key: str, findings: list[Finding]) -> float | None:
     node = fields.get(key)
     if node is None:
         return None
@@ -135,31 +135,33 @@ def _bound(fields: Fields, key: str, findings: list[Finding]) -> float | None:
     return None
 
 
-def _given(name: str, text: str, param: MissionParam, findings: list[Finding]) -> MissionParam:
-    """Return the param with the value given beside the file, which must fit as the default does."""
-    node, wrong = override_node(name, text, as_text=param.type == "text")
-    findings += wrong
+def _apply_override(name: str, text: str, param: MissionParam, findings: list[Finding]) -> MissionParam:
+    """Return the param with the value of `--set`, which is checked like the default."""
+    node, override_findings = override_node(name, text, as_text=param.type == "text")
+    findings += override_findings
     if node is None:
         return param
-    return _checked(name, param, literal_of(node), findings) or param
+    return _check_value(name, param, literal_of(node), findings) or param
 
 
-def _checked(name: str, param: MissionParam, value: Literal, findings: list[Finding]) -> MissionParam | None:
-    """Return the param with a value of its type and within its bounds, or None with a finding."""
-    fitting = value.value
+def _check_value(
+    name: str, param: MissionParam, value: Literal, findings: list[Finding]
+) -> MissionParam | None:
+    """Return the param with a value of its type and within its bounds, or None after adding a finding."""
+    converted = value.value
     if param.type:
         try:
-            fitting = cast("JsonValue", convert(value.value, TYPES[param.type]))
+            converted = cast("JsonValue", convert(value.value, TYPES[param.type]))
         except WrongType as problem:
             findings.append(error(value.mark, "wrong-type", f"{name} {problem}"))
             return None
-    if sentence := _out_of_bounds(param, fitting):
-        findings.append(error(value.mark, "out-of-range", f"{name} {sentence}, not {describe(fitting)}"))
+    if violation := _explain_violation(param, converted):
+        findings.append(error(value.mark, "out-of-range", f"{name} {violation}, not {describe(converted)}"))
         return None
-    return replace(param, value=replace(value, value=fitting))
+    return replace(param, value=replace(value, value=converted))
 
 
-def _out_of_bounds(param: MissionParam, value: object) -> str:
+def _explain_violation(param: MissionParam, value: object) -> str:
     if isinstance(value, int | float):
         if param.minimum is not None and value < param.minimum:
             return f"must be at least {param.minimum:g}"

@@ -1,4 +1,4 @@
-"""A mission file with its libraries and its cell file: read, and everything that is wrong with their form."""
+"""Reader of a mission file with its libraries and its cell file."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from executive.tree.registry import ControlNodes
 
 @dataclass(frozen=True)
 class MissionFiles:
-    """What a mission is written in.
+    """The files of a mission.
 
     Attributes:
-        source: The mission file.
-        mission: What it says, the subtrees of its libraries included.
-        libraries: The text of every library file by its path as the mission writes it.
-        cell: The cell file, or None where it could not be read.
-        cell_path: Where it is.
-        findings: What is wrong with the form of any of them.
+        source: Text of the mission file.
+        mission: Content of the mission file and the subtrees of its libraries.
+        libraries: Text of each library file by its path as written in the mission.
+        cell: Content of the cell file, or None if it cannot be read.
+        cell_path: Path of the cell file, or None if it cannot be read.
+        findings: Errors in the form of the files.
     """
 
     source: Source
@@ -43,11 +43,11 @@ class MissionFiles:
 
 @dataclass(frozen=True)
 class GivenCell:
-    """A cell that need not be read: as it was in a recorded run.
+    """Cell of a recorded run, which replaces the cell file.
 
     Attributes:
-        config: What its file said, bases and overrides put in.
-        path: Where that was.
+        config: Content of the cell file, merged with bases and overrides.
+        path: Path of the cell file in the recorded run.
     """
 
     config: CellConfig
@@ -61,11 +61,11 @@ def read_mission(
     control: ControlNodes,
     given: GivenCell | None = None,
 ) -> MissionFiles:
-    """Return a mission file and the files that it names; a cell that is `given` instead of its cell file.
+    """Return the content of a mission file and of its files; a `given` cell replaces the cell file.
 
     Raises:
-        MissionError: The mission file is no YAML that a mission could be.
-        InputError: There is no such file.
+        MissionError: The mission file is not valid YAML.
+        InputError: The mission file does not exist.
     """
     source = read_source(file)
     root, findings = parse_yaml(source)
@@ -83,7 +83,7 @@ def read_mission(
     cell_path: Path | None
     cell: CellFile | None
     if given is None:
-        cell_path, cell = _cell(mission.cell, file.parent, overrides, findings)
+        cell_path, cell = _read_cell_file(mission.cell, file.parent, overrides, findings)
     else:
         cell_path, cell = given.path, CellFile(given.config, Source(str(given.path), ""), None, ())
     return MissionFiles(
@@ -104,14 +104,14 @@ def _add_library(
     trees: dict[str, Subtree],
     findings: list[Finding],
 ) -> str | None:
-    """Add the subtrees of a library to `trees` and return its text, or None where it cannot be read."""
+    """Add the subtrees of a library to `trees` and return its text, or None if it cannot be read."""
     try:
         source = read_source(below(folder, named.name))
     except InputError as problem:
         findings.append(error(named.mark, "no-library", str(problem)))
         return None
-    root, wrong = parse_yaml(source)
-    findings += wrong
+    root, yaml_findings = parse_yaml(source)
+    findings += yaml_findings
     if root is None:
         return None
     library, malformed = parse_library(root, skills, control)
@@ -120,19 +120,19 @@ def _add_library(
         if name not in trees:
             trees[name] = subtree
             continue
-        # The author can mend their own file: a subtree there, or the list of libraries.
-        other, own = trees[name], not trees[name].library
-        mark, place = (other.mark, subtree.mark) if own else (named.mark, other.mark)
+        # The finding lies in the mission file: at its subtree, or at its list of libraries.
+        other, is_in_mission = trees[name], not trees[name].library
+        mark, place = (other.mark, subtree.mark) if is_in_mission else (named.mark, other.mark)
         message = f'there are two subtrees "{name}"; the other is in {place.place(mark.source)}'
-        hint = "Rename one of them." if own else "Leave one of the libraries out."
+        hint = "Rename one of them." if is_in_mission else "Leave one of the libraries out."
         findings.append(error(mark, "duplicate-tree", message, hint))
     return source.text
 
 
-def _cell(
+def _read_cell_file(
     named: Named, folder: Path, overrides: Mapping[str, str], findings: list[Finding]
 ) -> tuple[Path | None, CellFile | None]:
-    """Return the mission's cell file; what is wrong with it is added to the findings."""
+    """Return path and content of the cell file of a mission, and add its errors to `findings`."""
     if not named.name:
         return None, None
     try:

@@ -1,4 +1,4 @@
-"""From positioned nodes to a pydantic model, or findings in our own words at the right places."""
+"""Validation of YAML nodes with pydantic, with findings at their places in the file."""
 
 from __future__ import annotations
 
@@ -25,35 +25,35 @@ _CODES = {
     "too_long": "wrong-length",
     "too_short": "wrong-length",
 }
-"""Codes of findings by pydantic's kinds of errors; the others are wrong types."""
+"""Codes of findings by the types of pydantic's errors; all other types are `wrong-type`."""
 
 KeyPath = tuple[str | int, ...]
-"""Keys and list indices from the root of a file to one value in it."""
+"""Keys and list indices from the root of a file to a value."""
 
 
 @dataclass(frozen=True)
 class Validated(Generic[M]):
-    """A model, or None with the findings that say why."""
+    """A model, or None with the errors that prevent it."""
 
     model: M | None
     findings: tuple[Finding, ...]
 
 
 def validate(root: Node, model: type[M]) -> Validated[M]:
-    """Return the file's content as `model`: strict types, except that a whole number is a number too."""
-    findings = list(_infinite(root))
+    """Return the content of a file as `model`, with strict types except for integers as floats."""
+    findings = list(_find_infinite_numbers(root))
     if findings:
         return Validated(None, tuple(findings))
     try:
-        # JSON mode is the strict one in which lists become tuples and whole numbers floats.
+        # In strict mode, only JSON input converts lists to tuples and integers to floats.
         return Validated(model.model_validate_json(json.dumps(plain(root)), strict=True), ())
     except ValidationError as problems:
-        found = [_finding(root, model, problem) for problem in problems.errors(include_url=False)]
+        found = [_describe_problem(root, model, problem) for problem in problems.errors(include_url=False)]
         return Validated(None, tuple(found))
 
 
 def mark_of(root: Node, path: KeyPath, of_key: bool = False) -> Mark:
-    """Return where the value at `path`, or its key, stands, or where the last part that exists does."""
+    """Return the place of the value or key at `path`, or of the last part of `path` that exists."""
     node, mark = root, root.mark
     for step in path:
         if isinstance(node, Mapping) and (entry := node.entry(str(step))):
@@ -73,12 +73,12 @@ def dotted(path: KeyPath) -> str:
     return text.removeprefix(".")
 
 
-def _finding(root: Node, model: type[BaseModel], problem: ErrorDetails) -> Finding:
+def _describe_problem(root: Node, model: type[BaseModel], problem: ErrorDetails) -> Finding:
     path: KeyPath = problem["loc"]
     kind = problem["type"]
     inside, last = path[:-1], path[-1] if path else ""
     if kind == "extra_forbidden":
-        parent = _section(model, inside)
+        parent = _find_section(model, inside)
         owner = dotted(inside) or "the file"
         known = list(parent.model_fields) if parent else []
         hint = alternatives(str(last), known, f"{owner} takes")
@@ -86,7 +86,7 @@ def _finding(root: Node, model: type[BaseModel], problem: ErrorDetails) -> Findi
         return error(key, "unknown-key", f'{owner} has no key "{last}"', hint)
     if kind == "missing" and isinstance(last, int):
         given = len(problem["input"])
-        message = f"{dotted(inside)} has {given} of the {_length(model, inside)} values it needs"
+        message = f"{dotted(inside)} has {given} of the {_tuple_length(model, inside)} values it needs"
         return error(mark_of(root, inside), "wrong-length", message)
     if kind == "missing":
         owner = dotted(inside) or "the file"
@@ -98,39 +98,39 @@ def _finding(root: Node, model: type[BaseModel], problem: ErrorDetails) -> Findi
     return error(mark_of(root, path), code, f"{name} {violation(problem)}")
 
 
-def _annotation(model: object, path: KeyPath) -> object:
-    """Return the declared type of the value at `path`, or None where it cannot be told."""
-    here: object = model
+def _find_type(model: object, path: KeyPath) -> object:
+    """Return the declared type of the value at `path`, or None if it is unknown."""
+    declared: object = model
     for step in path:
-        if isinstance(here, type) and issubclass(here, BaseModel):
-            field = here.model_fields.get(str(step))
-            here = _without_none(field.annotation) if field else None
-        elif get_origin(here) is dict:
-            here = get_args(here)[1]
-        elif get_origin(here) in (tuple, list):
-            here = get_args(here)[0]
+        if isinstance(declared, type) and issubclass(declared, BaseModel):
+            field = declared.model_fields.get(str(step))
+            declared = _without_none(field.annotation) if field else None
+        elif get_origin(declared) is dict:
+            declared = get_args(declared)[1]
+        elif get_origin(declared) in (tuple, list):
+            declared = get_args(declared)[0]
         else:
             return None
-    return here
+    return declared
 
 
 def _without_none(annotation: object) -> object:
-    """Return `T` for the declared type `T | None`, and any other type as it is."""
+    """Return `T` for the type `T | None`, and any other type unchanged."""
     kinds = [kind for kind in get_args(annotation) if kind is not NoneType]
     return kinds[0] if NoneType in get_args(annotation) and len(kinds) == 1 else annotation
 
 
-def _section(model: type[BaseModel], path: KeyPath) -> type[BaseModel] | None:
-    here = _annotation(model, path)
-    return here if isinstance(here, type) and issubclass(here, BaseModel) else None
+def _find_section(model: type[BaseModel], path: KeyPath) -> type[BaseModel] | None:
+    declared = _find_type(model, path)
+    return declared if isinstance(declared, type) and issubclass(declared, BaseModel) else None
 
 
-def _length(model: type[BaseModel], path: KeyPath) -> int:
-    here = _annotation(model, path)
-    return len(get_args(here)) if get_origin(here) is tuple else 0
+def _tuple_length(model: type[BaseModel], path: KeyPath) -> int:
+    declared = _find_type(model, path)
+    return len(get_args(declared)) if get_origin(declared) is tuple else 0
 
 
-def _infinite(node: Node) -> Iterator[Finding]:
+def _find_infinite_numbers(node: Node) -> Iterator[Finding]:
     for scalar in scalars(node):
         if isinstance(scalar.value, float) and not math.isfinite(scalar.value):
-            yield error(scalar.mark, "not-finite", f'"{scalar.text}" is not a number one can reach')
+            yield error(scalar.mark, "not-finite", f'"{scalar.text}" is not a finite number')

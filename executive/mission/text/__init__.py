@@ -1,1 +1,1 @@
-"""Files, their text, and where things stand in it."""
+"""Files and their YAML text, with the places of all values."""

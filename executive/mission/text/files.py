@@ -1,4 +1,4 @@
-"""Which files a mission means: its own, those below its folder, and the shipped ones."""
+"""Search for the files of a mission: in its folder and among the shipped files."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from executive.mission.findings import alternatives
 from executive.mission.source import Source
 
 _MAX_FILE_SIZE = 1_000_000
+"""Maximum size of a mission or cell file [byte]."""
 
 
 def shipped_folder() -> Path:
-    """Return the folder of the missions that come with the executive: in a wheel, or in a checkout."""
+    """Return the folder of the shipped missions, in a wheel or in a checkout."""
     package = Path(executive.__file__).parent
     installed = package / "shipped"
     return installed if installed.is_dir() else package.parent / "missions"
@@ -28,19 +29,19 @@ def shipped_missions() -> list[str]:
 
 
 def find_mission(name: str | Path) -> Path:
-    """Return the mission file that `name` means: a path, or the name of a shipped mission.
+    """Return the mission file with the path `name`, or the shipped mission with this name.
 
     Raises:
-        InputError: There is neither.
+        InputError: Neither exists.
     """
     path = Path(name)
-    # Unlike Path's methods these say no to a name that no file can have.
+    # Unlike the methods of Path, these functions return False for invalid file names.
     if os.path.isfile(path):
         return path
     if os.path.isdir(path):
         raise InputError(f'"{name}" is a folder; name one of its files')
     if os.path.lexists(path):
-        raise InputError(f'"{name}" is {_kind_of(path)}, not a file')
+        raise InputError(f'"{name}" is {_describe_kind(path)}, not a file')
     bare = PurePosixPath(str(name).removeprefix("missions/").removesuffix(".yaml"))
     if len(bare.parts) == 1 and os.path.isfile(shipped := shipped_folder() / f"{bare}.yaml"):
         return shipped
@@ -49,10 +50,10 @@ def find_mission(name: str | Path) -> Path:
 
 
 def below(folder: Path, reference: str, shipped: Sequence[str] = ("",)) -> Path:
-    """Return the file that `reference` names below `folder`, or else below one of the `shipped` folders.
+    """Return the file `reference` below `folder`, or else below one of the `shipped` folders.
 
     Raises:
-        InputError: The reference leaves the folder, or there is no such file.
+        InputError: The reference leaves the folder, or the file does not exist.
     """
     if leaves_folder(reference):
         raise InputError(
@@ -67,7 +68,7 @@ def below(folder: Path, reference: str, shipped: Sequence[str] = ("",)) -> Path:
                 raise InputError(f'"{reference}" is a link to a file outside of {base}')
             return path
         if os.path.lexists(path):
-            raise InputError(f'"{reference}" in {_shown(base)} is {_kind_of(path)}, not a file')
+            raise InputError(f'"{reference}" in {_shorten_path(base)} is {_describe_kind(path)}, not a file')
     folders = [
         (base, base / PurePosixPath(reference).parent)
         for base in bases
@@ -75,7 +76,7 @@ def below(folder: Path, reference: str, shipped: Sequence[str] = ("",)) -> Path:
     ]
     known = {p.relative_to(base).as_posix() for base, folder in folders for p in folder.glob("*.yaml")}
     hint = alternatives(reference, sorted(known), "There are")
-    searched = " or ".join(dict.fromkeys(map(_shown, bases)))
+    searched = " or ".join(dict.fromkeys(map(_shorten_path, bases)))
     raise InputError(f'there is no file "{reference}" in {searched}. {hint}')
 
 
@@ -83,16 +84,16 @@ def read_source(path: Path) -> Source:
     """Return the text of a file.
 
     Raises:
-        InputError: It is missing, too large, or no UTF-8 text.
+        InputError: The file is missing, too large, or not UTF-8 text.
     """
     try:
         if path.exists() and not path.is_file():
-            raise InputError(f"{path} is {_kind_of(path)}, not a file")
+            raise InputError(f"{path} is {_describe_kind(path)}, not a file")
         if path.stat().st_size > _MAX_FILE_SIZE:
             raise InputError(
                 f"{path} is larger than {_MAX_FILE_SIZE} bytes; it cannot be a mission or a cell"
             )
-        return Source(_shown(path), path.read_bytes().decode("utf-8-sig"))
+        return Source(_shorten_path(path), path.read_bytes().decode("utf-8-sig"))
     except FileNotFoundError:
         raise InputError(f"there is no file {path}") from None
     except UnicodeDecodeError as problem:
@@ -101,15 +102,15 @@ def read_source(path: Path) -> Source:
         raise InputError(f"{path} cannot be read: {problem.strerror}") from None
 
 
-def _kind_of(path: str | Path) -> str:
-    """Return the kind of something that is there and no regular file, with an article."""
+def _describe_kind(path: str | Path) -> str:
+    """Return the kind of an existing path that is not a regular file, with an article."""
     if os.path.isdir(path):
         return "a folder"
     return "a pipe or a device" if os.path.exists(path) else "a link to nothing"
 
 
-def _shown(path: Path) -> str:
-    """Return the path as the user would write it here."""
+def _shorten_path(path: Path) -> str:
+    """Return the path relative to the working directory if it lies below."""
     try:
         here = Path.cwd()
     except FileNotFoundError:  # The working directory was deleted.

@@ -1,8 +1,8 @@
-"""YAML text as a tree of nodes that know where they stand.
+"""Parser of YAML text to a tree of nodes with their places in the text.
 
-Only what a mission needs is read: mappings with text keys, sequences and scalars of YAML 1.2.
-Tags and merge keys are refused, and aliases may not blow the tree up, so no file can run code or
-grow in memory. What an alias stands for keeps the place where it is written out.
+The parser supports mappings with text keys, sequences and scalars of YAML 1.2. Tags and merge keys are
+refused and the size of the tree is limited, so a file can neither execute code nor exhaust the memory.
+The node of an alias has the place of its anchor.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ _ADVICE = {
     "expected <block end>": "Compare the indentation with the lines above.",
     "expected ',' or": "A bracket or brace that was opened is not closed.",
 }
-"""What to do about problems that PyYAML names in words of its own trade, by how they begin."""
+"""Advice on syntax errors, by the start of PyYAML's message."""
 
 
 @dataclass(frozen=True)
 class Scalar:
-    """A single value; `text` is how it is written, without quotes."""
+    """A single value; `text` is its text in the file without quotes."""
 
     mark: Mark
     value: ScalarValue
@@ -60,7 +60,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Mapping:
-    """A list of `key: value` with different keys, in the order of the text."""
+    """Entries with different keys, in the order of the text."""
 
     mark: Mark
     entries: tuple[Entry, ...]
@@ -93,7 +93,7 @@ def plain(node: Node) -> JsonValue:
 
 
 def scalars(node: Node) -> Iterator[Scalar]:
-    """Yield every single value of the node and below it, in the order of the text; keys are none."""
+    """Yield every scalar of a node in the order of the text, without keys."""
     if isinstance(node, Scalar):
         yield node
         return
@@ -102,108 +102,108 @@ def scalars(node: Node) -> Iterator[Scalar]:
 
 
 def parse_yaml(source: Source) -> tuple[Node | None, list[Finding]]:
-    """Return the root node, or None where there is no sound tree, and what is wrong with the text."""
+    """Return the root node, or None if the tree is incomplete, and the findings."""
     composer = _Composer(source)
     try:
-        root = composer.document()
+        root = composer.read_document()
     except yaml.MarkedYAMLError as problem:
-        return None, [*composer.findings, _syntax(source, problem)]
+        return None, [*composer.findings, _describe_syntax_error(source, problem)]
     except yaml.reader.ReaderError as problem:
-        return None, [*composer.findings, _unreadable(source, problem)]
-    except _Unsound:
+        return None, [*composer.findings, _describe_invalid_character(source, problem)]
+    except _IncompleteTree:
         return None, composer.findings
     return root, composer.findings
 
 
-class _Unsound(Exception):
-    """The tree cannot be completed; the findings say why."""
+class _IncompleteTree(Exception):
+    """The tree cannot be completed; the findings contain the reason."""
 
 
 class _Composer:
-    """Builds nodes from PyYAML's events and collects what is wrong."""
+    """Builds nodes from PyYAML's events and collects findings."""
 
     def __init__(self, source: Source) -> None:
         self.source = source
         self.findings: list[Finding] = []
-        # The parser in Python: its messages do not change with the libyaml that happens to be there.
+        # The messages of the parser in Python do not depend on the installed version of libyaml.
         self._events: Iterator[yaml.Event] = yaml.parse(source.text, Loader=yaml.SafeLoader)
         self._anchors: dict[str, tuple[Node, int]] = {}
         self._count = 0
 
-    def document(self) -> Node:
-        next(self._events)  # the stream's start
+    def read_document(self) -> Node:
+        next(self._events)  # StreamStartEvent
         if isinstance(next(self._events), yaml.StreamEndEvent):
-            raise self._unsound(self.source.mark(), "empty", "the file is empty")
-        root = self._node(next(self._events), 0)
-        next(self._events)  # the document's end
+            raise self._abort(self.source.mark(), "empty", "the file is empty")
+        root = self._read_node(next(self._events), 0)
+        next(self._events)  # DocumentEndEvent
         after = next(self._events)
         if not isinstance(after, yaml.StreamEndEvent):
-            raise self._unsound(
-                self._mark(after, 3), "two-documents", 'a second document starts here, after "---"'
+            raise self._abort(
+                self._mark_of(after, 3), "two-documents", 'a second document starts here, after "---"'
             )
         return root
 
-    def _node(self, event: yaml.Event, depth: int) -> Node:
+    def _read_node(self, event: yaml.Event, depth: int) -> Node:
         if isinstance(event, yaml.AliasEvent):
-            return self._alias(event, depth)
-        # Only these events begin a node: the parser checks the grammar.
+            return self._resolve_alias(event, depth)
+        # The parser checks the grammar, so only these events start a node.
         assert isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent)
         before = self._count
-        self._add(1, event)
+        self._count_nodes(1, event)
         if event.tag is not None:
-            self._refuse(self._mark(event), "tag", f'the tag "{event.tag}" is not allowed')
-        node = self._value(event, depth)
+            self._refuse(self._mark_of(event), "tag", f'the tag "{event.tag}" is not allowed')
+        node = self._read_value(event, depth)
         if event.anchor is not None:
             self._anchors[event.anchor] = node, self._count - before
         return node
 
-    def _alias(self, event: yaml.AliasEvent, depth: int) -> Node:
+    def _resolve_alias(self, event: yaml.AliasEvent, depth: int) -> Node:
         if event.anchor not in self._anchors:
-            raise self._unsound(self._mark(event), "alias", f'nothing above is marked "&{event.anchor}"')
+            raise self._abort(self._mark_of(event), "alias", f'nothing above is marked "&{event.anchor}"')
         node, size = self._anchors[event.anchor]
         if depth + _height(node) > _MAX_DEPTH:
-            raise self._unsound(self._mark(event), "too-deep", f"nested more than {_MAX_DEPTH} levels deep")
-        self._add(size, event)
+            raise self._abort(self._mark_of(event), "too-deep", f"nested more than {_MAX_DEPTH} levels deep")
+        self._count_nodes(size, event)
         return node
 
-    def _add(self, count: int, event: yaml.Event) -> None:
+    def _count_nodes(self, count: int, event: yaml.Event) -> None:
         """Count keys and values.
 
         Raises:
-            _Unsound: There are too many.
+            _IncompleteTree: The file has too many keys and values.
         """
         self._count += count
         if self._count > _MAX_NODES:
             message = f"the file has more than {_MAX_NODES} keys and values, those behind aliases included"
-            raise self._unsound(self._mark(event), "too-large", message)
+            raise self._abort(self._mark_of(event), "too-large", message)
 
-    def _value(self, event: yaml.Event, depth: int) -> Node:
+    def _read_value(self, event: yaml.Event, depth: int) -> Node:
         if isinstance(event, yaml.ScalarEvent):
-            return self._scalar(event)
+            return self._read_scalar(event)
         if depth >= _MAX_DEPTH:
-            raise self._unsound(
-                self._mark(event, 1), "too-deep", f"nested more than {_MAX_DEPTH} levels deep"
+            raise self._abort(
+                self._mark_of(event, 1), "too-deep", f"nested more than {_MAX_DEPTH} levels deep"
             )
         if isinstance(event, yaml.SequenceStartEvent):
             items = []
             while not isinstance(item := next(self._events), yaml.SequenceEndEvent):
-                items.append(self._node(item, depth + 1))
-            return YamlSequence(self._mark(event, 1), tuple(items))
-        return self._mapping(event, depth)
+                items.append(self._read_node(item, depth + 1))
+            return YamlSequence(self._mark_of(event, 1), tuple(items))
+        return self._read_mapping(event, depth)
 
-    def _scalar(self, event: yaml.ScalarEvent) -> Scalar:
-        text, mark = event.value, self._mark(event)
+    def _read_scalar(self, event: yaml.ScalarEvent) -> Scalar:
+        text, mark = event.value, self._mark_of(event)
         if _SURROGATE.search(text):
-            # An escape can name one; no file or terminal can take it.
+            # An escape sequence can contain a surrogate, which cannot be encoded in UTF-8.
             self._refuse(mark, "yaml", "half of a surrogate pair is no character")
             text = _SURROGATE.sub("?", text)
         return Scalar(mark, core_value(text) if event.implicit[0] else text, text)
 
-    def _mapping(self, event: yaml.Event, depth: int) -> Mapping:
+    def _read_mapping(self, event: yaml.Event, depth: int) -> Mapping:
         entries: dict[str, Entry] = {}
         while not isinstance(start := next(self._events), yaml.MappingEndEvent):
-            key = self._node(start, depth + 1)
-            value = self._node(next(self._events), depth + 1)
+            key = self._read_node(start, depth + 1)
+            value = self._read_node(next(self._events), depth + 1)
             if not isinstance(key, Scalar):
                 self._refuse(key.mark, "bad-key", "a key must be a single word")
             elif key.text == "<<":
@@ -214,9 +214,9 @@ class _Composer:
                 self._refuse(key.mark, "duplicate-key", message)
             else:
                 entries[key.text] = Entry(key, value)
-        return Mapping(self._mark(event, 1), tuple(entries.values()))
+        return Mapping(self._mark_of(event, 1), tuple(entries.values()))
 
-    def _mark(self, event: yaml.Event, length: int = 0) -> Mark:
+    def _mark_of(self, event: yaml.Event, length: int = 0) -> Mark:
         start, end = event.start_mark, event.end_mark
         assert start is not None and end is not None, "the parser marks every event"
         if not length:
@@ -224,10 +224,10 @@ class _Composer:
             length = max(1, end.column - start.column) if same_line else 1000
         return Mark(self.source, start.line + 1, start.column + 1, length)
 
-    def _unsound(self, mark: Mark, code: str, message: str) -> _Unsound:
-        """Add a finding after which the tree cannot be completed, and return the exception to raise."""
+    def _abort(self, mark: Mark, code: str, message: str) -> _IncompleteTree:
+        """Add a finding that prevents a complete tree, and return the exception to raise."""
         self._refuse(mark, code, message)
-        return _Unsound()
+        return _IncompleteTree()
 
     def _refuse(self, mark: Mark, code: str, message: str) -> None:
         self.findings.append(error(mark, code, message))
@@ -240,11 +240,11 @@ def _height(node: Node) -> int:
     return 1 + max(map(_height, inner), default=0)
 
 
-def _syntax(source: Source, problem: yaml.MarkedYAMLError) -> Finding:
+def _describe_syntax_error(source: Source, problem: yaml.MarkedYAMLError) -> Finding:
     place = problem.problem_mark or problem.context_mark
     mark = source.mark(place.line + 1, place.column + 1, 1) if place else source.mark()
     if place and not source.line(mark.line):
-        # The text ended too early: show its last line instead of nothing.
+        # The text ends too early, so the finding shows the last line with text.
         written = source.text.rstrip()
         last = written.count("\n") + 1
         mark = source.mark(last, max(1, len(source.line(last))), 1)
@@ -252,12 +252,12 @@ def _syntax(source: Source, problem: yaml.MarkedYAMLError) -> Finding:
     began = problem.context_mark
     since = f" that began in line {began.line + 1}" if context and began and began is not place else ""
     message = f"not valid YAML:{context}{since}: {problem.problem}".replace("::", ":")
-    said = str(problem.problem)
-    advice = next((advice for begin, advice in _ADVICE.items() if said.startswith(begin)), "")
+    text_of_problem = str(problem.problem)
+    advice = next((advice for begin, advice in _ADVICE.items() if text_of_problem.startswith(begin)), "")
     return error(mark, "yaml", message, advice)
 
 
-def _unreadable(source: Source, problem: yaml.reader.ReaderError) -> Finding:
+def _describe_invalid_character(source: Source, problem: yaml.reader.ReaderError) -> Finding:
     lines = source.text[: problem.position + 1].splitlines()
     line, col = len(lines), len(lines[-1])
     character = source.text[problem.position : problem.position + 1]
